@@ -1,0 +1,55 @@
+"""The one place that says njit: disk cache, safe fast-math subset, threads.
+
+Kernels compile at their first call, never at import. Where no folder is writable for the cache, they compile
+in every process instead, and one line in the log says so.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numba
+
+log = logging.getLogger("fastcontact")
+F = TypeVar("F", bound=Callable[..., Any])
+
+# Contraction to fused multiply-add only: NaN, infinities and the order of sums stay as written.
+FASTMATH = {"contract"}
+
+_cache_reported = False
+
+
+def kernel(function: F) -> F:
+    """Compile `function` lazily in nopython mode, with the disk cache where one can be had."""
+    return _compile(function, parallel=False)
+
+
+def parallel_kernel(function: F) -> F:
+    """Like `kernel`, with `prange` loops spread over threads; iterations must write disjoint memory."""
+    return _compile(function, parallel=True)
+
+
+def _compile(function: F, parallel: bool) -> F:
+    options = {"fastmath": FASTMATH, "parallel": parallel, "nogil": True, "error_model": "numpy"}
+    try:
+        return numba.njit(cache=True, **options)(function)  # type: ignore[return-value]
+    except RuntimeError as error:  # numba: "cannot cache function ...: no locator available for file ..."
+        if "cannot cache" not in str(error):
+            raise
+        global _cache_reported
+        if not _cache_reported:
+            _cache_reported = True
+            log.info("no writable folder for compiled kernels (set NUMBA_CACHE_DIR): compiling in every process")
+        return numba.njit(cache=False, **options)(function)  # type: ignore[return-value]
+
+
+def set_threads(count: int) -> None:
+    """Set the number of threads that parallel kernels use in this process."""
+    numba.set_num_threads(count)
+
+
+def threads() -> int:
+    """Return the number of threads that parallel kernels use in this process."""
+    return int(numba.get_num_threads())

@@ -1,0 +1,97 @@
+"""What a reference element is: data, two functions and its default quadrature."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Element:
+    """A reference element.
+
+    Parameters
+    ----------
+    name : str
+        Our name, e.g. ``"tri6"``.
+    dim : int
+        Dimension of the reference cell: 1 for lines, 2 for faces, 3 for solids.
+    order : int
+        1 for linear, 2 for quadratic.
+    nodes : ndarray (n_nodes, dim)
+        Reference coordinates; corners first, then mid nodes in the order of `edges`, then a centre node.
+    edges : tuple of (int, int)
+        Corner pairs, one per edge; in 2D counter-clockwise.
+    facets : tuple of tuple of int
+        Local nodes of each boundary facet, oriented so that its normal points outward.
+    facet : str
+        Name of the facet's element; empty for lines.
+    shape : callable
+        ``shape(xi)`` maps (m, dim) to values (m, n_nodes).
+    gradient : callable
+        ``gradient(xi)`` maps (m, dim) to derivatives (m, n_nodes, dim).
+    quadrature : (ndarray (n_q, dim), ndarray (n_q,))
+        Default points and weights for the stiffness: those of code_aster's element of the same shape.
+    meshio, med : str
+        The name in meshio and the three-letter MED code.
+    vtk : int
+        The VTK cell type.
+    linear, quadratic : str
+        Name of the element on the same corners without, or with, mid nodes.
+    """
+
+    name: str
+    dim: int
+    order: int
+    nodes: Array
+    edges: tuple[tuple[int, int], ...]
+    facets: tuple[tuple[int, ...], ...]
+    facet: str
+    shape: Callable[[Array], Array]
+    gradient: Callable[[Array], Array]
+    quadrature: tuple[Array, Array]
+    meshio: str
+    med: str
+    vtk: int
+    linear: str
+    quadratic: str
+    corner_shape: Callable[[Array], Array]
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return len(self.nodes)
+
+    @property
+    def n_corners(self) -> int:
+        """Number of corner nodes."""
+        return self.corner_shape(self.nodes[:1]).shape[1]
+
+    @cached_property
+    def tables(self) -> tuple[Array, Array, Array]:
+        """Shape values (n_q, n_nodes), derivatives (n_q, n_nodes, dim) and weights (n_q,) at the default points."""
+        points, weights = self.quadrature
+        return (
+            np.ascontiguousarray(self.shape(points)),
+            np.ascontiguousarray(self.gradient(points)),
+            np.ascontiguousarray(weights),
+        )
+
+    @cached_property
+    def extrapolation(self) -> Array:
+        """Matrix (n_nodes, n_q) from values at the default quadrature points to values at the nodes.
+
+        The corner polynomial is fitted to the point values by least squares (exact when there are as many points
+        as corners) and evaluated at all nodes; with fewer points than corners, the mean is taken. This is what
+        code_aster does for SIEF_ELNO.
+        """
+        points, _ = self.quadrature
+        if len(points) < self.n_corners:
+            return np.full((self.n_nodes, len(points)), 1.0 / len(points))
+        return self.corner_shape(self.nodes) @ np.linalg.pinv(self.corner_shape(points))

@@ -1,0 +1,64 @@
+"""Every exception and warning that fastcontact raises, under one base class."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+
+class FastcontactError(Exception):
+    """Base class of every error that fastcontact raises on purpose."""
+
+
+class MeshError(FastcontactError):
+    """The mesh cannot be used: a bad cell, a missing group, a wrong number."""
+
+
+class ModelError(FastcontactError):
+    """The model is incomplete or contradicts itself (materials, supports, loads)."""
+
+
+class ContactError(FastcontactError):
+    """A contact pair cannot be set up: wrong side, empty surface, illegal option."""
+
+
+class CaseError(FastcontactError):
+    """A case file or a command-line option is wrong."""
+
+
+class FileError(FastcontactError):
+    """A file cannot be read or written."""
+
+
+class ConvergenceError(FastcontactError):
+    """The solution of a load step did not converge.
+
+    Attributes
+    ----------
+    history : list of dict
+        One entry per iteration of the failed step: residual, active constraints, displacement change.
+    """
+
+    def __init__(self, message: str, history: Sequence[Mapping[str, Any]] = ()) -> None:
+        super().__init__(message)
+        self.history = [dict(entry) for entry in history]
+
+
+class FastcontactWarning(UserWarning):
+    """Something a user should know, with the number that says how much."""
+
+
+def unknown(kind: str, name: str, known: Iterable[str]) -> str:
+    """Return the message for an unknown name: the culprit, the nearest known names, all of them if few."""
+    names = sorted(known)
+    if not names:
+        return f"unknown {kind} '{name}': there is none here"
+    near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+    if not near:
+        folded = {candidate.casefold(): candidate for candidate in names}
+        near = [folded[key] for key in difflib.get_close_matches(name.casefold(), folded, n=3, cutoff=0.5)]
+    if near:
+        return f"unknown {kind} '{name}': did you mean " + " or ".join(f"'{candidate}'" for candidate in near) + "?"
+    shown = ", ".join(names[:12]) + (f", ... ({len(names)} in all)" if len(names) > 12 else "")
+    return f"unknown {kind} '{name}': known are {shown}"

@@ -1,0 +1,104 @@
+"""What a load step leaves behind: plain data, no mesh, no file, no solver."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ContactResult:
+    """State of one contact pair at the end of a step, on the secondary nodes in order along the surface.
+
+    Attributes
+    ----------
+    name, formulation : str
+        Name of the pair and of its formulation.
+    points : ndarray of int (m,)
+        Point numbers.
+    coordinates : ndarray (m, dim)
+        Reference coordinates [length].
+    abscissa : ndarray (m,)
+        Length along the reference surface from its first node [length].
+    gap : ndarray (m,)
+        Open positive, closed zero [length].
+    pressure : ndarray (m,)
+        Contact pressure, >= 0 in compression, per reference area [pressure].
+    multiplier : ndarray (m,)
+        What the formulation solves for: nodal contact force (node-to-segment) [force], or nodal value of the
+        pressure field (continuous) [pressure].
+    force_vectors : ndarray (m, dim)
+        Contact force on each secondary node; axisymmetric: over the full circle [force].
+    normal : ndarray (m, dim)
+        Unit outward normal of the primary facet faced.
+    active : ndarray of bool (m,)
+        Closed constraints.
+    force : ndarray (dim,)
+        Resultant on the secondary side [force].
+    radius : (float, float)
+        Bracket of the contact radius (half-width in plane problems): distance from the axis x = 0 of the outermost
+        closed node and of the first open node beyond it [length]; NaN without contact.
+    """
+
+    name: str
+    formulation: str
+    points: NDArray[np.int32]
+    coordinates: Array
+    abscissa: Array
+    gap: Array
+    pressure: Array
+    multiplier: Array
+    force_vectors: Array
+    normal: Array
+    active: NDArray[np.bool_]
+    force: Array
+    radius: tuple[float, float]
+
+    @property
+    def pressure_max(self) -> float:
+        """Largest nodal pressure [pressure]."""
+        return float(self.pressure.max(initial=0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class StepResult:
+    """State at the end of one load step.
+
+    Attributes
+    ----------
+    index : int
+        1 for the first step.
+    load_factor : float
+        Pseudo-time of the step.
+    displacement : ndarray (n_points, dim)
+        [length].
+    stress : ndarray (n_points, 4) or (n_points, 6)
+        Nodal stress, averaged over the elements at each node; components xx, yy, zz, xy (then yz, xz in 3D), in
+        axisymmetry rr, yy, hoop, ry [pressure].
+    von_mises, von_mises_signed : ndarray (n_points,)
+        Equivalent stress of `stress`; the same with the sign of its trace [pressure].
+    reaction : ndarray (n_points, dim)
+        Support reactions, zero at free degrees of freedom; axisymmetric: over the full circle [force].
+    contact : dict of str to ContactResult
+        By contact pair.
+    iterations : dict
+        ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``, ``history`` (list of dict).
+    warnings : tuple of str
+        What the step warned of.
+    """
+
+    index: int
+    load_factor: float
+    displacement: Array
+    stress: Array
+    von_mises: Array
+    von_mises_signed: Array
+    reaction: Array
+    contact: dict[str, ContactResult] = field(default_factory=dict)
+    iterations: dict[str, Any] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()

@@ -1,0 +1,154 @@
+"""Questions to the connectivity: outer facets, bodies, orientation, nodes in order along a line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from fastcontact import elements
+from fastcontact.errors import MeshError
+from fastcontact.mesh import Mesh
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+# Node order of an element turned inside out, for cells read clockwise.
+_REVERSED = {
+    "tri3": [0, 2, 1],
+    "tri6": [0, 2, 1, 5, 4, 3],
+    "quad4": [0, 3, 2, 1],
+    "quad8": [0, 3, 2, 1, 7, 6, 5, 4],
+    "quad9": [0, 3, 2, 1, 7, 6, 5, 4, 8],
+}
+
+
+def corner_areas(mesh: Mesh, name: str) -> Array:
+    """Return the signed area (n_cells,) of the corner polygons of the 2D cells of element `name` [length^2]."""
+    corners = mesh.points[mesh.cells[name][:, : elements.get(name).n_corners]]
+    x, y = corners[..., 0], corners[..., 1]
+    return 0.5 * (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
+
+
+def oriented(mesh: Mesh) -> tuple[Mesh, int]:
+    """Return the mesh with every solid cell counter-clockwise, and how many cells were turned."""
+    cells, turned = dict(mesh.cells), 0
+    for name in mesh.solids:
+        clockwise = corner_areas(mesh, name) < 0
+        if clockwise.any():
+            block = mesh.cells[name].copy()
+            block[clockwise] = block[clockwise][:, _REVERSED[name]]
+            cells[name] = block
+            turned += int(clockwise.sum())
+    return (mesh.replace(cells=cells) if turned else mesh), turned
+
+
+def bodies(mesh: Mesh) -> tuple[int, NDArray[np.int32]]:
+    """Return the number of bodies (sets of solid cells connected by nodes) and the body of each point, -1 for none."""
+    rows, columns, used = [], [], np.zeros(mesh.n_points, bool)
+    for block in mesh.solids.values():
+        rows.append(np.repeat(block[:, 0], block.shape[1]))
+        columns.append(block.ravel())
+        used[block] = True
+    if not rows:
+        return 0, np.full(mesh.n_points, -1, np.int32)
+    row, column = np.concatenate(rows), np.concatenate(columns)
+    graph = coo_array((np.ones(len(row), np.int8), (row, column)), shape=(mesh.n_points, mesh.n_points))
+    _, label = connected_components(graph, directed=False)
+    found, compact = np.unique(label[used], return_inverse=True)
+    body = np.full(mesh.n_points, -1, np.int32)
+    body[used] = compact
+    return len(found), body
+
+
+def outer_facets(mesh: Mesh) -> dict[str, Indices]:
+    """Return the facets that belong to exactly one solid cell, by facet element, normals pointing outward."""
+    found: dict[str, list[Indices]] = {}
+    for name, block in mesh.solids.items():
+        element = elements.get(name)
+        for facet in element.facets:
+            found.setdefault(element.facet, []).append(block[:, list(facet)])
+    outer = {}
+    for name, blocks in found.items():
+        facets = np.concatenate(blocks)
+        keys = np.sort(facets, axis=1)
+        _, first, count = np.unique(keys, axis=0, return_index=True, return_counts=True)
+        outer[name] = np.ascontiguousarray(facets[np.sort(first[count == 1])])
+    return outer
+
+
+@dataclass(frozen=True, eq=False)
+class OrderedLine:
+    """Nodes of a line of facets in order, with the length along it.
+
+    Attributes
+    ----------
+    points : ndarray of int (m,)
+        Point numbers from the start node on.
+    abscissa : ndarray (m,)
+        Length from the start node along the straight pieces between consecutive nodes [length].
+    """
+
+    points: Indices
+    abscissa: Array
+
+
+def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> OrderedLine:
+    """Return the nodes of a line group in order, as code_aster's NOEUD_ORDO and ABSC_CURV.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    group : str
+        A group of line cells that form one open line.
+    start : str or int, optional
+        The end to start from: a group with one point, or a point number; by default the end nearest to x = 0.
+
+    Raises
+    ------
+    MeshError
+        If the group holds no lines, branches, closes on itself, is in pieces, or `start` is not one of its ends.
+    """
+    blocks = mesh.cells_of(group, dim=1)
+    if not blocks:
+        raise MeshError(f"group '{group}' holds no line cells, so its nodes have no order along a line")
+    pieces = [block[:, [0, 2, 1]] if block.shape[1] == 3 else block for block in blocks.values()]
+    segments = np.concatenate([np.column_stack([p[:, i], p[:, i + 1]]) for p in pieces for i in range(p.shape[1] - 1)])
+    nodes, local = np.unique(segments, return_inverse=True)
+    local = local.reshape(segments.shape)
+    degree = np.bincount(local.ravel(), minlength=len(nodes))
+    ends = np.flatnonzero(degree == 1)
+    if len(ends) != 2 or degree.max() > 2:
+        raise MeshError(f"group '{group}' is not one open line: it has {len(ends)} ends, not 2")
+    if start is None:
+        first = ends[np.argmin(np.abs(mesh.points[nodes[ends], 0]))]
+    else:
+        number = mesh.point(start) if isinstance(start, str) else int(start)
+        matches = ends[nodes[ends] == number]
+        if not len(matches):
+            raise MeshError(f"point {number} is not an end of '{group}': its ends are {nodes[ends[0]]}, {nodes[ends[1]]}")
+        first = matches[0]
+    order = _walk(local, len(nodes), int(first))
+    if len(order) != len(nodes):
+        raise MeshError(f"group '{group}' is in pieces: only {len(order)} of its {len(nodes)} nodes are connected")
+    points = nodes[order].astype(np.int32)
+    lengths = np.linalg.norm(np.diff(mesh.points[points], axis=0), axis=1)
+    return OrderedLine(points, np.concatenate([[0.0], np.cumsum(lengths)]))
+
+
+def _walk(segments: NDArray[np.intp], n_nodes: int, first: int) -> list[int]:
+    """Follow the segments from `first`, each node at most once."""
+    neighbours: list[list[int]] = [[] for _ in range(n_nodes)]
+    for a, b in segments.tolist():
+        neighbours[a].append(b)
+        neighbours[b].append(a)
+    order, previous, here = [first], -1, first
+    while True:
+        ahead = [n for n in neighbours[here] if n != previous]
+        if not ahead:
+            return order
+        previous, here = here, ahead[0]
+        order.append(here)
