@@ -3,7 +3,7 @@
 import numpy as np
 
 from fastcontact.elements._element import Array, Element
-from fastcontact.elements._quadrature import gauss_line
+from fastcontact.quadrature import gauss_line
 
 
 def shape(xi: Array) -> Array:

@@ -4,7 +4,7 @@ import numpy as np
 
 from fastcontact.elements import line2
 from fastcontact.elements._element import Array, Element
-from fastcontact.elements._quadrature import gauss_line
+from fastcontact.quadrature import gauss_line
 
 
 def shape(xi: Array) -> Array:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fastcontact.elements._element import Array, Element
-from fastcontact.elements._quadrature import gauss_square
+from fastcontact.quadrature import gauss_square
 
 NODES = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 

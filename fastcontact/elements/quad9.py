@@ -4,7 +4,7 @@ import numpy as np
 
 from fastcontact.elements import line3, quad4
 from fastcontact.elements._element import Array, Element
-from fastcontact.elements._quadrature import gauss_square
+from fastcontact.quadrature import gauss_square
 
 NODES = np.vstack([quad4.NODES, [[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, 0.0]]])
 # Node i is the product of the line3 functions I[i] in s and J[i] in t.

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fastcontact.elements._element import Array, Element
-from fastcontact.elements._quadrature import triangle_1
+from fastcontact.quadrature import triangle_1
 
 
 def shape(xi: Array) -> Array:

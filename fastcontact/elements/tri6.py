@@ -4,7 +4,7 @@ import numpy as np
 
 from fastcontact.elements import tri3
 from fastcontact.elements._element import Array, Element
-from fastcontact.elements._quadrature import triangle_3
+from fastcontact.quadrature import triangle_3
 
 
 def shape(xi: Array) -> Array:

@@ -48,3 +48,13 @@ def triangle_6() -> Rule:
     wa, wb = 0.223381589678011 / 2.0, 0.109951743655322 / 2.0
     points = [[a, a], [1 - 2 * a, a], [a, 1 - 2 * a], [b, b], [1 - 2 * b, b], [b, 1 - 2 * b]]
     return np.array(points), np.array([wa, wa, wa, wb, wb, wb])
+
+
+def subdivided(rule: Rule, parts: int) -> Rule:
+    """Return a rule on [-1, 1] applied on `parts` equal pieces; points that coincide are merged."""
+    points, weights = rule
+    left = -1.0 + 2.0 * np.arange(parts) / parts
+    all_points = (left[:, None] + (points[:, 0] + 1.0) / parts).ravel()
+    all_weights = np.tile(weights / parts, parts)
+    unique, place = np.unique(np.round(all_points, 14), return_inverse=True)
+    return unique[:, None], np.bincount(place, weights=all_weights)

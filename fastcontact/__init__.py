@@ -1,0 +1,123 @@
+"""fastcontact: fast, trustworthy elastic-contact finite elements.
+
+Public names load when first used, so that ``import fastcontact`` costs next to nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from fastcontact import analytic, generate, plot, recovery, topology
+    from fastcontact.errors import (
+        CaseError,
+        ContactError,
+        ConvergenceError,
+        FastcontactError,
+        FastcontactWarning,
+        FileError,
+        MeshError,
+        ModelError,
+    )
+    from fastcontact.io.med import read_med_field, write_med_results
+    from fastcontact.io.mesh_files import read_mesh, write_mesh
+    from fastcontact.io.result_reader import open_results
+    from fastcontact.io.result_writer import ResultWriter
+    from fastcontact.io.tables import contact_table, line_table, write_csv
+    from fastcontact.io.xmgrace import write_agr
+    from fastcontact.materials import LinearElastic
+    from fastcontact.mesh import Mesh
+    from fastcontact.model import Model
+    from fastcontact.quality import quality
+    from fastcontact.ramp import Ramp, linear_ramp
+    from fastcontact.results import ContactResult, StepResult
+    from fastcontact.solve import Criteria, solve
+    from fastcontact.topology import ordered_line
+
+_MODULES = ("analytic", "generate", "plot", "recovery", "topology")
+_HOME = {
+    "CaseError": "errors",
+    "ContactError": "errors",
+    "ContactResult": "results",
+    "ConvergenceError": "errors",
+    "Criteria": "solve",
+    "FastcontactError": "errors",
+    "FastcontactWarning": "errors",
+    "FileError": "errors",
+    "LinearElastic": "materials",
+    "Mesh": "mesh",
+    "MeshError": "errors",
+    "Model": "model",
+    "ModelError": "errors",
+    "Ramp": "ramp",
+    "ResultWriter": "io.result_writer",
+    "StepResult": "results",
+    "contact_table": "io.tables",
+    "line_table": "io.tables",
+    "linear_ramp": "ramp",
+    "open_results": "io.result_reader",
+    "ordered_line": "topology",
+    "quality": "quality",
+    "read_med_field": "io.med",
+    "read_mesh": "io.mesh_files",
+    "solve": "solve",
+    "write_agr": "io.xmgrace",
+    "write_csv": "io.tables",
+    "write_med_results": "io.med",
+    "write_mesh": "io.mesh_files",
+}
+
+__all__ = [
+    "CaseError",
+    "ContactError",
+    "ContactResult",
+    "ConvergenceError",
+    "Criteria",
+    "FastcontactError",
+    "FastcontactWarning",
+    "FileError",
+    "LinearElastic",
+    "Mesh",
+    "MeshError",
+    "Model",
+    "ModelError",
+    "Ramp",
+    "ResultWriter",
+    "StepResult",
+    "analytic",
+    "contact_table",
+    "generate",
+    "line_table",
+    "linear_ramp",
+    "open_results",
+    "ordered_line",
+    "plot",
+    "quality",
+    "read_med_field",
+    "read_mesh",
+    "recovery",
+    "solve",
+    "topology",
+    "write_agr",
+    "write_csv",
+    "write_med_results",
+    "write_mesh",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        value = getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
+    elif name in _MODULES:
+        value = importlib.import_module(f"{__name__}.{name}")
+    else:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

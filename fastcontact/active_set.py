@@ -1,0 +1,139 @@
+"""The inequality solver: ``K u = f + B.T multiplier``, ``multiplier >= 0``, ``gap >= 0``, product zero.
+
+The gap is ``gap0 + B u + C multiplier``; the compliance C of the constraints themselves, symmetric and positive
+semidefinite, is absent in most formulations.
+
+The primal-dual active set (Hintermueller, Ito and Kunisch, 2003) changes all wrong constraints at once and usually
+settles in a few solutions, but it can cycle. ``B K^-1 B.T + C`` is symmetric positive definite when no constraint repeats
+others, so the problem is a linear complementarity problem with a P-matrix; when a set comes back, the solver
+therefore goes on changing only the wrong constraint with the lowest number, which never repeats a set and so ends
+(Murty, 1974).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from fastcontact.linear import Loaded
+
+Array = NDArray[np.float64]
+Active = NDArray[np.bool_]
+
+
+class Compliance(Protocol):
+    """A symmetric positive semidefinite matrix C (m, m) over all constraints."""
+
+    def block(self, rows: NDArray[np.intp]) -> Array:
+        """Return the dense rows and columns `rows` of C."""
+        ...
+
+    def apply(self, multiplier: Array) -> Array:
+        """Return ``C multiplier`` (m,)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """A solution under a set of active constraints.
+
+    Attributes
+    ----------
+    u : ndarray (n,)
+    multiplier, gap : ndarray (m,)
+        Of all constraints; the multiplier of inactive ones is zero.
+    active : ndarray of bool (m,)
+        The set this is the solution of.
+    wanted : ndarray of bool (m,)
+        The set its signs ask for; equal to `active` when every inequality holds.
+    iterations : int
+        Linear solutions made.
+    """
+
+    u: Array
+    multiplier: Array
+    gap: Array
+    active: Active
+    wanted: Active
+    iterations: int
+    sizes: list[int] = field(default_factory=list)
+
+    @property
+    def settled(self) -> bool:
+        """Whether all inequalities hold."""
+        return bool(np.array_equal(self.active, self.wanted))
+
+
+def solve(
+    loaded: Loaded,
+    B: csr_array,
+    gap0: Array,
+    usable: Active,
+    *,
+    compliance: Compliance | None = None,
+    active: Active,
+    gap_tolerance: float,
+    multiplier_tolerance: float = 1e-12,
+    max_iterations: int = 200,
+    guess: Array | None = None,
+) -> Equilibrium:
+    """Find the displacement and the contact forces that satisfy every inequality.
+
+    Parameters
+    ----------
+    loaded : Loaded
+        Matrix and right-hand side, from a linear solver.
+    B : csr_array (m, n)
+    gap0 : ndarray (m,)
+    usable : ndarray of bool (m,)
+        Constraints that may become active at all.
+    compliance : Compliance, optional
+        C above.
+    active : ndarray of bool (m,)
+        Set to start from.
+    gap_tolerance : float
+        A gap above minus this counts as open or closed, not as penetration.
+    multiplier_tolerance : float
+        A multiplier above minus this fraction of the largest one counts as compression.
+    max_iterations : int
+        Linear solutions allowed; the result may then not be settled.
+    guess : ndarray (n,), optional
+        Displacement to start iterative solvers from.
+
+    Returns
+    -------
+    Equilibrium
+    """
+    active = active & usable
+    seen: set[bytes] = set()
+    single = False
+    sizes: list[int] = []
+    for iteration in range(1, max_iterations + 1):
+        rows = np.flatnonzero(active)
+        C = compliance.block(rows) if compliance is not None else None
+        u, forces = loaded.solve(B[rows], -gap0[rows], C, guess)
+        multiplier = np.zeros(len(gap0))
+        multiplier[rows] = forces
+        gap = gap0 + B @ u
+        if compliance is not None:
+            gap += compliance.apply(multiplier)
+        largest = np.abs(forces).max(initial=0.0)
+        wanted = np.where(active, multiplier > -multiplier_tolerance * largest, gap < -gap_tolerance) & usable
+        sizes.append(len(rows))
+        state = Equilibrium(u, multiplier, gap, active, wanted, iteration, sizes)
+        if state.settled or iteration == max_iterations:
+            return state
+        seen.add(active.tobytes())
+        single = single or wanted.tobytes() in seen
+        if single:
+            active = active.copy()
+            first = np.flatnonzero(active != wanted)[0]
+            active[first] = wanted[first]
+        else:
+            active = wanted
+        guess = u
+    raise AssertionError("unreachable: the loop returns")

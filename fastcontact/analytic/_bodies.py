@@ -1,0 +1,86 @@
+"""Two elastic bodies as a contact formula sees them: one modulus, one curvature."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from fastcontact.analytic._checks import one_of, poisson, positive
+from fastcontact.errors import ModelError
+
+PLANE = ("plane_strain", "plane_stress")
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Elastic constants of two bodies; a second body with `E2` None is rigid.
+
+    Attributes
+    ----------
+    E1, E2 : float, float or None
+        Young's moduli [pressure].
+    nu1, nu2 : float
+        Poisson ratios.
+    """
+
+    E1: float
+    nu1: float
+    E2: float | None = None
+    nu2: float = 0.0
+
+    def __post_init__(self) -> None:
+        set_ = object.__setattr__
+        set_(self, "E1", positive("E1", self.E1))
+        set_(self, "nu1", poisson("nu1", self.nu1))
+        set_(self, "nu2", poisson("nu2", self.nu2))
+        if self.E2 is not None:
+            set_(self, "E2", positive("E2", self.E2))
+
+    @property
+    def E_star(self) -> float:
+        """Contact modulus, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2 (Johnson 1985, eq. 4.20) [pressure]."""
+        return 1.0 / sum((1.0 - nu**2) / E for E, nu in self._elastic)
+
+    @property
+    def E_star_plane_stress(self) -> float:
+        """Contact modulus of two thin discs, 1/E* = 1/E1 + 1/E2 [pressure]."""
+        return 1.0 / sum(1.0 / E for E, _ in self._elastic)
+
+    @property
+    def G_star(self) -> float:
+        """Tangential modulus, 1/G* = (2 - nu1)/(4 G1) + (2 - nu2)/(4 G2) (Johnson 1985, eq. 7.43) [pressure]."""
+        return 1.0 / sum((2.0 - nu) * (1.0 + nu) / (2.0 * E) for E, nu in self._elastic)
+
+    @property
+    def dundurs(self) -> float:
+        """Dundurs' second constant in plane strain; zero where pressure causes no shear (Johnson 1985, eq. 2.23)."""
+        first = (1.0 - 2.0 * self.nu1) * (1.0 + self.nu1) / self.E1
+        second = 0.0 if self.E2 is None else (1.0 - 2.0 * self.nu2) * (1.0 + self.nu2) / self.E2
+        return 0.5 * (first - second) * self.E_star
+
+    @property
+    def _elastic(self) -> list[tuple[float, float]]:
+        first = [(self.E1, self.nu1)]
+        return first if self.E2 is None else [*first, (self.E2, self.nu2)]
+
+    def constants(self, body: int) -> tuple[float, float]:
+        """Return E and nu of body 1 or 2; a rigid body has none."""
+        if body not in (1, 2):
+            raise ModelError(f"body is {body!r}: it must be 1 or 2")
+        if body > len(self._elastic):
+            raise ModelError("body 2 is rigid (E2 is None): it has no displacement field, ask for body 1")
+        return self._elastic[body - 1]
+
+
+def effective_radius(R1: float, R2: float, names: tuple[str, str] = ("R1", "R2")) -> float:
+    """Return R of 1/R = 1/R1 + 1/R2 [length]; one of the two may be infinite, a plane."""
+    R1 = positive(names[0], R1, infinite=True)
+    R2 = positive(names[1], R2, infinite=True)
+    if math.isinf(R1) and math.isinf(R2):
+        raise ModelError(f"{names[0]} and {names[1]} are both infinite: two planes have no Hertz contact")
+    return 1.0 / (1.0 / R1 + 1.0 / R2)
+
+
+def plane_kinematics(kinematics: str) -> str:
+    """Return the word if it is "plane_strain" or "plane_stress"."""
+    return one_of("kinematics", kinematics, PLANE)

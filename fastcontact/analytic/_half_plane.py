@@ -1,0 +1,58 @@
+"""Elastic half plane under Hertz's pressure: stress and displacement anywhere, in closed form.
+
+The half plane is y <= 0 and carries the pressure p0 sqrt(1 - x^2/b^2) on |x| <= b. With k = |y| + i x and the root
+w = sqrt(b^2 + k^2), Re w >= 0, the harmonic function that equals the pressure on the surface is p0/b Re(w - k)
+(McEwen 1949; Johnson 1985, eq. 4.49). Displacements are measured from the point (0, 0): in a half plane there is no
+point at infinity to measure from. Plane stress: the same with nu/(1 + nu) for nu and the same shear modulus.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastcontact.analytic._half_space import below_surface
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+def plane_nu(nu: float, kinematics: str) -> float:
+    """Return the Poisson ratio that plane-strain formulas take for `kinematics`."""
+    return nu if kinematics == "plane_strain" else nu / (1.0 + nu)
+
+
+def _roots(x: ArrayLike, y: ArrayLike, b: float) -> tuple[Array, ComplexArray, ComplexArray, ComplexArray]:
+    """Return depth, k, w and w - k, all in units of b."""
+    across, depth = np.broadcast_arrays(np.asarray(x, dtype=np.float64) / b, below_surface(y, b) / b)
+    k = depth + 1j * across
+    square = np.empty(k.shape, dtype=np.complex128)
+    square.real = (1.0 - across) * (1.0 + across) + depth**2
+    square.imag = 2.0 * across * depth
+    w = np.sqrt(square)
+    w = w.real + 1j * np.copysign(w.imag, across)  # outside the contact, on the surface, the sign is that of x
+    return depth, k, w, 1.0 / (w + k)  # (w - k)(w + k) = b^2; the difference itself would lose digits far away
+
+
+def stress(x: ArrayLike, y: ArrayLike, b: float, p0: float, nu: float, kinematics: str) -> Array:
+    """Return stresses (..., 4) xx, yy, zz, xy [pressure] (McEwen 1949)."""
+    depth, _, w, q = _roots(x, y, b)
+    inside = depth > 0.0
+    gradient = depth * q / np.where(inside, w, 1.0)  # the depth times -dq/dk; w vanishes only on the surface
+    xx, yy = -(q - gradient).real, -(q + gradient).real
+    zz = nu * (xx + yy) if kinematics == "plane_strain" else np.zeros_like(xx)
+    return p0 * np.stack([xx, yy, zz, -gradient.imag], axis=-1)
+
+
+def displacement(x: ArrayLike, y: ArrayLike, b: float, p0: float, E: float, nu: float, kinematics: str) -> Array:
+    """Return displacements (..., 2) along x, y [length], measured from the point (0, 0).
+
+    With H the integral of w - k over k, 2 G u_x = (p0/b) [y Im(w - k) - (1 - 2 nu) Im H] and
+    2 G u_y = (p0/b) [y Re(w - k) + 2 (1 - nu) Re H].
+    """
+    depth, k, w, q = _roots(x, y, b)
+    H = 0.5 * (k * q + np.log(k + w))
+    nu_plane = plane_nu(nu, kinematics)
+    u_x = -depth * q.imag - (1.0 - 2.0 * nu_plane) * H.imag
+    u_y = -depth * q.real + 2.0 * (1.0 - nu_plane) * H.real
+    return p0 * b * (1.0 + nu) / E * np.stack([u_x, u_y], axis=-1)

@@ -1,0 +1,356 @@
+"""Partial slip of Hertz contacts under a tangential force, and the block that slides as a whole."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastcontact.analytic._bodies import Bodies
+from fastcontact.analytic._checks import not_negative, number, poisson, positive
+from fastcontact.analytic.hertz_line import HertzLine, hertz_line
+from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
+from fastcontact.errors import FastcontactWarning, ModelError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _PartialSlip:
+    """What the line and the sphere share: a load up to a peak, then perhaps back (Mindlin and Deresiewicz 1953).
+
+    The traction of a first load T is f times the pressure less that of a smaller contact, the stick zone. Coming
+    back from a peak T* to T subtracts twice the traction of a first load (T* - T)/2.
+    """
+
+    friction: float
+    tangential_force: float
+    tangential_force_peak: float
+
+    @property
+    def _reversal(self) -> float:
+        """First load that, taken twice, leads from the peak back to the present force."""
+        return 0.5 * (self.tangential_force_peak - self.tangential_force)
+
+    def _checked(self, tangential_force: float) -> float:
+        force = number("tangential_force", tangential_force)
+        if not -self.tangential_force_peak <= force <= self.tangential_force:
+            raise ModelError(
+                f"tangential_force is {force:g}: unloading runs from {self.tangential_force:g} down to the opposite "
+                f"peak {-self.tangential_force_peak:g}"
+            )
+        return force
+
+
+def _stick(radius: float, load: float, limit: float, power: float) -> float:
+    """Return the size of the stick zone, a (1 - T/(f F))^power, for a first load T."""
+    return radius * max(1.0 - load / limit, 0.0) ** power
+
+
+def _traction(normal: HertzLine | HertzPoint, friction: float, stick: float, position: ArrayLike) -> Array:
+    """Return f p0 [sqrt(1 - x^2/a^2) - (c/a) sqrt(1 - x^2/c^2)], each root where it is real."""
+    x2, a = np.asarray(position, dtype=np.float64) ** 2, normal.radius
+    roots = np.sqrt(np.maximum(a**2 - x2, 0.0)) - np.sqrt(np.maximum(stick**2 - x2, 0.0))
+    return friction * normal.pressure_max / a * roots
+
+
+@dataclass(frozen=True)
+class CattaneoMindlinLine(_PartialSlip):
+    """Two cylinders under a normal and a tangential force per unit length (Cattaneo 1938; Mindlin 1949).
+
+    Formulas as in Johnson (1985), section 7.2(a).
+
+    Attributes
+    ----------
+    friction : float
+        Coulomb's coefficient f.
+    tangential_force : float
+        Present tangential force per unit length [force/length].
+    tangential_force_peak : float
+        Largest one so far; equal to the present one while loading [force/length].
+    normal : HertzLine
+        The normal contact.
+    """
+
+    normal: HertzLine
+
+    @property
+    def stick_radius(self) -> float:
+        """Half-width of the zone that sticks now, a sqrt(1 - Q/(f P)) while loading (eq. 7.29) [length]."""
+        return self._zone(self._reversal if self._reversal > 0.0 else self.tangential_force)
+
+    def traction(self, x: ArrayLike) -> Array:
+        """Return the shear traction in the direction of the force (Johnson 1985, eqs 7.26 and 7.28) [pressure]."""
+        first, back = self._zone(self.tangential_force_peak), self._zone(self._reversal)
+        return _traction(self.normal, self.friction, first, x) - 2.0 * _traction(self.normal, self.friction, back, x)
+
+    def slip(self, x: ArrayLike) -> Array:
+        """Return how far the surfaces have slipped on each other, in the direction of the force [length].
+
+        The integral of f p0/a (2/E*) sqrt(x^2 - c^2) from the edge c of the stick zone outward, for c <= |x| <= a;
+        zero within the stick zone and outside the contact (from Johnson 1985, eq. 2.25 and section 7.2a).
+        """
+        return self._slip(self._zone(self.tangential_force_peak), x) - 2.0 * self._slip(self._zone(self._reversal), x)
+
+    def unloaded_to(self, tangential_force: float) -> CattaneoMindlinLine:
+        """Return the contact after the tangential force went down to a value not below the opposite peak.
+
+        Raises
+        ------
+        ModelError
+            If the force would rise, or pass the opposite peak.
+        """
+        return replace(self, tangential_force=self._checked(tangential_force))
+
+    def _zone(self, load: float) -> float:
+        return _stick(self.normal.radius, load, self.friction * self.normal.force, 0.5)
+
+    def _slip(self, c: float, x: ArrayLike) -> Array:
+        a = self.normal.radius
+        distance = np.abs(np.asarray(x, dtype=np.float64))
+        beyond = np.clip(distance, c, a)
+        root = beyond * np.sqrt((beyond - c) * (beyond + c))
+        hyperbolic = c**2 * np.arccosh(beyond / c) if c > 0.0 else 0.0
+        amount = self.friction * self.normal.pressure_max / (a * self.normal.E_star) * (root - hyperbolic)
+        return np.where(distance <= a, amount, 0.0)
+
+
+@dataclass(frozen=True)
+class CattaneoMindlinSphere(_PartialSlip):
+    """Two spheres under a normal and a tangential force (Cattaneo 1938; Mindlin 1949).
+
+    Formulas as in Johnson (1985), section 7.2(b) and 7.4(b). The direction of slip is taken along the force, which
+    is exact for nu = 0 and leaves an error of the order nu/(4 - 2 nu) otherwise.
+
+    Attributes
+    ----------
+    friction : float
+        Coulomb's coefficient f.
+    tangential_force : float
+        Present tangential force [force].
+    tangential_force_peak : float
+        Largest one so far; equal to the present one while loading [force].
+    normal : HertzPoint
+        The normal contact.
+    """
+
+    normal: HertzPoint
+
+    @property
+    def G_star(self) -> float:
+        """Tangential modulus, 1/G* = (2 - nu1)/(4 G1) + (2 - nu2)/(4 G2) [pressure]."""
+        return self.normal.bodies.G_star
+
+    @property
+    def stick_radius(self) -> float:
+        """Radius of the zone that sticks now, a (1 - T/(f F))^(1/3) while loading (eq. 7.39) [length]."""
+        return self._zone(self._reversal if self._reversal > 0.0 else self.tangential_force)
+
+    @property
+    def tangential_displacement(self) -> float:
+        """Tangential displacement of distant points, 3 f F/(16 a G*) [1 - (1 - T/(f F))^(2/3)] (eq. 7.42) [length]."""
+        return self._shift(self.tangential_force_peak) - 2.0 * self._shift(self._reversal)
+
+    @property
+    def dissipation_per_cycle(self) -> float:
+        """Work lost in one cycle of the force between +peak and -peak (Johnson 1985, eq. 7.57) [force length]."""
+        limit = self.friction * self.normal.force
+        load = self.tangential_force_peak / limit
+        rest = max(1.0 - load, 0.0)
+        bracket = 1.0 - rest ** (5.0 / 3.0) - 5.0 * load / 6.0 * (1.0 + rest ** (2.0 / 3.0))
+        return 9.0 * limit**2 / (10.0 * self.normal.radius) * bracket / self.G_star
+
+    def traction(self, r: ArrayLike) -> Array:
+        """Return the shear traction in the direction of the force (Johnson 1985, eqs 7.36 and 7.37) [pressure]."""
+        first, back = self._zone(self.tangential_force_peak), self._zone(self._reversal)
+        return _traction(self.normal, self.friction, first, r) - 2.0 * _traction(self.normal, self.friction, back, r)
+
+    def unloaded_to(self, tangential_force: float) -> CattaneoMindlinSphere:
+        """Return the contact after the tangential force went down to a value not below the opposite peak.
+
+        Raises
+        ------
+        ModelError
+            If the force would rise, or pass the opposite peak.
+        """
+        return replace(self, tangential_force=self._checked(tangential_force))
+
+    def _zone(self, load: float) -> float:
+        return _stick(self.normal.radius, load, self.friction * self.normal.force, 1.0 / 3.0)
+
+    def _shift(self, load: float) -> float:
+        limit, a = self.friction * self.normal.force, self.normal.radius
+        return 3.0 * limit / (16.0 * a * self.G_star) * (1.0 - (self._zone(load) / a) ** 2)
+
+
+def _friction_limit(friction: float, normal_force: float, tangential_force: float) -> tuple[float, float]:
+    """Return the checked coefficient and tangential force."""
+    f = positive("friction", friction)
+    T = not_negative("tangential_force", tangential_force)
+    if T > f * normal_force:
+        raise ModelError(
+            f"tangential_force is {T:g}: above friction times normal force, {f * normal_force:g}, the bodies slide"
+        )
+    return f, T
+
+
+def _warn_of_coupling(bodies: Bodies) -> None:
+    """Warn where normal and tangential loads are coupled, which the theory leaves out."""
+    if abs(bodies.dundurs) > 1e-12:
+        warnings.warn(
+            f"Cattaneo-Mindlin is exact for like materials only: Dundurs' constant is {bodies.dundurs:.3g}, not 0",
+            FastcontactWarning,
+            stacklevel=3,
+        )
+
+
+def cattaneo_mindlin_line(
+    *,
+    E1: float,
+    nu1: float,
+    R1: float,
+    friction: float,
+    tangential_force: float,
+    E2: float | None = None,
+    nu2: float = 0.0,
+    R2: float = math.inf,
+    force: float | None = None,
+    radius: float | None = None,
+    pressure_max: float | None = None,
+) -> CattaneoMindlinLine:
+    """Return the partial slip of two parallel cylinders in plane strain (Cattaneo 1938; Mindlin 1949).
+
+    The normal force stays constant; the tangential force grows from zero.
+
+    Parameters
+    ----------
+    E1, nu1, R1, E2, nu2, R2, force, radius, pressure_max : float
+        The normal contact, as for `hertz_line`.
+    friction : float
+        Coulomb's coefficient f > 0.
+    tangential_force : float
+        Per unit length, between 0 and f times the normal force [force/length].
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range, or the bodies would slide.
+
+    Warns
+    -----
+    FastcontactWarning
+        If the materials differ, so that the theory is approximate.
+    """
+    normal = hertz_line(
+        E1=E1, nu1=nu1, R1=R1, E2=E2, nu2=nu2, R2=R2, force=force, radius=radius, pressure_max=pressure_max
+    )
+    f, Q = _friction_limit(friction, normal.force, tangential_force)
+    _warn_of_coupling(normal.bodies)
+    return CattaneoMindlinLine(f, Q, Q, normal)
+
+
+def cattaneo_mindlin_sphere(
+    *,
+    E1: float,
+    nu1: float,
+    R1: float,
+    friction: float,
+    tangential_force: float,
+    E2: float | None = None,
+    nu2: float = 0.0,
+    R2: float = math.inf,
+    force: float | None = None,
+    approach: float | None = None,
+    radius: float | None = None,
+    pressure_max: float | None = None,
+) -> CattaneoMindlinSphere:
+    """Return the partial slip of two spheres (Cattaneo 1938; Mindlin 1949).
+
+    The normal force stays constant; the tangential force grows from zero.
+
+    Parameters
+    ----------
+    E1, nu1, R1, E2, nu2, R2, force, approach, radius, pressure_max : float
+        The normal contact, as for `hertz_point`.
+    friction : float
+        Coulomb's coefficient f > 0.
+    tangential_force : float
+        Between 0 and f times the normal force [force].
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range, or the bodies would slide.
+
+    Warns
+    -----
+    FastcontactWarning
+        If the materials differ, so that the theory is approximate.
+    """
+    normal = hertz_point(
+        E1=E1, nu1=nu1, R1=R1, E2=E2, nu2=nu2, R2=R2,
+        force=force, approach=approach, radius=radius, pressure_max=pressure_max,
+    )  # fmt: skip
+    f, T = _friction_limit(friction, normal.force, tangential_force)
+    _warn_of_coupling(normal.bodies)
+    return CattaneoMindlinSphere(f, T, T, normal)
+
+
+@dataclass(frozen=True)
+class BlockSliding:
+    """A block pressed on a plane by a uniform pressure while its top is moved sideways: stick, then slide.
+
+    The shear is uniform; the traction is the smaller of G gamma and f p (Coulomb's law).
+
+    Attributes
+    ----------
+    shear_traction : float
+        On the interface [pressure].
+    slip : float
+        Sliding distance of the block on the plane [length].
+    sliding : bool
+        The friction limit is reached.
+    dissipation : float
+        Work of friction per area [force/length].
+    """
+
+    shear_traction: float
+    slip: float
+    sliding: bool
+    dissipation: float
+
+
+def block_sliding(
+    *, E: float, nu: float, height: float, pressure: float, friction: float, displacement: float
+) -> BlockSliding:
+    """Return the state of a block in uniform pressure and shear whose top is moved sideways (Coulomb's law).
+
+    Parameters
+    ----------
+    E, nu : float
+        Material [pressure], [-].
+    height : float
+        [length].
+    pressure : float
+        Uniform contact pressure [pressure].
+    friction : float
+        Coulomb's coefficient f >= 0.
+    displacement : float
+        Sideways displacement of the top, >= 0 [length].
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range.
+    """
+    G = positive("E", E) / (2.0 * (1.0 + poisson("nu", nu)))
+    H, shift = positive("height", height), not_negative("displacement", displacement)
+    limit = not_negative("friction", friction) * not_negative("pressure", pressure)
+    elastic = G * shift / H
+    sliding = elastic >= limit
+    traction = limit if sliding else elastic
+    slip = shift - traction * H / G if sliding else 0.0
+    return BlockSliding(traction, slip, sliding, traction * slip)

@@ -1,0 +1,168 @@
+"""Hertz contact of two bodies with different curvatures in two directions: an elliptical contact area."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastcontact.analytic._bodies import Bodies, effective_radius
+from fastcontact.analytic._checks import exactly_one
+from fastcontact.errors import ModelError
+
+Array = NDArray[np.float64]
+_FLATTEST = 1e-6  # ratio of the axes b/a below which the contact is a line for every purpose
+
+
+@dataclass(frozen=True)
+class HertzElliptical:
+    """Frictionless contact with an elliptical area after Hertz (1881), formulas as in Johnson (1985), section 4.2(b).
+
+    Attributes
+    ----------
+    bodies : Bodies
+        Elastic constants.
+    E_star : float
+        Contact modulus [pressure].
+    R_x, R_y : float
+        Relative principal radii, 1/R_x = 1/R1x + 1/R2x [length].
+    radius_x, radius_y : float
+        Semi-axes of the contact area along x and y [length].
+    approach : float
+        Approach of distant points of the two bodies [length].
+    force : float
+        [force].
+    pressure_max : float
+        Pressure p0 at the centre [pressure].
+    """
+
+    bodies: Bodies
+    E_star: float
+    R_x: float
+    R_y: float
+    radius_x: float
+    radius_y: float
+    approach: float
+    force: float
+    pressure_max: float
+
+    @property
+    def radius(self) -> float:
+        """Radius of the circle with the area of the contact, sqrt(radius_x radius_y) [length]."""
+        return math.sqrt(self.radius_x * self.radius_y)
+
+    def at_force(self, force: float) -> HertzElliptical:
+        """Return the same contact under another force [force]."""
+        return _solve(self.bodies, self.R_x, self.R_y, *exactly_one(force=force))
+
+    def at_approach(self, approach: float) -> HertzElliptical:
+        """Return the same contact at another approach [length]."""
+        return _solve(self.bodies, self.R_x, self.R_y, *exactly_one(approach=approach))
+
+    def pressure(self, x: ArrayLike, y: ArrayLike = 0.0) -> Array:
+        """Return the contact pressure at points, zero outside (Johnson 1985, eq. 3.58) [pressure]."""
+        inside = (
+            1.0
+            - (np.asarray(x, dtype=np.float64) / self.radius_x) ** 2
+            - (np.asarray(y, dtype=np.float64) / self.radius_y) ** 2
+        )
+        return self.pressure_max * np.sqrt(np.maximum(inside, 0.0))
+
+
+def _ratio_of_radii(ratio: float) -> float:
+    """Return R'/R'' >= 1 of an ellipse with ratio of axes b/a <= 1 (Johnson 1985, eq. 4.28).
+
+    Carlson's integral R_D stands for [(a/b)^2 E - K]/[K - E] of the textbooks: near the circle both differences
+    vanish.
+    """
+    from scipy.special import elliprd
+
+    return float(elliprd(0.0, 1.0, ratio**2) / elliprd(0.0, ratio**2, 1.0))
+
+
+def _ratio_of_axes(ratio_of_radii: float) -> float:
+    """Return b/a <= 1 of the contact ellipse for R'/R'' >= 1."""
+    from scipy.optimize import brentq
+
+    if ratio_of_radii == 1.0:
+        return 1.0
+    if ratio_of_radii > _ratio_of_radii(_FLATTEST):
+        raise ModelError(
+            f"the relative radii differ by a factor {ratio_of_radii:g}: that is a line contact, use hertz_line"
+        )
+    goal = math.log(ratio_of_radii)
+    return math.exp(
+        brentq(lambda x: math.log(_ratio_of_radii(math.exp(x))) - goal, math.log(_FLATTEST), 0.0, xtol=1e-15)
+    )
+
+
+def _solve(bodies: Bodies, R_x: float, R_y: float, name: str, value: float) -> HertzElliptical:
+    """Return the contact in which the quantity called `name` has the given value."""
+    from scipy.special import ellipkm1, elliprd
+
+    E_star, R_mean = bodies.E_star, math.sqrt(R_x * R_y)
+    k = _ratio_of_axes(max(R_x, R_y) / min(R_x, R_y))
+    integrals = math.sqrt(elliprd(0.0, 1.0, k**2) * elliprd(0.0, k**2, 1.0)) / 3.0
+    # Sizes for a unit force; then all grow with powers of the force.
+    mean = (0.75 * R_mean / E_star * 4.0 / math.pi * k**1.5 * integrals) ** (1.0 / 3.0)
+    pressure = 1.5 / (math.pi * mean**2)
+    approach = pressure * mean * math.sqrt(k) * float(ellipkm1(k**2)) / E_star
+    force = {
+        "force": lambda: value,
+        "approach": lambda: (value / approach) ** 1.5,
+        "pressure_max": lambda: (value / pressure) ** 3,
+    }[name]()
+    scale = force ** (1.0 / 3.0)
+    long, short = scale * mean / math.sqrt(k), scale * mean * math.sqrt(k)
+    derived = {"approach": approach * scale**2, "force": force, "pressure_max": pressure * scale}
+    axes = (long, short) if R_x >= R_y else (short, long)
+    return HertzElliptical(bodies, E_star, R_x, R_y, *axes, **{**derived, name: value})
+
+
+def hertz_elliptical(
+    *,
+    E1: float,
+    nu1: float,
+    R1x: float,
+    R1y: float,
+    E2: float | None = None,
+    nu2: float = 0.0,
+    R2x: float = math.inf,
+    R2y: float = math.inf,
+    force: float | None = None,
+    approach: float | None = None,
+    pressure_max: float | None = None,
+) -> HertzElliptical:
+    """Return the Hertz contact of two bodies whose principal curvatures are parallel (Johnson 1985, eqs 4.24-4.31).
+
+    Parameters
+    ----------
+    E1, E2 : float
+        Young's moduli; `E2` None makes the second body rigid [pressure].
+    nu1, nu2 : float
+        Poisson ratios in (-1, 0.5].
+    R1x, R1y, R2x, R2y : float
+        Principal radii of bodies 1 and 2 in the planes through x and y; infinity is straight [length].
+    force, approach, pressure_max : float
+        Exactly one of them.
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range, the bodies are straight in one direction (a line contact), or not exactly one
+        load quantity is given.
+
+    Examples
+    --------
+    Crossed cylinders of one radius touch as a sphere of that radius touches a plane:
+
+    >>> hertz = hertz_elliptical(E1=1e5, nu1=0.3, R1x=10.0, R1y=float("inf"), R2y=10.0, force=1e3)
+    >>> hertz.radius_x == hertz.radius_y
+    True
+    """
+    given = exactly_one(force=force, approach=approach, pressure_max=pressure_max)
+    R_x = effective_radius(R1x, R2x, ("R1x", "R2x"))
+    R_y = effective_radius(R1y, R2y, ("R1y", "R2y"))
+    return _solve(Bodies(E1, nu1, E2, nu2), R_x, R_y, *given)

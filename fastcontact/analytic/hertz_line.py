@@ -1,0 +1,195 @@
+"""Hertz contact of two parallel cylinders, or of a cylinder and a plane, per unit length."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastcontact.analytic import _half_plane
+from fastcontact.analytic._bodies import Bodies, effective_radius, plane_kinematics
+from fastcontact.analytic._checks import exactly_one, poisson
+from fastcontact.analytic._von_mises import VonMisesMaximum, von_mises
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class HertzLine:
+    """Frictionless contact of two parallel cylinders, formulas as in Johnson (1985), section 4.2(c).
+
+    Positions are x across the contact and y along the outward normal of the body asked for: each body is the half
+    plane y <= 0. Stresses come in the order xx, yy, zz, xy, tension positive. There is no `approach`: in the plane
+    it depends on the far shape of the bodies and how they are held.
+
+    Attributes
+    ----------
+    bodies : Bodies
+        Elastic constants.
+    kinematics : str
+        "plane_strain" or "plane_stress".
+    E_star : float
+        Contact modulus [pressure].
+    R_effective : float
+        1/R = 1/R1 + 1/R2 [length].
+    radius : float
+        Half-width b of the contact [length].
+    force : float
+        Force per unit length [force/length].
+    pressure_max : float
+        Pressure p0 at the centre [pressure].
+    """
+
+    bodies: Bodies
+    kinematics: str
+    E_star: float
+    R_effective: float
+    radius: float
+    force: float
+    pressure_max: float
+
+    @property
+    def half_width(self) -> float:
+        """Half-width b of the contact, another word for `radius` [length]."""
+        return self.radius
+
+    def at_force(self, force: float) -> HertzLine:
+        """Return the same contact under another force per unit length [force/length]."""
+        return _solve(self.bodies, self.kinematics, self.R_effective, *exactly_one(force=force))
+
+    def pressure(self, x: ArrayLike) -> Array:
+        """Return the contact pressure at positions `x`, zero outside (Johnson 1985, eq. 4.42) [pressure]."""
+        inside = 1.0 - (np.asarray(x, dtype=np.float64) / self.radius) ** 2
+        return self.pressure_max * np.sqrt(np.maximum(inside, 0.0))
+
+    def stress(self, x: ArrayLike, y: ArrayLike, nu: float | None = None) -> Array:
+        """Return the stresses (..., 4) at points of a body (McEwen 1949; Johnson 1985, eq. 4.49) [pressure].
+
+        Parameters
+        ----------
+        x, y : array_like
+            Position, y <= 0 in the body [length].
+        nu : float, optional
+            Poisson ratio; by default that of the first body. It matters for the component zz only.
+
+        Raises
+        ------
+        ModelError
+            If a point lies above the surface or `nu` is no Poisson ratio.
+        """
+        return _half_plane.stress(x, y, self.radius, self.pressure_max, self._nu(nu), self.kinematics)
+
+    def stress_on_axis(self, depth: ArrayLike, nu: float | None = None) -> Array:
+        """Return the stresses (..., 4) at depths >= 0 below the centre (Johnson 1985, eqs 4.46) [pressure]."""
+        return self.stress(np.zeros_like(np.asarray(depth, dtype=np.float64)), np.negative(depth), nu)
+
+    def surface_stress(self, x: ArrayLike, nu: float | None = None) -> Array:
+        """Return the stresses (..., 4) of the surface: xx = yy = -pressure (Johnson 1985, section 4.2c) [pressure]."""
+        return self.stress(x, np.zeros_like(np.asarray(x, dtype=np.float64)), nu)
+
+    def von_mises(self, x: ArrayLike, y: ArrayLike, nu: float | None = None) -> Array:
+        """Return the equivalent stress at points of a body [pressure]."""
+        return von_mises(self.stress(x, y, nu))
+
+    def displacement(self, x: ArrayLike, y: ArrayLike, *, body: int = 1) -> Array:
+        """Return the displacements (..., 2) of body 1 or 2, measured from the point (0, 0) [length].
+
+        The integral of McEwen's (1949) field; the displacement of a half plane has no value at infinity.
+
+        Raises
+        ------
+        ModelError
+            If the body is rigid or a point lies above the surface.
+        """
+        E, nu = self.bodies.constants(body)
+        return _half_plane.displacement(x, y, self.radius, self.pressure_max, E, nu, self.kinematics)
+
+    def surface_displacement(self, x: ArrayLike, *, body: int = 1) -> Array:
+        """Return the displacements (..., 2) of the surface, measured from the point (0, 0) [length]."""
+        return self.displacement(x, np.zeros_like(np.asarray(x, dtype=np.float64)), body=body)
+
+    def von_mises_maximum(self, nu: float | None = None) -> VonMisesMaximum:
+        """Return the largest equivalent stress on the axis and its depth.
+
+        On the axis at depth s b, with w = sqrt(1 + s^2) and e = 1 - 2 nu (e = 1 in plane stress), Johnson (1985),
+        eqs 4.46 give von Mises = p0 (w - s) sqrt(3 s^2/w^2 + e^2): either at the surface, or where
+        3 s = 3 s^2 w + e^2 w^3.
+        """
+        from scipy.optimize import brentq
+
+        e = 1.0 - 2.0 * self._nu(nu) if self.kinematics == "plane_strain" else 1.0
+
+        def rise(s: float) -> float:
+            w = math.hypot(1.0, s)
+            return 3.0 * s - 3.0 * s * s * w - e * e * w**3
+
+        s = float(brentq(rise, 0.4, 0.9, xtol=1e-15)) if rise(0.4) > 0.0 else 0.0
+        w = math.hypot(1.0, s)
+        below = (w - s) * math.sqrt(3.0 * (s / w) ** 2 + e * e)
+        if below <= abs(e):
+            return VonMisesMaximum(abs(e) * self.pressure_max, 0.0)
+        return VonMisesMaximum(below * self.pressure_max, s * self.radius)
+
+    def _nu(self, nu: float | None) -> float:
+        return self.bodies.nu1 if nu is None else poisson("nu", nu)
+
+
+def _solve(bodies: Bodies, kinematics: str, R: float, name: str, value: float) -> HertzLine:
+    """Return the contact in which the quantity called `name` has the given value."""
+    E_star = bodies.E_star if kinematics == "plane_strain" else bodies.E_star_plane_stress
+    radius = {
+        "force": lambda: 2.0 * math.sqrt(value * R / (math.pi * E_star)),
+        "radius": lambda: value,
+        "pressure_max": lambda: 2.0 * value * R / E_star,
+    }[name]()
+    derived = {
+        "radius": radius,
+        "force": 0.25 * math.pi * E_star * radius**2 / R,
+        "pressure_max": 0.5 * E_star * radius / R,
+    }
+    return HertzLine(bodies, kinematics, E_star, R, **{**derived, name: value})
+
+
+def hertz_line(
+    *,
+    E1: float,
+    nu1: float,
+    R1: float,
+    E2: float | None = None,
+    nu2: float = 0.0,
+    R2: float = math.inf,
+    force: float | None = None,
+    radius: float | None = None,
+    pressure_max: float | None = None,
+    kinematics: str = "plane_strain",
+) -> HertzLine:
+    """Return the Hertz contact of two parallel cylinders (Johnson 1985, eqs 4.43 to 4.45).
+
+    Parameters
+    ----------
+    E1, E2 : float
+        Young's moduli; `E2` None makes the second body rigid [pressure].
+    nu1, nu2 : float
+        Poisson ratios in (-1, 0.5].
+    R1, R2 : float
+        Radii; infinity is a plane [length].
+    force, radius, pressure_max : float
+        Exactly one of them; the force is per unit length, the radius is the half-width of the contact.
+    kinematics : str
+        "plane_strain" or "plane_stress" (thin discs).
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range, both radii are infinite, or not exactly one load quantity is given.
+
+    Examples
+    --------
+    >>> roller = hertz_line(E1=210_000.0, nu1=0.3, R1=50.0, E2=70_000.0, nu2=0.3, force=35_000.0)
+    >>> round(roller.half_width, 4), round(roller.pressure_max, 2)
+    (6.2146, 3585.36)
+    """
+    given = exactly_one(force=force, radius=radius, pressure_max=pressure_max)
+    return _solve(Bodies(E1, nu1, E2, nu2), plane_kinematics(kinematics), effective_radius(R1, R2), *given)

@@ -1,0 +1,186 @@
+"""Hertz contact of two spheres, or of a sphere and a plane."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastcontact.analytic import _half_space
+from fastcontact.analytic._bodies import Bodies, effective_radius
+from fastcontact.analytic._checks import exactly_one, poisson
+from fastcontact.analytic._von_mises import VonMisesMaximum, von_mises
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class HertzPoint:
+    """Frictionless contact of two spheres after Hertz (1881), formulas as in Johnson (1985), sections 3.4 and 4.2.
+
+    Positions are the distance r from the axis and the height z along the outward normal of the body asked for: each
+    body is the half space z <= 0. Stresses come in the order rr, zz, hoop, rz, tension positive.
+
+    Attributes
+    ----------
+    bodies : Bodies
+        Elastic constants.
+    E_star : float
+        Contact modulus [pressure].
+    R_effective : float
+        1/R = 1/R1 + 1/R2 [length].
+    radius : float
+        Contact radius a [length].
+    approach : float
+        Approach of distant points of the two bodies [length].
+    force : float
+        [force].
+    pressure_max : float
+        Pressure p0 at the centre [pressure].
+    """
+
+    bodies: Bodies
+    E_star: float
+    R_effective: float
+    radius: float
+    approach: float
+    force: float
+    pressure_max: float
+
+    def at_force(self, force: float) -> HertzPoint:
+        """Return the same contact under another force [force]."""
+        return _solve(self.bodies, self.R_effective, *exactly_one(force=force))
+
+    def at_approach(self, approach: float) -> HertzPoint:
+        """Return the same contact at another approach [length]."""
+        return _solve(self.bodies, self.R_effective, *exactly_one(approach=approach))
+
+    def pressure(self, r: ArrayLike) -> Array:
+        """Return the contact pressure at distances `r`, zero outside (Johnson 1985, eq. 3.39) [pressure]."""
+        inside = 1.0 - (np.asarray(r, dtype=np.float64) / self.radius) ** 2
+        return self.pressure_max * np.sqrt(np.maximum(inside, 0.0))
+
+    def stress(self, r: ArrayLike, z: ArrayLike, nu: float | None = None) -> Array:
+        """Return the stresses (..., 4) at points of a body (Huber 1904) [pressure].
+
+        Parameters
+        ----------
+        r, z : array_like
+            Distance from the axis and height, z <= 0 in the body [length].
+        nu : float, optional
+            Poisson ratio; by default that of the first body.
+
+        Raises
+        ------
+        ModelError
+            If a point lies above the surface or `nu` is no Poisson ratio.
+        """
+        return _half_space.stress(r, z, self.radius, self.pressure_max, self._nu(nu))
+
+    def stress_on_axis(self, depth: ArrayLike, nu: float | None = None) -> Array:
+        """Return the stresses (..., 4) at depths >= 0 below the centre (Johnson 1985, eq. 3.45) [pressure]."""
+        return self.stress(np.zeros_like(np.asarray(depth, dtype=np.float64)), np.negative(depth), nu)
+
+    def surface_stress(self, r: ArrayLike, nu: float | None = None) -> Array:
+        """Return the stresses (..., 4) of the surface (Johnson 1985, eqs 3.43 and 3.44) [pressure]."""
+        return self.stress(r, np.zeros_like(np.asarray(r, dtype=np.float64)), nu)
+
+    def von_mises(self, r: ArrayLike, z: ArrayLike, nu: float | None = None) -> Array:
+        """Return the equivalent stress at points of a body [pressure]."""
+        return von_mises(self.stress(r, z, nu))
+
+    def displacement(self, r: ArrayLike, z: ArrayLike, *, body: int = 1) -> Array:
+        """Return the displacements (..., 2) radial and along z of body 1 or 2, zero at infinity [length].
+
+        Boussinesq's potentials of the pressure, see Johnson (1985), eqs 3.2 to 3.6.
+
+        Raises
+        ------
+        ModelError
+            If the body is rigid or a point lies above the surface.
+        """
+        return _half_space.displacement(r, z, self.radius, self.pressure_max, *self.bodies.constants(body))
+
+    def surface_displacement(self, r: ArrayLike, *, body: int = 1) -> Array:
+        """Return the displacements (..., 2) of the surface (Johnson 1985, eqs 3.41 and 3.42) [length]."""
+        return self.displacement(r, np.zeros_like(np.asarray(r, dtype=np.float64)), body=body)
+
+    def von_mises_maximum(self, nu: float | None = None) -> VonMisesMaximum:
+        """Return the largest equivalent stress on the axis and its depth.
+
+        The stationary point of |rr - zz| of Johnson (1985), eq. 3.45, found to rounding. For nu >= -0.3 it is the
+        largest anywhere in the body; with a Poisson ratio below that the edge of the contact is stressed more.
+        """
+        from scipy.optimize import brentq
+
+        ratio = self._nu(nu)
+
+        def slope(s: float) -> float:
+            return (1.0 + ratio) * (math.atan2(1.0, s) - s / (1.0 + s * s)) - 3.0 * s / (1.0 + s * s) ** 2
+
+        depth = float(brentq(slope, 0.0, 10.0, xtol=1e-15)) * self.radius
+        return VonMisesMaximum(float(self.von_mises(0.0, -depth, ratio)), depth)
+
+    def _nu(self, nu: float | None) -> float:
+        return self.bodies.nu1 if nu is None else poisson("nu", nu)
+
+
+def _solve(bodies: Bodies, R: float, name: str, value: float) -> HertzPoint:
+    """Return the contact in which the quantity called `name` has the given value."""
+    E_star = bodies.E_star
+    radius = {
+        "force": lambda: (0.75 * value * R / E_star) ** (1.0 / 3.0),
+        "approach": lambda: math.sqrt(value * R),
+        "radius": lambda: value,
+        "pressure_max": lambda: 0.5 * math.pi * value * R / E_star,
+    }[name]()
+    derived = {
+        "radius": radius,
+        "approach": radius**2 / R,
+        "force": 4.0 / 3.0 * E_star * radius**3 / R,
+        "pressure_max": 2.0 * E_star * radius / (math.pi * R),
+    }
+    return HertzPoint(bodies, E_star, R, **{**derived, name: value})
+
+
+def hertz_point(
+    *,
+    E1: float,
+    nu1: float,
+    R1: float,
+    E2: float | None = None,
+    nu2: float = 0.0,
+    R2: float = math.inf,
+    force: float | None = None,
+    approach: float | None = None,
+    radius: float | None = None,
+    pressure_max: float | None = None,
+) -> HertzPoint:
+    """Return the Hertz contact of two spheres at a given load (Hertz 1881; Johnson 1985, eqs 4.22 to 4.24).
+
+    Parameters
+    ----------
+    E1, E2 : float
+        Young's moduli; `E2` None makes the second body rigid [pressure].
+    nu1, nu2 : float
+        Poisson ratios in (-1, 0.5].
+    R1, R2 : float
+        Radii; infinity is a plane [length].
+    force, approach, radius, pressure_max : float
+        Exactly one of them.
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range, both radii are infinite, or not exactly one load quantity is given.
+
+    Examples
+    --------
+    >>> hertz = hertz_point(E1=20_000.0, nu1=0.3, R1=50.0, E2=20_000.0, nu2=0.3, R2=50.0, approach=4.0)
+    >>> round(hertz.pressure_max, 4), hertz.radius
+    (2798.3287, 10.0)
+    """
+    given = exactly_one(force=force, approach=approach, radius=radius, pressure_max=pressure_max)
+    return _solve(Bodies(E1, nu1, E2, nu2), effective_radius(R1, R2), *given)

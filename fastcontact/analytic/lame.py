@@ -1,0 +1,159 @@
+"""Thick cylinders and hollow spheres under pressure (Lame 1852)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastcontact.analytic._bodies import plane_kinematics
+from fastcontact.analytic._checks import not_negative, number, poisson, positive
+from fastcontact.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LameShell:
+    """A thick cylinder or a hollow sphere under pressure on its bore and its rim.
+
+    With m = 2 (cylinder) or 3 (sphere) the stresses are C - (m - 1) D/r^m radial and C + D/r^m hoop (Lame 1852;
+    Timoshenko and Goodier 1970, articles 28 and 136).
+
+    Attributes
+    ----------
+    inner_radius, outer_radius : float
+        Radius of the bore (0 if solid) and of the rim [length].
+    inner_pressure, outer_pressure : float
+        Pressures on them [pressure].
+    E, nu : float
+        Material [pressure], [-].
+    kinematics : str
+        "plane_strain", "plane_stress" or "sphere". A cylinder with free ends and no friction is in plane stress.
+    """
+
+    inner_radius: float
+    outer_radius: float
+    inner_pressure: float
+    outer_pressure: float
+    E: float
+    nu: float
+    kinematics: str
+
+    def __post_init__(self) -> None:
+        not_negative("inner_radius", self.inner_radius)
+        positive("outer_radius", self.outer_radius)
+        if self.inner_radius >= self.outer_radius:
+            raise ModelError(
+                f"outer_radius is {self.outer_radius:g}: it must be larger than inner_radius {self.inner_radius:g}"
+            )
+        number("inner_pressure", self.inner_pressure)
+        number("outer_pressure", self.outer_pressure)
+        positive("E", self.E)
+        poisson("nu", self.nu)
+        if self.inner_radius == 0.0 and self.inner_pressure != 0.0:
+            raise ModelError("inner_pressure must be 0 for a solid body (inner_radius 0): there is no bore to press on")
+
+    def displacement(self, r: ArrayLike) -> Array:
+        """Return the radial displacement at radii `r`: r times the hoop strain [length].
+
+        Raises
+        ------
+        ModelError
+            If a radius lies outside the body.
+        """
+        radii, _, uniform, varying = self._fields(r)
+        bulk = {
+            "plane_strain": (1.0 + self.nu) * (1.0 - 2.0 * self.nu),
+            "plane_stress": 1.0 - self.nu,
+            "sphere": 1.0 - 2.0 * self.nu,
+        }[self.kinematics]
+        return radii * (bulk * uniform + (1.0 + self.nu) * varying) / self.E
+
+    def radial_stress(self, r: ArrayLike) -> Array:
+        """Return the radial stress at radii `r` [pressure]; errors as for `displacement`."""
+        _, m, uniform, varying = self._fields(r)
+        return uniform - (m - 1) * varying
+
+    def hoop_stress(self, r: ArrayLike) -> Array:
+        """Return the hoop stress at radii `r` [pressure]; errors as for `displacement`."""
+        _, _, uniform, varying = self._fields(r)
+        return uniform + varying
+
+    def axial_stress(self, r: ArrayLike) -> Array:
+        """Return the stress along the axis of a cylinder at radii `r` [pressure].
+
+        Raises
+        ------
+        ModelError
+            For a sphere, which has no axis, or if a radius lies outside the body.
+        """
+        if self.kinematics == "sphere":
+            raise ModelError("a sphere has no axial stress: ask for radial_stress or hoop_stress")
+        radii, _, uniform, _ = self._fields(r)
+        strength = 2.0 * self.nu * uniform if self.kinematics == "plane_strain" else 0.0
+        return np.full(radii.shape, strength)
+
+    def _fields(self, r: ArrayLike) -> tuple[Array, int, float, Array]:
+        """Return radii, m, C and D/r^m."""
+        radii = np.asarray(r, dtype=np.float64)
+        slack = 1e-9 * self.outer_radius  # mesh coordinates are rounded
+        wrong = (radii < self.inner_radius - slack) | (radii > self.outer_radius + slack)
+        if wrong.any():
+            raise ModelError(
+                f"r = {radii[wrong].flat[0]:g} lies outside the body: its radii run from {self.inner_radius:g} to "
+                f"{self.outer_radius:g}"
+            )
+        m = 3 if self.kinematics == "sphere" else 2
+        if self.inner_radius == 0.0:
+            return radii, m, -self.outer_pressure, np.zeros_like(radii)
+        bore, rim = self.inner_radius**m, self.outer_radius**m
+        uniform = (self.inner_pressure * bore - self.outer_pressure * rim) / (rim - bore)
+        varying = (self.inner_pressure - self.outer_pressure) * bore / ((m - 1) * (rim - bore))
+        return radii, m, uniform, varying * rim / radii**m
+
+
+def thick_cylinder(
+    *,
+    E: float,
+    nu: float,
+    inner_radius: float,
+    outer_radius: float,
+    inner_pressure: float = 0.0,
+    outer_pressure: float = 0.0,
+    kinematics: str = "plane_strain",
+) -> LameShell:
+    """Return a thick cylinder under pressure (Lame 1852).
+
+    Parameters
+    ----------
+    E, nu : float
+        Material [pressure], [-].
+    inner_radius, outer_radius : float
+        Radii; `inner_radius` 0 is a solid cylinder [length].
+    inner_pressure, outer_pressure : float
+        Pressures on the bore and the rim [pressure].
+    kinematics : str
+        "plane_strain" or "plane_stress".
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range.
+    """
+    plane_kinematics(kinematics)
+    return LameShell(inner_radius, outer_radius, inner_pressure, outer_pressure, E, nu, kinematics)
+
+
+def thick_sphere(
+    *,
+    E: float,
+    nu: float,
+    inner_radius: float,
+    outer_radius: float,
+    inner_pressure: float = 0.0,
+    outer_pressure: float = 0.0,
+) -> LameShell:
+    """Return a hollow sphere under pressure (Lame 1852); parameters and errors as for `thick_cylinder`."""
+    return LameShell(inner_radius, outer_radius, inner_pressure, outer_pressure, E, nu, "sphere")

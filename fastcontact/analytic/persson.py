@@ -1,0 +1,137 @@
+"""Pin in the hole of an infinite plate of the same material, with clearance: a conforming contact (Persson 1964)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastcontact.analytic._bodies import plane_kinematics
+from fastcontact.analytic._checks import exactly_one, not_negative, poisson, positive
+from fastcontact.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PerssonPin:
+    """Frictionless contact of a pin and a hole (Persson 1964; Ciavarella and Decuzzi 2001).
+
+    Attributes
+    ----------
+    R : float
+        Radius of the hole [length].
+    clearance : float
+        Radius of the hole less that of the pin [length].
+    force : float
+        Force per unit length [force/length].
+    contact_angle : float
+        Half the angle of the contact [degrees].
+    """
+
+    R: float
+    clearance: float
+    force: float
+    contact_angle: float
+
+    @property
+    def radius(self) -> float:
+        """Half the length of the contact along the arc [length]."""
+        return self.R * math.radians(self.contact_angle)
+
+    @property
+    def pressure_max(self) -> float:
+        """Pressure at the middle [pressure]."""
+        return float(self.pressure(0.0))
+
+    def pressure(self, angle: ArrayLike) -> Array:
+        """Return the contact pressure at angles from the middle in degrees, zero outside [pressure].
+
+        Persson (1964); Ciavarella and Decuzzi (2001), for like materials.
+        """
+        b = _half_tangent(self.contact_angle)
+        y = np.tan(0.5 * np.radians(np.asarray(angle, dtype=np.float64)))
+        root, hypotenuse = np.sqrt(np.maximum(b**2 - y**2, 0.0)), math.hypot(1.0, b)
+        first = 2.0 / math.pi * root / (hypotenuse * (1.0 + y**2))
+        second = np.arctanh(root / hypotenuse) / (math.pi * b**2 * (1.0 + b**2))
+        return self.force / self.R * (first + second)
+
+
+def _half_tangent(angle: float) -> float:
+    return math.tan(0.5 * math.radians(angle))
+
+
+def _clearance_ratio(angle: float) -> float:
+    """Return E dR/Q of a contact angle (Persson 1964); the integral by the trapezium rule, exact for a period."""
+    b = _half_tangent(angle)
+    theta = (np.arange(256) + 0.5) * math.pi / 256 - 0.5 * math.pi
+    integrand = 2.0 * np.arctanh(b * np.cos(theta) / math.hypot(1.0, b)) / (1.0 + (b * np.sin(theta)) ** 2)
+    integral = float((integrand * np.cos(theta)).mean()) * math.pi * b
+    return 2.0 / math.pi * (1.0 - b**2) / b**2 - integral / (math.pi**2 * (1.0 + b**2) * b**2)
+
+
+def persson_limit_angle() -> float:
+    """Return half the contact angle of a pin without clearance under any force, the largest there is [degrees]."""
+    from scipy.optimize import brentq
+
+    return float(brentq(_clearance_ratio, 60.0, 89.0, xtol=1e-13))
+
+
+def persson_pin(
+    *,
+    E: float,
+    R: float,
+    clearance: float,
+    nu: float = 0.0,
+    force: float | None = None,
+    contact_angle: float | None = None,
+    kinematics: str = "plane_stress",
+) -> PerssonPin:
+    """Return the contact of a pin with the hole of an infinite plate of the same material (Persson 1964).
+
+    Parameters
+    ----------
+    E, nu : float
+        Material of both [pressure], [-]; in plane stress `nu` does not matter.
+    R : float
+        Radius of the hole [length].
+    clearance : float
+        Radius of the hole less that of the pin, >= 0 [length].
+    force, contact_angle : float
+        Exactly one of them: force per unit length [force/length], or half the contact angle [degrees].
+    kinematics : str
+        "plane_stress" or "plane_strain".
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range; if `contact_angle` exceeds what a pin with clearance can reach, or is given
+        without clearance, when any force gives the same angle.
+    """
+    from scipy.optimize import brentq
+
+    modulus = positive("E", E)
+    if plane_kinematics(kinematics) == "plane_strain":
+        modulus /= 1.0 - poisson("nu", nu) ** 2
+    R, gap = positive("R", R), not_negative("clearance", clearance)
+    name, value = exactly_one(force=force, contact_angle=contact_angle)
+    limit = persson_limit_angle()
+    if name == "contact_angle":
+        if gap == 0.0:
+            raise ModelError("contact_angle cannot be given without clearance: any force gives the same angle")
+        if value >= limit:
+            raise ModelError(f"contact_angle is {value:g}: with clearance it stays below {limit:.4f} degrees")
+        return PerssonPin(R, gap, modulus * gap / _clearance_ratio(value), value)
+    if gap == 0.0:
+        return PerssonPin(R, gap, value, limit)
+    goal = modulus * gap / value
+    # The angle of Hertz's line contact bounds the root from below to within a small factor.
+    start = min(0.5 * limit, 0.5 * math.degrees(math.sqrt(8.0 / (math.pi * goal))))
+    angle = float(brentq(lambda e: math.log(_positive_ratio(e) / goal), start, limit - 1e-12, xtol=1e-13))
+    return PerssonPin(R, gap, value, angle)
+
+
+def _positive_ratio(angle: float) -> float:
+    return max(_clearance_ratio(angle), 1e-300)

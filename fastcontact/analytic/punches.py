@@ -1,0 +1,307 @@
+"""Rigid axisymmetric punches pressed without friction into an elastic half space: flat, cone, paraboloid, any power."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastcontact.analytic._checks import exactly_one, number, poisson, positive
+from fastcontact.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FlatPunch:
+    """Flat-ended rigid cylinder on a half space (Boussinesq 1885; Sneddon 1946; Johnson 1985, section 3.4).
+
+    Attributes
+    ----------
+    E_star : float
+        E/(1 - nu^2) of the half space [pressure].
+    radius : float
+        Radius of the punch [length].
+    approach : float
+        Indentation [length].
+    force : float
+        [force].
+    bonded : bool
+        The punch sticks to the half space.
+    """
+
+    E_star: float
+    radius: float
+    approach: float
+    force: float
+    bonded: bool = False
+
+    @property
+    def stiffness(self) -> float:
+        """Force over indentation, a constant [force/length]."""
+        return self.force / self.approach
+
+    def pressure(self, r: ArrayLike) -> Array:
+        """Return F/(2 pi a sqrt(a^2 - r^2)), infinite at the edge, zero outside (Johnson 1985, eq. 3.34) [pressure].
+
+        Raises
+        ------
+        ModelError
+            If the punch is bonded: its pressure has no such form.
+        """
+        self._frictionless("pressure")
+        inside = self.radius**2 - np.asarray(r, dtype=np.float64) ** 2
+        with np.errstate(divide="ignore"):
+            value = self.force / (2.0 * math.pi * self.radius * np.sqrt(np.maximum(inside, 0.0)))
+        return np.where(inside < 0.0, 0.0, value)
+
+    def normal_displacement(self, r: ArrayLike) -> Array:
+        """Return the displacement of the surface along its outward normal, <= 0 (Johnson 1985, eq. 3.38) [length].
+
+        Raises
+        ------
+        ModelError
+            If the punch is bonded.
+        """
+        self._frictionless("normal displacement")
+        ratio = self.radius / np.maximum(np.abs(np.asarray(r, dtype=np.float64)), self.radius)
+        return -2.0 * self.approach / math.pi * np.arcsin(ratio)
+
+    def _frictionless(self, what: str) -> None:
+        if self.bonded:
+            raise ModelError(f"a bonded flat punch has no closed form for its {what}: use bonded=False")
+
+
+@dataclass(frozen=True)
+class PowerLawPunch:
+    """Rigid punch of the profile A r^n on a half space (Galin 1946; Sneddon 1965).
+
+    n = 1 is a cone, n = 2 a paraboloid; the flat punch is the limit of large n.
+
+    Attributes
+    ----------
+    E_star : float
+        E/(1 - nu^2) of the half space [pressure].
+    coefficient : float
+        A [length^(1 - n)].
+    exponent : float
+        n.
+    radius : float
+        Contact radius a [length].
+    approach : float
+        Indentation of the tip [length].
+    force : float
+        [force].
+    """
+
+    E_star: float
+    coefficient: float
+    exponent: float
+    radius: float
+    approach: float
+    force: float
+
+    @property
+    def pressure_max(self) -> float:
+        """Pressure at the tip; infinite for a cone [pressure]."""
+        return float(self.pressure(0.0)) if self.exponent > 1.0 else math.inf
+
+    def at_force(self, force: float) -> PowerLawPunch:
+        """Return the same contact under another force [force]."""
+        return _solve(self.E_star, self.coefficient, self.exponent, *exactly_one(force=force))
+
+    def at_approach(self, approach: float) -> PowerLawPunch:
+        """Return the same contact at another indentation [length]."""
+        return _solve(self.E_star, self.coefficient, self.exponent, *exactly_one(approach=approach))
+
+    def pressure(self, r: ArrayLike) -> Array:
+        """Return the contact pressure at distances `r`, zero outside [pressure].
+
+        With k = delta/(A a^n), the integral E*/pi int_r^a k n A x^(n-1)/sqrt(x^2 - r^2) dx (Sneddon 1965, eq. 4.8)
+        is E* k n A a^(n-2) sqrt(a^2 - r^2)/pi 2F1(1 - n/2, 1; 3/2; 1 - r^2/a^2).
+        """
+        from scipy.special import hyp2f1
+
+        n, a = self.exponent, self.radius
+        inside = np.maximum(1.0 - (np.asarray(r, dtype=np.float64) / a) ** 2, 0.0)
+        scale = self.E_star * self.approach * n / (math.pi * a)
+        shape = np.sqrt(inside) * hyp2f1(1.0 - 0.5 * n, 1.0, 1.5, inside)
+        return scale * np.where((inside == 1.0) & (n <= 1.0), math.inf, shape)
+
+    def normal_displacement(self, r: ArrayLike) -> Array:
+        """Return the displacement of the surface along its outward normal, <= 0 (Sneddon 1965, eq. 4.7) [length]."""
+        from scipy.special import hyp2f1
+
+        n, a = self.exponent, self.radius
+        distance = np.abs(np.asarray(r, dtype=np.float64))
+        ratio = a / np.maximum(distance, a)
+        profile = ratio / (n + 1.0) * hyp2f1(0.5, 0.5 * (n + 1.0), 0.5 * (n + 3.0), ratio**2)
+        outside = 2.0 * self.approach / math.pi * (np.arcsin(ratio) - profile)
+        inside = self.approach - self.coefficient * distance**n
+        return -np.where(distance <= a, inside, outside)
+
+
+def _depth_factor(n: float) -> float:
+    """Return delta/(A a^n) = sqrt(pi) Gamma(n/2 + 1)/Gamma(n/2 + 1/2) (Sneddon 1965, eq. 6.2)."""
+    return math.sqrt(math.pi) * math.exp(math.lgamma(0.5 * n + 1.0) - math.lgamma(0.5 * n + 0.5))
+
+
+def _solve(E_star: float, A: float, n: float, name: str, value: float) -> PowerLawPunch:
+    """Return the contact in which the quantity called `name` has the given value."""
+    slope = A * _depth_factor(n)  # approach = slope * radius^n
+    strength = 2.0 * E_star * slope * n / (n + 1.0)  # force = strength * radius^(n + 1)
+    radius = {
+        "force": lambda: (value / strength) ** (1.0 / (n + 1.0)),
+        "approach": lambda: (value / slope) ** (1.0 / n),
+        "radius": lambda: value,
+    }[name]()
+    derived = {"radius": radius, "approach": slope * radius**n, "force": strength * radius ** (n + 1.0)}
+    return PowerLawPunch(E_star, A, n, **{**derived, name: value})
+
+
+def _modulus(E: float, nu: float) -> float:
+    return positive("E", E) / (1.0 - poisson("nu", nu) ** 2)
+
+
+def bonded_stiffness_ratio(nu: float) -> float:
+    """Return how much stiffer a bonded flat punch is than a frictionless one, (1 - nu) ln(3 - 4 nu)/(1 - 2 nu).
+
+    Mossakovskii (1954); Spence (1968). The ratio is 1 for nu = 0.5.
+
+    Raises
+    ------
+    ModelError
+        If `nu` is no Poisson ratio.
+    """
+    compressibility = 1.0 - 2.0 * poisson("nu", nu)
+    if compressibility == 0.0:
+        return 1.0
+    return 0.5 * (1.0 + compressibility) * math.log1p(2.0 * compressibility) / compressibility
+
+
+def flat_punch(
+    *,
+    E: float,
+    nu: float,
+    radius: float,
+    force: float | None = None,
+    approach: float | None = None,
+    bonded: bool = False,
+) -> FlatPunch:
+    """Return the contact of a flat rigid cylinder with a half space, F = 2 E* a delta (Johnson 1985, eq. 3.36).
+
+    Parameters
+    ----------
+    E, nu : float
+        Half space [pressure], [-].
+    radius : float
+        Radius of the punch [length].
+    force, approach : float
+        Exactly one of them.
+    bonded : bool
+        The punch sticks; the force is larger by `bonded_stiffness_ratio`.
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range or not exactly one load quantity is given.
+    """
+    name, value = exactly_one(force=force, approach=approach)
+    E_star, a = _modulus(E, nu), positive("radius", radius)
+    stiffness = 2.0 * E_star * a * (bonded_stiffness_ratio(nu) if bonded else 1.0)
+    if name == "force":
+        return FlatPunch(E_star, a, value / stiffness, value, bonded)
+    return FlatPunch(E_star, a, value, stiffness * value, bonded)
+
+
+def power_law_punch(
+    *,
+    E: float,
+    nu: float,
+    coefficient: float,
+    exponent: float,
+    force: float | None = None,
+    approach: float | None = None,
+    radius: float | None = None,
+) -> PowerLawPunch:
+    """Return the contact of a rigid punch A r^n with a half space (Galin 1946; Sneddon 1965).
+
+    Parameters
+    ----------
+    E, nu : float
+        Half space [pressure], [-].
+    coefficient, exponent : float
+        A > 0 [length^(1 - n)] and n > 0.
+    force, approach, radius : float
+        Exactly one of them.
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range or not exactly one load quantity is given.
+    """
+    given = exactly_one(force=force, approach=approach, radius=radius)
+    return _solve(_modulus(E, nu), positive("coefficient", coefficient), positive("exponent", exponent), *given)
+
+
+def cone_punch(
+    *,
+    E: float,
+    nu: float,
+    slope_angle: float,
+    force: float | None = None,
+    approach: float | None = None,
+    radius: float | None = None,
+) -> PowerLawPunch:
+    """Return the contact of a rigid cone with a half space (Love 1939; Sneddon 1965).
+
+    Parameters
+    ----------
+    E, nu : float
+        Half space [pressure], [-].
+    slope_angle : float
+        Angle between the cone's side and the surface, in (0, 90) degrees; the formula is linear, so it should be small.
+    force, approach, radius : float
+        Exactly one of them.
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range or not exactly one load quantity is given.
+    """
+    angle = number("slope_angle", slope_angle)
+    if not 0.0 < angle < 90.0:
+        raise ModelError(f"slope_angle is {angle:g}: it must lie between 0 and 90 degrees")
+    given = exactly_one(force=force, approach=approach, radius=radius)
+    return _solve(_modulus(E, nu), math.tan(math.radians(angle)), 1.0, *given)
+
+
+def paraboloid_punch(
+    *,
+    E: float,
+    nu: float,
+    R: float,
+    force: float | None = None,
+    approach: float | None = None,
+    radius: float | None = None,
+) -> PowerLawPunch:
+    """Return the contact of a rigid paraboloid r^2/(2 R) with a half space: Hertz's (Sneddon 1965).
+
+    Parameters
+    ----------
+    E, nu : float
+        Half space [pressure], [-].
+    R : float
+        Radius of curvature [length].
+    force, approach, radius : float
+        Exactly one of them.
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range or not exactly one load quantity is given.
+    """
+    given = exactly_one(force=force, approach=approach, radius=radius)
+    return _solve(_modulus(E, nu), 0.5 / positive("R", R), 2.0, *given)

@@ -1,0 +1,117 @@
+"""Stiffness matrix: its sparsity once, its values as often as needed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import bsr_array
+
+from fastcontact import elements
+from fastcontact.errors import MeshError
+from fastcontact.kernels import pattern as pattern_kernels
+from fastcontact.kernels import solid2d
+from fastcontact.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Sparsity:
+    """Which node pairs share a cell.
+
+    Attributes
+    ----------
+    indptr, indices : ndarray of int32
+        Node-block rows and columns, sorted.
+    slots : dict of str to ndarray (n_cells, n_nodes, n_nodes)
+        By solid element: position in `indices` of every node pair of every cell.
+    """
+
+    indptr: NDArray[np.int32]
+    indices: NDArray[np.int32]
+    slots: dict[str, NDArray[np.int32]]
+
+
+def sparsity(mesh: Mesh) -> Sparsity:
+    """Return the sparsity of the stiffness matrix of `mesh`."""
+    blocks = mesh.solids
+    sizes = np.concatenate([[0], *(np.full(len(b), b.shape[1]) for b in blocks.values())])
+    start = np.cumsum(sizes, dtype=np.int64)
+    nodes = np.concatenate([np.empty(0, np.int32), *(b.ravel() for b in blocks.values())])
+    first, cells = pattern_kernels.cells_at_nodes(start, nodes, mesh.n_points)
+    indptr, indices = pattern_kernels.neighbours(start, nodes, first, cells)
+    slots = {name: pattern_kernels.slots_of(block, indptr, indices) for name, block in blocks.items()}
+    return Sparsity(indptr, indices, slots)
+
+
+def stiffness(
+    mesh: Mesh,
+    kinematics: str,
+    moduli: Array,
+    material: dict[str, NDArray[np.int32]],
+    pattern: Sparsity | None = None,
+) -> bsr_array:
+    """Assemble the stiffness matrix of the solid cells.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    kinematics : str
+        ``"axisymmetric"`` (forces over the full circle), ``"plane_strain"`` or ``"plane_stress"`` (unit thickness).
+    moduli : ndarray (n_materials, 4, 4)
+        [pressure].
+    material : dict of str to ndarray of int (n_cells,)
+        By solid element: material number of each cell.
+    pattern : Sparsity, optional
+        From `sparsity`, to reuse it.
+
+    Returns
+    -------
+    bsr_array (n_points * dim, n_points * dim)
+        Symmetric, blocks of dim x dim [force / length].
+
+    Raises
+    ------
+    MeshError
+        If a cell is degenerate or turned inside out.
+    """
+    pattern = pattern or sparsity(mesh)
+    data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))
+    for name, block in mesh.solids.items():
+        N, dN, weights = elements.get(name).tables
+        bad = solid2d.add_stiffness(
+            mesh.points, block, N, dN, weights, moduli, material[name], kinematics == "axisymmetric",
+            pattern.slots[name], data,
+        )  # fmt: skip
+        if bad >= 0:
+            where = mesh.points[block[bad]].mean(axis=0)
+            raise MeshError(f"cell {bad} of {name} near {where} is degenerate or inside out: its Jacobian is not positive")
+    size = mesh.n_points * mesh.dim
+    return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
+
+
+def rigid_modes(points: Array, kinematics: str) -> Array:
+    """Return the rigid-body modes (n_points * dim, n_modes) as displacements of all points.
+
+    Columns: axisymmetric, the translation along the axis; plane, two translations and the rotation; 3D, three
+    translations and three rotations. Rotations turn about the mean point.
+    """
+    n, dim = points.shape
+    if kinematics == "axisymmetric":
+        modes = np.zeros((n, 2, 1))
+        modes[:, 1, 0] = 1.0
+        return modes.reshape(-1, 1)
+    x = points - points.mean(axis=0)
+    if dim == 2:
+        modes = np.zeros((n, 2, 3))
+        modes[:, 0, 0] = modes[:, 1, 1] = 1.0
+        modes[:, 0, 2], modes[:, 1, 2] = -x[:, 1], x[:, 0]
+        return modes.reshape(2 * n, 3)
+    modes = np.zeros((n, 3, 6))
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        modes[:, k, k] = 1.0
+        modes[:, i, 3 + k], modes[:, j, 3 + k] = -x[:, j], x[:, i]
+    return modes.reshape(3 * n, 6)

@@ -1,0 +1,1 @@
+"""Contact: surfaces, pairing, constraints and the formulations that join them."""

@@ -1,0 +1,82 @@
+"""What a contact formulation is: constraints from a configuration, nodal pressures from multipliers."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.pairing import Candidates, gap_rows, pair
+from fastcontact.contact.surface import Surface
+from fastcontact.errors import ContactError, unknown
+
+Array = NDArray[np.float64]
+NORMALS = ("facet", "averaged")
+
+
+@dataclass(eq=False)
+class Formulation(ABC):
+    """A contact formulation bound to one pair of surfaces.
+
+    Sub-classes are dataclasses; their further fields are the options that a user may set by name.
+
+    Parameters
+    ----------
+    secondary, primary : Surface
+    points : ndarray (n_points, dim)
+        Reference coordinates [length].
+    axisymmetric : bool
+        Integrals run over the full circle.
+    modulus : float
+        Typical stiffness of the bodies, E / (1 - nu^2) [pressure].
+    projection_tolerance : float
+        How far a point may stand out beyond the end of its facet and still be paired, in facet lengths.
+    normals : str
+        ``"facet"``: of the primary facet at the projection; ``"averaged"``: interpolated between nodal means.
+    """
+
+    secondary: Surface
+    primary: Surface
+    points: Array
+    axisymmetric: bool
+    modulus: float
+
+    projection_tolerance: float = 0.5
+    normals: str = "facet"
+
+    name: ClassVar[str]
+    # Re-pair after every active-set iteration (True), or after the active set has settled (False).
+    geometry_in_loop: ClassVar[bool]
+
+    def __post_init__(self) -> None:
+        if self.normals not in NORMALS:
+            raise ContactError(unknown("kind of normals", self.normals, NORMALS))
+        if not self.projection_tolerance >= 0:
+            raise ContactError(f"projection_tolerance = {self.projection_tolerance} must not be negative")
+
+    @abstractmethod
+    def constraints(self, displacement: Array) -> Constraints:
+        """Pair on the configuration displaced by `displacement` (n_points, dim) and return the constraints."""
+
+    @abstractmethod
+    def pressure(self, multiplier: Array) -> Array:
+        """Return nodal pressures (n_nodes,) per reference area from the multipliers (m,) [pressure]."""
+
+    @abstractmethod
+    def closed_nodes(self, active: NDArray[np.bool_], gap: Array, pressure: Array) -> NDArray[np.bool_]:
+        """Return which secondary nodes are in contact, from the active constraints and the nodal gap and pressure."""
+
+    def nodal_gap(self, displacement: Array) -> tuple[Array, Array]:
+        """Return the gap (n_nodes,) of the secondary nodes in the displaced configuration, and the normals faced.
+
+        Infinite where a node faces no primary facet.
+        """
+        nodes = Candidates(self.secondary.points[:, None], np.ones((len(self.secondary.points), 1)))
+        deformed = self.points + displacement
+        pairing = pair(nodes.positions(deformed), self.primary, deformed, self.projection_tolerance, self.normals)
+        G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
+        return np.where(pairing.paired, gap0 + G @ displacement.ravel(), np.inf), pairing.normal

@@ -1,0 +1,197 @@
+r"""Continuous contact: a pressure field on the secondary facets, contact decided at integration points.
+
+The multiplier field :math:`\lambda_h` has the order of the facets. At every integration point the pressure is
+
+.. math:: p = [\lambda_h - \rho g]_+
+
+and the field is its projection, :math:`\int (\lambda_h - p) N_j = 0` for every node j (Alart and Curnier, 1991; with
+integration points, Ben Dhia and Zarroug, 2002; code_aster, R5.03.52). Both are the stationarity of one augmented
+Lagrangian. With the point forces :math:`y = w p` as unknowns it becomes a linear complementarity problem
+
+.. math:: y \ge 0, \quad g + C y \ge 0, \quad y^T (g + C y) = 0, \quad
+          C = \tfrac{1}{\rho} \left( W^{-1} - P (P^T W P)^{-1} P^T \right)
+
+with P the shape functions at the points and W their areas. C is positive semidefinite and vanishes on the fields that
+the shape functions can represent, so the multiplier itself is not softened; it only decides what is finer than the
+field. The primal-dual active set solves this exactly (as a semismooth Newton method), for every rho > 0, with the
+pairing renewed in every iteration. No multiplier can stay undetermined as long as :math:`P^T W P` is regular: that
+takes at least as many points with a weight on a facet as it has nodes, and is checked. Integrals run over the reference
+surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array, diags_array, eye_array
+from scipy.sparse.linalg import SuperLU, splu
+
+from fastcontact import elements, quadrature
+from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.formulations._formulation import Formulation
+from fastcontact.contact.integration import facet_measure
+from fastcontact.contact.pairing import Candidates, gap_rows, pair
+from fastcontact.errors import ContactError, unknown
+
+Array = NDArray[np.float64]
+RULES = ("gauss", "simpson", "node")
+
+
+@dataclass(frozen=True, eq=False)
+class Projection:
+    """The compliance C of the module's formula.
+
+    Attributes
+    ----------
+    P : csr_array (m, k)
+        Functions of the multiplier field at the integration points.
+    areas : ndarray (m,)
+        W; a point without area (at the axis) never carries a force.
+    rho : float
+        Augmentation [pressure / length].
+    """
+
+    P: csr_array
+    areas: Array
+    rho: float
+    mass: SuperLU
+
+    def block(self, rows: NDArray[np.intp]) -> Array:
+        """Return rows and columns `rows` of C."""
+        P = self.P[rows].toarray()
+        return (np.diag(1.0 / self.areas[rows]) - P @ self.mass.solve(np.ascontiguousarray(P.T))) / self.rho
+
+    def apply(self, multiplier: Array) -> Array:
+        """Return ``C multiplier``."""
+        own = np.divide(multiplier, self.areas, out=np.zeros_like(multiplier), where=self.areas > 0)
+        return (own - self.P @ self.field(multiplier)) / self.rho
+
+    def field(self, multiplier: Array) -> Array:
+        """Return the independent values (k,) of the multiplier field [pressure] for point forces (m,) [force]."""
+        return self.mass.solve(self.P.T @ multiplier)
+
+
+@dataclass(eq=False)
+class Continuous(Formulation):
+    """Continuous contact with a multiplier field.
+
+    Parameters
+    ----------
+    integration : str
+        ``"gauss"``, ``"simpson"`` (on each half of a quadratic facet) or ``"node"``.
+    n_gauss : int, optional
+        Gauss points per facet; by default 3 on linear and 4 on quadratic facets, at least the number of its nodes.
+    augmentation : float
+        rho times the length of the shortest facet over the modulus of the bodies [1].
+    normals : str
+        ``"averaged"`` by default: with normals that jump between facets, a point opposite a node can flip for ever.
+    """
+
+    normals: str = "averaged"
+
+    integration: str = "gauss"
+    n_gauss: int | None = None
+    augmentation: float = 1.0
+
+    name: ClassVar[str] = "continuous"
+    geometry_in_loop: ClassVar[bool] = True
+    _candidates: Candidates = field(init=False, repr=False)
+    _projection: Projection = field(init=False, repr=False)
+    _field: csr_array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.augmentation > 0:
+            raise ContactError(f"augmentation = {self.augmentation} must be positive; 1 suits most problems")
+        surface, element = self.secondary, elements.get(self.secondary.element)
+        xi, weights = self._rule(element.n_nodes)
+        shape = np.tile(element.shape(xi), (len(surface.facets), 1))
+        self._candidates = Candidates(np.repeat(surface.facets, len(xi), axis=0), shape)
+        areas = self._areas(xi, weights, element.n_nodes)
+        row = np.broadcast_to(np.arange(len(shape))[:, None], shape.shape)
+        column = np.repeat(surface.local, len(xi), axis=0)
+        size = (len(shape), len(surface.points))
+        P = coo_array((shape.ravel(), (row.ravel(), column.ravel())), shape=size).tocsr()
+        self._field = self._determined(P, areas)
+        P = P @ self._field
+        mass = splu((P.T @ diags_array(areas) @ P).tocsc())
+        shortest = facet_measure(surface.facets, surface.element, self.points, xi, False) @ weights
+        rho = self.augmentation * self.modulus / shortest.min()
+        self._projection = Projection(csr_array(P), areas, float(rho), mass)
+
+    def _rule(self, n_nodes: int) -> quadrature.Rule:
+        if self.integration not in RULES:
+            raise ContactError(unknown("integration rule", self.integration, RULES))
+        if self.integration == "simpson":
+            return quadrature.subdivided(quadrature.simpson_line(), n_nodes - 1)
+        if self.integration == "node":
+            return quadrature.trapezium_line() if n_nodes == 2 else quadrature.simpson_line()
+        count = n_nodes + 1 if self.n_gauss is None else self.n_gauss
+        if count < n_nodes:
+            raise ContactError(
+                f"n_gauss = {count} on facets with {n_nodes} nodes leaves a multiplier undetermined: "
+                f"use at least {n_nodes}"
+            )
+        return quadrature.gauss_line(count)
+
+    def _areas(self, xi: Array, weights: Array, n_nodes: int) -> Array:
+        """Return the area (n_facets * n_q,) of each integration point.
+
+        At the nodes these are the integrals of the shape functions, so that a pressure field and its point forces have
+        the same resultant also where the radius varies along the facet.
+        """
+        surface = self.secondary
+        if self.integration != "node":
+            measure = facet_measure(surface.facets, surface.element, self.points, xi, self.axisymmetric)
+            return np.maximum(measure * weights, 0.0).ravel()
+        fine, w = quadrature.gauss_line(n_nodes + 1)
+        measure = facet_measure(surface.facets, surface.element, self.points, fine, self.axisymmetric) * w
+        areas = measure @ elements.get(surface.element).shape(fine)
+        if n_nodes == 3:  # at the axis the integral vanishes, but for the curvature of the facet
+            areas[np.abs(areas) < 1e-3 * areas[:, 2:]] = 0.0
+        return areas.ravel()
+
+    def _determined(self, P: csr_array, areas: Array) -> csr_array:
+        """Return the matrix (n_nodes, k) from independent multipliers to nodal values of the field.
+
+        The identity, but for a quadratic facet that ends on the axis when the points are the nodes: that end has no
+        area and its value no equation. The field is even about the axis, which gives it by the two other nodes.
+        """
+        size = P.shape[1]
+        seen = np.asarray((P.T @ diags_array(areas) @ P).diagonal())
+        blind = np.flatnonzero(seen == 0.0)
+        values = eye_array(size, format="lil")
+        for facet in self.secondary.local:
+            for end, other in ((0, 1), (1, 0)) if len(facet) == 3 else ():
+                if facet[end] in blind:
+                    values[facet[end], facet[end]] = 0.0
+                    values[facet[end], facet[2]] = 4.0 / 3.0
+                    values[facet[end], facet[other]] = -1.0 / 3.0
+        return csr_array(values.tocsr()[:, np.setdiff1d(np.arange(size), blind)])
+
+    def constraints(self, displacement: Array) -> Constraints:
+        """Pair the integration points on the displaced configuration and return their gaps."""
+        deformed = self.points + displacement
+        positions = self._candidates.positions(deformed)
+        pairing = pair(positions, self.primary, deformed, self.projection_tolerance, self.normals)
+        usable = self._projection.areas > 1e-12 * self._projection.areas.max()
+        pairing.paired[~usable] = False
+        G, gap0 = gap_rows(self._candidates, pairing, self.primary, self.points)
+        return Constraints(G, gap0, self._candidates.positions(self.points), self._projection)
+
+    def pressure(self, multiplier: Array) -> Array:
+        """Return the multiplier field at the nodes; it may be slightly negative beyond the edge of the contact."""
+        return self._field @ self._projection.field(multiplier)
+
+    def closed_nodes(self, active: NDArray[np.bool_], gap: Array, pressure: Array) -> NDArray[np.bool_]:
+        """Return the nodes where ``pressure - rho gap`` is positive, on facets with an active point."""
+        on_facet = active.reshape(len(self.secondary.facets), -1).any(axis=1)
+        touched = np.zeros(len(gap), bool)
+        touched[self.secondary.local[on_facet]] = True
+        return touched & (pressure - self._projection.rho * np.where(np.isfinite(gap), gap, np.inf) > 0)
+
+
+FORMULATION = Continuous

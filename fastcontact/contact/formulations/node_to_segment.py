@@ -1,0 +1,62 @@
+"""Node-to-segment contact: every secondary node keeps off the primary facet it faces.
+
+One constraint per secondary node, enforced exactly; the multiplier is the nodal contact force. The pairing, the
+normal of the primary facet and the projection are held during an active-set solution (code_aster, R5.03.50,
+formulation DISCRETE with ALGO_CONT='CONTRAINTE'). It does not pass the patch test on meshes that do not match, and
+oscillates on quadratic facets: there, the continuous formulation is the better choice.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
+
+from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.formulations._formulation import Formulation
+from fastcontact.contact.integration import mass_matrix, nodal_areas
+from fastcontact.contact.pairing import Candidates, gap_rows, pair
+
+Array = NDArray[np.float64]
+
+
+@dataclass(eq=False)
+class NodeToSegment(Formulation):
+    """Node-to-segment contact; parameters as in `Formulation`."""
+
+    name: ClassVar[str] = "node_to_segment"
+    geometry_in_loop: ClassVar[bool] = False
+    _candidates: Candidates = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        nodes = self.secondary.points[:, None]
+        self._candidates = Candidates(nodes, np.ones(nodes.shape))
+
+    def constraints(self, displacement: Array) -> Constraints:
+        """Pair on the displaced configuration and return one gap per secondary node."""
+        deformed = self.points + displacement
+        positions = self._candidates.positions(deformed)
+        pairing = pair(positions, self.primary, deformed, self.projection_tolerance, self.normals)
+        B, gap0 = gap_rows(self._candidates, pairing, self.primary, self.points)
+        return Constraints(B, gap0, self.points[self.secondary.points])
+
+    def pressure(self, multiplier: Array) -> Array:
+        """Return nodal forces over nodal areas; on quadratic facets, solve with the surface mass matrix instead.
+
+        The nodal areas of quadratic facets are not positive (zero at the axis), so division by them means nothing.
+        """
+        if self.secondary.local.shape[1] == 2:
+            return multiplier / nodal_areas(self.secondary, self.points, self.axisymmetric)
+        mass = mass_matrix(self.secondary, self.points, self.axisymmetric)
+        return splu(mass.tocsc()).solve(multiplier)
+
+    def closed_nodes(self, active: NDArray[np.bool_], gap: Array, pressure: Array) -> NDArray[np.bool_]:
+        """Return the active constraints: there is one per node."""
+        return active
+
+
+FORMULATION = NodeToSegment

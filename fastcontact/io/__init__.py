@@ -1,0 +1,1 @@
+"""Mesh and result files, in and out: one file a format."""

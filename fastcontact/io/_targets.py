@@ -1,0 +1,125 @@
+"""Where a file may be written: checks before the work, room on the disk, one writer a path."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import shutil
+import sys
+from pathlib import Path
+from typing import IO, Any
+
+from fastcontact.errors import FileError
+
+PathLike = str | os.PathLike[str]
+
+
+def checked_target(path: PathLike) -> Path:
+    """Return the real path to write to; links are followed, so that the file they name is written.
+
+    Raises
+    ------
+    FileError
+        If the folder is missing, the path is no plain file, or nothing may be written there.
+    """
+    target = Path(os.path.realpath(os.fspath(path)))
+    try:
+        if target.is_dir():
+            raise FileError(f"'{target}' is a folder: name a file in it")
+        if not target.parent.is_dir():
+            raise FileError(f"folder '{target.parent}' does not exist: create it or name another file")
+        if target.exists() and not target.is_file():
+            raise FileError(f"'{target}' is a device or a pipe: name a plain file")
+        if target.exists() and not _may_write(target):
+            raise FileError(f"'{target}' is write-protected: remove the protection or name another file")
+    except OSError as error:
+        raise FileError(f"'{target}' cannot be written ({error.strerror}): name another file") from error
+    if not _may_write(target.parent):
+        raise FileError(f"folder '{target.parent}' is write-protected: name a file in another folder")
+    return target
+
+
+def _may_write(path: Path) -> bool:
+    return os.access(path, os.W_OK, effective_ids=os.access in os.supports_effective_ids)
+
+
+def reserve(path: Path, start: int, size: int) -> None:
+    """Take `size` bytes from `start` on for a file, or raise OSError while nothing is half written yet."""
+    if hasattr(os, "posix_fallocate"):
+        with open(path, "ab") as file:
+            try:
+                os.posix_fallocate(file.fileno(), start, size)
+                return
+            except OSError as error:
+                if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS):
+                    raise
+    if shutil.disk_usage(path.parent).free < size:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+class PathLock:
+    """Exclusive right to write one path, held through a file beside it.
+
+    The operating system drops the lock when its process ends, however it ends, so that there are no stale
+    locks. The result file itself is not locked: viewers that lock what they read could not follow a run.
+
+    Raises
+    ------
+    FileError
+        If another writer, in this process or in another one, holds the path.
+    """
+
+    def __init__(self, target: Path) -> None:
+        self.path = target.with_name(f".{target.name}.lock")
+        while True:
+            file = open(self.path, "a+")  # noqa: SIM115
+            if not _lock(file):
+                file.seek(0)
+                holder = file.read().strip() or "unknown"
+                file.close()
+                raise FileError(
+                    f"'{target}' is being written by process {holder}: let it end or name another file"
+                )
+            if self._is_current(file):
+                break
+            file.close()  # its holder removed it between our open and our lock
+        file.truncate(0)
+        file.write(str(os.getpid()))
+        file.flush()
+        self._file = file
+
+    def _is_current(self, file: IO[str]) -> bool:
+        try:
+            return os.path.samestat(os.fstat(file.fileno()), os.stat(self.path))
+        except FileNotFoundError:
+            return False
+
+    def release(self) -> None:
+        """Give the right back; a second call does nothing."""
+        if self._file.closed:
+            return
+        with contextlib.suppress(OSError):  # Windows keeps open files: the empty lock file stays, harmless
+            self.path.unlink()
+        self._file.close()
+
+
+def _lock(file: IO[Any]) -> bool:
+    """Lock an open file without waiting; True also where the file system knows no locks."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        try:
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        except OSError:
+            return False
+        return True
+    import fcntl
+
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+    return True

@@ -1,0 +1,285 @@
+"""Read a result file back: nothing but the file is needed, neither the model nor the mesh file."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import FileError
+from fastcontact.io import _result_layout as layout
+from fastcontact.io._files import existing_file
+from fastcontact.io._targets import PathLike
+from fastcontact.mesh import Mesh
+from fastcontact.results import ContactResult, StepResult
+
+_DAMAGED = "is truncated or damaged"
+
+
+def open_results(path: PathLike) -> Results:
+    """Open a result file.
+
+    Parameters
+    ----------
+    path : path-like
+        A file that ``ResultWriter`` wrote, or is still writing: then the steps complete by now are seen.
+
+    Returns
+    -------
+    Results
+        A sequence of ``StepResult``.
+
+    Raises
+    ------
+    FileError
+        If the file is missing, no result file, damaged, or written by a newer fastcontact.
+
+    Examples
+    --------
+    >>> last = open_results("punch.vtkhdf")[-1]  # doctest: +SKIP
+    """
+    return Results(path)
+
+
+class Results(Sequence[StepResult]):
+    """The steps of a result file, each read when asked for, and what the file says beside them.
+
+    Steps are plain NumPy data: they stay valid when the file is closed.
+
+    Attributes
+    ----------
+    path : pathlib.Path
+        The file.
+    mesh : Mesh
+        The mesh with its groups.
+    kinematics, case_text : str
+        Kinematics of the analysis and the case file, empty if there was none.
+    versions : dict of str to str
+        Versions of the packages that computed the results.
+    load_factors : ndarray (n_steps,)
+        Pseudo-time of each step.
+    warnings : tuple of str
+        Every warning of the run and its steps, once.
+    log : object
+        Log of the run, None if there is none.
+    complete : bool
+        Whether the run came to its end: False after a crash, and while it goes on.
+    error : str
+        What stopped the run, empty if nothing did or nobody could write it down.
+    """
+
+    def __init__(self, path: PathLike) -> None:
+        self.path = Path(path)
+        self._file = _opened(self.path)
+        try:
+            with self._explained():
+                self._read_header(self._file["fastcontact"])
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _read_header(self, own: Any) -> None:
+        self._n_steps = int(self._file["VTKHDF/Steps"].attrs["NSteps"])
+        self.mesh = _read_mesh(own["mesh"])
+        self.kinematics: str = _text(own["kinematics"])
+        self.case_text: str = _text(own["case"])
+        self.versions: dict[str, str] = _text(own["versions"])
+        self._rows = own["steps"][: self._n_steps]
+        if len(self._rows) != self._n_steps:
+            raise ValueError(f"only {len(self._rows)} of {self._n_steps} steps")
+        self.load_factors: NDArray[np.float64] = np.ascontiguousarray(self._rows["load_factor"])
+        run: dict[str, Any] = _text(own["run"]) if "run" in own else {}
+        self.log: Any = run.get("log")
+        self.error: str = run.get("error", "")
+        self.complete = "run" in own and not self.error
+        of_steps = [text for number in range(self._n_steps) for text in self._notes(number)["warnings"]]
+        self.warnings: tuple[str, ...] = tuple(dict.fromkeys([*run.get("warnings", ()), *of_steps]))
+
+    def __len__(self) -> int:
+        return self._n_steps
+
+    @overload
+    def __getitem__(self, number: int) -> StepResult: ...
+    @overload
+    def __getitem__(self, number: slice) -> list[StepResult]: ...
+    def __getitem__(self, number: int | slice) -> StepResult | list[StepResult]:
+        """Return a step by its position, from 0, or from the end if negative; a slice gives a list of steps.
+
+        Raises
+        ------
+        IndexError
+            If there is no such step.
+        FileError
+            If the file was closed or is damaged.
+        """
+        if isinstance(number, slice):
+            return [self._read_step(position) for position in range(*number.indices(self._n_steps))]
+        position = range(self._n_steps)[number] if -self._n_steps <= number < self._n_steps else -1
+        if position < 0:
+            raise IndexError(
+                f"'{self.path}' has {self._n_steps} steps, so there is no step at position {number}"
+            )
+        return self._read_step(position)
+
+    def __enter__(self) -> Results:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        state = "complete" if self.complete else "incomplete"
+        return f"Results('{self.path}': {self._n_steps} steps, {state}, {self.kinematics}, {self.mesh!r})"
+
+    def close(self) -> None:
+        """Close the file; the steps already read stay valid, no further ones can be read."""
+        self._file.close()
+
+    def to_pyvista(self, step: int | StepResult) -> Any:
+        """Return a step as a ``pyvista.UnstructuredGrid`` of the solid cells, with all fields and groups.
+
+        Parameters
+        ----------
+        step : int or StepResult
+            Position of a step, or a step of this mesh.
+
+        Raises
+        ------
+        FileError
+            If PyVista is not installed.
+        """
+        try:
+            import pyvista
+        except ImportError as error:
+            raise FileError("PyVista is not installed: pip install 'fastcontact[view]'") from error
+        if not isinstance(step, StepResult):
+            step = self[step]
+        cells = layout.solid_cells(self.mesh)
+        # VTK's older flat layout, which every PyVista takes: each cell's size before its nodes.
+        flat = np.insert(cells.connectivity, cells.offsets[:-1], np.diff(cells.offsets))
+        grid = pyvista.UnstructuredGrid(flat, cells.types, layout.padded(self.mesh.points, 3))
+        for name, values in (layout.point_fields(self.mesh, step) | layout.point_flags(self.mesh)).items():
+            grid.point_data[name] = values
+        for name, values in layout.cell_fields(self.mesh).items():
+            grid.cell_data[name] = values
+        return grid
+
+    def _notes(self, number: int) -> dict[str, Any]:
+        row = self._rows[number]
+        first, count = int(row["notes_first"]), int(row["notes_count"])
+        return json.loads(self._file["fastcontact/notes"][first : first + count].tobytes())
+
+    def _read_step(self, number: int) -> StepResult:
+        if not self._file:
+            raise FileError(f"'{self.path}' is closed: open it again to read more steps")
+        with self._explained():
+            notes = self._notes(number)
+            return StepResult(
+                index=int(self._rows["index"][number]),
+                load_factor=float(self._rows["load_factor"][number]),
+                displacement=self._field("displacement", number, self.mesh.dim),
+                stress=self._field("stress", number, 4 if self.mesh.dim == 2 else 6),
+                von_mises=self._field("von_mises", number),
+                von_mises_signed=self._field("von_mises_signed", number),
+                reaction=self._field("reaction", number, self.mesh.dim),
+                contact=self._contact(number, dict(notes["contact"])),
+                iterations=notes["iterations"],
+                warnings=tuple(notes["warnings"]),
+            )
+
+    def _field(self, name: str, number: int, width: int | None = None) -> NDArray[np.float64]:
+        n = self.mesh.n_points
+        data, rows = self._file["VTKHDF/PointData"][name], slice(number * n, (number + 1) * n)
+        values = data[rows] if width is None else data[rows, :width]
+        if len(values) != n:
+            raise ValueError(f"{name} of step {number} is cut off")
+        return values
+
+    def _contact(self, number: int, formulations: dict[str, str]) -> dict[str, ContactResult]:
+        if not formulations:
+            return {}
+        pairs = {_text(pair["name"]): pair for pair in self._file["fastcontact/contact"].values()}
+        return {name: _read_contact(pairs[name], number, name, kind) for name, kind in formulations.items()}
+
+    @contextlib.contextmanager
+    def _explained(self) -> Iterator[None]:
+        """Turn whatever a broken file makes of HDF5 and of our own reading into one sentence."""
+        try:
+            yield
+        except (OSError, RuntimeError, KeyError, ValueError, IndexError, TypeError) as error:
+            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise FileError(
+                f"'{self.path}' {_DAMAGED} ({reason}): compute it again or restore a copy"
+            ) from error
+
+
+def _opened(path: Path) -> Any:
+    """Open the file and make sure that it is one of ours and not from the future."""
+    import h5py
+
+    existing_file(path)
+    if not os.access(path, os.R_OK, effective_ids=os.access in os.supports_effective_ids):
+        raise FileError(f"'{path}' may not be read: ask its owner for the permission")
+    if not h5py.is_hdf5(path):
+        raise FileError(f"'{path}' is no HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
+    try:
+        file = h5py.File(path, "r", locking=False)
+    except OSError as error:
+        reason = str(error).splitlines()[0]
+        raise FileError(f"'{path}' {_DAMAGED} ({reason}): compute it again or restore a copy") from error
+    try:
+        schema = file["fastcontact"].attrs["schema"] if "fastcontact" in file else None
+    except (OSError, RuntimeError, KeyError) as error:
+        file.close()
+        raise FileError(f"'{path}' {_DAMAGED} ({error}): compute it again or restore a copy") from error
+    if schema is None or schema > layout.SCHEMA:
+        file.close()
+        if schema is None:
+            raise FileError(
+                f"'{path}' holds no fastcontact results: name a file that fastcontact wrote (.vtkhdf)"
+            )
+        raise FileError(
+            f"'{path}' has schema {schema}, this fastcontact reads up to {layout.SCHEMA}: update it"
+        )
+    return file
+
+
+def _text(dataset: Any) -> Any:
+    return json.loads(dataset[()])
+
+
+def _read_mesh(stored: Any) -> Mesh:
+    return Mesh(
+        points=stored["points"][:, : int(stored.attrs["dim"])],
+        cells={name: stored["cells"][name][()] for name in _text(stored["elements"])},
+        cell_groups=_read_groups(stored["cell_groups"]),
+        point_groups=_read_groups(stored["point_groups"]),
+    )
+
+
+def _read_groups(group: Any) -> dict[str, NDArray[np.int32]]:
+    members = np.split(group["members"][()], np.cumsum(group["sizes"][()])[:-1])
+    return dict(zip(_text(group["names"]), members))
+
+
+def _read_contact(pair: Any, number: int, name: str, formulation: str) -> ContactResult:
+    step = pair["steps"][number]
+    first, count = int(step["first"]), int(step["count"])
+    rows = pair["rows"][first : first + count]
+    if len(rows) != count:
+        raise ValueError(f"the contact table of '{name}' is cut off")
+    columns = {column: np.ascontiguousarray(rows[column]) for column in rows.dtype.names}
+    columns["active"] = columns["active"].astype(bool)
+    inner, outer = step["radius"].tolist()
+    return ContactResult(
+        name=name, formulation=formulation, force=step["force"].copy(), radius=(inner, outer), **columns
+    )

@@ -1,0 +1,72 @@
+"""Constraints through their compliance: ``(B K^-1 B.T + C) multiplier = c - B K^-1 f``.
+
+Only the degrees of freedom that appear in B matter. Their part of ``K^-1`` is computed when they first appear and
+kept, so further active sets and pairings cost a small dense solution and one solution with K each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, lstsq
+from scipy.sparse import csr_array
+
+Array = NDArray[np.float64]
+CHUNK = 32
+
+
+class ComplianceCache:
+    """Rows and columns of ``K^-1`` for the degrees of freedom asked for so far.
+
+    Parameters
+    ----------
+    n : int
+        Size of K.
+    solve_many : callable
+        Maps right-hand sides (n, k) to solutions (n, k).
+    """
+
+    def __init__(self, n: int, solve_many: Callable[[Array], Array]) -> None:
+        self._solve_many = solve_many
+        self._place = np.full(n, -1, np.intp)
+        self._dofs = np.empty(0, np.intp)
+        self._values = np.empty((0, 0))
+
+    def of(self, dofs: NDArray[np.intp]) -> Array:
+        """Return ``K^-1`` at the rows and columns `dofs` (k,), shape (k, k)."""
+        new = dofs[self._place[dofs] < 0]
+        if len(new):
+            self._extend(new)
+        place = self._place[dofs]
+        return self._values[np.ix_(place, place)]
+
+    def _extend(self, new: NDArray[np.intp]) -> None:
+        old = len(self._dofs)
+        self._dofs = np.concatenate([self._dofs, new])
+        self._place[new] = np.arange(old, len(self._dofs))
+        grown = np.empty((len(self._dofs), len(self._dofs)))
+        grown[:old, :old] = self._values
+        # A few right-hand sides at a time: whole columns of K^-1 are long, and only short parts of them are kept.
+        for first in range(0, len(new), CHUNK):
+            chunk = new[first : first + CHUNK]
+            unit = np.zeros((len(self._place), len(chunk)))
+            unit[chunk, np.arange(len(chunk))] = 1.0
+            grown[:, old + first : old + first + len(chunk)] = self._solve_many(unit)[self._dofs]
+        grown[old:, :old] = grown[:old, old:].T
+        self._values = grown
+
+
+def multipliers(cache: ComplianceCache, B: csr_array, wanted: Array, C: Array | None) -> Array:
+    """Return the multipliers (m,) with ``(B K^-1 B.T + C) multiplier = wanted``; C (m, m) may be None."""
+    dofs = np.unique(B.indices[B.data != 0.0]).astype(np.intp)
+    rows = B[:, dofs].toarray()
+    flexibility = rows @ cache.of(dofs) @ rows.T
+    if C is not None:
+        flexibility += C
+    flexibility = 0.5 * (flexibility + flexibility.T)
+    try:
+        return cho_solve(cho_factor(flexibility), wanted)
+    except LinAlgError:  # rows that repeat each other: any of their multipliers does, the smallest is taken
+        return lstsq(flexibility, wanted)[0]

@@ -1,0 +1,69 @@
+"""Material laws: small-strain linear elasticity."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import ModelError, unknown
+
+KINEMATICS = ("axisymmetric", "plane_strain", "plane_stress", "3d")
+
+
+@dataclass(frozen=True)
+class LinearElastic:
+    """Isotropic linear elasticity.
+
+    Parameters
+    ----------
+    E : float
+        Young's modulus [pressure], positive.
+    nu : float
+        Poisson's ratio, -1 < nu < 0.5.
+
+    Raises
+    ------
+    ModelError
+        If a constant is outside its range.
+    """
+
+    E: float
+    nu: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.E) and self.E > 0):
+            raise ModelError(f"Young's modulus E = {self.E} must be a positive number")
+        if not -1.0 < self.nu < 0.5:
+            raise ModelError(
+                f"Poisson's ratio nu = {self.nu} must lie between -1 and 0.5, both excluded "
+                "(an incompressible material needs another formulation; nu = 0.499 is close to it)"
+            )
+
+    @property
+    def shear_modulus(self) -> float:
+        """Shear modulus [pressure]."""
+        return self.E / (2 * (1 + self.nu))
+
+    def moduli(self, kinematics: str) -> NDArray[np.float64]:
+        """Return the matrix from strains (xx, yy, zz, 2xy[, 2yz, 2xz]) to stresses [pressure].
+
+        Shape (4, 4) in two dimensions, (6, 6) in three. Plane stress has no stress zz (Timoshenko and Goodier, 1970,
+        section 16).
+        """
+        E, nu, G = self.E, self.nu, self.shear_modulus
+        if kinematics not in KINEMATICS:
+            raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
+        if kinematics == "plane_stress":
+            D = np.zeros((4, 4))
+            D[:2, :2] = E / (1 - nu * nu) * np.array([[1.0, nu], [nu, 1.0]])
+            D[3, 3] = G
+            return D
+        size = 6 if kinematics == "3d" else 4
+        D = np.zeros((size, size))
+        D[:3, :3] = E * nu / ((1 + nu) * (1 - 2 * nu))
+        D[range(3), range(3)] += 2 * G
+        D[range(3, size), range(3, size)] = G
+        return D

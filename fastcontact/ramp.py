@@ -1,0 +1,70 @@
+"""The load ramp: at which instants to solve, and how large the loads are there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fastcontact.errors import ModelError
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """Instants and a piecewise linear load function.
+
+    Parameters
+    ----------
+    instants : sequence of float
+        Load factors (pseudo-times) at which a step ends, ascending.
+    table : sequence of (float, float)
+        Points (instant, multiplier of the loads) of the function, ascending instants.
+
+    Raises
+    ------
+    ModelError
+        If the instants or the table do not ascend, or an instant lies outside the table.
+    """
+
+    instants: tuple[float, ...]
+    table: tuple[tuple[float, float], ...] = ((0.0, 0.0), (1.0, 1.0))
+
+    def __post_init__(self) -> None:
+        instants = np.asarray(self.instants, float)
+        times = np.asarray([row[0] for row in self.table], float)
+        if instants.ndim != 1 or not len(instants):
+            raise ModelError("the ramp has no instants: give at least one load factor to solve at")
+        if not (np.isfinite(instants).all() and (np.diff(instants) > 0).all()):
+            raise ModelError(f"the instants of the ramp must ascend, not {self.instants}")
+        if len(times) < 2 or not (np.diff(times) > 0).all():
+            raise ModelError("the table of the ramp needs at least two points with ascending instants")
+        outside = instants[(instants < times[0]) | (instants > times[-1])]
+        if len(outside):
+            raise ModelError(
+                f"instant {outside[0]:g} lies outside the table of the ramp, which covers {times[0]:g} to {times[-1]:g}"
+            )
+        object.__setattr__(self, "instants", tuple(float(t) for t in instants))
+        object.__setattr__(self, "table", tuple((float(t), float(v)) for t, v in self.table))
+
+    def __len__(self) -> int:
+        return len(self.instants)
+
+    def value(self, instant: float) -> float:
+        """Return the multiplier of the loads at `instant`."""
+        times, values = zip(*self.table, strict=True)
+        return float(np.interp(instant, times, values))
+
+
+def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:
+    """Return a ramp of equal steps from zero to the full loads at `end`.
+
+    Raises
+    ------
+    ModelError
+        If `steps` is not a positive whole number or `end` is not positive.
+    """
+    if int(steps) != steps or steps < 1:
+        raise ModelError(f"the number of load steps must be a positive whole number, not {steps}")
+    if not end > 0:
+        raise ModelError(f"the ramp must end at a positive load factor, not {end}")
+    return Ramp(tuple(end * (i + 1) / int(steps) for i in range(int(steps))), ((0.0, 0.0), (end, 1.0)))
