@@ -44,17 +44,16 @@ def _may_write(path: Path) -> bool:
     return os.access(path, os.W_OK, effective_ids=os.access in os.supports_effective_ids)
 
 
-def reserve(path: Path, start: int, size: int) -> None:
-    """Take `size` bytes from `start` on for a file, or raise OSError while nothing is half written yet."""
+def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
+    """Take `size` bytes from `start` on for an open file, or raise OSError with nothing half written."""
     if hasattr(os, "posix_fallocate"):
-        with open(path, "ab") as file:
-            try:
-                os.posix_fallocate(file.fileno(), start, size)
-                return
-            except OSError as error:
-                if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS):
-                    raise
-    if shutil.disk_usage(path.parent).free < size:
+        try:
+            os.posix_fallocate(descriptor, start, size)
+            return
+        except OSError as error:
+            if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS):
+                raise
+    if shutil.disk_usage(folder).free < size:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 

@@ -157,15 +157,14 @@ class ResultWriter:
                     self._file["fastcontact"].create_dataset("run", data=text)
                     self._file.flush()
                 finally:
-                    size = self._file.id.get_filesize()
-                    self._file.close()
-                    _trim(self.path, size)
+                    _close_trimmed(self._file)
         finally:
             self._file = None
             self._lock.release()
 
     def _reserve(self, size: int) -> None:
-        reserve(self.path, self._file.id.get_filesize(), size + MARGIN)
+        start, descriptor = self._file.id.get_filesize(), self._file.id.get_vfd_handle()
+        reserve(descriptor, self.path.parent, start, size + MARGIN)
 
     @contextlib.contextmanager
     def _explained(self, what: str) -> Iterator[None]:
@@ -173,7 +172,9 @@ class ResultWriter:
         try:
             yield
         except (OSError, RuntimeError) as error:
-            reason = getattr(error, "strerror", None) or str(error).splitlines()[0]
+            reason = getattr(error, "strerror", None) or next(
+                iter(str(error).splitlines()), type(error).__name__
+            )
             raise FileError(
                 f"'{self.path}' cannot be {what} ({reason}), {self.n_steps} steps are complete: "
                 "see whether the disk is full or the folder protected"
@@ -185,7 +186,9 @@ class ResultWriter:
 
         temporary = self.path.with_name(f".{self.path.name}.tmp")
         try:
-            reserve(temporary, 0, _header_size(self._mesh) + len(case_text) + MARGIN)
+            with open(temporary, "wb") as probe:
+                size = _header_size(self._mesh) + len(case_text) + MARGIN
+                reserve(probe.fileno(), temporary.parent, 0, size)
             with h5py.File(temporary, "w", locking=False) as file:
                 write_geometry(file, self._mesh)
                 write_own(file, self._mesh, kinematics, case_text)
@@ -326,8 +329,12 @@ def _set_row(table: Any, number: int, value: Any) -> None:
     table[number] = value
 
 
-def _trim(path: Any, size: int) -> None:
-    """Cut what was reserved and not used, and have the file carried to the disk, against a power failure."""
-    with open(path, "r+b") as file:
-        file.truncate(size)
-        os.fsync(file.fileno())
+def _close_trimmed(file: Any) -> None:
+    """Close an HDF5 file, cut what was reserved in vain, and see it to the disk, against a power failure."""
+    size, descriptor = file.id.get_filesize(), os.dup(file.id.get_vfd_handle())
+    try:
+        file.close()
+        os.ftruncate(descriptor, size)
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -12,6 +12,8 @@ from fastcontact.io._files import replacing
 from fastcontact.io._targets import PathLike, checked_target
 from fastcontact.io.result_reader import open_results
 
+Node = ElementTree.Element
+
 # XDMF puts the six components of a symmetric tensor in an order that is not VTK's, so they go one by one.
 STRESS_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
@@ -61,9 +63,6 @@ def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
     with replacing(target) as temporary, open(temporary, "w", encoding="utf-8") as file:
         file.write('<?xml version="1.0" encoding="utf-8"?>\n')
         file.write(ElementTree.tostring(document, encoding="unicode") + "\n")
-
-
-Node = ElementTree.Element
 
 
 def _document(

@@ -1,0 +1,310 @@
+"""Case files: a contact problem as TOML, checked whole before anything runs. They hold data, no code."""
+
+from __future__ import annotations
+
+import inspect
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fastcontact import analytic, generate
+from fastcontact.errors import CaseError, FastcontactError, unknown
+from fastcontact.io.mesh_files import read_mesh
+from fastcontact.materials import LinearElastic
+from fastcontact.mesh import Mesh
+from fastcontact.model import Model
+from fastcontact.ramp import Ramp, linear_ramp
+from fastcontact.solve import Criteria
+
+_NUMBER = (int, float)
+_UNITS = {"length": str, "force": str, "pressure": str}
+_RAMP = {"steps": int, "end": _NUMBER, "instants": list, "table": list}
+_SOLVE = {
+    "linear_solver": str,
+    "linear_tolerance": _NUMBER,
+    "relative": _NUMBER,
+    "absolute": _NUMBER,
+    "geometry_updates": int,
+    "geometry": _NUMBER,
+    "max_geometry_updates": int,
+    "max_active_set_iterations": int,
+}
+_CHECK = {"quantity": str, "theory": str, "tolerance": _NUMBER, "name": str}
+_TOP = {
+    "title": str,
+    "kinematics": str,
+    "units": dict,
+    "mesh": dict,
+    "material": list,
+    "support": list,
+    "contact": dict,
+    "ramp": dict,
+    "solve": dict,
+    "probes": dict,
+    "theory": dict,
+    "check": list,
+}
+
+
+@dataclass(frozen=True)
+class Check:
+    """A comparison of a probe with a theory: ``quantity`` is ``"PROBE.stress.yy"`` or ``"PROBE.pressure"``."""
+
+    name: str
+    quantity: str
+    theory: str
+    tolerance: float
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A case file, checked and ready to run.
+
+    Attributes
+    ----------
+    name, title, text : str
+        File name without suffix, its title, its text.
+    mesh : Mesh
+    model : Model
+    ramp : Ramp
+    criteria : Criteria
+    linear_solver : str
+    linear_tolerance : float
+    probes : dict of str to int
+        Point number by probe name.
+    theories : dict of str to dict
+        By contact pair: ``"theory"`` and, where given, ``"mesh_converged"``, objects of `fastcontact.analytic`.
+    checks : list of Check
+    units : dict of str to str
+        Names of the units of length, force and pressure, for labels.
+    approach : dict of str to float
+        Approach of the theory by contact pair, where it was given [length].
+    """
+
+    name: str
+    title: str
+    text: str
+    mesh: Mesh
+    model: Model
+    ramp: Ramp
+    criteria: Criteria
+    linear_solver: str
+    linear_tolerance: float
+    probes: dict[str, int]
+    theories: dict[str, dict[str, Any]] = field(default_factory=dict)
+    checks: list[Check] = field(default_factory=list)
+    units: dict[str, str] = field(default_factory=dict)
+    approach: dict[str, float] = field(default_factory=dict)
+
+
+def read_case(path: str | Path) -> Case:
+    """Read a case file and build its model.
+
+    Raises
+    ------
+    CaseError
+        If the file is missing, no TOML, or has an unknown key or a wrong value; the message names file and key.
+    FastcontactError
+        If its mesh or model is wrong.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = "it does not exist" if not path.exists() else str(error)
+        raise CaseError(f"cannot read the case file '{path}': {reason}") from error
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise CaseError(f"the case file '{path}' is not valid TOML: {error}") from error
+    try:
+        return _build(path, text, data)
+    except CaseError as error:
+        raise CaseError(f"{path}: {error}") from error
+
+
+def _build(path: Path, text: str, data: dict[str, Any]) -> Case:
+    _check_keys("", data, _TOP)
+    for key in ("kinematics", "mesh", "material"):
+        if key not in data:
+            raise CaseError(f"the key '{key}' is missing")
+    units = data.get("units", {})
+    _check_keys("units", units, _UNITS)
+    solve = data.get("solve", {})
+    _check_keys("solve", solve, _SOLVE)
+    ramp = _ramp(data.get("ramp", {}))
+    criteria = Criteria(**{k: v for k, v in solve.items() if not k.startswith("linear_")})
+    theories, approach = _theories(data.get("theory", {}), data.get("contact", {}))
+    mesh = _mesh(path, data["mesh"])
+    model = _model(mesh, data, text)
+    probes = _probes(mesh, data.get("probes", {}))
+    checks = [_check(i, entry, probes, theories) for i, entry in enumerate(_tables("check", data.get("check", [])))]
+    return Case(
+        name=path.stem,
+        title=data.get("title", path.stem),
+        text=text,
+        mesh=mesh,
+        model=model,
+        ramp=ramp,
+        criteria=criteria,
+        linear_solver=solve.get("linear_solver", "auto"),
+        linear_tolerance=float(solve.get("linear_tolerance", 1e-10)),
+        probes=probes,
+        theories=theories,
+        checks=checks,
+        units={"length": "-", "force": "-", "pressure": "-", **units},
+        approach=approach,
+    )
+
+
+def _check_keys(where: str, data: Any, known: Mapping[str, Any]) -> None:
+    """Raise CaseError for a key that is not in `known`, or a value not of the type there (None: any)."""
+    if not isinstance(data, dict):
+        raise CaseError(f"'{where}' must be a table of keys, not {data!r}")
+    for key, value in data.items():
+        label = f"{where}.{key}" if where else key
+        if key not in known:
+            raise CaseError(unknown("key", label, [f"{where}.{k}" if where else k for k in known]))
+        kind = known[key]
+        if kind is not None and (not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool)):
+            names = " or ".join(k.__name__ for k in (kind if isinstance(kind, tuple) else (kind,)))
+            raise CaseError(f"the value of '{label}' must be of type {names}, not {value!r}")
+
+
+def _parameters(function: Callable[..., Any]) -> list[str]:
+    """Return the names of the arguments of a function."""
+    return list(inspect.signature(function).parameters)
+
+
+def _tables(where: str, entries: Any) -> list[dict[str, Any]]:
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+        raise CaseError(f"'{where}' must be a list of tables: write [[{where}]] above each")
+    return entries
+
+
+def _mesh(path: Path, data: dict[str, Any]) -> Mesh:
+    if "file" in data:
+        _check_keys("mesh", data, {"file": str, "name": str})
+        return read_mesh(path.parent / data["file"], mesh_name=data.get("name"))
+    if "generator" not in data:
+        raise CaseError("'mesh' needs either the key 'file' or the key 'generator'")
+    name = data["generator"]
+    if name not in generate.GENERATORS:
+        raise CaseError(unknown("mesh.generator", str(name), generate.GENERATORS))
+    make = generate.GENERATORS[name]
+    arguments = {key: value for key, value in data.items() if key != "generator"}
+    _check_keys("mesh", arguments, dict.fromkeys(_parameters(make)))
+    return make(**{key: tuple(v) if isinstance(v, list) else v for key, v in arguments.items()})
+
+
+def _model(mesh: Mesh, data: dict[str, Any], text: str) -> Model:
+    model = Model(mesh, data["kinematics"], case_text=text)
+    for i, entry in enumerate(_tables("material", data["material"])):
+        _check_keys(f"material[{i}]", entry, {"E": _NUMBER, "nu": _NUMBER, "groups": (list, str)})
+        for key in ("E", "nu"):
+            if key not in entry:
+                raise CaseError(f"material[{i}] needs '{key}'")
+        model.add_material(LinearElastic(E=float(entry["E"]), nu=float(entry["nu"])), entry.get("groups"))
+    for i, entry in enumerate(_tables("support", data.get("support", []))):
+        _check_keys(f"support[{i}]", entry, {"group": str, "x": _NUMBER, "y": _NUMBER, "z": _NUMBER})
+        if "group" not in entry:
+            raise CaseError(f"support[{i}] needs 'group'")
+        model.prescribe(entry["group"], **{key: float(value) for key, value in entry.items() if key != "group"})
+    for name, entry in data.get("contact", {}).items():
+        if not isinstance(entry, dict):
+            raise CaseError(f"'contact' needs a name for each pair: write [contact.NAME] above its keys, not '{name}'")
+        for key in ("secondary", "primary"):
+            if not isinstance(entry.get(key), str):
+                raise CaseError(f"contact.{name} needs '{key}', the name of a group of facets")
+        model.add_contact(name, **entry)
+    return model
+
+
+def _ramp(data: dict[str, Any]) -> Ramp:
+    _check_keys("ramp", data, _RAMP)
+    if "instants" not in data:
+        if "table" in data:
+            end = float(data["table"][-1][0])
+            steps = linear_ramp(data.get("steps", 20), end)
+            return Ramp(steps.instants, _points(data["table"]))
+        return linear_ramp(data.get("steps", 20), float(data.get("end", 1.0)))
+    if "steps" in data or "end" in data:
+        raise CaseError("'ramp' takes either 'instants', or 'steps' and 'end', not both")
+    instants = tuple(float(t) for t in data["instants"])
+    table = _points(data["table"]) if "table" in data else ((0.0, 0.0), (1.0, 1.0))
+    return Ramp(instants, table)
+
+
+def _points(table: list[Any]) -> tuple[tuple[float, float], ...]:
+    if not all(isinstance(row, list) and len(row) == 2 and all(isinstance(v, _NUMBER) for v in row) for row in table):
+        raise CaseError("'ramp.table' must be a list of pairs [instant, multiplier of the loads]")
+    return tuple((float(t), float(v)) for t, v in table)
+
+
+def _probes(mesh: Mesh, data: dict[str, Any]) -> dict[str, int]:
+    _check_keys("probes", data, dict.fromkeys(data, str))
+    return {name: mesh.point(group) for name, group in data.items()}
+
+
+def _theories(data: dict[str, Any], pairs: Mapping[str, Any]) -> tuple[dict[str, dict[str, Any]], dict[str, float]]:
+    """Build the theories of ``[theory.PAIR]`` and, below it, ``mesh_converged``."""
+    theories: dict[str, dict[str, Any]] = {}
+    approach = {}
+    for pair, entry in data.items():
+        if pair not in pairs:
+            raise CaseError(unknown("contact pair in 'theory'", pair, pairs))
+        own = {key: value for key, value in entry.items() if key != "mesh_converged"}
+        theories[pair] = {"theory": _theory(f"theory.{pair}", own)}
+        if "mesh_converged" in entry:
+            theories[pair]["mesh_converged"] = _theory(f"theory.{pair}.mesh_converged", entry["mesh_converged"])
+        if "approach" in own:
+            approach[pair] = float(own["approach"])
+    return theories, approach
+
+
+def _theory(where: str, data: dict[str, Any]) -> Any:
+    if not isinstance(data, dict) or "kind" not in data:
+        raise CaseError(f"'{where}' needs the key 'kind', one of {', '.join(analytic.THEORIES)}")
+    if data["kind"] not in analytic.THEORIES:
+        raise CaseError(unknown(f"{where}.kind", str(data["kind"]), analytic.THEORIES))
+    factory = analytic.THEORIES[data["kind"]]
+    arguments = {key: value for key, value in data.items() if key != "kind"}
+    _check_keys(where, arguments, dict.fromkeys(_parameters(factory)))
+    try:
+        return factory(**arguments)
+    except (TypeError, FastcontactError) as error:
+        raise CaseError(f"'{where}': {error}") from error
+
+
+def described(data: dict[str, Any]) -> dict[str, Any]:
+    """Return what pictures need of a case: ``title``, ``units``, ``theories`` and ``approach`` by contact pair.
+
+    `data` is the parsed text kept in a result file; it may be empty.
+    """
+    theories, approach = _theories(data.get("theory", {}), data.get("contact", {}))
+    return {
+        "title": data.get("title", ""),
+        "units": {"length": "-", "force": "-", "pressure": "-", **data.get("units", {})},
+        "theories": {pair: entry["theory"] for pair, entry in theories.items()},
+        "approach": approach,
+    }
+
+
+def _check(index: int, entry: dict[str, Any], probes: dict[str, int], theories: Mapping[str, Any]) -> Check:
+    where = f"check[{index}]"
+    _check_keys(where, entry, _CHECK)
+    for key in ("quantity", "theory", "tolerance"):
+        if key not in entry:
+            raise CaseError(f"{where} needs '{key}'")
+    probe, _, what = entry["quantity"].partition(".")
+    if probe not in probes:
+        raise CaseError(unknown(f"probe in {where}.quantity", probe, probes))
+    allowed = ["pressure", *(f"stress.{component}" for component in ("xx", "yy", "zz", "xy"))]
+    if what not in allowed:
+        raise CaseError(unknown(f"quantity in {where}", what, allowed))
+    if entry["theory"] not in theories:
+        raise CaseError(unknown(f"theory in {where}", entry["theory"], theories))
+    name = entry.get("name", entry["quantity"])
+    return Check(name, entry["quantity"], entry["theory"], float(entry["tolerance"]))

@@ -1,0 +1,68 @@
+"""Dispatch to the sub-commands, and turn errors into exit codes.
+
+0: done; 1: wrong input, one clear line; 2: no convergence, the result file keeps all converged steps.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import logging
+import pkgutil
+import sys
+from collections.abc import Sequence
+
+import fastcontact
+from fastcontact import cli
+from fastcontact.errors import ConvergenceError, FastcontactError
+
+log = logging.getLogger("fastcontact")
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser whose errors are those of the library: one line, exit code 1."""
+
+    def error(self, message: str) -> None:  # type: ignore[override]
+        """Raise instead of exiting with code 2, which stands for no convergence."""
+        raise FastcontactError(f"{message}; see '{self.prog} --help'")
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser with every sub-command of this package."""
+    top = Parser(prog="fastcontact", description="Elastic contact by finite elements, fast.")
+    top.add_argument("--version", action="version", version=f"fastcontact {fastcontact.__version__}")
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for _, name, _ in pkgutil.iter_modules(cli.__path__):
+        if not name.startswith("_"):
+            module = importlib.import_module(f"{cli.__name__}.{name}")
+            sub = commands.add_parser(name, help=module.HELP, description=module.HELP)
+            module.arguments(sub)
+            sub.set_defaults(run=module.run)
+            loudness = sub.add_mutually_exclusive_group()
+            loudness.add_argument("-v", "--verbose", action="store_true", help="say what is being done and why")
+            loudness.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
+    return top
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code."""
+    try:
+        arguments = parser().parse_args(argv)
+        handler = logging.StreamHandler()
+        handler.setFormatter(logging.Formatter("%(message)s"))
+        log.handlers[:] = [handler]
+        log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
+        return int(arguments.run(arguments) or 0)
+    except ConvergenceError as error:
+        print(f"no convergence: {error}", file=sys.stderr)
+        return 2
+    except FastcontactError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    except BrokenPipeError:
+        return 1
+
+
+def entry_point() -> None:
+    """Run the command line and exit with its code."""
+    sys.exit(main())

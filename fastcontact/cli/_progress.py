@@ -1,0 +1,36 @@
+"""A progress bar on a terminal."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+from fastcontact.results import StepResult
+
+WIDTH = 30
+
+
+class Progress:
+    """Steps done, active nodes, time left; nothing at all unless `show`."""
+
+    def __init__(self, total: int, show: bool) -> None:
+        self._total, self._show = total, show
+        self._started = time.perf_counter()
+
+    def step(self, step: StepResult) -> None:
+        """Redraw after a step."""
+        if not self._show:
+            return
+        done = step.index / self._total
+        left = (time.perf_counter() - self._started) * (1.0 / done - 1.0)
+        bar = "#" * round(WIDTH * done)
+        closed = sum(int(contact.active.sum()) for contact in step.contact.values())
+        text = f"step {step.index}/{self._total}, {closed} nodes in contact, {left:.0f} s left"
+        sys.stderr.write(f"\r[{bar:<{WIDTH}}] {text:<50}")
+        sys.stderr.flush()
+
+    def close(self) -> None:
+        """Clear the line."""
+        if self._show:
+            sys.stderr.write("\r" + " " * (WIDTH + 54) + "\r")
+            sys.stderr.flush()

@@ -1,0 +1,59 @@
+"""What commands on result files share: the step, the contact pair, the case kept in the file."""
+
+from __future__ import annotations
+
+import argparse
+import tomllib
+from typing import Any
+
+from fastcontact.errors import CaseError, unknown
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments that choose a step and a contact pair."""
+    parser.add_argument("file", help="result file (.vtkhdf)")
+    parser.add_argument("--step", type=int, default=-1, help="number of the step, from 1; by default the last")
+    parser.add_argument("--contact", metavar="NAME", help="contact pair; by default the first")
+
+
+def chosen_step(results: Any, number: int) -> Any:
+    """Return the step with a number from 1, or the last for -1.
+
+    Raises
+    ------
+    CaseError
+        If there is no such step.
+    """
+    if not len(results):
+        raise CaseError(f"'{results.path}' holds no finished step yet")
+    if number == -1:
+        return results[-1]
+    if not 1 <= number <= len(results):
+        raise CaseError(f"there is no step {number} in '{results.path}': it holds the steps 1 to {len(results)}")
+    return results[number - 1]
+
+
+def chosen_contact(step: Any, name: str | None) -> str:
+    """Return the name of a contact pair of a step.
+
+    Raises
+    ------
+    CaseError
+        If there is none, or none of that name.
+    """
+    if not step.contact:
+        raise CaseError("this result holds no contact pair")
+    if name is not None and name not in step.contact:
+        raise CaseError(unknown("contact pair", name, step.contact))
+    return name or next(iter(step.contact))
+
+
+def case_data(results: Any) -> dict[str, Any]:
+    """Return title, units, theories and approaches of the case text kept in the file; empty without one."""
+    from fastcontact.case import described
+
+    try:
+        data = tomllib.loads(results.case_text or "")
+    except tomllib.TOMLDecodeError:
+        data = {}
+    return described(data)

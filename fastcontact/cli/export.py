@@ -1,0 +1,35 @@
+"""``fastcontact export``: results for other programs."""
+
+from __future__ import annotations
+
+import argparse
+
+from fastcontact.errors import CaseError
+
+HELP = "export a result file: MED with fields (Salome, ParaVis) or an XDMF sidecar (old ParaView)"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    parser.add_argument("file", help="result file (.vtkhdf)")
+    parser.add_argument("--med", metavar="FILE", help="write mesh and fields of all steps as MED")
+    parser.add_argument("--xdmf", metavar="FILE", help="write an XDMF file that points into the result file")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write what was asked for."""
+    if not (options.med or options.xdmf):
+        raise CaseError("nothing to export: give --med FILE or --xdmf FILE")
+    if options.med:
+        from fastcontact.io.med import write_med_results
+        from fastcontact.io.result_reader import open_results
+
+        with open_results(options.file) as results:
+            write_med_results(options.med, results.mesh, results)
+    if options.xdmf:
+        from fastcontact.io.xdmf import write_xdmf
+
+        write_xdmf(options.file, options.xdmf)
+    if not options.quiet:
+        print(f"wrote {', '.join(path for path in (options.med, options.xdmf) if path)}")
+    return 0

@@ -1,0 +1,53 @@
+"""``fastcontact info``: what a mesh or result file holds."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+HELP = "show what a mesh or result file holds: groups, sizes, steps, iterations, versions"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    parser.add_argument("file", help="mesh file or result file (.vtkhdf)")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print what the file holds."""
+    if Path(options.file).suffix == ".vtkhdf":
+        from fastcontact.io.result_reader import open_results
+
+        with open_results(options.file) as results:
+            print("\n".join([*_mesh_lines(results.mesh), *_result_lines(results)]))
+        return 0
+    from fastcontact.io.mesh_files import read_mesh_report
+    from fastcontact.quality import quality
+
+    mesh, report = read_mesh_report(options.file)
+    print("\n".join([str(report), *_mesh_lines(mesh), str(quality(mesh))]))
+    return 0
+
+
+def _mesh_lines(mesh: Any) -> list[str]:
+    cells = ", ".join(f"{len(block)} {name}" for name, block in mesh.cells.items())
+    found = [f"{mesh.n_points} points in {mesh.dim}D; cells: {cells}"]
+    found += [f"  cells  {name:<16} {len(members):>8}" for name, members in mesh.cell_groups.items()]
+    found += [f"  points {name:<16} {len(members):>8}" for name, members in mesh.point_groups.items()]
+    return found
+
+
+def _result_lines(results: Any) -> list[str]:
+    found = [f"{len(results)} steps, {results.kinematics}; versions: "]
+    found[0] += ", ".join(f"{name} {version}" for name, version in results.versions.items())
+    for step in results:
+        closed = ", ".join(f"{name}: {int(c.active.sum())} nodes closed" for name, c in step.contact.items())
+        counts = step.iterations
+        found.append(
+            f"  step {step.index:>3}  load factor {step.load_factor:<8.5g} geometry updates "
+            f"{counts.get('geometry_updates', 0):>3}  active-set iterations {counts.get('active_set_iterations', 0):>3}  "
+            f"linear {counts.get('linear_iterations', 0):>4}  {closed}"
+        )
+        found += [f"    warning: {text}" for text in step.warnings]
+    return found

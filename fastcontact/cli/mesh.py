@@ -1,0 +1,62 @@
+"""``fastcontact mesh``: make a mesh with its named groups."""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import typing
+from collections.abc import Callable
+from typing import Any
+
+HELP = "make a mesh with named groups and report its quality"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add one sub-command a generator, its options read from the generator's own signature."""
+    from fastcontact.generate import GENERATORS
+
+    kinds = parser.add_subparsers(dest="generator", metavar="GENERATOR", required=True)
+    for name, make in GENERATORS.items():
+        doc = (inspect.getdoc(make) or "").splitlines()[0]
+        sub = kinds.add_parser(name, help=doc, description=inspect.getdoc(make), formatter_class=_Raw)
+        sub.add_argument("-o", "--output", required=True, help="mesh file, format by suffix: .med, .msh, .inp, .vtu, ...")
+        for parameter in inspect.signature(make).parameters.values():
+            sub.add_argument(f"--{parameter.name.replace('_', '-')}", dest=parameter.name, **_option(make, parameter))
+
+
+class _Raw(argparse.RawDescriptionHelpFormatter):
+    """Keeps the line breaks of docstrings."""
+
+
+def _option(make: Callable[..., Any], parameter: inspect.Parameter) -> dict[str, Any]:
+    """Return the argparse settings for one argument of a generator."""
+    hint = typing.get_type_hints(make).get(parameter.name, str)
+    default = parameter.default
+    options = [kind for kind in (hint, *typing.get_args(hint)) if kind is not type(None)]
+    settings: dict[str, Any] = {"default": argparse.SUPPRESS, "help": f"default: {default}", "metavar": "VALUE"}
+    if bool in options:
+        return {"default": argparse.SUPPRESS, "help": f"default: {default}", "action": argparse.BooleanOptionalAction}
+    for kind in options:
+        if typing.get_origin(kind) is tuple:
+            members = [member for member in typing.get_args(kind) if member is not Ellipsis]
+            return {**settings, "nargs": len(members), "type": members[0]}
+    settings["type"] = int if int in options and float not in options else float if float in options else str
+    return settings
+
+
+def run(options: argparse.Namespace) -> int:
+    """Make the mesh, write it, print its quality."""
+    from fastcontact.generate import GENERATORS
+    from fastcontact.io.mesh_files import write_mesh
+    from fastcontact.quality import quality
+
+    make = GENERATORS[options.generator]
+    names = inspect.signature(make).parameters
+    given = {name: value for name, value in vars(options).items() if name in names}
+    mesh = make(**{name: tuple(value) if isinstance(value, list) else value for name, value in given.items()})
+    write_mesh(options.output, mesh)
+    if not options.quiet:
+        print(quality(mesh))
+        print(f"groups: {', '.join(mesh.group_names)}")
+        print(f"wrote {options.output}")
+    return 0

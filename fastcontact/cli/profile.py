@@ -1,0 +1,100 @@
+"""``fastcontact profile``: pressure along the contact line, as table, XMGRACE file and picture, against theory."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+import numpy as np
+
+from fastcontact.cli import _results
+
+HELP = "pressure along the contact line against theory: CSV, XMGRACE .agr, PNG"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    _results.arguments(parser)
+    parser.add_argument("--csv", metavar="FILE", help="write the table")
+    parser.add_argument("--agr", metavar="FILE", help="write an XMGRACE project with the computed and Hertz's curve")
+    parser.add_argument("--png", metavar="FILE", help="write a picture")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write what was asked for; print the table if nothing was."""
+    from fastcontact.io.result_reader import open_results
+    from fastcontact.io.tables import contact_table, with_theory, write_csv
+
+    with open_results(options.file) as results:
+        step = _results.chosen_step(results, options.step)
+        name = _results.chosen_contact(step, options.contact)
+        case = _results.case_data(results)
+    contact = step.contact[name]
+    table = contact_table(contact, step)
+    theories = _theories(case, name, contact)
+    for label, theory in theories.items():
+        table = with_theory(table, f"pressure_{label.replace(' ', '_')}", theory.pressure)
+    if options.csv:
+        write_csv(options.csv, table)
+    if options.agr:
+        _write_agr(options.agr, case, contact, step, theories)
+    if options.png:
+        _write_png(options.png, case, contact, step, theories)
+    written = [path for path in (options.csv, options.agr, options.png) if path]
+    if not written:
+        _print(table)
+    elif not options.quiet:
+        print(f"wrote {', '.join(written)}")
+    return 0
+
+
+def _theories(case: dict[str, Any], name: str, contact: Any) -> dict[str, Any]:
+    theory = case["theories"].get(name)
+    if theory is None:
+        return {}
+    force = float(np.linalg.norm(contact.force))
+    found = {"Hertz equal approach": theory}
+    if force > 0:
+        found["Hertz equal force"] = theory.at_force(force)
+    return found
+
+
+def _print(table: Any) -> None:
+    names = [name for name in table.dtype.names if name in ("point", "x", "y", "gap", "pressure", "active")]
+    names += [name for name in table.dtype.names if name.startswith("pressure_")]
+    print("  ".join(f"{name:>14}" for name in names))
+    for row in table:
+        print("  ".join(f"{row[name]:>14.6g}" for name in names))
+
+
+def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theories: dict[str, Any]) -> None:
+    from fastcontact.io.xmgrace import Curve, write_agr
+
+    r = np.abs(contact.coordinates[:, 0])
+    curves = [Curve(r, contact.pressure, "computed", style="line+symbols")]
+    for label, theory in theories.items():
+        x = np.append(np.linspace(0.0, theory.radius, 200), r.max())
+        curves.append(Curve(x, theory.pressure(x), label.replace("Hertz ", "Hertz, ")))
+    write_agr(
+        path,
+        curves,
+        title=case["title"] or f"Contact '{contact.name}'",
+        subtitle=f"load factor {step.load_factor:g}",
+        xlabel=f"distance from the axis [{case['units']['length']}]",
+        ylabel=f"contact pressure [{case['units']['pressure']}]",
+    )
+
+
+def _write_png(path: str, case: dict[str, Any], contact: Any, step: Any, theories: dict[str, Any]) -> None:
+    from fastcontact import plot
+    from fastcontact.cli._pictures import save
+
+    named = {label.replace("Hertz ", "Hertz, "): theory for label, theory in theories.items()}
+    axes = plot.pressure_profile(
+        contact,
+        other_theories=named,
+        stress=step.stress[contact.points, 1],
+        title=f"{case['title'] or contact.name}\nload factor {step.load_factor:g}",
+        units=case["units"],
+    )
+    save(axes, path)

@@ -1,0 +1,103 @@
+"""``fastcontact run``: solve a case file."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+import warnings
+from pathlib import Path
+from typing import Any
+
+from fastcontact.cli._progress import Progress
+from fastcontact.errors import FastcontactWarning, FileError
+
+HELP = "solve a case file and write the results of all steps"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    parser.add_argument("case", help="case file (TOML)")
+    parser.add_argument("-o", "--output", help="result file (default: the case's name with .vtkhdf, here)")
+    parser.add_argument("--json", metavar="FILE", help="write a summary of the last step and the iterations")
+    parser.add_argument("--plot", metavar="PNG", help="plot the contact pressure of the last step against theory")
+    parser.add_argument("--linear", metavar="SOLVER", help="linear solver: auto, direct or amg (default: the case's)")
+    parser.add_argument("--threads", type=int, metavar="N", help="threads of parallel kernels")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Solve, write, print the summary."""
+    from fastcontact import summary
+    from fastcontact.case import read_case
+    from fastcontact.io.result_writer import ResultWriter
+    from fastcontact.solve import solve
+
+    started = time.perf_counter()
+    if options.threads is not None:
+        _set_threads(options.threads)
+    case = read_case(options.case)
+    output = Path(options.output or f"{case.name}.vtkhdf")
+    _check_targets(options.json, options.plot)
+    read = time.perf_counter()
+    progress = Progress(len(case.ramp), show=sys.stderr.isatty() and not options.quiet)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", FastcontactWarning)
+        with ResultWriter(output, case.model, case_text=case.text) as writer:
+
+            def on_step(step: Any) -> None:
+                writer.write(step)
+                progress.step(step)
+
+            try:
+                steps = solve(
+                    case.model,
+                    case.ramp,
+                    linear_solver=options.linear or case.linear_solver,
+                    linear_tolerance=case.linear_tolerance,
+                    criteria=case.criteria,
+                    on_step=on_step,
+                )
+            finally:
+                progress.close()
+    texts = [str(entry.message) for entry in caught if issubclass(entry.category, FastcontactWarning)]
+    solved = time.perf_counter()
+    timings = {"read": read - started, "solve": solved - read, "cpu": time.process_time()}
+    numbers = summary.summarise(case, steps, timings, texts)
+    if options.json:
+        _write_json(options.json, numbers)
+    if options.plot:
+        from fastcontact.cli._pictures import profile_picture
+
+        profile_picture(case, steps[-1], options.plot)
+    for text in texts:
+        print(f"warning: {text}", file=sys.stderr)
+    if not options.quiet:
+        print("\n".join(summary.lines(numbers)))
+        print(f"  wrote {output}" + "".join(f", {path}" for path in (options.json, options.plot) if path))
+    return 0
+
+
+def _set_threads(count: int) -> None:
+    from fastcontact import _jit
+    from fastcontact.errors import CaseError
+
+    limit = os.cpu_count() or 1
+    if not 1 <= count <= limit:
+        raise CaseError(f"--threads {count} must lie between 1 and {limit}, the number of processors")
+    _jit.set_threads(count)
+
+
+def _check_targets(*paths: str | None) -> None:
+    for path in paths:
+        if path and not Path(path).resolve().parent.is_dir():
+            raise FileError(f"cannot write '{path}': the folder '{Path(path).parent}' does not exist; create it first")
+
+
+def _write_json(path: str, numbers: dict[str, Any]) -> None:
+    text = json.dumps(numbers, indent=2)
+    try:
+        Path(path).write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"cannot write '{path}': {error.strerror}") from error

@@ -1,0 +1,53 @@
+"""What all tests share: where the validation cases lie, and small models."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import fastcontact as fc
+
+ROOT = Path(__file__).resolve().parent.parent
+SHARED = ROOT.parent / "shared"
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    """The checkout."""
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def cases() -> Path:
+    """The folder of validation meshes beside the checkout."""
+    folder = SHARED / "cases"
+    if not folder.is_dir():
+        pytest.skip(f"the validation meshes are not there: {folder}")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def code_aster(cases: Path) -> Path:
+    """The folder of code_aster's fields beside the checkout."""
+    folder = SHARED / "reference" / "code_aster"
+    if not folder.is_dir():
+        pytest.skip(f"code_aster's fields are not there: {folder}")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def forma04():
+    """A function that sets up the training case on a mesh."""
+
+    def make(mesh: fc.Mesh, formulation: str = "node_to_segment", *, contact: bool = True, **options) -> fc.Model:
+        model = fc.Model(mesh, kinematics="axisymmetric")
+        model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+        model.fix("A1A2", "x")
+        model.prescribe("A2B2", y=-2.0)
+        model.prescribe("A1B1", y=+2.0)
+        if contact:
+            model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation=formulation, **options)
+        return model
+
+    return make

@@ -1,0 +1,267 @@
+"""Tables: the right numbers in the right rows, and CSV files that lose no bit."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from fastcontact.errors import CaseError, ContactError, FileError, MeshError
+from fastcontact.io.tables import (
+    contact_table,
+    history_table,
+    line_table,
+    point_table,
+    read_csv,
+    with_theory,
+    write_csv,
+)
+from fastcontact.mesh import Mesh
+from fastcontact.results import ContactResult, StepResult
+
+# A quadratic triangle whose numbers run wild, with its inclined edge of length 5 as a line of two pieces.
+POINTS = [[-3.0, 0.0], [0.0, 4.0], [0.0, 0.0], [-1.5, 0.0], [-1.5, 2.0], [0.0, 2.0]]
+MESH = Mesh(
+    POINTS,
+    {"tri6": [[0, 2, 1, 3, 5, 4]], "line3": [[0, 1, 4]]},
+    {"SOLID": [0], "EDGE": [1]},
+    {"A": [0], "B": [1], "BOTH": [1, 0]},
+)
+RANDOM = np.random.default_rng(3)
+
+
+def step_result(number: int, names: tuple[str, ...] = ("c",), mesh: Mesh = MESH) -> StepResult:
+    n, dim = mesh.n_points, mesh.dim
+    stress = RANDOM.normal(size=(n, 4 if dim == 2 else 6))
+    return StepResult(
+        index=number + 1,
+        load_factor=(number + 1) / 4,
+        displacement=RANDOM.normal(size=(n, dim)),
+        stress=stress,
+        von_mises=np.abs(stress[:, 0]),
+        von_mises_signed=stress[:, 0],
+        reaction=np.zeros((n, dim)),
+        contact={name: contact_result(name, number + 1, mesh) for name in names},
+    )
+
+
+def contact_result(name: str, m: int, mesh: Mesh = MESH) -> ContactResult:
+    points = np.array([0, 4, 1, 2], np.int32)[:m]
+    return ContactResult(
+        name=name,
+        formulation="node_to_segment",
+        points=points,
+        coordinates=mesh.points[points],
+        abscissa=2.5 * np.arange(m),
+        gap=RANDOM.normal(size=m),
+        pressure=np.arange(m) * 100.0,
+        multiplier=RANDOM.normal(size=m),
+        force_vectors=RANDOM.normal(size=(m, mesh.dim)),
+        normal=np.zeros((m, mesh.dim)),
+        active=np.arange(m) % 2 == 0,
+        force=np.arange(mesh.dim) + 10.0 * m,
+        radius=(float(m), m + 0.5),
+    )
+
+
+def test_contact_table() -> None:
+    step = step_result(2)
+    contact = step.contact["c"]
+    table = contact_table(contact)
+    assert table.dtype.names == (
+        "point", "x", "y", "abscissa", "radius", "gap", "pressure", "multiplier", "force_x", "force_y",
+        "active",
+    )  # fmt: skip
+    assert table["point"].tolist() == [0, 4, 1]
+    assert table["x"].tolist() == [-3.0, -1.5, 0.0]
+    assert table["y"].tolist() == [0.0, 2.0, 4.0]
+    assert table["radius"].tolist() == [3.0, 1.5, 0.0]
+    assert table["active"].tolist() == [True, False, True]
+    for name in ("gap", "pressure", "multiplier", "abscissa"):
+        np.testing.assert_array_equal(table[name], getattr(contact, name))
+    np.testing.assert_array_equal(table["force_y"], contact.force_vectors[:, 1])
+
+
+def test_contact_table_with_the_fields_of_its_step() -> None:
+    step = step_result(2)
+    table = contact_table(step.contact["c"], step)
+    np.testing.assert_array_equal(table["displacement_y"], step.displacement[[0, 4, 1], 1])
+    for column, component in enumerate(("xx", "yy", "zz", "xy")):
+        np.testing.assert_array_equal(table[f"stress_{component}"], step.stress[[0, 4, 1], column])
+    np.testing.assert_array_equal(table["von_mises"], step.von_mises[[0, 4, 1]])
+    np.testing.assert_array_equal(table["von_mises_signed"], step.von_mises_signed[[0, 4, 1]])
+
+
+def test_contact_table_without_rows() -> None:
+    step = step_result(-1)
+    assert len(contact_table(step.contact["c"], step)) == 0
+
+
+def test_tables_in_space_measure_the_radius_from_the_y_axis() -> None:
+    mesh = Mesh([[3, 7, 4], [0, 1, 0], [-6, 0, 8.0]], {"tri3": [[0, 1, 2]]}, {}, {"P": [0, 1, 2]})
+    step = step_result(0, (), mesh)
+    table = point_table(mesh, step, "P")
+    np.testing.assert_allclose(table["radius"], [5.0, 0.0, 10.0], rtol=1e-15)
+    assert {"z", "displacement_z", "stress_yz", "stress_xz"} <= set(table.dtype.names)
+    np.testing.assert_array_equal(table["stress_xz"], step.stress[:, 5])
+
+
+def test_line_table_follows_the_line() -> None:
+    step = step_result(0)
+    table = line_table(MESH, step, "EDGE")
+    assert table["point"].tolist() == [1, 4, 0], "it starts at the end next to x = 0"
+    np.testing.assert_allclose(table["abscissa"], [0.0, 2.5, 5.0], rtol=1e-15)
+    np.testing.assert_array_equal(table["displacement_x"], step.displacement[[1, 4, 0], 0])
+    np.testing.assert_array_equal(table["stress_zz"], step.stress[[1, 4, 0], 2])
+    for start in ("A", 0):
+        assert line_table(MESH, step, "EDGE", start)["point"].tolist() == [0, 4, 1]
+    with pytest.raises(MeshError, match="did you mean 'EDGE'"):
+        line_table(MESH, step, "EGDE")
+
+
+def test_point_table_goes_group_by_group() -> None:
+    step = step_result(0)
+    table = point_table(MESH, step, ["B", "BOTH"])
+    assert table["group"].tolist() == ["B", "BOTH", "BOTH"]
+    assert table["point"].tolist() == [1, 0, 1]
+    np.testing.assert_array_equal(table["von_mises"], step.von_mises[[1, 0, 1]])
+    assert len(point_table(MESH, step, [])) == 0
+    with pytest.raises(MeshError, match="unknown group"):
+        point_table(MESH, step, "C")
+
+
+def test_history_table() -> None:
+    steps = [step_result(number, ("left", "right")) for number in range(3)]
+    table = history_table(iter(steps), "right")
+    assert table.dtype.names == (
+        "step", "load_factor", "force_x", "force_y", "radius_inside", "radius_outside", "pressure_max",
+        "von_mises_max",
+    )  # fmt: skip
+    assert table["step"].tolist() == [1, 2, 3]
+    assert table["load_factor"].tolist() == [0.25, 0.5, 0.75]
+    assert table["force_y"].tolist() == [11.0, 21.0, 31.0]
+    assert table["radius_inside"].tolist() == [1.0, 2.0, 3.0]
+    assert table["radius_outside"].tolist() == [1.5, 2.5, 3.5]
+    assert table["pressure_max"].tolist() == [0.0, 100.0, 200.0]
+    assert table["von_mises_max"].tolist() == [step.von_mises.max() for step in steps]
+
+
+def test_history_needs_to_know_the_pair() -> None:
+    steps = [step_result(0, ("left", "right"))]
+    with pytest.raises(ContactError, match="contact pairs left, right: name the one"):
+        history_table(steps)
+    with pytest.raises(ContactError, match="unknown contact pair 'rihgt': did you mean 'right'"):
+        history_table(steps, "rihgt")
+    assert "pressure_max" in history_table([step_result(0)]).dtype.names
+    assert history_table([step_result(0, ())]).dtype.names == ("step", "load_factor", "von_mises_max")
+    assert len(history_table([])) == 0
+    late = history_table([step_result(0, ()), step_result(1)])
+    assert np.isnan(late["radius_inside"][0])
+    assert late["radius_inside"][1] == 2.0
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda r: np.sqrt(np.maximum(4.0 - r**2, 0.0)),
+        lambda r: math.sqrt(max(4.0 - r * r, 0.0)),
+        lambda r: math.sqrt(4.0 - r**2) if r < 2.0 else 0.0,
+    ],
+    ids=["arrays", "numbers", "a branch"],
+)
+def test_theory_may_be_any_callable(function) -> None:
+    table = with_theory(contact_table(contact_result("c", 3)), "hertz", function)
+    np.testing.assert_allclose(table["hertz"], [0.0, math.sqrt(4 - 1.5**2), 2.0], rtol=1e-15)
+    assert table.dtype.names[-1] == "hertz"
+    assert table["point"].tolist() == [0, 4, 1]
+
+
+def test_theory_along_another_column_and_its_errors() -> None:
+    table = contact_table(contact_result("c", 3))
+    np.testing.assert_array_equal(
+        with_theory(table, "twice", lambda s: 2 * s, "abscissa")["twice"], [0, 5, 10]
+    )
+    np.testing.assert_array_equal(with_theory(table, "flat", lambda s: 7.0)["flat"], [7, 7, 7])
+    with pytest.raises(CaseError, match="unknown column 'abcissa': did you mean 'abscissa'"):
+        with_theory(table, "t", np.sqrt, "abcissa")
+    with pytest.raises(CaseError, match="has a column 'gap' already"):
+        with_theory(table, "gap", np.sqrt)
+    with pytest.raises(CaseError, match=r"'t' gives \(2,\) values for the \(3,\) values of 'radius'"):
+        with_theory(table, "t", lambda r: r[1:])
+
+
+# --------------------------------------------------------------------------------------------------- CSV
+
+
+def assert_same_table(found: np.ndarray, expected: np.ndarray) -> None:
+    assert found.dtype.names == expected.dtype.names
+    for name in expected.dtype.names:
+        assert found[name].dtype.kind == expected[name].dtype.kind, name
+        np.testing.assert_array_equal(found[name], expected[name], err_msg=name)
+        if expected[name].dtype.kind == "f":
+            assert np.signbit(found[name]).tolist() == np.signbit(expected[name]).tolist(), name
+
+
+def test_tables_come_back_from_csv(tmp_path: Path) -> None:
+    step, path = step_result(2), tmp_path / "table.csv"
+    units = {"x": "mm", "pressure": "MPa", "force_x": "N, full circle"}
+    for table in (
+        contact_table(step.contact["c"], step),
+        line_table(MESH, step, "EDGE"),
+        point_table(MESH.with_groups(points={'1, "quoted"': [3], "2": [4]}), step, ['1, "quoted"', "2"]),
+        history_table([step_result(0), step_result(1)]),
+    ):
+        of_table = {name: unit for name, unit in units.items() if name in table.dtype.names}
+        write_csv(path, table, of_table)
+        found, found_units = read_csv(path)
+        assert_same_table(found, table)
+        assert found_units == of_table
+
+
+@settings(max_examples=60, deadline=None)
+@given(values=hnp.arrays(np.float64, st.integers(1, 6), elements=st.floats(width=64)))
+def test_csv_loses_no_bit(values: np.ndarray, tmp_path_factory: pytest.TempPathFactory) -> None:
+    path = tmp_path_factory.getbasetemp() / "bits.csv"
+    table = np.array(list(zip(values, range(len(values)))), dtype=[("a", float), ("b", np.int64)])
+    write_csv(path, table)
+    assert_same_table(read_csv(path)[0], table)
+
+
+def test_csv_is_what_the_standard_says(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    table = np.array(
+        [(1, 0.1, True, 'a "b", c')], [("n", int), ("x", float), ("active", bool), ("group", "U9")]
+    )
+    write_csv(path, table, {"x": "mm"})
+    text = path.read_bytes().decode("utf-8")
+    assert text == 'n,x [mm],active,group\r\n1,0.10000000000000001,true,"a ""b"", c"\r\n'
+    with open(path, newline="") as file:
+        assert next(csv.DictReader(file))["group"] == 'a "b", c'
+    numbers = np.genfromtxt(path, delimiter=",", skip_header=1, usecols=(0, 1))
+    assert numbers.tolist() == [1.0, 0.1]
+
+
+def test_csv_messages(tmp_path: Path) -> None:
+    table, path = contact_table(contact_result("c", 1)), tmp_path / "t.csv"
+    with pytest.raises(CaseError, match="unknown column 'presure': did you mean 'pressure'"):
+        write_csv(path, table, {"presure": "MPa"})
+    assert not path.exists()
+    with pytest.raises(FileError, match="does not exist: create it"):
+        write_csv(tmp_path / "nowhere" / "t.csv", table)
+    with pytest.raises(FileError, match="cannot be read"):
+        read_csv(path)
+    path.write_text("")
+    with pytest.raises(FileError, match="is empty"):
+        read_csv(path)
+    path.write_text("a,b\n1,2\n3\n")
+    with pytest.raises(FileError, match="line 3 has 1 values, but the header names 2"):
+        read_csv(path)
+    path.write_bytes(b"a\n\xff\n")
+    with pytest.raises(FileError, match="UTF-8"):
+        read_csv(path)

@@ -1,0 +1,101 @@
+"""The inequality solver against enumeration of all active sets, with every linear solver."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.sparse import bsr_array, csr_array
+
+from fastcontact import active_set, linear
+
+
+class Dense:
+    """A compliance given as a matrix."""
+
+    def __init__(self, C):
+        self.C = C
+
+    def block(self, rows):
+        return self.C[np.ix_(rows, rows)]
+
+    def apply(self, multiplier):
+        return self.C @ multiplier
+
+
+def enumerate_solutions(K, f, B, gap0, C):
+    """Return the multipliers of the only active set that satisfies all inequalities."""
+    flexibility, free = B @ np.linalg.solve(K, B.T) + C, gap0 + B @ np.linalg.solve(K, f)
+    m = len(gap0)
+    for size in range(m + 1):
+        for rows in itertools.combinations(range(m), size):
+            rows = list(rows)
+            multiplier = np.zeros(m)
+            multiplier[rows] = np.linalg.solve(flexibility[np.ix_(rows, rows)], -free[rows])
+            if (multiplier >= -1e-12).all() and (free + flexibility @ multiplier >= -1e-10).all():
+                return multiplier
+    raise AssertionError("a strictly convex problem has a solution")
+
+
+def random_problem(seed, n=8, m=5):
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(n, n))
+    return A @ A.T + np.eye(n), rng.normal(size=n), rng.normal(size=(m, n)), rng.normal(size=m), rng
+
+
+def solve(K, f, B, gap0, C=None, start=None, solver="direct", **options):
+    loaded = linear.make(solver, dim=2, n_dofs=len(f), tolerance=1e-13)
+    loaded.prepare(bsr_array(K, blocksize=(2, 2)), np.ones((len(f), 1)))
+    return active_set.solve(
+        loaded.load(f), csr_array(B), gap0, np.ones(len(gap0), bool), compliance=C,
+        active=np.zeros(len(gap0), bool) if start is None else start, gap_tolerance=1e-12, **options,
+    )  # fmt: skip
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 100_000), soft=st.booleans(), start=st.integers(0, 31))
+def test_every_start_ends_in_the_enumerated_solution(seed, soft, start):
+    K, f, B, gap0, rng = random_problem(seed)
+    half = rng.normal(size=(5, 2))
+    C = half @ half.T if soft else np.zeros((5, 5))
+    begin = np.array([bool(start >> k & 1) for k in range(5)])
+    state = solve(K, f, B, gap0, Dense(C) if soft else None, begin)
+    assert state.settled
+    assert state.multiplier == pytest.approx(enumerate_solutions(K, f, B, gap0, C), abs=1e-8)
+    assert np.abs(K @ state.u - f - B.T @ state.multiplier).max() < 1e-9
+    assert np.abs(state.gap * state.multiplier).max() < 1e-9
+
+
+@pytest.mark.parametrize("solver", linear.SOLVERS)
+def test_every_linear_solver_gives_the_same_state(solver):
+    K, f, B, gap0, _ = random_problem(3)
+    state = solve(K, f, B, gap0, solver=solver)
+    assert state.multiplier == pytest.approx(enumerate_solutions(K, f, B, gap0, np.zeros((5, 5))), abs=1e-8)
+
+
+def test_rows_that_repeat_each_other_do_no_harm():
+    K, f, B, gap0, _ = random_problem(3)
+    twice = np.vstack([B, B[:1]])
+    state = solve(K, f, twice, np.append(gap0, gap0[0]), start=np.ones(6, bool))
+    single = solve(K, f, B, gap0)
+    assert state.u == pytest.approx(single.u, abs=1e-10)
+
+
+def test_an_unusable_constraint_stays_open():
+    K, f, B, gap0, _ = random_problem(3)
+    loaded = linear.make("direct", dim=2, n_dofs=8)
+    loaded.prepare(bsr_array(K, blocksize=(2, 2)), np.ones((8, 1)))
+    state = active_set.solve(
+        loaded.load(f), csr_array(B), gap0, np.zeros(5, bool), active=np.ones(5, bool), gap_tolerance=1e-12
+    )
+    assert state.u == pytest.approx(np.linalg.solve(K, f))
+    assert not state.multiplier.any()
+
+
+def test_a_limit_of_iterations_returns_an_unsettled_state():
+    for seed in range(50):
+        K, f, B, gap0, _ = random_problem(seed)
+        if not solve(K, f, B, gap0, max_iterations=1).settled:
+            return
+    raise AssertionError("no problem needed a second iteration")

@@ -1,0 +1,74 @@
+"""Every linear solver under one test of the protocol."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+
+import fastcontact as fc
+from fastcontact import linear
+from fastcontact.errors import ModelError
+from fastcontact.solve import Analysis, Criteria
+
+
+@pytest.fixture(scope="module")
+def problem(forma04):
+    model = forma04(fc.generate.half_spheres("tri3", size=6.0))
+    analysis = Analysis(model, "direct", 1e-12, Criteria())
+    rng = np.random.default_rng(0)
+    f = np.where(analysis.fixed, 0.0, rng.normal(size=model.n_dofs))
+    constraints = analysis.pairs["hertz"].constraints(np.zeros(model.mesh.points.shape))
+    B = constraints.B[:4].copy()
+    B.data[analysis.fixed[B.indices]] = 0.0
+    B.eliminate_zeros()
+    return analysis, f, csr_array(B), rng.normal(size=4) * 1e-3
+
+
+def prepared(name, analysis):
+    from fastcontact.solve import _near_nullspace, _with_supports
+
+    solver = linear.make(name, dim=2, n_dofs=analysis.model.n_dofs, tolerance=1e-12)
+    modes = _near_nullspace(analysis.model)
+    modes[analysis.fixed] = 0.0
+    solver.prepare(_with_supports(analysis.K, analysis.fixed), modes)
+    return solver
+
+
+@pytest.mark.parametrize("name", linear.SOLVERS)
+def test_equations_hold_and_forces_balance(name, problem):
+    analysis, f, B, c = problem
+    u, multiplier = prepared(name, analysis).load(f).solve(B, c)
+    free = ~analysis.fixed
+    out = (analysis.K @ u - f - B.T @ multiplier)[free]
+    assert np.abs(B @ u - c).max() < 1e-9 * np.abs(u).max()
+    assert np.abs(out).max() < 1e-9 * np.abs(f).max()
+    assert np.abs(u[~free]).max() == 0.0
+
+
+@pytest.mark.parametrize("name", linear.SOLVERS)
+def test_soft_equations_hold(name, problem):
+    analysis, f, B, c = problem
+    C = np.diag([1.0, 2.0, 3.0, 4.0]) * 1e-6
+    u, multiplier = prepared(name, analysis).load(f).solve(B, c, C)
+    assert np.abs(B @ u + C @ multiplier - c).max() < 1e-9 * np.abs(u).max()
+
+
+@pytest.mark.parametrize("name", linear.SOLVERS)
+def test_no_equations_is_a_plain_solution_and_the_solver_describes_itself(name, problem):
+    analysis, f, B, _ = problem
+    solver = prepared(name, analysis)
+    u, multiplier = solver.load(f).solve(B[:0], np.empty(0))
+    assert len(multiplier) == 0
+    assert np.abs((analysis.K @ u - f)[~analysis.fixed]).max() < 1e-9 * np.abs(f).max()
+    assert solver.counters.setups == 1
+    assert solver.counters.iterations >= 1
+    assert type(solver).__name__ in repr(solver)
+
+
+def test_auto_chooses_by_dimension_and_size():
+    assert linear.make("auto", dim=2, n_dofs=1000).name == "direct"
+    assert linear.make("auto", dim=3, n_dofs=1_000_000).name == "amg"
+
+
+def test_an_unknown_solver_is_refused():
+    with pytest.raises(ModelError, match="'amgg'.*'amg'"):
+        linear.make("amgg", dim=2, n_dofs=10)

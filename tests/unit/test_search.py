@@ -1,0 +1,74 @@
+"""The tree search against brute force."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fastcontact.kernels import search2d
+
+
+def search(points, corners):
+    n = len(points)
+    facet, xi, normal, overhang = np.empty(n, np.intp), np.empty(n), np.empty((n, 2)), np.empty(n)
+    search2d.closest_facets(points, corners, *search2d.build_tree(corners), facet, xi, normal, overhang)
+    return facet, xi, normal, overhang
+
+
+def curve(corners, s):
+    if corners.shape[1] == 2:
+        return 0.5 * (1 - s) * corners[:, 0] + 0.5 * (1 + s) * corners[:, 1]
+    return 0.5 * s * (s - 1) * corners[:, 0] + 0.5 * s * (s + 1) * corners[:, 1] + (1 - s * s) * corners[:, 2]
+
+
+def brute_force(points, corners):
+    """Distances to the closest facet by dense sampling, from above."""
+    samples = np.concatenate([curve(corners, s) for s in np.linspace(-1, 1, 2001)])
+    return np.sqrt(((points[:, None] - samples[None]) ** 2).sum(axis=2).min(axis=1))
+
+
+def random_facets(seed, n, n_nodes):
+    rng = np.random.default_rng(seed)
+    start = rng.uniform(-5, 5, (n, 2))
+    end = start + rng.normal(0, 1, (n, 2))
+    corners = np.stack([start, end], axis=1)
+    if n_nodes == 3:
+        middle = 0.5 * (start + end) + 0.15 * rng.normal(0, 1, (n, 2)) * np.linalg.norm(end - start, axis=1)[:, None]
+        corners = np.concatenate([corners, middle[:, None]], axis=1)
+    return np.ascontiguousarray(corners), rng.uniform(-7, 7, (12, 2))
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 10_000), n=st.integers(1, 40), n_nodes=st.sampled_from([2, 3]))
+def test_the_closest_facet_is_found(seed, n, n_nodes):
+    corners, points = random_facets(seed, n, n_nodes)
+    facet, xi, normal, _ = search(points, corners)
+    found = np.linalg.norm(points - np.stack([curve(corners[f : f + 1], s)[0] for f, s in zip(facet, xi)]), axis=1)
+    expected = brute_force(points, corners)
+    assert (found <= expected + 1e-12).all()
+    assert (found >= expected - 5e-3).all()
+    assert np.abs(np.linalg.norm(normal, axis=1) - 1).max() < 1e-14
+
+
+def test_projection_on_a_circle_of_quadratic_facets_and_normals_point_outward():
+    angle = np.linspace(0, -np.pi / 2, 9)  # clockwise: the solid lies inside
+    end, middle = angle, 0.5 * (angle[1:] + angle[:-1])
+    on = lambda a: 10 * np.column_stack([np.cos(a), np.sin(a)])  # noqa: E731
+    corners = np.ascontiguousarray(np.stack([on(end[1:]), on(end[:-1]), on(middle)], axis=1))
+    directions = np.linspace(-1.5, -0.05, 23)
+    facet, xi, normal, overhang = search(1.3 * on(directions), corners)
+    unit = on(directions) / 10
+    assert np.abs(normal - unit).max() < 2e-3
+    assert (overhang == 0).all()
+
+
+def test_overhang_counts_facet_lengths_beyond_the_end():
+    corners = np.array([[[0.0, 0.0], [2.0, 0.0]], [[2.0, 0.0], [4.0, 0.0]]])
+    _, _, _, overhang = search(np.array([[5.0, 1.0], [-3.0, 0.5], [1.0, 1.0]]), corners)
+    assert overhang == pytest.approx([0.5, 1.5, 0.0], abs=1e-15)
+
+
+def test_of_equally_close_facets_the_first_is_taken():
+    corners = np.array([[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [2.0, 0.0]]])
+    facet, xi, _, _ = search(np.array([[1.0, 0.7]]), corners)
+    assert (facet[0], xi[0]) == (0, 1.0)
