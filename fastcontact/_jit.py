@@ -32,7 +32,7 @@ def parallel_kernel(function: F) -> F:
 
 
 def _compile(function: F, parallel: bool) -> F:
-    options = {"fastmath": FASTMATH, "parallel": parallel, "nogil": True, "error_model": "numpy"}
+    options: dict[str, Any] = {"fastmath": FASTMATH, "parallel": parallel, "nogil": True, "error_model": "numpy"}
     try:
         return numba.njit(cache=True, **options)(function)  # type: ignore[return-value]
     except RuntimeError as error:  # numba: "cannot cache function ...: no locator available for file ..."

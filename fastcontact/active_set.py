@@ -4,8 +4,8 @@ The gap is ``gap0 + B u + C multiplier``; the compliance C of the constraints th
 semidefinite, is absent in most formulations.
 
 The primal-dual active set (Hintermueller, Ito and Kunisch, 2003) changes all wrong constraints at once and usually
-settles in a few solutions, but it can cycle. ``B K^-1 B.T + C`` is symmetric positive definite when no constraint repeats
-others, so the problem is a linear complementarity problem with a P-matrix; when a set comes back, the solver
+settles in a few solutions, but it can cycle. ``B K^-1 B.T + C`` is symmetric positive definite when no constraint
+repeats others, so the problem is a linear complementarity problem with a P-matrix; when a set comes back, the solver
 therefore goes on changing only the wrong constraint with the lowest number, which never repeats a set and so ends
 (Murty, 1974).
 """

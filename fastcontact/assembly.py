@@ -87,7 +87,9 @@ def stiffness(
         )  # fmt: skip
         if bad >= 0:
             where = mesh.points[block[bad]].mean(axis=0)
-            raise MeshError(f"cell {bad} of {name} near {where} is degenerate or inside out: its Jacobian is not positive")
+            raise MeshError(
+                f"cell {bad} of {name} near {where} is degenerate or inside out: its Jacobian is not positive"
+            )
     size = mesh.n_points * mesh.dim
     return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
 

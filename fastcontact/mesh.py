@@ -14,7 +14,7 @@ from fastcontact import elements
 from fastcontact.errors import MeshError, unknown
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int32]
+Indices = NDArray[Any]
 
 
 def _read_only(values: ArrayLike, dtype: Any) -> NDArray[Any]:
@@ -64,7 +64,9 @@ class Mesh:
             raise MeshError(f"points must have shape (n_points, 2) or (n_points, 3), not {points.shape}")
         bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
         if len(bad):
-            raise MeshError(f"point {bad[0]} has coordinates {points[bad[0]]}: {len(bad)} points are not finite numbers")
+            raise MeshError(
+                f"point {bad[0]} has coordinates {points[bad[0]]}: {len(bad)} points are not finite numbers"
+            )
         cells = {name: self._checked_cells(name, block, len(points)) for name, block in self.cells.items()}
         cells = {name: block for name, block in cells.items() if len(block)}
         n_cells = sum(map(len, cells.values()))
@@ -203,7 +205,8 @@ class Mesh:
     ) -> Mesh:
         """Return the mesh with further (or redefined) groups of cells and points."""
         return self.replace(
-            cell_groups={**self.cell_groups, **(cells or {})}, point_groups={**self.point_groups, **(points or {})}
+            cell_groups={**self.cell_groups, **(cells or {})},
+            point_groups={**self.point_groups, **(points or {})},
         )
 
     def merged_groups(self, name: str, members: Iterable[str]) -> Mesh:

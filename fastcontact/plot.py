@@ -75,7 +75,14 @@ def pressure_profile(
     shown = r <= reach
     for style, (legend, curve) in zip(("-", "--", ":", "-."), theories.items(), strict=False):
         x = np.append(np.linspace(0.0, curve.radius, 400), reach)
-        ax.plot(x, curve.pressure(x), style, color="black", lw=1.1, label=f"{legend} ($p_0$ = {curve.pressure_max:.1f})")
+        ax.plot(
+            x,
+            curve.pressure(x),
+            style,
+            color="black",
+            lw=1.1,
+            label=f"{legend} ($p_0$ = {curve.pressure_max:.1f})",
+        )
     label = f"{contact.formulation.replace('_', '-')} ($p$ max = {contact.pressure_max:.1f})"
     ax.plot(r[shown], contact.pressure[shown], "o-", color="tab:blue", ms=4, lw=0.8, label=label)
     if stress is not None:
@@ -127,20 +134,29 @@ def deformed_shape(
     ax = _new_axes(ax, (7.0, 7.0))
     xy = mesh.points + scale * step.displacement
     loops = [cells[:, _outline(name)] for name, cells in mesh.solids.items()]
-    triangles = np.concatenate([np.concatenate([_fan(name, cells) for name, cells in mesh.solids.items()])])
-    field = ax.tripcolor(Triangulation(*xy.T, triangles), step.von_mises, shading="gouraud", cmap="viridis")
+    triangles = np.concatenate([_fan(name, cells) for name, cells in mesh.solids.items()])
+    shape = Triangulation(xy[:, 0], xy[:, 1], triangles)
+    field = ax.tripcolor(shape, step.von_mises, shading="gouraud", cmap="viridis")
     if edges if edges is not None else sum(map(len, loops)) <= 5000:
         for loop in loops:
-            ax.add_collection(PolyCollection(xy[loop], facecolors="none", edgecolors="black", lw=0.15, alpha=0.6))
+            ax.add_collection(PolyCollection(list(xy[loop]), facecolors="none", edgecolors="black", lw=0.15, alpha=0.6))
     top = int(np.argmax(step.von_mises))
     where = f"({mesh.points[top, 0]:.2f}, {mesh.points[top, 1]:.2f})"
-    ax.plot(*xy[top], "o", mfc="none", mec="red", ms=9, mew=1.5, label=f"maximum {step.von_mises[top]:.1f} at {where}")
+    ax.plot(
+        *xy[top],
+        "o",
+        mfc="none",
+        mec="red",
+        ms=9,
+        mew=1.5,
+        label=f"maximum {step.von_mises[top]:.1f} at {where}",
+    )
     ax.figure.colorbar(field, ax=ax, label=f"von Mises stress [{units['pressure']}]", shrink=0.8)
     ax.set_aspect("equal")
     ax.set_xlabel(f"x [{units['length']}]")
     ax.set_ylabel(f"y [{units['length']}]")
     ax.set_title(title or f"Deformed shape (displacements x {scale:g}), load factor {step.load_factor:g}")
-    ax.legend(loc="upper right")
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09))
     return ax
 
 
@@ -204,7 +220,8 @@ def history(
     contacts = [step.contact[pair] for step in steps]
     upper.plot(x, [np.linalg.norm(c.force) for c in contacts], "o-", ms=4, label="computed")
     bracket = np.array([c.radius for c in contacts])
-    lower.fill_between(x, *bracket.T, alpha=0.3, label="computed (between closed and open)", step="mid")
+    legend = "computed (between closed and open)"
+    lower.fill_between(x, bracket[:, 0], bracket[:, 1], alpha=0.3, label=legend, step="mid")
     if law is not None and approach is not None:
         fine = np.linspace(1e-3, 1.0, 200) * x[-1]
         curves = [law.at_approach(d) for d in fine]

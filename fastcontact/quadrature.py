@@ -57,4 +57,6 @@ def subdivided(rule: Rule, parts: int) -> Rule:
     all_points = (left[:, None] + (points[:, 0] + 1.0) / parts).ravel()
     all_weights = np.tile(weights / parts, parts)
     unique, place = np.unique(np.round(all_points, 14), return_inverse=True)
-    return unique[:, None], np.bincount(place, weights=all_weights)
+    merged = np.zeros(len(unique))
+    np.add.at(merged, place, all_weights)
+    return unique[:, None], merged

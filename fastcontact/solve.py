@@ -192,13 +192,17 @@ class Analysis:
             if not (state.settled or in_loop):
                 raise ConvergenceError(self._cycling(state, constraints), history)
             # Iterative solvers leave a noise of their tolerance; asking for less would never end.
-            if fixed_updates is None and state.settled and change <= max(criteria.geometry, self.solver.tolerance) * size:
+            if (
+                fixed_updates is None
+                and state.settled
+                and change <= max(criteria.geometry, self.solver.tolerance) * size
+            ):
                 return constraints, state
         if fixed_updates is None:
             raise ConvergenceError(
                 f"the contact geometry did not settle in {limit} updates: the displacement still changes by "
-                f"{history[-1]['displacement_change']:.1e} of its largest component, {history[-1]['active']} constraints "
-                "are active. Use more load steps, a finer mesh on the primary side, or a fixed number of updates",
+                f"{history[-1]['displacement_change']:.1e} of its largest component, {history[-1]['active']} "
+                "constraints are active. Use more load steps, a finer mesh on the primary side, or a fixed number of updates",
                 history,
             )
         return constraints, state
@@ -242,7 +246,7 @@ class Analysis:
         if not residual <= bound:
             raise ConvergenceError(
                 f"step {index}: the out-of-balance force {residual:.3g} stays above {bound:.3g} "
-                f"({self.criteria.relative:g} of the largest force): solve with the direct solver or a smaller tolerance",
+                f"({self.criteria.relative:g} of the largest force): use the direct solver or a smaller tolerance",
                 history,
             )
         return reaction
@@ -257,7 +261,8 @@ class Analysis:
         stress = recovery.nodal_average(mesh, at_points)
         contact, first = {}, 0
         for name, pair in self.pairs.items():
-            assert constraints is not None and state is not None
+            assert constraints is not None
+            assert state is not None
             rows = slice(first, first + self.sizes[name])
             contact[name] = contact_result(name, pair, constraints, state, u, rows)
             first = rows.stop
@@ -281,7 +286,8 @@ class Analysis:
         joined = {
             frozenset((int(body[p.secondary.points[0]]), int(body[p.primary.points[0]]))) for p in self.pairs.values()
         }
-        texts, seen = [], set()
+        texts: list[str] = []
+        seen: set[frozenset[int]] = set()
         coordinates = mesh.points + self.u.reshape(-1, mesh.dim)
         deep = sorted(penetration(mesh, coordinates), key=lambda entry: -entry[2])
         for number, other, depth, where in deep:

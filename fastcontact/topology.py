@@ -129,7 +129,9 @@ def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> Orde
         number = mesh.point(start) if isinstance(start, str) else int(start)
         matches = ends[nodes[ends] == number]
         if not len(matches):
-            raise MeshError(f"point {number} is not an end of '{group}': its ends are {nodes[ends[0]]}, {nodes[ends[1]]}")
+            raise MeshError(
+                f"point {number} is not an end of '{group}': its ends are {nodes[ends[0]]}, {nodes[ends[1]]}"
+            )
         first = matches[0]
     order = _walk(local, len(nodes), int(first))
     if len(order) != len(nodes):

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from fastcontact.assembly import rigid_modes
 from fastcontact.errors import ModelError
-from fastcontact.kernels import search2d
 from fastcontact.mesh import Mesh
+from fastcontact.search import closest
 from fastcontact.topology import bodies, outer_facets
 
 Array = NDArray[np.float64]
@@ -107,12 +107,10 @@ def _inside(points: Array, edges: Array) -> NDArray[np.bool_]:
 
 
 def _distance(points: Array, edges: Array) -> Array:
-    n = len(points)
-    facet, xi, normal, overhang = np.empty(n, np.intp), np.empty(n), np.empty((n, 2)), np.empty(n)
-    corners = np.ascontiguousarray(edges)
-    search2d.closest_facets(points, corners, *search2d.build_tree(corners), facet, xi, normal, overhang)
-    closest = 0.5 * (1 - xi)[:, None] * edges[facet, 0] + 0.5 * (1 + xi)[:, None] * edges[facet, 1]
-    return np.linalg.norm(points - closest, axis=1)
+    """Return the distances (n,) of `points` (n, 2) to the closest of `edges` (m, 2, 2)."""
+    found = closest(points, edges)
+    at = 0.5 * (1 - found.xi)[:, None] * edges[found.facet, 0] + 0.5 * (1 + found.xi)[:, None] * edges[found.facet, 1]
+    return np.linalg.norm(points - at, axis=1)
 
 
 def check_overlap(mesh: Mesh, paired: Iterable[tuple[str, str]]) -> None:
@@ -121,13 +119,11 @@ def check_overlap(mesh: Mesh, paired: Iterable[tuple[str, str]]) -> None:
     `paired` holds the (secondary, primary) groups of the contact pairs.
     """
     _, body = bodies(mesh)
-    joined = {
-        frozenset((int(body[mesh.points_of(a)[0]]), int(body[mesh.points_of(b)[0]]))) for a, b in paired
-    }
+    joined = {frozenset((int(body[mesh.points_of(a)[0]]), int(body[mesh.points_of(b)[0]]))) for a, b in paired}
     size = float(np.ptp(mesh.points, axis=0).max())
     for number, other, depth, where in penetration(mesh, mesh.points):
         if depth > 1e-6 * size and frozenset((number, other)) not in joined:
+            names = body_name(mesh, body, number), body_name(mesh, body, other)
             raise ModelError(
-                f"body {body_name(mesh, body, number)} overlaps body {body_name(mesh, body, other)} by {depth:.3g} near "
-                f"{where} before any load, and no contact pair joins them: add the contact or move one of them"
+                f"body {names[0]} overlaps body {names[1]} by {depth:.3g} near {where} before any load, and no contact pair joins them: add the contact or move one of them"
             )

@@ -48,12 +48,12 @@ class Bodies:
 
     @property
     def G_star(self) -> float:
-        """Tangential modulus, 1/G* = (2 - nu1)/(4 G1) + (2 - nu2)/(4 G2) (Johnson 1985, eq. 7.43) [pressure]."""
+        """Tangential modulus, 1/G* = sum of (2 - nu)/(4 G) (Johnson 1985, eq. 7.43) [pressure]."""
         return 1.0 / sum((2.0 - nu) * (1.0 + nu) / (2.0 * E) for E, nu in self._elastic)
 
     @property
     def dundurs(self) -> float:
-        """Dundurs' second constant in plane strain; zero where pressure causes no shear (Johnson 1985, eq. 2.23)."""
+        """Dundurs' second constant, plane strain; 0 uncouples pressure and shear (Johnson 1985, eq. 2.23)."""
         first = (1.0 - 2.0 * self.nu1) * (1.0 + self.nu1) / self.E1
         second = 0.0 if self.E2 is None else (1.0 - 2.0 * self.nu2) * (1.0 + self.nu2) / self.E2
         return 0.5 * (first - second) * self.E_star

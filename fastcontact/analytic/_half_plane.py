@@ -1,9 +1,10 @@
 """Elastic half plane under Hertz's pressure: stress and displacement anywhere, in closed form.
 
-The half plane is y <= 0 and carries the pressure p0 sqrt(1 - x^2/b^2) on |x| <= b. With k = |y| + i x and the root
-w = sqrt(b^2 + k^2), Re w >= 0, the harmonic function that equals the pressure on the surface is p0/b Re(w - k)
-(McEwen 1949; Johnson 1985, eq. 4.49). Displacements are measured from the point (0, 0): in a half plane there is no
-point at infinity to measure from. Plane stress: the same with nu/(1 + nu) for nu and the same shear modulus.
+The half plane is y <= 0 and carries the pressure p0 sqrt(1 - x^2/b^2) on |x| <= b. With k = |y| + i x and the
+root w = sqrt(b^2 + k^2), Re w >= 0, the harmonic function that equals the pressure on the surface is p0/b
+Re(w - k) (McEwen 1949; Johnson 1985, eq. 4.49). Displacements are measured from the point (0, 0): in a half
+plane there is no point at infinity to measure from. Plane stress: the same with nu/(1 + nu) for nu and the
+same shear modulus.
 """
 
 from __future__ import annotations
@@ -30,8 +31,15 @@ def _roots(x: ArrayLike, y: ArrayLike, b: float) -> tuple[Array, ComplexArray, C
     square.real = (1.0 - across) * (1.0 + across) + depth**2
     square.imag = 2.0 * across * depth
     w = np.sqrt(square)
-    w = w.real + 1j * np.copysign(w.imag, across)  # outside the contact, on the surface, the sign is that of x
-    return depth, k, w, 1.0 / (w + k)  # (w - k)(w + k) = b^2; the difference itself would lose digits far away
+    w = w.real + 1j * np.copysign(
+        w.imag, across
+    )  # outside the contact, on the surface, the sign is that of x
+    return (
+        depth,
+        k,
+        w,
+        1.0 / (w + k),
+    )  # (w - k)(w + k) = b^2; the difference itself would lose digits far away
 
 
 def stress(x: ArrayLike, y: ArrayLike, b: float, p0: float, nu: float, kinematics: str) -> Array:
@@ -44,7 +52,9 @@ def stress(x: ArrayLike, y: ArrayLike, b: float, p0: float, nu: float, kinematic
     return p0 * np.stack([xx, yy, zz, -gradient.imag], axis=-1)
 
 
-def displacement(x: ArrayLike, y: ArrayLike, b: float, p0: float, E: float, nu: float, kinematics: str) -> Array:
+def displacement(
+    x: ArrayLike, y: ArrayLike, b: float, p0: float, E: float, nu: float, kinematics: str
+) -> Array:
     """Return displacements (..., 2) along x, y [length], measured from the point (0, 0).
 
     With H the integral of w - k over k, 2 G u_x = (p0/b) [y Im(w - k) - (1 - 2 nu) Im H] and

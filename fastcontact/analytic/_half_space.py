@@ -1,10 +1,10 @@
 """Elastic half space under Hertz's axisymmetric pressure: stress and displacement anywhere, in closed form.
 
-The half space is z <= 0 and carries the pressure p0 sqrt(1 - r^2/a^2) on r <= a. In oblate spheroidal coordinates
-s >= 0, 0 <= t <= 1 with r^2 = a^2 (1 + s^2)(1 - t^2) and -z = a s t, every quantity is a rational function of s and
-t and the Legendre functions of the second kind of i s, without cancellation near the axis or the surface. Huber
-1904 gives the stresses in other coordinates; the displacement follows from Boussinesq's potentials (Johnson 1985,
-section 3.1).
+The half space is z <= 0 and carries the pressure p0 sqrt(1 - r^2/a^2) on r <= a. In oblate spheroidal
+coordinates s >= 0, 0 <= t <= 1 with r^2 = a^2 (1 + s^2)(1 - t^2) and -z = a s t, every quantity is a rational
+function of s and t and the Legendre functions of the second kind of i s, without cancellation near the axis
+or the surface. Huber 1904 gives the stresses in other coordinates; the displacement follows from Boussinesq's
+potentials (Johnson 1985, section 3.1).
 """
 
 from __future__ import annotations
@@ -23,7 +23,9 @@ def below_surface(z: ArrayLike, a: float) -> Array:
     """Return the depth -z, forgiving the rounding of mesh coordinates on the surface."""
     depth = -np.asarray(z, dtype=np.float64)
     if depth.size and depth.min() < -1e-9 * a:
-        raise ModelError(f"a point lies {-depth.min():g} above the surface: the body is z <= 0 (y <= 0 in the plane)")
+        raise ModelError(
+            f"a point lies {-depth.min():g} above the surface: the body is z <= 0 (y <= 0 in the plane)"
+        )
     return np.maximum(depth, 0.0)
 
 
@@ -71,8 +73,8 @@ def stress(r: ArrayLike, z: ArrayLike, a: float, p0: float, nu: float) -> Array:
 def displacement(r: ArrayLike, z: ArrayLike, a: float, p0: float, E: float, nu: float) -> Array:
     """Return displacements (..., 2) radial, axial [length], zero at infinity; z points out of the body.
 
-    The radial one is r times the hoop strain; the axial one is (z P - 2 (1 - nu) V)/(2 G) with the potential V of
-    the pressure and P = -dV/d|z| (Johnson 1985, eq. 3.2-3.6 without shear tractions).
+    The radial one is r times the hoop strain; the axial one is (z P - 2 (1 - nu) V)/(2 G) with the potential
+    V of the pressure and P = -dV/d|z| (Johnson 1985, eq. 3.2-3.6 without shear tractions).
     """
     radial, height = np.broadcast_arrays(np.asarray(r, dtype=np.float64), -below_surface(z, a))
     s, t = _spheroidal(r, z, a)

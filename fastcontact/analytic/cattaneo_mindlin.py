@@ -20,10 +20,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class _PartialSlip:
-    """What the line and the sphere share: a load up to a peak, then perhaps back (Mindlin and Deresiewicz 1953).
+    """A tangential load up to a peak, then perhaps back: what the line and the sphere share.
 
-    The traction of a first load T is f times the pressure less that of a smaller contact, the stick zone. Coming
-    back from a peak T* to T subtracts twice the traction of a first load (T* - T)/2.
+    After Mindlin and Deresiewicz (1953). The traction of a first load T is f times the pressure less that of
+    a smaller contact, the stick zone. Coming back from a peak T* to T subtracts twice the traction of a first
+    load (T* - T)/2.
     """
 
     friction: float
@@ -39,8 +40,8 @@ class _PartialSlip:
         force = number("tangential_force", tangential_force)
         if not -self.tangential_force_peak <= force <= self.tangential_force:
             raise ModelError(
-                f"tangential_force is {force:g}: unloading runs from {self.tangential_force:g} down to the opposite "
-                f"peak {-self.tangential_force_peak:g}"
+                f"tangential_force is {force:g}: unloading runs from {self.tangential_force:g} "
+                f"down to the opposite peak {-self.tangential_force_peak:g}"
             )
         return force
 
@@ -79,21 +80,26 @@ class CattaneoMindlinLine(_PartialSlip):
 
     @property
     def stick_radius(self) -> float:
-        """Half-width of the zone that sticks now, a sqrt(1 - Q/(f P)) while loading (eq. 7.29) [length]."""
+        """Half-width of the zone that sticks; a sqrt(1 - Q/(f P)) while loading (Johnson, 7.29) [length]."""
         return self._zone(self._reversal if self._reversal > 0.0 else self.tangential_force)
 
     def traction(self, x: ArrayLike) -> Array:
-        """Return the shear traction in the direction of the force (Johnson 1985, eqs 7.26 and 7.28) [pressure]."""
+        """Return the shear traction along the force (Johnson 1985, eqs 7.26 and 7.28) [pressure]."""
         first, back = self._zone(self.tangential_force_peak), self._zone(self._reversal)
-        return _traction(self.normal, self.friction, first, x) - 2.0 * _traction(self.normal, self.friction, back, x)
+        return _traction(self.normal, self.friction, first, x) - 2.0 * _traction(
+            self.normal, self.friction, back, x
+        )
 
     def slip(self, x: ArrayLike) -> Array:
         """Return how far the surfaces have slipped on each other, in the direction of the force [length].
 
-        The integral of f p0/a (2/E*) sqrt(x^2 - c^2) from the edge c of the stick zone outward, for c <= |x| <= a;
-        zero within the stick zone and outside the contact (from Johnson 1985, eq. 2.25 and section 7.2a).
+        The integral of f p0/a (2/E*) sqrt(x^2 - c^2) from the edge c of the stick zone outward, for c <= |x|
+        <= a; zero within the stick zone and outside the contact (from Johnson 1985, eq. 2.25 and section
+        7.2a).
         """
-        return self._slip(self._zone(self.tangential_force_peak), x) - 2.0 * self._slip(self._zone(self._reversal), x)
+        return self._slip(self._zone(self.tangential_force_peak), x) - 2.0 * self._slip(
+            self._zone(self._reversal), x
+        )
 
     def unloaded_to(self, tangential_force: float) -> CattaneoMindlinLine:
         """Return the contact after the tangential force went down to a value not below the opposite peak.
@@ -122,8 +128,8 @@ class CattaneoMindlinLine(_PartialSlip):
 class CattaneoMindlinSphere(_PartialSlip):
     """Two spheres under a normal and a tangential force (Cattaneo 1938; Mindlin 1949).
 
-    Formulas as in Johnson (1985), section 7.2(b) and 7.4(b). The direction of slip is taken along the force, which
-    is exact for nu = 0 and leaves an error of the order nu/(4 - 2 nu) otherwise.
+    Formulas as in Johnson (1985), section 7.2(b) and 7.4(b). The direction of slip is taken along the force,
+    which is exact for nu = 0 and leaves an error of the order nu/(4 - 2 nu) otherwise.
 
     Attributes
     ----------
@@ -146,17 +152,20 @@ class CattaneoMindlinSphere(_PartialSlip):
 
     @property
     def stick_radius(self) -> float:
-        """Radius of the zone that sticks now, a (1 - T/(f F))^(1/3) while loading (eq. 7.39) [length]."""
+        """Radius of the zone that sticks; a (1 - T/(f F))^(1/3) while loading (Johnson, 7.39) [length]."""
         return self._zone(self._reversal if self._reversal > 0.0 else self.tangential_force)
 
     @property
     def tangential_displacement(self) -> float:
-        """Tangential displacement of distant points, 3 f F/(16 a G*) [1 - (1 - T/(f F))^(2/3)] (eq. 7.42) [length]."""
+        """Tangential displacement of distant points (Johnson 1985, eq. 7.42) [length].
+
+        While loading, 3 f F/(16 a G*) [1 - (1 - T/(f F))^(2/3)].
+        """
         return self._shift(self.tangential_force_peak) - 2.0 * self._shift(self._reversal)
 
     @property
     def dissipation_per_cycle(self) -> float:
-        """Work lost in one cycle of the force between +peak and -peak (Johnson 1985, eq. 7.57) [force length]."""
+        """Work lost in a cycle between +peak and -peak (Johnson 1985, eq. 7.57) [force length]."""
         limit = self.friction * self.normal.force
         load = self.tangential_force_peak / limit
         rest = max(1.0 - load, 0.0)
@@ -164,9 +173,11 @@ class CattaneoMindlinSphere(_PartialSlip):
         return 9.0 * limit**2 / (10.0 * self.normal.radius) * bracket / self.G_star
 
     def traction(self, r: ArrayLike) -> Array:
-        """Return the shear traction in the direction of the force (Johnson 1985, eqs 7.36 and 7.37) [pressure]."""
+        """Return the shear traction along the force (Johnson 1985, eqs 7.36 and 7.37) [pressure]."""
         first, back = self._zone(self.tangential_force_peak), self._zone(self._reversal)
-        return _traction(self.normal, self.friction, first, r) - 2.0 * _traction(self.normal, self.friction, back, r)
+        return _traction(self.normal, self.friction, first, r) - 2.0 * _traction(
+            self.normal, self.friction, back, r
+        )
 
     def unloaded_to(self, tangential_force: float) -> CattaneoMindlinSphere:
         """Return the contact after the tangential force went down to a value not below the opposite peak.
@@ -190,9 +201,10 @@ def _friction_limit(friction: float, normal_force: float, tangential_force: floa
     """Return the checked coefficient and tangential force."""
     f = positive("friction", friction)
     T = not_negative("tangential_force", tangential_force)
-    if T > f * normal_force:
+    limit = f * normal_force
+    if limit < T:
         raise ModelError(
-            f"tangential_force is {T:g}: above friction times normal force, {f * normal_force:g}, the bodies slide"
+            f"tangential_force is {T:g}: the bodies slide above friction times normal force, {limit:g}"
         )
     return f, T
 
@@ -201,7 +213,7 @@ def _warn_of_coupling(bodies: Bodies) -> None:
     """Warn where normal and tangential loads are coupled, which the theory leaves out."""
     if abs(bodies.dundurs) > 1e-12:
         warnings.warn(
-            f"Cattaneo-Mindlin is exact for like materials only: Dundurs' constant is {bodies.dundurs:.3g}, not 0",
+            f"Cattaneo-Mindlin is exact for like materials: Dundurs' beta is {bodies.dundurs:.3g}, not 0",
             FastcontactWarning,
             stacklevel=3,
         )

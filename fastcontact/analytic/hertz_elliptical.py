@@ -18,7 +18,7 @@ _FLATTEST = 1e-6  # ratio of the axes b/a below which the contact is a line for 
 
 @dataclass(frozen=True)
 class HertzElliptical:
-    """Frictionless contact with an elliptical area after Hertz (1881), formulas as in Johnson (1985), section 4.2(b).
+    """Frictionless contact with an elliptical area after Hertz (1881), see Johnson (1985), section 4.2(b).
 
     Attributes
     ----------
@@ -74,8 +74,8 @@ class HertzElliptical:
 def _ratio_of_radii(ratio: float) -> float:
     """Return R'/R'' >= 1 of an ellipse with ratio of axes b/a <= 1 (Johnson 1985, eq. 4.28).
 
-    Carlson's integral R_D stands for [(a/b)^2 E - K]/[K - E] of the textbooks: near the circle both differences
-    vanish.
+    Carlson's integral R_D stands for [(a/b)^2 E - K]/[K - E] of the textbooks: near the circle both
+    differences vanish.
     """
     from scipy.special import elliprd
 
@@ -90,7 +90,7 @@ def _ratio_of_axes(ratio_of_radii: float) -> float:
         return 1.0
     if ratio_of_radii > _ratio_of_radii(_FLATTEST):
         raise ModelError(
-            f"the relative radii differ by a factor {ratio_of_radii:g}: that is a line contact, use hertz_line"
+            f"the relative radii differ by a factor {ratio_of_radii:g}: a line contact, use hertz_line"
         )
     goal = math.log(ratio_of_radii)
     return math.exp(
@@ -135,7 +135,7 @@ def hertz_elliptical(
     approach: float | None = None,
     pressure_max: float | None = None,
 ) -> HertzElliptical:
-    """Return the Hertz contact of two bodies whose principal curvatures are parallel (Johnson 1985, eqs 4.24-4.31).
+    """Return the Hertz contact of two bodies with parallel principal curvatures (Johnson 1985, 4.24-4.31).
 
     Parameters
     ----------
@@ -151,8 +151,8 @@ def hertz_elliptical(
     Raises
     ------
     ModelError
-        If a number is out of range, the bodies are straight in one direction (a line contact), or not exactly one
-        load quantity is given.
+        If a number is out of range, the bodies are straight in one direction (a line contact), or not exactly
+        one load quantity is given.
 
     Examples
     --------

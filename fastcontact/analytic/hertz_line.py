@@ -20,9 +20,9 @@ Array = NDArray[np.float64]
 class HertzLine:
     """Frictionless contact of two parallel cylinders, formulas as in Johnson (1985), section 4.2(c).
 
-    Positions are x across the contact and y along the outward normal of the body asked for: each body is the half
-    plane y <= 0. Stresses come in the order xx, yy, zz, xy, tension positive. There is no `approach`: in the plane
-    it depends on the far shape of the bodies and how they are held.
+    Positions are x across the contact and y along the outward normal of the body asked for: each body is the
+    half plane y <= 0. Stresses come in the order xx, yy, zz, xy, tension positive. There is no `approach`: in
+    the plane it depends on the far shape of the bodies and how they are held.
 
     Attributes
     ----------
@@ -82,11 +82,11 @@ class HertzLine:
         return _half_plane.stress(x, y, self.radius, self.pressure_max, self._nu(nu), self.kinematics)
 
     def stress_on_axis(self, depth: ArrayLike, nu: float | None = None) -> Array:
-        """Return the stresses (..., 4) at depths >= 0 below the centre (Johnson 1985, eqs 4.46) [pressure]."""
+        """Return the stresses (..., 4) at depths >= 0 on the axis (Johnson 1985, eqs 4.46) [pressure]."""
         return self.stress(np.zeros_like(np.asarray(depth, dtype=np.float64)), np.negative(depth), nu)
 
     def surface_stress(self, x: ArrayLike, nu: float | None = None) -> Array:
-        """Return the stresses (..., 4) of the surface: xx = yy = -pressure (Johnson 1985, section 4.2c) [pressure]."""
+        """Return the stresses (..., 4) of the surface, xx = yy = -pressure (Johnson, 4.2c) [pressure]."""
         return self.stress(x, np.zeros_like(np.asarray(x, dtype=np.float64)), nu)
 
     def von_mises(self, x: ArrayLike, y: ArrayLike, nu: float | None = None) -> Array:
@@ -113,9 +113,9 @@ class HertzLine:
     def von_mises_maximum(self, nu: float | None = None) -> VonMisesMaximum:
         """Return the largest equivalent stress on the axis and its depth.
 
-        On the axis at depth s b, with w = sqrt(1 + s^2) and e = 1 - 2 nu (e = 1 in plane stress), Johnson (1985),
-        eqs 4.46 give von Mises = p0 (w - s) sqrt(3 s^2/w^2 + e^2): either at the surface, or where
-        3 s = 3 s^2 w + e^2 w^3.
+        On the axis at depth s b, with w = sqrt(1 + s^2) and e = 1 - 2 nu (e = 1 in plane stress), Johnson
+        (1985), eqs 4.46 give von Mises = p0 (w - s) sqrt(3 s^2/w^2 + e^2): either at the surface, or where 3
+        s = 3 s^2 w + e^2 w^3.
         """
         from scipy.optimize import brentq
 

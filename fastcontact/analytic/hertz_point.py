@@ -18,10 +18,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class HertzPoint:
-    """Frictionless contact of two spheres after Hertz (1881), formulas as in Johnson (1985), sections 3.4 and 4.2.
+    """Frictionless contact of two spheres after Hertz (1881), see Johnson (1985), sections 3.4 and 4.2.
 
-    Positions are the distance r from the axis and the height z along the outward normal of the body asked for: each
-    body is the half space z <= 0. Stresses come in the order rr, zz, hoop, rz, tension positive.
+    Positions are the distance r from the axis and the height z along the outward normal of the body asked
+    for: each body is the half space z <= 0. Stresses come in the order rr, zz, hoop, rz, tension positive.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class HertzPoint:
         return _half_space.stress(r, z, self.radius, self.pressure_max, self._nu(nu))
 
     def stress_on_axis(self, depth: ArrayLike, nu: float | None = None) -> Array:
-        """Return the stresses (..., 4) at depths >= 0 below the centre (Johnson 1985, eq. 3.45) [pressure]."""
+        """Return the stresses (..., 4) at depths >= 0 on the axis (Johnson 1985, eq. 3.45) [pressure]."""
         return self.stress(np.zeros_like(np.asarray(depth, dtype=np.float64)), np.negative(depth), nu)
 
     def surface_stress(self, r: ArrayLike, nu: float | None = None) -> Array:
@@ -110,8 +110,9 @@ class HertzPoint:
     def von_mises_maximum(self, nu: float | None = None) -> VonMisesMaximum:
         """Return the largest equivalent stress on the axis and its depth.
 
-        The stationary point of |rr - zz| of Johnson (1985), eq. 3.45, found to rounding. For nu >= -0.3 it is the
-        largest anywhere in the body; with a Poisson ratio below that the edge of the contact is stressed more.
+        The stationary point of |rr - zz| of Johnson (1985), eq. 3.45, found to rounding. For nu >= -0.3 it is
+        the largest anywhere in the body; with a Poisson ratio below that the edge of the contact is stressed
+        more.
         """
         from scipy.optimize import brentq
 

@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 class LameShell:
     """A thick cylinder or a hollow sphere under pressure on its bore and its rim.
 
-    With m = 2 (cylinder) or 3 (sphere) the stresses are C - (m - 1) D/r^m radial and C + D/r^m hoop (Lame 1852;
-    Timoshenko and Goodier 1970, articles 28 and 136).
+    With m = 2 (cylinder) or 3 (sphere) the stresses are C - (m - 1) D/r^m radial and C + D/r^m hoop (Lame
+    1852; Timoshenko and Goodier 1970, articles 28 and 136).
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class LameShell:
     E, nu : float
         Material [pressure], [-].
     kinematics : str
-        "plane_strain", "plane_stress" or "sphere". A cylinder with free ends and no friction is in plane stress.
+        "plane_strain", "plane_stress" (also a cylinder with free ends) or "sphere".
     """
 
     inner_radius: float
@@ -46,14 +46,16 @@ class LameShell:
         positive("outer_radius", self.outer_radius)
         if self.inner_radius >= self.outer_radius:
             raise ModelError(
-                f"outer_radius is {self.outer_radius:g}: it must be larger than inner_radius {self.inner_radius:g}"
+                f"outer_radius is {self.outer_radius:g}: it must exceed inner_radius, {self.inner_radius:g}"
             )
         number("inner_pressure", self.inner_pressure)
         number("outer_pressure", self.outer_pressure)
         positive("E", self.E)
         poisson("nu", self.nu)
         if self.inner_radius == 0.0 and self.inner_pressure != 0.0:
-            raise ModelError("inner_pressure must be 0 for a solid body (inner_radius 0): there is no bore to press on")
+            raise ModelError(
+                "inner_pressure must be 0 for a solid body (inner_radius 0): there is no bore to press on"
+            )
 
     def displacement(self, r: ArrayLike) -> Array:
         """Return the radial displacement at radii `r`: r times the hoop strain [length].
@@ -102,8 +104,8 @@ class LameShell:
         wrong = (radii < self.inner_radius - slack) | (radii > self.outer_radius + slack)
         if wrong.any():
             raise ModelError(
-                f"r = {radii[wrong].flat[0]:g} lies outside the body: its radii run from {self.inner_radius:g} to "
-                f"{self.outer_radius:g}"
+                f"r = {radii[wrong].flat[0]:g} lies outside the body: "
+                f"its radii run from {self.inner_radius:g} to {self.outer_radius:g}"
             )
         m = 3 if self.kinematics == "sphere" else 2
         if self.inner_radius == 0.0:

@@ -1,8 +1,8 @@
 """Hertz in a box: a contact problem on a finite body whose exact solution is known, for convergence studies.
 
-The boundary of the box, apart from its top, is given the displacement that Hertz's pressure causes in the infinite
-body; a rigid parabola lies on the top. The solution in the box is then Hertz's field itself, with the limited
-regularity that contact really has and without any model error.
+The boundary of the box, apart from its top, is given the displacement that Hertz's pressure causes in the
+infinite body; a rigid parabola lies on the top. The solution in the box is then Hertz's field itself, with
+the limited regularity that contact really has and without any model error.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ KINEMATICS = ("plane_strain", "plane_stress", "axisymmetric")
 class HertzBox:
     """Exact solution of a linear contact problem on the box 0 <= x <= width, -height <= y <= 0.
 
-    The problem: u_y <= obstacle(x) at the top, without friction, on the reference geometry; `displacement` prescribed
-    on the side x = width and at the bottom; u_x = 0 on x = 0 (in the full box |x| <= width: prescribed on both
-    sides). Choose a contact radius that no mesh node hits, or results superconverge by chance.
+    The problem: u_y <= obstacle(x) at the top, without friction, on the reference geometry; `displacement`
+    prescribed on the side x = width and at the bottom; u_x = 0 on x = 0 (in the full box |x| <= width:
+    prescribed on both sides). Choose a contact radius that no mesh node hits, or results superconverge by
+    chance.
 
     Attributes
     ----------
@@ -92,7 +93,9 @@ class HertzBox:
         return self.hertz.displacement(x, y) - self.hertz.displacement(0.0, 0.0)
 
     def stress(self, points: ArrayLike) -> Array:
-        """Return the exact stresses (..., 4) at `points` (..., 2): xx, yy, zz, xy or rr, yy, hoop, ry [pressure].
+        """Return the exact stresses (..., 4) at `points` (..., 2) [pressure].
+
+        The order is xx, yy, zz, xy; in axisymmetry rr, yy, hoop, ry.
 
         Raises
         ------
@@ -121,8 +124,8 @@ def hertz_box(
 ) -> HertzBox:
     """Return the exact solution of the box under a rigid parabola with a given contact radius and pressure.
 
-    The fields are those of McEwen (1949) in the plane and of Huber (1904) in axisymmetry; the radius of the parabola
-    follows from Johnson (1985), eq. 4.44 and eq. 4.24.
+    The fields are those of McEwen (1949) in the plane and of Huber (1904) in axisymmetry; the radius of the
+    parabola follows from Johnson (1985), eq. 4.44 and eq. 4.24.
 
     Parameters
     ----------

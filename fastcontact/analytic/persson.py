@@ -1,4 +1,4 @@
-"""Pin in the hole of an infinite plate of the same material, with clearance: a conforming contact (Persson 1964)."""
+"""Pin in the hole of an infinite plate of the same material: a conforming contact (Persson 1964)."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _half_tangent(angle: float) -> float:
 
 
 def _clearance_ratio(angle: float) -> float:
-    """Return E dR/Q of a contact angle (Persson 1964); the integral by the trapezium rule, exact for a period."""
+    """Return E dR/Q of a contact angle (Persson 1964); its periodic integrand suits the trapezium rule."""
     b = _half_tangent(angle)
     theta = (np.arange(256) + 0.5) * math.pi / 256 - 0.5 * math.pi
     integrand = 2.0 * np.arctanh(b * np.cos(theta) / math.hypot(1.0, b)) / (1.0 + (b * np.sin(theta)) ** 2)
@@ -73,7 +73,7 @@ def _clearance_ratio(angle: float) -> float:
 
 
 def persson_limit_angle() -> float:
-    """Return half the contact angle of a pin without clearance under any force, the largest there is [degrees]."""
+    """Return half the contact angle of a pin without clearance, the same under any force [degrees]."""
     from scipy.optimize import brentq
 
     return float(brentq(_clearance_ratio, 60.0, 89.0, xtol=1e-13))
@@ -107,8 +107,8 @@ def persson_pin(
     Raises
     ------
     ModelError
-        If a number is out of range; if `contact_angle` exceeds what a pin with clearance can reach, or is given
-        without clearance, when any force gives the same angle.
+        If a number is out of range; if `contact_angle` exceeds what a pin with clearance can reach, or is
+        given without clearance, when any force gives the same angle.
     """
     from scipy.optimize import brentq
 
@@ -120,7 +120,9 @@ def persson_pin(
     limit = persson_limit_angle()
     if name == "contact_angle":
         if gap == 0.0:
-            raise ModelError("contact_angle cannot be given without clearance: any force gives the same angle")
+            raise ModelError(
+                "contact_angle cannot be given without clearance: any force gives the same angle"
+            )
         if value >= limit:
             raise ModelError(f"contact_angle is {value:g}: with clearance it stays below {limit:.4f} degrees")
         return PerssonPin(R, gap, modulus * gap / _clearance_ratio(value), value)

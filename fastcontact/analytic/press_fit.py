@@ -40,7 +40,9 @@ def _fit(interference: float, inner: LameShell, outer: LameShell) -> PressFit:
     """Return the fit of two bodies given under a unit pressure on their interface."""
     b, d = inner.outer_radius, positive("interference", interference)
     pressure = d / float(outer.displacement(b) - inner.displacement(b))
-    return PressFit(d, pressure, replace(inner, outer_pressure=pressure), replace(outer, inner_pressure=pressure))
+    return PressFit(
+        d, pressure, replace(inner, outer_pressure=pressure), replace(outer, inner_pressure=pressure)
+    )
 
 
 def press_fit_cylinders(
@@ -55,7 +57,7 @@ def press_fit_cylinders(
     inner_radius: float = 0.0,
     kinematics: str = "plane_strain",
 ) -> PressFit:
-    """Return the press fit of two concentric cylinders without friction (Lame 1852; Timoshenko 1956, article 41).
+    """Return the frictionless press fit of two concentric cylinders (Lame 1852; Timoshenko 1956, article 41).
 
     Parameters
     ----------
@@ -66,7 +68,7 @@ def press_fit_cylinders(
     interference : float
         Radius of the shaft less that of the hole [length].
     kinematics : str
-        "plane_strain", or "plane_stress": also right for long cylinders with free ends that slide on each other.
+        "plane_strain" or "plane_stress"; the latter also holds for long cylinders with free ends.
 
     Raises
     ------
@@ -82,7 +84,11 @@ def press_fit_cylinders(
     """
     plane_kinematics(kinematics)
     return _pair(
-        (E_inner, nu_inner), (E_outer, nu_outer), (inner_radius, interface_radius, outer_radius), interference, kinematics
+        (E_inner, nu_inner),
+        (E_outer, nu_outer),
+        (inner_radius, interface_radius, outer_radius),
+        interference,
+        kinematics,
     )
 
 
@@ -102,7 +108,11 @@ def press_fit_spheres(
     Parameters and errors as for `press_fit_cylinders`.
     """
     return _pair(
-        (E_inner, nu_inner), (E_outer, nu_outer), (inner_radius, interface_radius, outer_radius), interference, "sphere"
+        (E_inner, nu_inner),
+        (E_outer, nu_outer),
+        (inner_radius, interface_radius, outer_radius),
+        interference,
+        "sphere",
     )
 
 

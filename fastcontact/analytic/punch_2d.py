@@ -1,4 +1,4 @@
-"""Rigid flat punch on an elastic half plane: without friction, bonded, and how far it sticks with Coulomb friction."""
+"""Rigid flat punch on an elastic half plane: frictionless, bonded, and how far it sticks with friction."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class FlatPunch2D:
         return self.half_width
 
     def pressure(self, x: ArrayLike) -> Array:
-        """Return the pressure, infinite at the edges, zero outside (Johnson 1985, eqs 2.64 and 2.69) [pressure].
+        """Return the pressure, infinite at the edges, 0 outside (Johnson 1985, eqs 2.64, 2.69) [pressure].
 
         Bonded, it changes sign ever faster towards the edge: the field oscillates there.
         """
@@ -48,7 +48,7 @@ class FlatPunch2D:
         return amplitude * np.cos(phase)
 
     def shear(self, x: ArrayLike) -> Array:
-        """Return the shear traction of the punch on the half plane along x (Johnson 1985, eq. 2.69) [pressure].
+        """Return the shear traction on the half plane along x (Johnson 1985, eq. 2.69) [pressure].
 
         It pulls the surface outward; without bond it is zero.
         """
@@ -89,16 +89,19 @@ def flat_punch_2d(*, nu: float, half_width: float, force: float, bonded: bool = 
     ModelError
         If a number is out of range.
     """
-    return FlatPunch2D(poisson("nu", nu), positive("half_width", half_width), positive("force", force), bool(bonded))
+    return FlatPunch2D(
+        poisson("nu", nu), positive("half_width", half_width), positive("force", force), bool(bonded)
+    )
 
 
 def spence_stick_ratio(*, nu: float, friction: float) -> float:
     """Return the half-width of the stick zone under a flat rigid punch over that of the punch, c/a.
 
-    The root of K(sqrt(1 - k^2))/K(k) = beta/f with k = c/a, beta = (1 - 2 nu)/(2 (1 - nu)) and the complete elliptic
-    integral K of modulus k (Spence 1973; Johnson 1985, eq. 2.73), for a monotonic load in plane strain. The formula
-    leaves out what the shear does to the pressure; solutions with that coupling by boundary elements stick less far,
-    by 3 % at nu = 0.3, f = 0.5, by 26 % at nu = 0, f = 0.5, and by more for less friction.
+    The root of K(sqrt(1 - k^2))/K(k) = beta/f with k = c/a, beta = (1 - 2 nu)/(2 (1 - nu)) and the complete
+    elliptic integral K of modulus k (Spence 1973; Johnson 1985, eq. 2.73), for a monotonic load in plane
+    strain. The formula leaves out what the shear does to the pressure; solutions with that coupling by
+    boundary elements stick less far, by 3 % at nu = 0.3, f = 0.5, by 26 % at nu = 0, f = 0.5, and by more for
+    less friction.
 
     Parameters
     ----------
@@ -119,7 +122,8 @@ def spence_stick_ratio(*, nu: float, friction: float) -> float:
     if goal == 0.0:
         return 1.0
 
-    # The unknown is ln(k/k'), which spreads both ends of (0, 1); the two integrals swap when its sign changes.
+    # The unknown is ln(k/k'), which spreads both ends of (0, 1); the two integrals swap when its sign
+    # changes.
     def residual(x: float) -> float:
         m = 1.0 / (1.0 + math.exp(-2.0 * x))
         m1 = 1.0 / (1.0 + math.exp(2.0 * x))

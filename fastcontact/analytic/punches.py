@@ -1,4 +1,4 @@
-"""Rigid axisymmetric punches pressed without friction into an elastic half space: flat, cone, paraboloid, any power."""
+"""Rigid axisymmetric punches in an elastic half space: flat, cone, paraboloid, any power."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class FlatPunch:
         return self.force / self.approach
 
     def pressure(self, r: ArrayLike) -> Array:
-        """Return F/(2 pi a sqrt(a^2 - r^2)), infinite at the edge, zero outside (Johnson 1985, eq. 3.34) [pressure].
+        """Return F/(2 pi a sqrt(a^2 - r^2)), infinite at the edge, 0 outside (Johnson 1985, 3.34) [pressure].
 
         Raises
         ------
@@ -58,7 +58,7 @@ class FlatPunch:
         return np.where(inside < 0.0, 0.0, value)
 
     def normal_displacement(self, r: ArrayLike) -> Array:
-        """Return the displacement of the surface along its outward normal, <= 0 (Johnson 1985, eq. 3.38) [length].
+        """Return the displacement of the surface along its normal, <= 0 (Johnson 1985, eq. 3.38) [length].
 
         Raises
         ------
@@ -119,8 +119,8 @@ class PowerLawPunch:
     def pressure(self, r: ArrayLike) -> Array:
         """Return the contact pressure at distances `r`, zero outside [pressure].
 
-        With k = delta/(A a^n), the integral E*/pi int_r^a k n A x^(n-1)/sqrt(x^2 - r^2) dx (Sneddon 1965, eq. 4.8)
-        is E* k n A a^(n-2) sqrt(a^2 - r^2)/pi 2F1(1 - n/2, 1; 3/2; 1 - r^2/a^2).
+        With k = delta/(A a^n), the integral E*/pi int_r^a k n A x^(n-1)/sqrt(x^2 - r^2) dx (Sneddon 1965, eq.
+        4.8) is E* k n A a^(n-2) sqrt(a^2 - r^2)/pi 2F1(1 - n/2, 1; 3/2; 1 - r^2/a^2).
         """
         from scipy.special import hyp2f1
 
@@ -131,7 +131,7 @@ class PowerLawPunch:
         return scale * np.where((inside == 1.0) & (n <= 1.0), math.inf, shape)
 
     def normal_displacement(self, r: ArrayLike) -> Array:
-        """Return the displacement of the surface along its outward normal, <= 0 (Sneddon 1965, eq. 4.7) [length]."""
+        """Return the displacement of the surface along its normal, <= 0 (Sneddon 1965) [length]."""
         from scipy.special import hyp2f1
 
         n, a = self.exponent, self.radius
@@ -144,7 +144,7 @@ class PowerLawPunch:
 
 
 def _depth_factor(n: float) -> float:
-    """Return delta/(A a^n) = sqrt(pi) Gamma(n/2 + 1)/Gamma(n/2 + 1/2) (Sneddon 1965, eq. 6.2)."""
+    """Return delta/(A a^n) = sqrt(pi) Gamma(n/2 + 1)/Gamma(n/2 + 1/2) (Sneddon 1965)."""
     return math.sqrt(math.pi) * math.exp(math.lgamma(0.5 * n + 1.0) - math.lgamma(0.5 * n + 0.5))
 
 
@@ -166,7 +166,7 @@ def _modulus(E: float, nu: float) -> float:
 
 
 def bonded_stiffness_ratio(nu: float) -> float:
-    """Return how much stiffer a bonded flat punch is than a frictionless one, (1 - nu) ln(3 - 4 nu)/(1 - 2 nu).
+    """Return stiffness bonded over frictionless of a flat punch, (1 - nu) ln(3 - 4 nu)/(1 - 2 nu).
 
     Mossakovskii (1954); Spence (1968). The ratio is 1 for nu = 0.5.
 
@@ -190,7 +190,7 @@ def flat_punch(
     approach: float | None = None,
     bonded: bool = False,
 ) -> FlatPunch:
-    """Return the contact of a flat rigid cylinder with a half space, F = 2 E* a delta (Johnson 1985, eq. 3.36).
+    """Return the contact of a flat rigid cylinder with a half space, F = 2 E* a delta (Johnson 1985, 3.36).
 
     Parameters
     ----------
@@ -243,7 +243,9 @@ def power_law_punch(
         If a number is out of range or not exactly one load quantity is given.
     """
     given = exactly_one(force=force, approach=approach, radius=radius)
-    return _solve(_modulus(E, nu), positive("coefficient", coefficient), positive("exponent", exponent), *given)
+    return _solve(
+        _modulus(E, nu), positive("coefficient", coefficient), positive("exponent", exponent), *given
+    )
 
 
 def cone_punch(
@@ -262,7 +264,8 @@ def cone_punch(
     E, nu : float
         Half space [pressure], [-].
     slope_angle : float
-        Angle between the cone's side and the surface, in (0, 90) degrees; the formula is linear, so it should be small.
+        Angle between the cone's side and the surface, in (0, 90) degrees; the formula is linear, so it should
+        be small.
     force, approach, radius : float
         Exactly one of them.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import time
 
 HELP = "show versions, threads and the cache folder of compiled kernels"
@@ -15,15 +16,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the environment."""
-    import numba
-
     from fastcontact import _jit, summary
     from fastcontact.kernels import solid2d
 
     for name, version in summary.versions().items():
         print(f"{name:<12} {version}")
-    print(f"{'threads':<12} {_jit.threads()} of {numba.config.NUMBA_NUM_THREADS}")
-    cache = getattr(getattr(solid2d.add_stiffness, "_cache", None), "cache_path", "none: kernels compile in every process")
+    print(f"{'threads':<12} {_jit.threads()} of {os.cpu_count()}")
+    cache = getattr(
+        getattr(solid2d.add_stiffness, "_cache", None), "cache_path", "none: kernels compile in every process"
+    )
     print(f"{'cache':<12} {cache}")
     if options.warmup:
         started = time.perf_counter()

@@ -46,8 +46,8 @@ def _result_lines(results: Any) -> list[str]:
         counts = step.iterations
         found.append(
             f"  step {step.index:>3}  load factor {step.load_factor:<8.5g} geometry updates "
-            f"{counts.get('geometry_updates', 0):>3}  active-set iterations {counts.get('active_set_iterations', 0):>3}  "
-            f"linear {counts.get('linear_iterations', 0):>4}  {closed}"
+            f"{counts.get('geometry_updates', 0):>3}  active-set iterations "
+            f"{counts.get('active_set_iterations', 0):>3}  linear {counts.get('linear_iterations', 0):>4}  {closed}"
         )
         found += [f"    warning: {text}" for text in step.warnings]
     return found

@@ -19,7 +19,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     for name, make in GENERATORS.items():
         doc = (inspect.getdoc(make) or "").splitlines()[0]
         sub = kinds.add_parser(name, help=doc, description=inspect.getdoc(make), formatter_class=_Raw)
-        sub.add_argument("-o", "--output", required=True, help="mesh file, format by suffix: .med, .msh, .inp, .vtu, ...")
+        sub.add_argument(
+            "-o", "--output", required=True, help="mesh file, format by suffix: .med, .msh, .inp, .vtu, ..."
+        )
         for parameter in inspect.signature(make).parameters.values():
             sub.add_argument(f"--{parameter.name.replace('_', '-')}", dest=parameter.name, **_option(make, parameter))
 
@@ -33,9 +35,17 @@ def _option(make: Callable[..., Any], parameter: inspect.Parameter) -> dict[str,
     hint = typing.get_type_hints(make).get(parameter.name, str)
     default = parameter.default
     options = [kind for kind in (hint, *typing.get_args(hint)) if kind is not type(None)]
-    settings: dict[str, Any] = {"default": argparse.SUPPRESS, "help": f"default: {default}", "metavar": "VALUE"}
+    settings: dict[str, Any] = {
+        "default": argparse.SUPPRESS,
+        "help": f"default: {default}",
+        "metavar": "VALUE",
+    }
     if bool in options:
-        return {"default": argparse.SUPPRESS, "help": f"default: {default}", "action": argparse.BooleanOptionalAction}
+        return {
+            "default": argparse.SUPPRESS,
+            "help": f"default: {default}",
+            "action": argparse.BooleanOptionalAction,
+        }
     for kind in options:
         if typing.get_origin(kind) is tuple:
             members = [member for member in typing.get_args(kind) if member is not Ellipsis]

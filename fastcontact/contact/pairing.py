@@ -10,7 +10,7 @@ from scipy.sparse import coo_array, csr_array
 
 from fastcontact import elements
 from fastcontact.contact.surface import Surface
-from fastcontact.kernels import search2d
+from fastcontact.search import closest
 
 Array = NDArray[np.float64]
 
@@ -58,7 +58,11 @@ class Pairing:
 
 
 def pair(
-    candidates: Array, primary: Surface, coordinates: Array, projection_tolerance: float, normals: str = "facet"
+    candidates: Array,
+    primary: Surface,
+    coordinates: Array,
+    projection_tolerance: float,
+    normals: str = "facet",
 ) -> Pairing:
     """Project candidate positions (n, 2) on the closest facet of `primary` at nodal `coordinates`.
 
@@ -66,14 +70,12 @@ def pair(
     (TOLE_PROJ_EXT of code_aster). With `normals` ``"averaged"``, the normal is interpolated between nodal means of
     the facets' normals, so that it does not jump where facets meet.
     """
-    corners = np.ascontiguousarray(coordinates[primary.facets])
-    tree = search2d.build_tree(corners)
-    n = len(candidates)
-    facet, xi, normal, overhang = np.empty(n, np.intp), np.empty(n), np.empty((n, 2)), np.empty(n)
-    search2d.closest_facets(np.ascontiguousarray(candidates), corners, *tree, facet, xi, normal, overhang)
+    corners = coordinates[primary.facets]
+    found = closest(candidates, corners)
+    normal = found.normal
     if normals == "averaged":
-        normal = _interpolated_normals(primary, corners, facet, xi)
-    return Pairing(facet, xi, normal, overhang <= projection_tolerance)
+        normal = _interpolated_normals(primary, corners, found.facet, found.xi)
+    return Pairing(found.facet, found.xi, normal, found.overhang <= projection_tolerance)
 
 
 def _interpolated_normals(primary: Surface, corners: Array, facet: NDArray[np.intp], xi: Array) -> Array:
@@ -89,9 +91,7 @@ def _interpolated_normals(primary: Surface, corners: Array, facet: NDArray[np.in
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
-def gap_rows(
-    candidates: Candidates, pairing: Pairing, primary: Surface, reference: Array
-) -> tuple[csr_array, Array]:
+def gap_rows(candidates: Candidates, pairing: Pairing, primary: Surface, reference: Array) -> tuple[csr_array, Array]:
     """Return (G, gap0): gap of the candidates = gap0 + G u; rows of unpaired candidates are empty.
 
     ``gap = n . (x_secondary - x_primary(xi))`` with the facet, xi and normal of `pairing` held fixed; `reference`

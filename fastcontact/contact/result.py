@@ -14,13 +14,19 @@ Array = NDArray[np.float64]
 
 
 def contact_result(
-    name: str, pair: Formulation, constraints: Constraints, state: Equilibrium, displacement: Array, rows: slice
+    name: str,
+    pair: Formulation,
+    constraints: Constraints,
+    state: Equilibrium,
+    displacement: Array,
+    rows: slice,
 ) -> ContactResult:
     """Return the part of a solution that belongs to one pair, whose constraints are `rows`."""
     points, dim = pair.secondary.points, pair.points.shape[1]
     multiplier, active = state.multiplier[rows], state.active[rows]
     field = pair.pressure(multiplier)
     gap, normal = pair.nodal_gap(displacement)
+    closed = pair.closed_nodes(active, gap, field)
     forces = (constraints.B[rows].T @ multiplier).reshape(-1, dim)[points]
     total = forces.sum(axis=0)
     if pair.axisymmetric:
@@ -32,11 +38,11 @@ def contact_result(
         coordinates=pair.points[points],
         abscissa=pair.secondary.abscissa,
         gap=gap,
-        pressure=np.maximum(field, 0.0),
+        pressure=np.where(closed, np.maximum(field, 0.0), 0.0),
         multiplier=field,
         force_vectors=forces,
         normal=normal,
-        active=pair.closed_nodes(active, gap, field),
+        active=closed,
         force=total,
         radius=_radius(np.abs(constraints.positions[rows, 0]), active),
     )

@@ -56,7 +56,9 @@ def surface(mesh: Mesh, group: str) -> Surface:
     """
     blocks = mesh.cells_of(group, dim=mesh.dim - 1)
     if not blocks:
-        raise ContactError(f"group '{group}' holds no facets (cells of dimension {mesh.dim - 1}): name a boundary group")
+        raise ContactError(
+            f"group '{group}' holds no facets (cells of dimension {mesh.dim - 1}): name a boundary group"
+        )
     if len(blocks) > 1:
         raise ContactError(f"group '{group}' mixes facets of {' and '.join(blocks)}: make the mesh of one order there")
     name, block = next(iter(blocks.items()))

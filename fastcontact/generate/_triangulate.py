@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from fastcontact.errors import MeshError
 from fastcontact.generate._delaunay import delaunay, edges_of
@@ -17,6 +18,7 @@ Numbers = NDArray[np.intp]
 # Inner points stand closer than the longest edge allowed, for no triangulation has all its edges equal.
 _DENSITIES = (0.82, 0.80, 0.84, 0.78, 0.75, 0.7)
 _ROUNDS = 8
+_AROUND = 4.0
 _GOOD_ANGLE = 35.0
 _LEAST_ANGLE = 20.0
 
@@ -73,13 +75,18 @@ def _attempt(outline: Array, spacing: Spacing, density: float) -> Array | None:
     """Points of a triangulation whose edges are short enough, or None."""
     n_fixed = len(outline)
     points = np.vstack([outline, inner_seeds(outline, spacing, density)])
-    points = relax(points, n_fixed, spacing, 40)
+    movable = np.arange(len(points)) >= n_fixed
+    points = relax(points, movable, spacing, 40)
     for _ in range(_ROUNDS):
-        points = polish(points, n_fixed, spacing, 20)
+        points = polish(points, movable, spacing, 20)
         added = _middles_of_long_edges(points, n_fixed, spacing)
         if not len(added):
             return points
-        points = relax(np.vstack([points, added]), n_fixed, spacing, 16)
+        points = np.vstack([points, added])
+        movable = np.arange(len(points)) >= n_fixed
+        # Only around the new points: elsewhere a good place was found already.
+        near = cKDTree(added).query(points)[0] < _AROUND * spacing(points)
+        points = relax(points, movable & near, spacing, 16)
     return None
 
 

@@ -23,9 +23,7 @@ def check_readable(path: Path) -> None:
     sections = [_keyword(line) for line in _lines(path) if line.startswith("*") and not line.startswith("**")]
     n_node_sections = sum(keyword == "NODE" for keyword, _ in sections)
     if n_node_sections > 1:
-        raise FileError(
-            f"'{path}' has {n_node_sections} *NODE sections, of which meshio keeps one: join them"
-        )
+        raise FileError(f"'{path}' has {n_node_sections} *NODE sections, of which meshio keeps one: join them")
     for option in ("ELSET", "NSET"):
         named = [options[option].casefold() for keyword, options in sections if options.get(option)
                  and keyword in (option, "ELEMENT")]  # fmt: skip
@@ -66,9 +64,7 @@ def append_cell_sets(path: Path, mesh: Mesh) -> None:
     """
     for name in mesh.group_names:
         if any(character in name for character in ",=*\n") or name != name.strip():
-            raise FileError(
-                f"group name '{name}' holds a blank or a sign that Abaqus files cannot take: rename it"
-            )
+            raise FileError(f"group name '{name}' holds a blank or a sign that Abaqus files cannot take: rename it")
     with open(path, "a", encoding="utf-8") as file:
         for name, members in mesh.cell_groups.items():
             file.write(f"*ELSET, ELSET={name}\n")

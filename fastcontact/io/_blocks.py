@@ -88,9 +88,7 @@ def without_duplicates(block: Block) -> tuple[Block, int]:
     """Return the block with cells on the same nodes united (their groups too), and how many were too many."""
     if not len(block.nodes):
         return block, 0
-    _, first, inverse = np.unique(
-        np.sort(block.nodes, axis=1), axis=0, return_index=True, return_inverse=True
-    )
+    _, first, inverse = np.unique(np.sort(block.nodes, axis=1), axis=0, return_index=True, return_inverse=True)
     if len(first) == len(block.nodes):
         return block, 0
     kept = np.sort(first)

@@ -28,16 +28,12 @@ def opened(path: PathLike) -> Iterator[Any]:
     found = existing_file(path)
     try:
         if not h5py.is_hdf5(found):
-            raise FileError(
-                f"'{path}' is not an HDF5 file: check that it is complete and has the right suffix"
-            )
+            raise FileError(f"'{path}' is not an HDF5 file: check that it is complete and has the right suffix")
         with h5py.File(found, "r") as file:
             _refuse_links_outside(file, path)
             yield file
     except (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError) as error:
-        raise FileError(
-            f"cannot read '{path}', it is damaged or incomplete ({error}): write it anew"
-        ) from error
+        raise FileError(f"cannot read '{path}', it is damaged or incomplete ({error}): write it anew") from error
 
 
 def _refuse_links_outside(file: Any, path: PathLike) -> None:

@@ -29,9 +29,7 @@ def checked_name(kind: str, name: str, size: int) -> bytes:
     """
     encoded = name.encode("utf-8")
     if not encoded or len(encoded) > size:
-        raise FileError(
-            f"{kind} name '{name}' has {len(encoded)} bytes, and MED takes 1 to {size}: rename it"
-        )
+        raise FileError(f"{kind} name '{name}' has {len(encoded)} bytes, and MED takes 1 to {size}: rename it")
     if name.endswith(" ") or "\0" in name:
         raise FileError(f"{kind} name '{name}' ends with a blank, which MED does not keep: rename it")
     return encoded
@@ -86,9 +84,7 @@ def members(numbers: NDArray[Any], families: Families) -> dict[str, NDArray[np.i
     return {name: np.unique(np.concatenate(parts)) for name, parts in found.items()}
 
 
-def families_of(
-    groups: Mapping[str, NDArray[Any]], count: int, sign: int
-) -> tuple[NDArray[np.int32], Families]:
+def families_of(groups: Mapping[str, NDArray[Any]], count: int, sign: int) -> tuple[NDArray[np.int32], Families]:
     """Return the family number of each of `count` cells or points, and the groups of each family.
 
     One family is made for each combination of groups that occurs, and one for all groups without members.

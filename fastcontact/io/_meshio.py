@@ -78,10 +78,15 @@ def _format(path: Path, writing: bool) -> str:
     names = next((formats[suffix] for suffix in suffixes if suffix in formats), None)
     if names is None:
         raise FileError(f"'{path}': {unknown('mesh file suffix', path.suffix, formats)}")
-    if "gmsh" in names:
-        # Ansys has the same suffix; Gmsh files start with a section name.
-        return "gmsh22" if writing else ("gmsh" if path.read_bytes()[:1] == b"$" else "ansys")
-    return str(names[0])
+    if "gmsh" not in names:
+        return str(names[0])
+    if writing:
+        return "gmsh22"
+    # Ansys has the same suffix, and meshio's reader of its files never ends on a damaged one.
+    with open(path, "rb") as file:
+        if file.read(1) != b"$":
+            raise FileError(f"'{path}' is no Gmsh file, which starts with $MeshFormat: convert it to .med")
+    return "gmsh"
 
 
 def read(path: Path) -> MeshioContent:
@@ -109,12 +114,20 @@ def read(path: Path) -> MeshioContent:
             united = [without_duplicates(block) for block in blocks if block.kind != VERTEX]
             blocks = [block for block, _ in united] + [block for block in blocks if block.kind == VERTEX]
             n_duplicates = sum(count for _, count in united)
-        names = [name for name in [*found.field_data, *found.cell_sets] if not name.startswith("gmsh:")]
-        mesh = build_mesh(found.points, blocks, _point_groups(found), names)
+        mesh = build_mesh(found.points, blocks, _point_groups(found), _cell_group_names(found, file_format))
     except MeshError as error:
         raise MeshError(f"'{path}': {error}") from None
     n_vertices = sum(len(block.nodes) for block in blocks if block.kind == VERTEX)
     return MeshioContent(mesh, file_format, n_vertices, n_duplicates)
+
+
+def _cell_group_names(found: Any, file_format: str) -> list[str]:
+    """Return the names of all groups of cells, also of those without any."""
+    names = [name for name in found.cell_sets if not name.startswith("gmsh:")]
+    names += [unquote(key[len(CELL_PREFIX) :]) for key in found.cell_data if key.startswith(CELL_PREFIX)]
+    if file_format == "gmsh":
+        names += [name for name, (_, dim) in found.field_data.items() if dim > 0]
+    return names
 
 
 def _blocks(found: Any) -> list[Block]:
@@ -153,9 +166,7 @@ def _tagged(tags: NDArray[Any], dim: int, field_data: Mapping[str, Any]) -> dict
     """Return the members of each tag, by its name for this dimension or else by a name made of the tag."""
     if tags.ndim != 1 or tags.dtype.kind not in "iu":
         return {}
-    names = {
-        (int(entry[0]), int(entry[1])): name for name, entry in field_data.items() if np.size(entry) == 2
-    }
+    names = {(int(entry[0]), int(entry[1])): name for name, entry in field_data.items() if np.size(entry) == 2}
     return {
         names.get((tag, dim), f"{SHAPES[dim]}_{tag}"): np.flatnonzero(tags == tag)
         for tag in np.unique(tags).tolist()
@@ -230,9 +241,7 @@ def _with_arrays(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
     for name, members in mesh.cell_groups.items():
         flags = _flags(members, mesh.n_cells)
         cell_data[CELL_PREFIX + quote(name)] = np.split(flags, list(mesh.offsets.values())[1:])
-    point_data = {
-        POINT_PREFIX + quote(name): _flags(m, mesh.n_points) for name, m in mesh.point_groups.items()
-    }
+    point_data = {POINT_PREFIX + quote(name): _flags(m, mesh.n_points) for name, m in mesh.point_groups.items()}
     return {**parts, "cell_data": cell_data, "point_data": point_data}
 
 
@@ -245,7 +254,8 @@ def _flags(members: NDArray[Any], count: int) -> NDArray[np.int32]:
 def _with_tags(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
     """Return the parts with a physical tag for each cell, and a vertex cell for each point in a group."""
     dims = np.concatenate([np.full(len(block), elements.get(name).dim) for name, block in mesh.cells.items()])
-    tags, field_data = np.zeros(mesh.n_cells, np.int32), {}
+    tags = np.zeros(mesh.n_cells, np.int32)
+    field_data: dict[str, NDArray[Any]] = {}
     # Small groups overwrite large ones, so that a group of everything does not hide all others.
     for name, members in sorted(mesh.cell_groups.items(), key=lambda item: -len(item[1])):
         if len(members):
@@ -267,9 +277,7 @@ def _with_tags(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
 def _with_vertices(
     cells: list[Any], blocks: list[Any], point_groups: Mapping[str, Any], field_data: dict[str, Any]
 ) -> tuple[list[Any], list[Any]]:
-    named = {
-        name: members for name, members in point_groups.items() if len(members) and name not in field_data
-    }
+    named = {name: members for name, members in point_groups.items() if len(members) and name not in field_data}
     twice = [name for name in point_groups if name in field_data]
     if twice:
         _warn(
@@ -281,9 +289,7 @@ def _with_vertices(
     tags = {name: len(field_data) + 1 + i for i, name in enumerate(named)}
     field_data.update({name: np.array([tag, 0]) for name, tag in tags.items()})
     vertices = np.concatenate(list(named.values()))[:, None]
-    vertex_tags = np.concatenate(
-        [np.full(len(members), tags[name], np.int32) for name, members in named.items()]
-    )
+    vertex_tags = np.concatenate([np.full(len(members), tags[name], np.int32) for name, members in named.items()])
     return [*cells, (VERTEX, vertices)], [*blocks, vertex_tags]
 
 
@@ -301,9 +307,7 @@ def _check_complete(path: Path, temporary: Path, file_format: str, mesh: Mesh) -
 
     with _contained("read back", path):
         found = meshio.read(temporary, file_format=file_format)
-    wrong = [
-        kind for kind, block in _meshio_cells(mesh) if not np.array_equal(found.get_cells_type(kind), block)
-    ]
+    wrong = [kind for kind, block in _meshio_cells(mesh) if not np.array_equal(found.get_cells_type(kind), block)]
     if wrong or len(found.points) != mesh.n_points:
         listed = f"the {', '.join(wrong)} cells" if wrong else "the points"
         raise FileError(f"'{path}': meshio's {file_format} format does not keep {listed}; {OTHER_FORMATS}")

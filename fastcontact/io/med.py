@@ -138,9 +138,7 @@ def _read_mesh(file: Any, group: Any) -> tuple[Mesh, int]:
     n_vertices = sum(len(block.nodes) for block in blocks if block.kind == VERTEX)
     for block in blocks:
         if len(block.nodes) and (block.nodes.min() < 0 or block.nodes.max() >= len(points)):
-            raise MeshError(
-                f"a cell names node {block.nodes.max() + 1}, but nodes go from 1 to {len(points)}"
-            )
+            raise MeshError(f"a cell names node {block.nodes.max() + 1}, but nodes go from 1 to {len(points)}")
     return build_mesh(points, blocks, point_groups, _group_names(families, -1)), n_vertices
 
 
@@ -179,18 +177,14 @@ def _read_blocks(step: Any, families: Families) -> Iterator[Block]:
     # MED 2 keeps faces and edges in folders of their own (FAC, ARE); later versions put all cells under MAI.
     folders = [step[name] for name in ("MAI", "FAC", "ARE") if name in step]
     entries = [entry for folder in folders for entry in folder.items()]
-    foreign = {
-        code: _cell_count(entry) for code, entry in entries if code not in elements.BY_MED and code != "PO1"
-    }
+    foreign = {code: _cell_count(entry) for code, entry in entries if code not in elements.BY_MED and code != "PO1"}
     if foreign:
         listed = ", ".join(f"{count} cells of kind {code}" for code, count in foreign.items())
         known = ", ".join(sorted(elements.BY_MED))
         raise MeshError(f"it has {listed}, which fastcontact does not know: use only {known}")
     for code, entry in entries:
         if "NOD" not in entry:
-            raise MeshError(
-                f"its {code} cells have no nodal connectivity: write the mesh with nodal connectivity"
-            )
+            raise MeshError(f"its {code} cells have no nodal connectivity: write the mesh with nodal connectivity")
         nodes = _read_nodes(entry, code)
         yield Block(_kind(code), nodes, _members(entry, len(nodes), families))
 
@@ -200,7 +194,7 @@ def _members(entry: Any, count: int, families: Families) -> dict[str, NDArray[np
         return {}
     numbers = values(entry, "FAM")
     if numbers.shape != (count,):
-        raise MeshError(f"it has {numbers.size} family numbers for {count} cells or nodes: the file is incomplete")
+        raise MeshError(f"it has {numbers.size} family numbers for {count} cells or nodes: write it anew")
     return members(numbers, families)
 
 
@@ -269,9 +263,7 @@ def _padded(names: Iterable[str]) -> str:
 def _write_mesh(file: Any, mesh: Mesh, mesh_name: str) -> None:
     checked_name("mesh", mesh_name, NAME_SIZE)
     if "/" in mesh_name:
-        raise FileError(
-            f"mesh name '{mesh_name}' holds a slash, which separates folders in a MED file: rename it"
-        )
+        raise FileError(f"mesh name '{mesh_name}' holds a slash, which separates folders in a MED file: rename it")
     group = file.create_group(f"ENS_MAA/{mesh_name}")
     _set(
         group,
@@ -323,9 +315,7 @@ def _step_key(number: int, iteration: int) -> str:
     return f"{number:020d}{iteration:020d}"
 
 
-def write_med_results(
-    path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *, mesh_name: str = "mesh"
-) -> None:
+def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *, mesh_name: str = "mesh") -> None:
     """Write a mesh and nodal results at all instants, for Salome and ParaVis.
 
     - DEPL (DX, DY [, DZ]): displacement [length].
@@ -441,9 +431,7 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
         times = np.array([entry.attrs["PDT"] for entry in instants], np.float64)
         n_points = _field_size(file, group, instants)
         n_components = int(group.attrs["NCO"])
-        return times, np.stack(
-            [_read_instant(file, entry["NOE"], n_points, n_components) for entry in instants]
-        )
+        return times, np.stack([_read_instant(file, entry["NOE"], n_points, n_components) for entry in instants])
 
 
 def _field_size(file: Any, group: Any, instants: list[Any]) -> int:

@@ -86,9 +86,7 @@ def read_mesh(path: PathLike, *, mesh_name: str | None = None, orient: bool = Tr
     return read_mesh_report(path, mesh_name=mesh_name, orient=orient)[0]
 
 
-def read_mesh_report(
-    path: PathLike, *, mesh_name: str | None = None, orient: bool = True
-) -> tuple[Mesh, MeshReport]:
+def read_mesh_report(path: PathLike, *, mesh_name: str | None = None, orient: bool = True) -> tuple[Mesh, MeshReport]:
     """Read a mesh, and tell what happened; parameters and errors as in `read_mesh`."""
     found = existing_file(path)
     if found.suffix.lower() in MED_SUFFIXES:
@@ -96,9 +94,7 @@ def read_mesh_report(
         mesh, file_format, name = content.mesh, f"MED {content.version}".strip(), content.name
         dropped = {"vertex": content.n_vertices}
     elif mesh_name is not None:
-        raise FileError(
-            f"'{path}' is no MED file, so its mesh has no name: leave out mesh_name='{mesh_name}'"
-        )
+        raise FileError(f"'{path}' is no MED file, so its mesh has no name: leave out mesh_name='{mesh_name}'")
     else:
         other = _meshio.read(found)
         mesh, file_format, name = other.mesh, other.format, ""

@@ -34,7 +34,13 @@ def make(name: str, *, dim: int, n_dofs: int, tolerance: float = 1e-10) -> Linea
     """
     if name == "auto":
         name = "direct" if n_dofs <= DIRECT_UP_TO[dim] else "amg"
-        log.info("linear solver: %s, for %d unknowns in %dD (direct up to %d)", name, n_dofs, dim, DIRECT_UP_TO[dim])
+        log.info(
+            "linear solver: %s, for %d unknowns in %dD (direct up to %d)",
+            name,
+            n_dofs,
+            dim,
+            DIRECT_UP_TO[dim],
+        )
     if name not in SOLVERS:
         raise ModelError(unknown("linear solver", name, [*SOLVERS, "auto"]))
     solver: LinearSolver = importlib.import_module(f"{__name__}.{name}").SOLVER(tolerance)

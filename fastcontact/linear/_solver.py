@@ -23,9 +23,7 @@ class Counters:
 class Loaded(Protocol):
     """A prepared matrix with a right-hand side."""
 
-    def solve(
-        self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None
-    ) -> tuple[Array, Array]:
+    def solve(self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None) -> tuple[Array, Array]:
         """Return (u, multiplier) with ``K u = f + B.T multiplier`` and ``B u + C multiplier = c``.
 
         B (m, n) has full row rank where C (m, m), symmetric and positive semidefinite, is None or singular.

@@ -16,9 +16,9 @@ from scipy.sparse import bsr_array, bsr_matrix, csr_array, csr_matrix, diags_arr
 from scipy.sparse.linalg import cg
 
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear._solver import Counters
 from fastcontact.linear._compliance import ComplianceCache, multipliers
 from fastcontact.linear._elimination import eliminate
+from fastcontact.linear._solver import Counters
 
 Array = NDArray[np.float64]
 SMOOTHER = ("block_gauss_seidel", {"sweep": "symmetric"})
@@ -84,7 +84,13 @@ class Amg:
             self.counters.iterations += 1
 
         u, failed = cg(
-            A, f, x0=guess, rtol=self.tolerance, maxiter=MAX_ITERATIONS, M=hierarchy.aspreconditioner(), callback=count
+            A,
+            f,
+            x0=guess,
+            rtol=self.tolerance,
+            maxiter=MAX_ITERATIONS,
+            M=hierarchy.aspreconditioner(),
+            callback=count,
         )
         if failed:
             left = np.linalg.norm(f - A @ u) / scale
@@ -124,9 +130,7 @@ class _Loaded:
         self._solver, self._f = solver, f
         self._free: Array | None = None
 
-    def solve(
-        self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None
-    ) -> tuple[Array, Array]:
+    def solve(self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None) -> tuple[Array, Array]:
         if B.shape[0] == 0:
             return self._unconstrained(self._f, guess), np.empty(0)
         if C is None:

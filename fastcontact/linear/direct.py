@@ -41,7 +41,9 @@ class Direct:
         try:
             lu = splu(K.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
         except RuntimeError as error:
-            raise ModelError("the stiffness matrix is singular: support the rigid-body motions of every body") from error
+            raise ModelError(
+                "the stiffness matrix is singular: support the rigid-body motions of every body"
+            ) from error
         self._lu: SuperLU = lu
         self.counters.setups += 1
         self.compliance = ComplianceCache(K.shape[0], lu.solve)
@@ -63,9 +65,7 @@ class _Loaded:
         self._solver, self._f = solver, f
         self._free = solver.back_substitute(f)
 
-    def solve(
-        self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None
-    ) -> tuple[Array, Array]:
+    def solve(self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None) -> tuple[Array, Array]:
         if B.shape[0] == 0:
             return self._free, np.empty(0)
         multiplier = multipliers(self._solver.compliance, B, c - B @ self._free, C)

@@ -103,9 +103,7 @@ def test_internal_forces_are_stiffness_times_displacement(element, kinematics):
     mesh = patch(element)
     K, D, material = assembled(mesh, kinematics)
     u = np.random.default_rng(2).normal(size=mesh.points.shape)
-    force = recovery.internal_force(
-        mesh, kinematics, recovery.stress_at_points(mesh, kinematics, D[None], material, u)
-    )
+    force = recovery.internal_force(mesh, kinematics, recovery.stress_at_points(mesh, kinematics, D[None], material, u))
     assert np.abs(force.ravel() - K @ u.ravel()).max() < 1e-12 * np.abs(force).max()
 
 

@@ -75,5 +75,5 @@ def test_linear_and_quadratic_partners_share_their_corners():
 
 
 def test_an_unknown_element_offers_near_names():
-    with pytest.raises(MeshError, match="'tri7'.*did you mean 'tri6'|'tri7'.*'tri6'"):
+    with pytest.raises(MeshError, match=r"'tri7'.*did you mean 'tri6'|'tri7'.*'tri6'"):
         elements.get("tri7")

@@ -70,5 +70,5 @@ def test_auto_chooses_by_dimension_and_size():
 
 
 def test_an_unknown_solver_is_refused():
-    with pytest.raises(ModelError, match="'amgg'.*'amg'"):
+    with pytest.raises(ModelError, match=r"'amgg'.*'amg'"):
         linear.make("amgg", dim=2, n_dofs=10)

@@ -5,14 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fastcontact.kernels import search2d
+from fastcontact.search import closest
 
 
 def search(points, corners):
-    n = len(points)
-    facet, xi, normal, overhang = np.empty(n, np.intp), np.empty(n), np.empty((n, 2)), np.empty(n)
-    search2d.closest_facets(points, corners, *search2d.build_tree(corners), facet, xi, normal, overhang)
-    return facet, xi, normal, overhang
+    found = closest(points, corners)
+    return found.facet, found.xi, found.normal, found.overhang
 
 
 def curve(corners, s):
@@ -56,7 +54,7 @@ def test_projection_on_a_circle_of_quadratic_facets_and_normals_point_outward():
     on = lambda a: 10 * np.column_stack([np.cos(a), np.sin(a)])  # noqa: E731
     corners = np.ascontiguousarray(np.stack([on(end[1:]), on(end[:-1]), on(middle)], axis=1))
     directions = np.linspace(-1.5, -0.05, 23)
-    facet, xi, normal, overhang = search(1.3 * on(directions), corners)
+    _, _, normal, overhang = search(1.3 * on(directions), corners)
     unit = on(directions) / 10
     assert np.abs(normal - unit).max() < 2e-3
     assert (overhang == 0).all()

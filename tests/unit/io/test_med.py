@@ -154,9 +154,7 @@ def test_meshio_reads_our_mesh(tmp_path):
 
     mesh, path = all_elements(), tmp_path / "mesh.med"
     # meshio's table has no nine-node quadrangle.
-    mesh = Mesh(
-        mesh.points, {name: block for name, block in mesh.cells.items() if name != "quad9"}, {"first": [0]}
-    )
+    mesh = Mesh(mesh.points, {name: block for name, block in mesh.cells.items() if name != "quad9"}, {"first": [0]})
     write_med_mesh(path, mesh)
     found = meshio.read(path)
     np.testing.assert_array_equal(found.points, mesh.points)
@@ -268,9 +266,7 @@ def test_code_aster_meshes(spec):
 
 
 def assert_box(points, box):
-    np.testing.assert_allclose(
-        [points.min(axis=0), points.max(axis=0)], np.array(box)[:, : points.shape[1]], atol=1e-9
-    )
+    np.testing.assert_allclose([points.min(axis=0), points.max(axis=0)], np.array(box)[:, : points.shape[1]], atol=1e-9)
 
 
 def assert_groups(mesh, facts):
@@ -296,9 +292,9 @@ def assert_groups(mesh, facts):
 # There and back -----------------------------------------------------------------------------------
 
 # MED pads names with blanks and zero bytes, so those two cannot end or stand in a name.
-NAMES = st.text(
-    st.characters(exclude_characters="\0", exclude_categories=["Cs"]), min_size=1, max_size=80
-).filter(lambda name: len(name.encode()) <= 80 and not name.endswith(" "))
+NAMES = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), min_size=1, max_size=80).filter(
+    lambda name: len(name.encode()) <= 80 and not name.endswith(" ")
+)
 COORDINATES = st.floats(-1e6, 1e6)
 
 
@@ -306,18 +302,14 @@ COORDINATES = st.floats(-1e6, 1e6)
 def meshes(draw):
     dim = draw(st.sampled_from([2, 3]))
     n_points = draw(st.integers(2, 12))
-    points = np.array(draw(st.lists(COORDINATES, min_size=n_points * dim, max_size=n_points * dim))).reshape(
-        -1, dim
-    )
+    points = np.array(draw(st.lists(COORDINATES, min_size=n_points * dim, max_size=n_points * dim))).reshape(-1, dim)
     if dim == 3:
         points[0, 2], points[1, 2] = 0.0, 1e6  # a flat one would come back in 2D
     kinds = [name for name, element in elements.ELEMENTS.items() if element.dim <= dim]
     node, cells = st.integers(0, n_points - 1), {}
     for name in draw(st.lists(st.sampled_from(kinds), min_size=1, unique=True)):
         size, count = elements.get(name).n_nodes, draw(st.integers(1, 3))
-        cells[name] = np.reshape(
-            draw(st.lists(node, min_size=size * count, max_size=size * count)), (count, size)
-        )
+        cells[name] = np.reshape(draw(st.lists(node, min_size=size * count, max_size=size * count)), (count, size))
     n_cells = sum(map(len, cells.values()))
     return Mesh(
         points,
@@ -400,9 +392,7 @@ def write_med_2(path):
         mesh.create_dataset("NOE/FAM", data=np.int32([0, 0, 1, 0])).attrs["NBR"] = np.int32(4)
         for where, nodes, families in [("MAI/TR3", [1, 1, 2, 3, 3, 4], [-1, -2]), ("ARE/SE2", [1, 2], [0])]:
             mesh.create_dataset(f"{where}/NOD", data=np.int32(nodes)).attrs["NBR"] = np.int32(len(families))
-            mesh.create_dataset(f"{where}/FAM", data=np.int32(families)).attrs["NBR"] = np.int32(
-                len(families)
-            )
+            mesh.create_dataset(f"{where}/FAM", data=np.int32(families)).attrs["NBR"] = np.int32(len(families))
         mesh.create_group("FAS/FAMILLE_ZERO").attrs["NUM"] = np.int32(0)
         for where, number, names in [
             ("ELEME/a", -1, ["one"]),
@@ -623,9 +613,7 @@ def test_values_in_another_file_are_refused(tmp_path):
             points = next(iter(file["ENS_MAA/mesh"].values()))["NOE"]
             del points["COO"]
             if make == "external":
-                points.create_dataset(
-                    "COO", 140, float, external=[(str(tmp_path / "numbers.bin"), 0, 140 * 8)]
-                )
+                points.create_dataset("COO", 140, float, external=[(str(tmp_path / "numbers.bin"), 0, 140 * 8)])
             else:
                 layout = h5py.VirtualLayout(140, float)
                 layout[:] = h5py.VirtualSource(str(tmp_path / "other.h5"), "x", 140)
@@ -682,9 +670,7 @@ def test_failed_results_leave_the_old_file(tmp_path):
     with pytest.raises(FileError, match="two steps have the index 1"):
         write_med_results(path, mesh, [*some_steps(mesh, 1), *some_steps(mesh, 1)])
     smaller = Mesh(mesh.points[:5], {"line2": [[0, 1]]})
-    with pytest.raises(
-        MeshError, match=r"stress of step 1 has shape \(70, 4\) where the mesh needs \(5, 4\)"
-    ):
+    with pytest.raises(MeshError, match=r"stress of step 1 has shape \(70, 4\) where the mesh needs \(5, 4\)"):
         write_med_results(path, smaller, some_steps(mesh))
     assert path.read_text() == "precious"
     assert [entry.name for entry in tmp_path.iterdir()] == ["results.med"]

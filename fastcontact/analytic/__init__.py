@@ -1,0 +1,110 @@
+"""Formulas of contact mechanics: what numerical results are held against.
+
+Each file holds one theory: a frozen result with its numbers and methods, and a factory that makes it.
+`THEORIES` names the factories for case files. Normal contacts share `radius` (half-width in the plane),
+`force`, `pressure_max` and `pressure(distance)`. Units are the caller's own; forces of plane problems are per
+unit length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from fastcontact.analytic._bodies import Bodies
+from fastcontact.analytic._von_mises import VonMisesMaximum
+from fastcontact.analytic.cattaneo_mindlin import (
+    BlockSliding,
+    CattaneoMindlinLine,
+    CattaneoMindlinSphere,
+    block_sliding,
+    cattaneo_mindlin_line,
+    cattaneo_mindlin_sphere,
+)
+from fastcontact.analytic.finite_spheres import FiniteHalfSpheres, finite_half_spheres
+from fastcontact.analytic.hertz_elliptical import HertzElliptical, hertz_elliptical
+from fastcontact.analytic.hertz_line import HertzLine, hertz_line
+from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
+from fastcontact.analytic.lame import LameShell, thick_cylinder, thick_sphere
+from fastcontact.analytic.manufactured import HertzBox, hertz_box
+from fastcontact.analytic.persson import PerssonPin, persson_limit_angle, persson_pin
+from fastcontact.analytic.press_fit import PressFit, press_fit_cylinders, press_fit_spheres
+from fastcontact.analytic.punch_2d import FlatPunch2D, flat_punch_2d, spence_stick_ratio
+from fastcontact.analytic.punches import (
+    FlatPunch,
+    PowerLawPunch,
+    bonded_stiffness_ratio,
+    cone_punch,
+    flat_punch,
+    paraboloid_punch,
+    power_law_punch,
+)
+from fastcontact.analytic.receding import RecedingLayer, receding_layer
+
+THEORIES: dict[str, Callable[..., Any]] = {
+    factory.__name__: factory
+    for factory in (
+        block_sliding,
+        cattaneo_mindlin_line,
+        cattaneo_mindlin_sphere,
+        cone_punch,
+        finite_half_spheres,
+        flat_punch,
+        flat_punch_2d,
+        hertz_box,
+        hertz_elliptical,
+        hertz_line,
+        hertz_point,
+        paraboloid_punch,
+        persson_pin,
+        power_law_punch,
+        press_fit_cylinders,
+        press_fit_spheres,
+        receding_layer,
+        thick_cylinder,
+        thick_sphere,
+    )
+}
+
+__all__ = [
+    "THEORIES",
+    "BlockSliding",
+    "Bodies",
+    "CattaneoMindlinLine",
+    "CattaneoMindlinSphere",
+    "FiniteHalfSpheres",
+    "FlatPunch",
+    "FlatPunch2D",
+    "HertzBox",
+    "HertzElliptical",
+    "HertzLine",
+    "HertzPoint",
+    "LameShell",
+    "PerssonPin",
+    "PowerLawPunch",
+    "PressFit",
+    "RecedingLayer",
+    "VonMisesMaximum",
+    "block_sliding",
+    "bonded_stiffness_ratio",
+    "cattaneo_mindlin_line",
+    "cattaneo_mindlin_sphere",
+    "cone_punch",
+    "finite_half_spheres",
+    "flat_punch",
+    "flat_punch_2d",
+    "hertz_box",
+    "hertz_elliptical",
+    "hertz_line",
+    "hertz_point",
+    "paraboloid_punch",
+    "persson_limit_angle",
+    "persson_pin",
+    "power_law_punch",
+    "press_fit_cylinders",
+    "press_fit_spheres",
+    "receding_layer",
+    "spence_stick_ratio",
+    "thick_cylinder",
+    "thick_sphere",
+]

@@ -1,0 +1,190 @@
+"""How good a mesh is: angles, lengths, and cells that are flat or inside out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact import elements
+from fastcontact.errors import MeshError
+from fastcontact.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+# A Jacobian below this fraction of the squared (cubed) longest edge is rounding, not area.
+_FLAT = 1e-12
+
+
+@dataclass(frozen=True)
+class MeshQuality:
+    """Figures of a mesh; angles and lengths are those of the straight-sided cells on the corner nodes.
+
+    Attributes
+    ----------
+    smallest_angle, largest_angle : float
+        Corner angles of all two-dimensional cells [degrees]; NaN without such cells.
+    shortest_edge, longest_edge : float
+        Edges of the solid cells [length]; NaN without cells.
+    worst_aspect : float
+        Largest ratio of longest to shortest edge in one solid cell.
+    measure : float
+        Area in 2D [length^2], volume in 3D [length^3], of the solid cells with their curved sides.
+    n_points : int
+        Number of points.
+    n_cells : dict of str to int
+        Number of cells by element, facets too.
+    n_bad : int
+        Number of solid cells that are degenerate or inverted; see `check_cells`.
+    dim : int
+        Dimension of the space.
+    """
+
+    smallest_angle: float
+    largest_angle: float
+    shortest_edge: float
+    longest_edge: float
+    worst_aspect: float
+    measure: float
+    n_points: int
+    n_cells: dict[str, int]
+    n_bad: int
+    dim: int
+
+    def __str__(self) -> str:
+        cells = ", ".join(f"{count} {name}" for name, count in self.n_cells.items()) or "no cells"
+        kind = "area" if self.dim == 2 else "volume"
+        return "\n".join(
+            [
+                f"{self.n_points} points, {cells}; degenerate or inverted: {self.n_bad}",
+                f"angles {self.smallest_angle:.1f} to {self.largest_angle:.1f} degrees",
+                f"edges {self.shortest_edge:.6g} to {self.longest_edge:.6g} [length], "
+                f"worst aspect ratio {self.worst_aspect:.3g}",
+                f"{kind} {self.measure:.9g} [length^{self.dim}]",
+            ]
+        )
+
+
+def quality(mesh: Mesh) -> MeshQuality:
+    """Return the quality figures of a mesh.
+
+    Examples
+    --------
+    >>> mesh = Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2]]})
+    >>> round(quality(mesh).smallest_angle, 9), quality(mesh).measure
+    (45.0, 0.5)
+    """
+    angles = [_angles(mesh.points[block[:, : _corners(name)]]).ravel() for name, block in _surfaces(mesh)]
+    lengths = [_edge_lengths(mesh, name) for name in mesh.solids]
+    angle = np.concatenate(angles) if angles else np.array([np.nan])
+    length = np.concatenate([block.ravel() for block in lengths]) if lengths else np.array([np.nan])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        aspects = [(block.max(axis=1) / block.min(axis=1)).max() for block in lengths]
+    return MeshQuality(
+        smallest_angle=float(np.degrees(angle.min())),
+        largest_angle=float(np.degrees(angle.max())),
+        shortest_edge=float(length.min()),
+        longest_edge=float(length.max()),
+        worst_aspect=float(max(aspects, default=np.nan)),
+        measure=float(sum(_jacobians(mesh, name)[2].sum() for name in mesh.solids)),
+        n_points=mesh.n_points,
+        n_cells={name: len(block) for name, block in mesh.cells.items()},
+        n_bad=sum(int((_flat(mesh, name) | _inverted(mesh, name)).sum()) for name in mesh.solids),
+        dim=mesh.dim,
+    )
+
+
+def check_cells(mesh: Mesh) -> None:
+    """Check that every solid cell has a positive Jacobian at its default quadrature points.
+
+    Raises
+    ------
+    MeshError
+        If a cell is degenerate (its area or volume is nothing but rounding) or inverted (clockwise, or folded so
+        that the Jacobian is negative at a quadrature point); the message names the first one and says where.
+    """
+    for name, start in mesh.offsets.items():
+        if name not in mesh.solids:
+            continue
+        flat = _flat(mesh, name)
+        _refuse(mesh, name, start, flat, "degenerate", "remove it or merge its points differently")
+        inverted = _inverted(mesh, name)
+        _refuse(
+            mesh,
+            name,
+            start,
+            inverted,
+            "inverted",
+            "turn it with fastcontact.topology.oriented, or refine if it is curved",
+        )
+
+
+def _refuse(mesh: Mesh, name: str, start: int, bad: NDArray[np.bool_], what: str, remedy: str) -> None:
+    if not bad.any():
+        return
+    row = int(np.flatnonzero(bad)[0])
+    centre = mesh.points[mesh.cells[name][row, : _corners(name)]].mean(axis=0)
+    place = ", ".join(f"{x:.6g}" for x in centre)
+    measure = _jacobians(mesh, name)[2][row]
+    kind = "area" if mesh.dim == 2 else "volume"
+    raise MeshError(
+        f"cell {start + row} ({name} at ({place}), {kind} {measure:.3g}) is {what}, one of {int(bad.sum())} such cells: {remedy}"
+    )
+
+
+def _corners(name: str) -> int:
+    return elements.get(name).n_corners
+
+
+def _surfaces(mesh: Mesh) -> Iterator[tuple[str, NDArray[np.int32]]]:
+    return ((name, block) for name, block in mesh.cells.items() if elements.get(name).dim == 2)
+
+
+def _angles(corners: Array) -> Array:
+    """Corner angles (n_cells, n_corners) of polygons (n_cells, n_corners, dim) [radian]."""
+    ahead = np.roll(corners, -1, axis=1) - corners
+    behind = np.roll(corners, 1, axis=1) - corners
+    cosine = (ahead * behind).sum(axis=2)
+    if corners.shape[2] == 3:
+        return np.arctan2(np.linalg.norm(np.cross(ahead, behind), axis=2), cosine)
+    sine = ahead[..., 0] * behind[..., 1] - ahead[..., 1] * behind[..., 0]
+    # Counted inside the polygon whichever way round it is, so that a re-entrant corner has more than 180 degrees.
+    sine *= np.where(sine.sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
+    return np.arctan2(sine, cosine) % (2 * np.pi)
+
+
+def _edge_lengths(mesh: Mesh, name: str) -> Array:
+    """Lengths (n_cells, n_edges) of the straight edges of the cells [length]."""
+    ends = mesh.points[mesh.cells[name][:, elements.get(name).edges]]
+    return np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+
+
+def _jacobians(mesh: Mesh, name: str) -> tuple[Array, Array, Array]:
+    """Smallest and largest Jacobian at the quadrature points, and area or volume, of each cell (n_cells,)."""
+    block = mesh.cells[name]
+    _, gradients, weights = elements.get(name).tables
+    low, high = np.full(len(block), np.inf), np.full(len(block), -np.inf)
+    measure = np.zeros(len(block))
+    # One quadrature point at a time keeps the memory at a few arrays of n_cells.
+    for gradient, weight in zip(gradients, weights, strict=True):
+        determinant = np.linalg.det(np.einsum("cni,nj->cij", mesh.points[block], gradient))
+        np.minimum(low, determinant, out=low)
+        np.maximum(high, determinant, out=high)
+        measure += weight * determinant
+    return low, high, measure
+
+
+def _flat(mesh: Mesh, name: str) -> NDArray[np.bool_]:
+    """Cells (n_cells,) whose Jacobian is zero but for rounding at all quadrature points."""
+    low, high, _ = _jacobians(mesh, name)
+    scale = _edge_lengths(mesh, name).max(axis=1) ** mesh.dim
+    return np.maximum(np.abs(low), np.abs(high)) <= _FLAT * scale
+
+
+def _inverted(mesh: Mesh, name: str) -> NDArray[np.bool_]:
+    """Cells (n_cells,) with a Jacobian that is not positive at a quadrature point, flat cells apart."""
+    low, _, _ = _jacobians(mesh, name)
+    scale = _edge_lengths(mesh, name).max(axis=1) ** mesh.dim
+    return (low <= _FLAT * scale) & ~_flat(mesh, name)

@@ -1,0 +1,98 @@
+"""Hertz in a box: tables, boundary conditions, force."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fastcontact.analytic import hertz_box
+from fastcontact.errors import ModelError
+
+REFERENCE = json.loads((Path(__file__).parents[3] / "data/reference/hertz_box.json").read_text())
+KINEMATICS = ["plane_strain", "plane_stress", "axisymmetric"]
+
+
+@pytest.mark.parametrize(("kinematics", "order"), [("plane_strain", [0, 1, 3]), ("axisymmetric", [0, 2, 1, 3])])
+def test_matches_table(kinematics, order):
+    case = REFERENCE[kinematics]
+    box = hertz_box(
+        kinematics=kinematics,
+        E=REFERENCE["E"],
+        nu=REFERENCE["nu"],
+        radius=REFERENCE["radius"],
+        pressure_max=REFERENCE["pressure_max"],
+    )
+    rows = np.array(case["rows"])
+    assert box.R == pytest.approx(case["R"], rel=1e-14)
+    np.testing.assert_allclose(box.displacement(rows[:, :2]), rows[:, 2:4], atol=1e-15)
+    np.testing.assert_allclose(box.stress(rows[:, :2])[:, order], rows[:, 4:], atol=1e-11)
+    force = case["force"] if kinematics == "axisymmetric" else 2.0 * case["half_force"]
+    assert box.force == pytest.approx(force, rel=1e-14)
+
+
+@pytest.mark.parametrize("kinematics", KINEMATICS)
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.45])
+def test_solves_the_contact_problem(kinematics, nu):
+    box = hertz_box(kinematics=kinematics, nu=nu)
+    x = np.linspace(0.0, box.width, 200)
+    top = np.column_stack([x, np.zeros_like(x)])
+    gap = box.obstacle(x) - box.displacement(top)[:, 1]
+    stress = box.stress(top)
+    closed = x <= box.radius
+    np.testing.assert_allclose(gap[closed], 0.0, atol=1e-15)
+    assert (gap[~closed] > 0.0).all()
+    np.testing.assert_allclose(-stress[:, 1], box.pressure(x), atol=1e-12)
+    np.testing.assert_allclose(stress[:, 3], 0.0, atol=1e-12)
+    assert (box.pressure(x)[closed] > 0.0).all()
+    axis = np.column_stack([np.zeros(20), -np.linspace(0.0, box.height, 20)])
+    np.testing.assert_allclose(box.displacement(axis)[:, 0], 0.0, atol=1e-17)
+    np.testing.assert_allclose(box.stress(axis)[:, 3], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("kinematics", KINEMATICS)
+def test_box_is_in_global_equilibrium(kinematics):
+    box = hertz_box(kinematics=kinematics, width=1.3, height=0.7)
+    s, weight = np.polynomial.legendre.leggauss(80)
+    across, up = 0.5 * box.width * (s + 1.0), -0.5 * box.height * (s + 1.0)
+    around = 2.0 * math.pi * across if kinematics == "axisymmetric" else np.full(80, 2.0)
+    rim = 2.0 * math.pi * box.width if kinematics == "axisymmetric" else 2.0
+    bottom = box.stress(np.column_stack([across, np.full(80, -box.height)]))[:, 1]
+    side = box.stress(np.column_stack([np.full(80, box.width), up]))[:, 3]
+    upward = -(0.5 * box.width * weight * bottom * around).sum() + (0.5 * box.height * weight * side * rim).sum()
+    assert upward == pytest.approx(box.force, rel=1e-10)
+
+
+@pytest.mark.parametrize("kinematics", KINEMATICS)
+def test_stress_follows_from_displacement(kinematics):
+    box, h = hertz_box(kinematics=kinematics), 1e-3
+    points = np.array([[0.2, -0.1], [0.6, -0.05], [0.9, -0.8]])
+
+    def slope(axis):
+        shift = np.zeros(2)
+        shift[axis] = h
+        u = [box.displacement(points + k * shift) for k in (-2, -1, 1, 2)]
+        return (u[0] - 8.0 * u[1] + 8.0 * u[2] - u[3]) / (12.0 * h)
+
+    xx, yy, zz, xy = box.stress(points).T
+    d_x, d_y = slope(0), slope(1)
+    np.testing.assert_allclose(d_x[:, 0], (xx - box.nu * (yy + zz)) / box.E, atol=1e-8)
+    np.testing.assert_allclose(d_y[:, 1], (yy - box.nu * (xx + zz)) / box.E, atol=1e-8)
+    np.testing.assert_allclose(d_x[:, 1] + d_y[:, 0], 2.0 * (1.0 + box.nu) / box.E * xy, atol=1e-8)
+
+
+def test_rounded_mesh_coordinates_are_forgiven():
+    box = hertz_box()
+    np.testing.assert_array_equal(box.stress([[0.2, 1e-16]]), box.stress([[0.2, 0.0]]))
+
+
+def test_bad_input_is_named():
+    with pytest.raises(ModelError, match="narrower than the box"):
+        hertz_box(radius=1.5)
+    with pytest.raises(ModelError, match="axisymmetric"):
+        hertz_box(kinematics="axisymetric")
+    with pytest.raises(ModelError, match=r"shape \(3,\)"):
+        hertz_box().stress([0.0, 1.0, 2.0])
+    with pytest.raises(ModelError, match="above the surface"):
+        hertz_box().displacement([[0.0, 0.5]])

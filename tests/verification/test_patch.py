@@ -1,0 +1,68 @@
+"""Contact patch tests on matching meshes, and motion without deformation."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+
+ELEMENTS = ("tri3", "tri6", "quad4", "quad8", "quad9")
+
+
+def two_blocks(element, formulation, kinematics="plane_strain", swap=False, **options):
+    mesh = fc.generate.block_on_block(divisions_lower=(3, 2), divisions_upper=(3, 2), element=element)
+    model = fc.Model(mesh, kinematics)
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    for side in ("LOWER", "UPPER"):
+        model.fix(f"{side}_LEFT", "x")
+    model.fix("LOWER_BOTTOM", "y")
+    model.prescribe("UPPER_TOP", y=-0.02)
+    sides = ("CONT_UPPER", "CONT_LOWER") if swap else ("CONT_LOWER", "CONT_UPPER")
+    model.add_contact("pair", secondary=sides[0], primary=sides[1], formulation=formulation, **options)
+    return model
+
+
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress", "axisymmetric"])
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_matching_meshes_transmit_a_uniform_pressure_exactly(element, formulation, kinematics, swap):
+    model = two_blocks(element, formulation, kinematics, swap)
+    last = fc.solve(model, fc.linear_ramp(2))[-1]
+    height = np.ptp(model.mesh.points[:, 1])
+    strain = 0.02 / height
+    modulus = 1000.0 / (1 - 0.3**2) if kinematics == "plane_strain" else 1000.0
+    expected = -modulus * strain
+    assert np.abs(last.stress[:, 1] - expected).max() < 1e-10 * abs(expected)
+    others = [0, 3] if kinematics == "plane_strain" else [0, 2, 3]
+    assert np.abs(last.stress[:, others]).max() < 1e-10 * abs(expected)
+    assert last.contact["pair"].pressure == pytest.approx(-expected, rel=1e-10)
+
+
+@pytest.mark.parametrize("integration", ["gauss", "simpson", "node"])
+def test_the_continuous_pressure_is_exact_with_every_rule(integration):
+    last = fc.solve(two_blocks("quad8", "continuous", integration=integration), fc.linear_ramp(1))[-1]
+    pressure = last.contact["pair"].pressure
+    assert np.ptp(pressure) < 1e-10 * pressure.max()
+
+
+def test_bodies_apart_stay_open_and_carry_nothing(forma04):
+    mesh = fc.generate.half_spheres("tri3", size=8.0)
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model.fix("A1A2", "x")
+    model.prescribe("A2B2", y=1.0)
+    model.fix("A1B1", "y")
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2")
+    last = fc.solve(model, fc.linear_ramp(2))[-1]
+    assert not last.contact["hertz"].active.any()
+    assert np.abs(last.stress).max() < 1e-10 * 20_000.0
+    assert last.contact["hertz"].gap[0] == pytest.approx(1.0, rel=1e-12)
+
+
+def test_without_contact_bodies_move_rigidly_and_their_overlap_is_told(forma04):
+    model = forma04(fc.generate.half_spheres("tri3", size=4.0), contact=False)
+    with pytest.warns(fc.FastcontactWarning, match=r"interpenetrate by 4 near .*no contact is defined"):
+        steps = fc.solve(model)
+    assert len(steps) == 20
+    assert np.abs(steps[-1].stress).max() < 1e-10 * 20_000.0
+    assert np.abs(steps[-1].reaction).max() < 1e-8
