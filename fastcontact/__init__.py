@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from fastcontact.materials import LinearElastic
     from fastcontact.mesh import Mesh
     from fastcontact.model import Model
-    from fastcontact.quality import quality
+    from fastcontact.mesh_quality import quality
     from fastcontact.ramp import Ramp, linear_ramp
     from fastcontact.results import ContactResult, StepResult
-    from fastcontact.solve import Criteria, solve
+    from fastcontact.analysis import Criteria, solve
     from fastcontact.topology import ordered_line
 
 _MODULES = ("analytic", "generate", "plot", "recovery", "topology")
@@ -43,7 +43,7 @@ _HOME = {
     "ContactError": "errors",
     "ContactResult": "results",
     "ConvergenceError": "errors",
-    "Criteria": "solve",
+    "Criteria": "analysis",
     "FastcontactError": "errors",
     "FastcontactWarning": "errors",
     "FileError": "errors",
@@ -60,10 +60,10 @@ _HOME = {
     "linear_ramp": "ramp",
     "open_results": "io.result_reader",
     "ordered_line": "topology",
-    "quality": "quality",
+    "quality": "mesh_quality",
     "read_med_field": "io.med",
     "read_mesh": "io.mesh_files",
-    "solve": "solve",
+    "solve": "analysis",
     "write_agr": "io.xmgrace",
     "write_csv": "io.tables",
     "write_med_results": "io.med",

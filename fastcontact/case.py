@@ -16,7 +16,7 @@ from fastcontact.materials import LinearElastic
 from fastcontact.mesh import Mesh
 from fastcontact.model import Model
 from fastcontact.ramp import Ramp, linear_ramp
-from fastcontact.solve import Criteria
+from fastcontact.analysis import Criteria
 
 _NUMBER = (int, float)
 _UNITS = {"length": str, "force": str, "pressure": str}
@@ -226,9 +226,8 @@ def _ramp(data: dict[str, Any]) -> Ramp:
     _check_keys("ramp", data, _RAMP)
     if "instants" not in data:
         if "table" in data:
-            end = float(data["table"][-1][0])
-            steps = linear_ramp(data.get("steps", 20), end)
-            return Ramp(steps.instants, _points(data["table"]))
+            table = _points(data["table"])
+            return Ramp(linear_ramp(data.get("steps", 20), table[-1][0]).instants, table)
         return linear_ramp(data.get("steps", 20), float(data.get("end", 1.0)))
     if "steps" in data or "end" in data:
         raise CaseError("'ramp' takes either 'instants', or 'steps' and 'end', not both")
@@ -238,7 +237,7 @@ def _ramp(data: dict[str, Any]) -> Ramp:
 
 
 def _points(table: list[Any]) -> tuple[tuple[float, float], ...]:
-    if not all(isinstance(row, list) and len(row) == 2 and all(isinstance(v, _NUMBER) for v in row) for row in table):
+    if not table or not all(isinstance(row, list) and len(row) == 2 and all(isinstance(v, _NUMBER) for v in row) for row in table):
         raise CaseError("'ramp.table' must be a list of pairs [instant, multiplier of the loads]")
     return tuple((float(t), float(v)) for t, v in table)
 

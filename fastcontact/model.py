@@ -16,7 +16,7 @@ from fastcontact.contact.surface import Surface, surface
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.materials import KINEMATICS, LinearElastic
 from fastcontact.mesh import Mesh
-from fastcontact.quality import check_cells
+from fastcontact.mesh_quality import check_cells
 from fastcontact.validation import check_overlap, check_supports
 
 Array = NDArray[np.float64]
@@ -250,7 +250,7 @@ class Model:
         """
         self.material_numbers()
         fixed, _ = self.prescribed()
-        check_overlap(self.mesh, [(pair.secondary, pair.primary) for pair in self.contact])
+        check_overlap(self.mesh, self.kinematics, [(pair.secondary, pair.primary) for pair in self.contact])
         check_supports(self.mesh, self.kinematics, fixed)
 
 

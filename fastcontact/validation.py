@@ -68,10 +68,11 @@ def check_supports(mesh: Mesh, kinematics: str, fixed: NDArray[np.bool_]) -> Non
         )
 
 
-def penetration(mesh: Mesh, coordinates: Array) -> list[tuple[int, int, float, Array]]:
+def penetration(mesh: Mesh, kinematics: str, coordinates: Array) -> list[tuple[int, int, float, Array]]:
     """Return (body, other, depth, where) for each pair of bodies of which the first has nodes inside the second.
 
-    Depth is the largest distance of such a node to the other body's outside [length]; two dimensions only.
+    Depth is the largest distance of such a node to the other body's outside [length]; two dimensions only. The axis
+    of an axisymmetric body is not its outside.
     """
     count, body = bodies(mesh)
     facets = [outer[:, :2] for outer in outer_facets(mesh).values()]
@@ -86,10 +87,12 @@ def penetration(mesh: Mesh, coordinates: Array) -> list[tuple[int, int, float, A
                 continue
             corners = coordinates[edges[body[edges[:, 0]] == other]]
             low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-            near = nodes[((coordinates[nodes] > low) & (coordinates[nodes] < high)).all(axis=1)]
+            near = nodes[((coordinates[nodes] >= low) & (coordinates[nodes] <= high)).all(axis=1)]
             near = near[_inside(coordinates[near], corners)]
             if len(near):
-                depth = _distance(coordinates[near], corners)
+                on_axis = (np.abs(corners[:, :, 0]) <= 1e-9 * np.ptp(mesh.points[:, 0])).all(axis=1)
+                outside = corners[~on_axis] if kinematics == "axisymmetric" else corners
+                depth = _distance(coordinates[near], outside)
                 deepest = int(np.argmax(depth))
                 found.append((number, other, float(depth[deepest]), coordinates[near[deepest]]))
     return found
@@ -113,7 +116,7 @@ def _distance(points: Array, edges: Array) -> Array:
     return np.linalg.norm(points - at, axis=1)
 
 
-def check_overlap(mesh: Mesh, paired: Iterable[tuple[str, str]]) -> None:
+def check_overlap(mesh: Mesh, kinematics: str, paired: Iterable[tuple[str, str]]) -> None:
     """Raise ModelError if bodies overlap in the reference configuration and no contact pair joins them.
 
     `paired` holds the (secondary, primary) groups of the contact pairs.
@@ -121,7 +124,7 @@ def check_overlap(mesh: Mesh, paired: Iterable[tuple[str, str]]) -> None:
     _, body = bodies(mesh)
     joined = {frozenset((int(body[mesh.points_of(a)[0]]), int(body[mesh.points_of(b)[0]]))) for a, b in paired}
     size = float(np.ptp(mesh.points, axis=0).max())
-    for number, other, depth, where in penetration(mesh, mesh.points):
+    for number, other, depth, where in penetration(mesh, kinematics, mesh.points):
         if depth > 1e-6 * size and frozenset((number, other)) not in joined:
             names = body_name(mesh, body, number), body_name(mesh, body, other)
             raise ModelError(

@@ -38,7 +38,7 @@ class Bodies:
 
     @property
     def E_star(self) -> float:
-        """Contact modulus, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2 (Johnson 1985, eq. 4.20) [pressure]."""
+        """Contact modulus, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2 (Johnson 1985, section 4.2) [pressure]."""
         return 1.0 / sum((1.0 - nu**2) / E for E, nu in self._elastic)
 
     @property
@@ -48,12 +48,12 @@ class Bodies:
 
     @property
     def G_star(self) -> float:
-        """Tangential modulus, 1/G* = sum of (2 - nu)/(4 G) (Johnson 1985, eq. 7.43) [pressure]."""
-        return 1.0 / sum((2.0 - nu) * (1.0 + nu) / (2.0 * E) for E, nu in self._elastic)
+        """Tangential modulus, 1/G* = (2 - nu1)/G1 + (2 - nu2)/G2 (Mindlin 1949) [pressure]."""
+        return 1.0 / sum(2.0 * (2.0 - nu) * (1.0 + nu) / E for E, nu in self._elastic)
 
     @property
     def dundurs(self) -> float:
-        """Dundurs' second constant, plane strain; 0 uncouples pressure and shear (Johnson 1985, eq. 2.23)."""
+        """Dundurs' beta in plane strain; where it is 0, pressure causes no shear (Dundurs 1969)."""
         first = (1.0 - 2.0 * self.nu1) * (1.0 + self.nu1) / self.E1
         second = 0.0 if self.E2 is None else (1.0 - 2.0 * self.nu2) * (1.0 + self.nu2) / self.E2
         return 0.5 * (first - second) * self.E_star

@@ -31,9 +31,7 @@ def _roots(x: ArrayLike, y: ArrayLike, b: float) -> tuple[Array, ComplexArray, C
     square.real = (1.0 - across) * (1.0 + across) + depth**2
     square.imag = 2.0 * across * depth
     w = np.sqrt(square)
-    w = w.real + 1j * np.copysign(
-        w.imag, across
-    )  # outside the contact, on the surface, the sign is that of x
+    w = w.real + 1j * np.copysign(w.imag, across)  # outside the contact, on the surface, the sign is that of x
     return (
         depth,
         k,
@@ -52,9 +50,7 @@ def stress(x: ArrayLike, y: ArrayLike, b: float, p0: float, nu: float, kinematic
     return p0 * np.stack([xx, yy, zz, -gradient.imag], axis=-1)
 
 
-def displacement(
-    x: ArrayLike, y: ArrayLike, b: float, p0: float, E: float, nu: float, kinematics: str
-) -> Array:
+def displacement(x: ArrayLike, y: ArrayLike, b: float, p0: float, E: float, nu: float, kinematics: str) -> Array:
     """Return displacements (..., 2) along x, y [length], measured from the point (0, 0).
 
     With H the integral of w - k over k, 2 G u_x = (p0/b) [y Im(w - k) - (1 - 2 nu) Im H] and

@@ -23,9 +23,7 @@ def below_surface(z: ArrayLike, a: float) -> Array:
     """Return the depth -z, forgiving the rounding of mesh coordinates on the surface."""
     depth = -np.asarray(z, dtype=np.float64)
     if depth.size and depth.min() < -1e-9 * a:
-        raise ModelError(
-            f"a point lies {-depth.min():g} above the surface: the body is z <= 0 (y <= 0 in the plane)"
-        )
+        raise ModelError(f"a point lies {-depth.min():g} above the surface: the body is z <= 0 (y <= 0 in the plane)")
     return np.maximum(depth, 0.0)
 
 

@@ -80,15 +80,13 @@ class CattaneoMindlinLine(_PartialSlip):
 
     @property
     def stick_radius(self) -> float:
-        """Half-width of the zone that sticks; a sqrt(1 - Q/(f P)) while loading (Johnson, 7.29) [length]."""
+        """Half-width of the zone that sticks; a sqrt(1 - Q/(f P)) while loading (Cattaneo 1938) [length]."""
         return self._zone(self._reversal if self._reversal > 0.0 else self.tangential_force)
 
     def traction(self, x: ArrayLike) -> Array:
-        """Return the shear traction along the force (Johnson 1985, eqs 7.26 and 7.28) [pressure]."""
+        """Return the shear traction along the force (Cattaneo 1938; Johnson 1985, section 7.2a) [pressure]."""
         first, back = self._zone(self.tangential_force_peak), self._zone(self._reversal)
-        return _traction(self.normal, self.friction, first, x) - 2.0 * _traction(
-            self.normal, self.friction, back, x
-        )
+        return _traction(self.normal, self.friction, first, x) - 2.0 * _traction(self.normal, self.friction, back, x)
 
     def slip(self, x: ArrayLike) -> Array:
         """Return how far the surfaces have slipped on each other, in the direction of the force [length].
@@ -97,9 +95,7 @@ class CattaneoMindlinLine(_PartialSlip):
         <= a; zero within the stick zone and outside the contact (from Johnson 1985, eq. 2.25 and section
         7.2a).
         """
-        return self._slip(self._zone(self.tangential_force_peak), x) - 2.0 * self._slip(
-            self._zone(self._reversal), x
-        )
+        return self._slip(self._zone(self.tangential_force_peak), x) - 2.0 * self._slip(self._zone(self._reversal), x)
 
     def unloaded_to(self, tangential_force: float) -> CattaneoMindlinLine:
         """Return the contact after the tangential force went down to a value not below the opposite peak.
@@ -147,17 +143,17 @@ class CattaneoMindlinSphere(_PartialSlip):
 
     @property
     def G_star(self) -> float:
-        """Tangential modulus, 1/G* = (2 - nu1)/(4 G1) + (2 - nu2)/(4 G2) [pressure]."""
+        """Tangential modulus, 1/G* = (2 - nu1)/G1 + (2 - nu2)/G2 [pressure]."""
         return self.normal.bodies.G_star
 
     @property
     def stick_radius(self) -> float:
-        """Radius of the zone that sticks; a (1 - T/(f F))^(1/3) while loading (Johnson, 7.39) [length]."""
+        """Radius of the zone that sticks; a (1 - T/(f F))^(1/3) while loading (Mindlin 1949) [length]."""
         return self._zone(self._reversal if self._reversal > 0.0 else self.tangential_force)
 
     @property
     def tangential_displacement(self) -> float:
-        """Tangential displacement of distant points (Johnson 1985, eq. 7.42) [length].
+        """Tangential displacement of distant points (Mindlin 1949; Johnson 1985, section 7.2b) [length].
 
         While loading, 3 f F/(16 a G*) [1 - (1 - T/(f F))^(2/3)].
         """
@@ -165,7 +161,7 @@ class CattaneoMindlinSphere(_PartialSlip):
 
     @property
     def dissipation_per_cycle(self) -> float:
-        """Work lost in a cycle between +peak and -peak (Johnson 1985, eq. 7.57) [force length]."""
+        """Work lost in a cycle between +peak and -peak (Mindlin and Deresiewicz 1953) [force length]."""
         limit = self.friction * self.normal.force
         load = self.tangential_force_peak / limit
         rest = max(1.0 - load, 0.0)
@@ -173,11 +169,9 @@ class CattaneoMindlinSphere(_PartialSlip):
         return 9.0 * limit**2 / (10.0 * self.normal.radius) * bracket / self.G_star
 
     def traction(self, r: ArrayLike) -> Array:
-        """Return the shear traction along the force (Johnson 1985, eqs 7.36 and 7.37) [pressure]."""
+        """Return the shear traction along the force (Mindlin 1949; Johnson 1985, section 7.2b) [pressure]."""
         first, back = self._zone(self.tangential_force_peak), self._zone(self._reversal)
-        return _traction(self.normal, self.friction, first, r) - 2.0 * _traction(
-            self.normal, self.friction, back, r
-        )
+        return _traction(self.normal, self.friction, first, r) - 2.0 * _traction(self.normal, self.friction, back, r)
 
     def unloaded_to(self, tangential_force: float) -> CattaneoMindlinSphere:
         """Return the contact after the tangential force went down to a value not below the opposite peak.
@@ -203,9 +197,7 @@ def _friction_limit(friction: float, normal_force: float, tangential_force: floa
     T = not_negative("tangential_force", tangential_force)
     limit = f * normal_force
     if limit < T:
-        raise ModelError(
-            f"tangential_force is {T:g}: the bodies slide above friction times normal force, {limit:g}"
-        )
+        raise ModelError(f"tangential_force is {T:g}: the bodies slide above friction times normal force, {limit:g}")
     return f, T
 
 
@@ -213,7 +205,7 @@ def _warn_of_coupling(bodies: Bodies) -> None:
     """Warn where normal and tangential loads are coupled, which the theory leaves out."""
     if abs(bodies.dundurs) > 1e-12:
         warnings.warn(
-            f"Cattaneo-Mindlin is exact for like materials: Dundurs' beta is {bodies.dundurs:.3g}, not 0",
+            f"Cattaneo-Mindlin is exact for like materials: Dundurs' beta is {bodies.dundurs:.4g}, not 0",
             FastcontactWarning,
             stacklevel=3,
         )

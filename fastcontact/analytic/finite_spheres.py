@@ -91,17 +91,15 @@ def _interpolated(table: Array, x: float) -> tuple[float, float, float]:
     return float(force), float(pressure), float(here.at_force(float(force)).radius * (1.0 + excess))
 
 
-def finite_half_spheres(
-    approach: float, *, R: float = 50.0, E: float = 20_000.0, nu: float = NU
-) -> FiniteHalfSpheres:
+def finite_half_spheres(approach: float, *, R: float = 50.0, E: float = 20_000.0, nu: float = NU) -> FiniteHalfSpheres:
     """Return the contact of two equal half spheres as finite bodies.
 
     Interpolates the mesh-converged axisymmetric solution of a half sphere on a frictionless plane (linear
     elasticity on the reference geometry, gap measured along the axis), computed independently twice with
-    elements of degree 8 to 10 at three approaches and with degree 4 at 21 others. Leaving out any one row of
-    the table and interpolating it from the others changes force and pressure by less than 2e-5 and the radius
-    by less than 4e-5, relatively; between approaches of 0.8 % and 8 % of the radius, by less than 3e-6. The
-    rows themselves are good to about 3e-6.
+    elements of degree 8 to 10 at three approaches, and with degree 4 at 21 others. Leaving out any one row
+    of the table and interpolating it from the others changes force and pressure by less than 2e-5 and the
+    radius by less than 4e-5, relatively; at approaches from 0.8 % to 8 % of the radius by less than 4e-6 and
+    1e-5. The rows themselves are good to about 3e-6.
 
     Parameters
     ----------

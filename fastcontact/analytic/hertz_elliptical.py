@@ -89,9 +89,7 @@ def _ratio_of_axes(ratio_of_radii: float) -> float:
     if ratio_of_radii == 1.0:
         return 1.0
     if ratio_of_radii > _ratio_of_radii(_FLATTEST):
-        raise ModelError(
-            f"the relative radii differ by a factor {ratio_of_radii:g}: a line contact, use hertz_line"
-        )
+        raise ModelError(f"the relative radii differ by a factor {ratio_of_radii:g}: a line contact, use hertz_line")
     goal = math.log(ratio_of_radii)
     return math.exp(
         brentq(lambda x: math.log(_ratio_of_radii(math.exp(x))) - goal, math.log(_FLATTEST), 0.0, xtol=1e-15)

@@ -60,7 +60,7 @@ class HertzLine:
         return _solve(self.bodies, self.kinematics, self.R_effective, *exactly_one(force=force))
 
     def pressure(self, x: ArrayLike) -> Array:
-        """Return the contact pressure at positions `x`, zero outside (Johnson 1985, eq. 4.42) [pressure]."""
+        """Return the contact pressure at positions `x`, zero outside (Johnson 1985, eq. 4.44) [pressure]."""
         inside = 1.0 - (np.asarray(x, dtype=np.float64) / self.radius) ** 2
         return self.pressure_max * np.sqrt(np.maximum(inside, 0.0))
 

@@ -53,9 +53,7 @@ class LameShell:
         positive("E", self.E)
         poisson("nu", self.nu)
         if self.inner_radius == 0.0 and self.inner_pressure != 0.0:
-            raise ModelError(
-                "inner_pressure must be 0 for a solid body (inner_radius 0): there is no bore to press on"
-            )
+            raise ModelError("inner_pressure must be 0 for a solid body (inner_radius 0): there is no bore to press on")
 
     def displacement(self, r: ArrayLike) -> Array:
         """Return the radial displacement at radii `r`: r times the hoop strain [length].

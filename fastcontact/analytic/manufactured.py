@@ -125,7 +125,7 @@ def hertz_box(
     """Return the exact solution of the box under a rigid parabola with a given contact radius and pressure.
 
     The fields are those of McEwen (1949) in the plane and of Huber (1904) in axisymmetry; the radius of the
-    parabola follows from Johnson (1985), eq. 4.44 and eq. 4.24.
+    parabola follows from Johnson (1985), eqs 4.45 and 4.24.
 
     Parameters
     ----------

@@ -120,9 +120,7 @@ def persson_pin(
     limit = persson_limit_angle()
     if name == "contact_angle":
         if gap == 0.0:
-            raise ModelError(
-                "contact_angle cannot be given without clearance: any force gives the same angle"
-            )
+            raise ModelError("contact_angle cannot be given without clearance: any force gives the same angle")
         if value >= limit:
             raise ModelError(f"contact_angle is {value:g}: with clearance it stays below {limit:.4f} degrees")
         return PerssonPin(R, gap, modulus * gap / _clearance_ratio(value), value)

@@ -40,9 +40,7 @@ def _fit(interference: float, inner: LameShell, outer: LameShell) -> PressFit:
     """Return the fit of two bodies given under a unit pressure on their interface."""
     b, d = inner.outer_radius, positive("interference", interference)
     pressure = d / float(outer.displacement(b) - inner.displacement(b))
-    return PressFit(
-        d, pressure, replace(inner, outer_pressure=pressure), replace(outer, inner_pressure=pressure)
-    )
+    return PressFit(d, pressure, replace(inner, outer_pressure=pressure), replace(outer, inner_pressure=pressure))
 
 
 def press_fit_cylinders(

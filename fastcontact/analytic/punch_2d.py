@@ -89,9 +89,7 @@ def flat_punch_2d(*, nu: float, half_width: float, force: float, bonded: bool = 
     ModelError
         If a number is out of range.
     """
-    return FlatPunch2D(
-        poisson("nu", nu), positive("half_width", half_width), positive("force", force), bool(bonded)
-    )
+    return FlatPunch2D(poisson("nu", nu), positive("half_width", half_width), positive("force", force), bool(bonded))
 
 
 def spence_stick_ratio(*, nu: float, friction: float) -> float:

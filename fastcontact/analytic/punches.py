@@ -190,7 +190,7 @@ def flat_punch(
     approach: float | None = None,
     bonded: bool = False,
 ) -> FlatPunch:
-    """Return the contact of a flat rigid cylinder with a half space, F = 2 E* a delta (Johnson 1985, 3.36).
+    """Return the contact of a flat rigid cylinder with a half space, F = 2 E* a delta (Johnson 1985, section 3.4).
 
     Parameters
     ----------
@@ -243,9 +243,7 @@ def power_law_punch(
         If a number is out of range or not exactly one load quantity is given.
     """
     given = exactly_one(force=force, approach=approach, radius=radius)
-    return _solve(
-        _modulus(E, nu), positive("coefficient", coefficient), positive("exponent", exponent), *given
-    )
+    return _solve(_modulus(E, nu), positive("coefficient", coefficient), positive("exponent", exponent), *given)
 
 
 def cone_punch(

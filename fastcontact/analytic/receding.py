@@ -70,11 +70,7 @@ def _layer(xi: Array) -> tuple[Array, Array]:
     both faces that bend it (A) or squeeze it (S), in Fourier space: S = (cosh xi - 1)/(sinh xi + xi) and
     A = (cosh xi + 1)/(sinh xi - xi).
     """
-    cubic = (
-        xi**3
-        / 6.0
-        * (1.0 + xi**2 / 20.0 * (1.0 + xi**2 / 42.0 * (1.0 + xi**2 / 72.0 * (1.0 + xi**2 / 110.0))))
-    )
+    cubic = xi**3 / 6.0 * (1.0 + xi**2 / 20.0 * (1.0 + xi**2 / 42.0 * (1.0 + xi**2 / 72.0 * (1.0 + xi**2 / 110.0))))
     difference = np.where(xi < 0.6, cubic, np.sinh(xi) - xi)
     return (1.0 + xi + np.exp(-xi)) / difference, (1.0 + xi - np.exp(-xi)) / (np.sinh(xi) + xi)
 
@@ -163,9 +159,7 @@ def receding_layer(
     a = not_negative("load_half_width", load_half_width) / h
     ratio = _modulus_ratio(bodies, kinematics)
     if ratio > _LARGEST_RATIO:
-        raise ModelError(
-            f"the layer is {ratio:g} times stiffer than the half plane: the limit is {_LARGEST_RATIO:g}"
-        )
+        raise ModelError(f"the layer is {ratio:g} times stiffer than the half plane: the limit is {_LARGEST_RATIO:g}")
     if a > _LARGEST_LOAD:
         raise ModelError(f"load_half_width is {a:g} thicknesses: the limit is {_LARGEST_LOAD:g}")
     c = _half_width(ratio, a)

@@ -39,7 +39,7 @@ def _warm_up() -> None:
     from fastcontact.materials import LinearElastic
     from fastcontact.model import Model
     from fastcontact.ramp import linear_ramp
-    from fastcontact.solve import solve
+    from fastcontact.analysis import solve
 
     for element, formulation in (("tri3", "node_to_segment"), ("tri6", "continuous")):
         model = Model(half_spheres(element, size=10.0), "axisymmetric")

@@ -23,7 +23,7 @@ def run(options: argparse.Namespace) -> int:
             print("\n".join([*_mesh_lines(results.mesh), *_result_lines(results)]))
         return 0
     from fastcontact.io.mesh_files import read_mesh_report
-    from fastcontact.quality import quality
+    from fastcontact.mesh_quality import quality
 
     mesh, report = read_mesh_report(options.file)
     print("\n".join([str(report), *_mesh_lines(mesh), str(quality(mesh))]))

@@ -58,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     """Make the mesh, write it, print its quality."""
     from fastcontact.generate import GENERATORS
     from fastcontact.io.mesh_files import write_mesh
-    from fastcontact.quality import quality
+    from fastcontact.mesh_quality import quality
 
     make = GENERATORS[options.generator]
     names = inspect.signature(make).parameters

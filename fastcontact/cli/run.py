@@ -32,7 +32,7 @@ def run(options: argparse.Namespace) -> int:
     from fastcontact import summary
     from fastcontact.case import read_case
     from fastcontact.io.result_writer import ResultWriter
-    from fastcontact.solve import solve
+    from fastcontact.analysis import solve
 
     started = time.perf_counter()
     if options.threads is not None:

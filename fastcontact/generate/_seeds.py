@@ -16,7 +16,7 @@ _CLEAR = 0.6  # seeds stay this many edge lengths off the outline
 
 def inner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
     """Points (m, 2) inside the convex polygon `outline` (n, 2), about ``density * spacing`` apart [length]."""
-    corners = _corner_seeds(outline, spacing, density)
+    corners = _apart(_corner_seeds(outline, spacing, density), outline, spacing, density)
     low, high = outline.min(axis=0), outline.max(axis=0)
     field = _lattice(spacing, density, low, high) if spacing.uniform else _rings(spacing, density, low, high)
     size = density * spacing(field)
@@ -25,6 +25,15 @@ def inner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
         return inside
     free = cKDTree(corners).query(inside)[0] > 0.7 * density * spacing(inside)
     return np.vstack([corners, inside[free]])
+
+
+def _apart(seeds: Array, outline: Array, spacing: Spacing, density: float) -> Array:
+    """The seeds (m, 2) that stand off the outline and off the seeds before them, where a body is a few edges wide."""
+    kept: list[Array] = []
+    for seed, depth, size in zip(seeds, _depth(outline, seeds), density * spacing(seeds), strict=True):
+        if depth > 0.4 * size and all(np.hypot(*(seed - other)) > 0.7 * size for other in kept):
+            kept.append(seed)
+    return np.array(kept).reshape(-1, 2)
 
 
 def _depth(outline: Array, points: Array) -> Array:

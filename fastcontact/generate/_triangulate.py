@@ -8,7 +8,8 @@ from scipy.spatial import cKDTree
 
 from fastcontact.errors import MeshError
 from fastcontact.generate._delaunay import delaunay, edges_of
-from fastcontact.generate._relax import polish, relax
+from fastcontact.generate._polish import polish
+from fastcontact.generate._relax import relax
 from fastcontact.generate._seeds import inner_seeds
 from fastcontact.generate._spacing import Spacing
 
@@ -16,11 +17,11 @@ Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 
 # Inner points stand closer than the longest edge allowed, for no triangulation has all its edges equal.
-_DENSITIES = (0.82, 0.80, 0.84, 0.78, 0.75, 0.7)
-_ROUNDS = 8
-_AROUND = 4.0
-_GOOD_ANGLE = 35.0
-_LEAST_ANGLE = 20.0
+_DENSITIES = (0.84, 0.82, 0.80, 0.78, 0.75, 0.7)
+_ROUNDS = 8  # of adding points where edges are too long
+_AROUND = 3.0  # edge lengths from an added point within which points give way to it
+_GOOD_ANGLE = 35.0  # a triangulation whose smallest angle [degrees] reaches this is taken at once
+_LEAST_ANGLE = 20.0  # and one that does not reach this, never
 
 
 def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Numbers]:
@@ -58,7 +59,8 @@ def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Numbers]:
             break
     if best is None:
         raise MeshError(
-            f"no triangulation with edges up to {spacing.near:g} to {spacing.far:g} was found: change the sizes a little"
+            f"no triangulation with edges up to {spacing.near:g} at the pole and {spacing.far:g} far from it was found: "
+            "change a size a little, or let it grow over a longer distance"
         )
     return best, _checked(delaunay(best), len(best), len(outline))
 
@@ -93,15 +95,16 @@ def _attempt(outline: Array, spacing: Spacing, density: float) -> Array | None:
 def _middles_of_long_edges(points: Array, n_fixed: int, spacing: Spacing) -> Array:
     """Middle points (m, 2) of the edges that are too long, the longest only at each point."""
     edges = edges_of(delaunay(points))
-    edges = edges[edges[:, 1] >= n_fixed]
+    # Sides of the outline are as long as they are, but a chord that cuts a corner off counts.
+    side = np.isin(edges[:, 1] - edges[:, 0], (1, n_fixed - 1)) & (edges[:, 1] < n_fixed)
+    edges = edges[~side]
     middles = points[edges].mean(axis=1)
     sides = points[edges[:, 0]] - points[edges[:, 1]]
     ratio = np.hypot(sides[:, 0], sides[:, 1]) / spacing(middles)
     long = ratio > 1.0 + 1e-9
     worst = np.zeros(len(points))
     np.maximum.at(worst, edges[long].ravel(), np.repeat(ratio[long], 2))
-    longest = long & (ratio >= worst[edges].max(axis=1))
-    return middles[longest]
+    return middles[long & (ratio >= worst[edges].max(axis=1))]
 
 
 def _checked(triangles: Numbers, n_points: int, n_outline: int) -> Numbers:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fastcontact import elements
 from fastcontact.errors import MeshError
 from fastcontact.mesh import Mesh
-from fastcontact.quality import check_cells
+from fastcontact.mesh_quality import check_cells
 from fastcontact.topology import outer_facets
 
 Array = NDArray[np.float64]

@@ -79,9 +79,7 @@ def _turned(name: str) -> list[int]:
     return [int(np.flatnonzero(np.abs(nodes - node).max(axis=1) < 1e-12)[0]) for node in image]
 
 
-def transformed(
-    mesh: Mesh, *, translate: ArrayLike | None = None, scale: float = 1.0, rotate: float = 0.0
-) -> Mesh:
+def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float = 1.0, rotate: float = 0.0) -> Mesh:
     """Return the mesh scaled about the origin, then rotated about it (2D only), then translated.
 
     Parameters

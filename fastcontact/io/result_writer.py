@@ -65,7 +65,7 @@ class ResultWriter:
     Examples
     --------
     >>> with ResultWriter("punch.vtkhdf", model) as out:  # doctest: +SKIP
-    ...     fastcontact.solve(model, ramp=fastcontact.linear_ramp(20), on_step=out.write)
+    ...     fastcontact.analysis(model, ramp=fastcontact.linear_ramp(20), on_step=out.write)
     """
 
     def __init__(

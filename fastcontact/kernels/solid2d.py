@@ -68,6 +68,7 @@ def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric,
                     local[a, b, 1, 0] += ay * yy_x + shear * ax * by
                     local[a, b, 1, 1] += ay * yy_y + shear * ax * bx
         for b in range(n_nodes):
+            local[b, b, 1, 0] = local[b, b, 0, 1]  # equal but for round-off; K is symmetric to the last bit
             for a in range(b + 1):
                 upper, lower = slots[c, a, b], slots[c, b, a]
                 for i in range(2):

@@ -7,7 +7,7 @@ from scipy.sparse import csr_array
 import fastcontact as fc
 from fastcontact import linear
 from fastcontact.errors import ModelError
-from fastcontact.solve import Analysis, Criteria
+from fastcontact.analysis import Analysis, Criteria
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def problem(forma04):
 
 
 def prepared(name, analysis):
-    from fastcontact.solve import _near_nullspace, _with_supports
+    from fastcontact.analysis import _near_nullspace, _with_supports
 
     solver = linear.make(name, dim=2, n_dofs=analysis.model.n_dofs, tolerance=1e-12)
     modes = _near_nullspace(analysis.model)

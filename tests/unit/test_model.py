@@ -81,7 +81,7 @@ def test_bodies_that_overlap_without_contact_are_refused(spheres):
     model.fix("A1A2", "x")
     model.fix("A1B1", "y")
     model.fix("A2B2", "y")
-    with pytest.raises(fc.ModelError, match=r"overlaps body .* by 3"):
+    with pytest.raises(fc.ModelError, match=r"overlaps body .* by 2.99"):
         model.check()
     model.add_contact("pair", secondary="CONT1", primary="CONT2")
     model.check()

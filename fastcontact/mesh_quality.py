@@ -59,7 +59,7 @@ class MeshQuality:
         return "\n".join(
             [
                 f"{self.n_points} points, {cells}; degenerate or inverted: {self.n_bad}",
-                f"angles {self.smallest_angle:.1f} to {self.largest_angle:.1f} degrees",
+                f"smallest angle {self.smallest_angle:.1f}, largest {self.largest_angle:.1f} degrees",
                 f"edges {self.shortest_edge:.6g} to {self.longest_edge:.6g} [length], "
                 f"worst aspect ratio {self.worst_aspect:.3g}",
                 f"{kind} {self.measure:.9g} [length^{self.dim}]",
@@ -129,9 +129,8 @@ def _refuse(mesh: Mesh, name: str, start: int, bad: NDArray[np.bool_], what: str
     place = ", ".join(f"{x:.6g}" for x in centre)
     measure = _jacobians(mesh, name)[2][row]
     kind = "area" if mesh.dim == 2 else "volume"
-    raise MeshError(
-        f"cell {start + row} ({name} at ({place}), {kind} {measure:.3g}) is {what}, one of {int(bad.sum())} such cells: {remedy}"
-    )
+    cell = f"cell {start + row} ({name} at ({place}), {kind} {measure:.3g})"
+    raise MeshError(f"{cell} is {what}, one of {int(bad.sum())} such cells: {remedy}")
 
 
 def _corners(name: str) -> int:

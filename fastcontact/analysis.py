@@ -289,7 +289,7 @@ class Analysis:
         texts: list[str] = []
         seen: set[frozenset[int]] = set()
         coordinates = mesh.points + self.u.reshape(-1, mesh.dim)
-        deep = sorted(penetration(mesh, coordinates), key=lambda entry: -entry[2])
+        deep = sorted(penetration(mesh, self.model.kinematics, coordinates), key=lambda entry: -entry[2])
         for number, other, depth, where in deep:
             both = frozenset((number, other))
             if both not in joined | seen and depth > 1e-9 * np.ptp(mesh.points, axis=0).max():

@@ -1,0 +1,37 @@
+"""Mesh makers with named groups, and operations on meshes.
+
+A maker is a function of plain numbers, strings and tuples that returns a `Mesh`; one listed in ``GENERATORS`` can be
+named in case files and on the command line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from fastcontact.generate.blocks import block, block_on_block, cylinder_on_block
+from fastcontact.generate.half_spheres import half_spheres, quarter_disc
+from fastcontact.generate.quadratic import Circle, to_quadratic
+from fastcontact.generate.transform import merge_points, mirrored, renamed, transformed, union
+from fastcontact.mesh import Mesh
+
+GENERATORS: dict[str, Callable[..., Mesh]] = {
+    "half-spheres": half_spheres,
+    "block-on-block": block_on_block,
+    "cylinder-on-block": cylinder_on_block,
+}
+
+__all__ = [
+    "GENERATORS",
+    "Circle",
+    "block",
+    "block_on_block",
+    "cylinder_on_block",
+    "half_spheres",
+    "merge_points",
+    "mirrored",
+    "quarter_disc",
+    "renamed",
+    "to_quadratic",
+    "transformed",
+    "union",
+]

@@ -1,0 +1,121 @@
+"""Case files are checked whole; every mistake is one line that names the key."""
+
+import pytest
+
+import fastcontact as fc
+from fastcontact.case import read_case
+
+GOOD = """
+title = "small"
+kinematics = "axisymmetric"
+units = { length = "mm", force = "N", pressure = "MPa" }
+[mesh]
+generator = "half-spheres"
+element = "tri3"
+size = 10.0
+[[material]]
+E = 20000.0
+nu = 0.3
+[[support]]
+group = "A1A2"
+x = 0.0
+[[support]]
+group = "A2B2"
+y = -2.0
+[[support]]
+group = "A1B1"
+y = 2.0
+[contact.hertz]
+secondary = "CONT1"
+primary = "CONT2"
+[ramp]
+steps = 2
+[solve]
+linear_solver = "direct"
+geometry_updates = 2
+[probes]
+C1 = "C1"
+[theory.hertz]
+kind = "hertz_point"
+E1 = 20000.0
+nu1 = 0.3
+R1 = 50.0
+E2 = 20000.0
+nu2 = 0.3
+R2 = 50.0
+approach = 4.0
+[[check]]
+quantity = "C1.stress.yy"
+theory = "hertz"
+tolerance = 0.05
+"""
+
+
+@pytest.fixture
+def write(tmp_path):
+    def make(text):
+        path = tmp_path / "case.toml"
+        path.write_text(text)
+        return path
+
+    return make
+
+
+def test_a_good_case_is_read_whole(write):
+    case = read_case(write(GOOD))
+    assert case.name == "case"
+    assert case.ramp.instants == (0.5, 1.0)
+    assert case.criteria.geometry_updates == 2
+    assert case.probes == {"C1": case.mesh.point("C1")}
+    assert case.theories["hertz"]["theory"].pressure_max == pytest.approx(2798.3286697)
+    assert case.approach == {"hertz": 4.0}
+    assert case.model.case_text == GOOD
+    case.model.check()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("kinematics =", "kinematic =", r"unknown key 'kinematic': did you mean 'kinematics'"),
+        ('kinematics = "axisymmetric"', "kinematics = 3", r"'kinematics' must be of type str"),
+        ('kinematics = "axisymmetric"\n', "", r"'kinematics' is missing"),
+        ("[mesh]", "[mesh", r"not valid TOML"),
+        ('generator = "half-spheres"', 'generator = "half-sphere"', r"mesh.generator 'half-sphere'.*'half-spheres'"),
+        ('generator = "half-spheres"\n', "", r"either the key 'file' or the key 'generator'"),
+        ("size = 10.0", "sise = 10.0", r"'mesh.sise': did you mean 'mesh.size'"),
+        ("E = 20000.0\nnu = 0.3\n[[support]]", "E = 20000.0\n[[support]]", r"material\[0\] needs 'nu'"),
+        ("nu = 0.3\n[[support]]", 'nu = "0.3"\n[[support]]', r"'material\[0\].nu' must be of type int or float"),
+        ("x = 0.0", "x = true", r"'support\[0\].x' must be of type"),
+        ('group = "A1A2"\n', "", r"support\[0\] needs 'group'"),
+        ('primary = "CONT2"', 'primry = "CONT2"', r"contact.hertz needs 'primary'"),
+        ("steps = 2", "steps = 2\ninstants = [1.0]", r"either 'instants', or 'steps'"),
+        ("steps = 2", "steps = 2\ntable = [[0.0, 0.0, 1.0]]", r"list of pairs"),
+        ("geometry_updates = 2", "geometry_update = 2", r"did you mean 'solve.geometry_updates'"),
+        ("[theory.hertz]", "[theory.herz]", r"'herz'.*'hertz'"),
+        ('kind = "hertz_point"', 'kind = "hertz_pint"', r"'hertz_pint': did you mean 'hertz_point'"),
+        ("approach = 4.0", "approach = -4.0", r"theory.hertz"),
+        ("C1.stress.yy", "C2.stress.yy", r"probe in check\[0\].quantity 'C2'"),
+        ("C1.stress.yy", "C1.stress.tt", r"quantity in check\[0\] 'stress.tt'"),
+        ("tolerance = 0.05\n", "", r"check\[0\] needs 'tolerance'"),
+    ],
+)
+def test_mistakes_name_the_key(write, old, new, message):
+    assert old in GOOD
+    with pytest.raises(fc.CaseError, match=message):
+        read_case(write(GOOD.replace(old, new, 1)))
+
+
+def test_a_missing_file_is_told(tmp_path):
+    with pytest.raises(fc.CaseError, match=r"does not exist"):
+        read_case(tmp_path / "none.toml")
+
+
+def test_a_wrong_group_is_a_mesh_error(write):
+    with pytest.raises(fc.MeshError, match=r"'A1A3'"):
+        read_case(write(GOOD.replace('"A1A2"', '"A1A3"')))
+
+
+def test_a_table_alone_sets_the_end_of_the_ramp(write):
+    case = read_case(write(GOOD.replace("steps = 2", "steps = 4\ntable = [[0.0, 0.0], [2.0, 1.0]]")))
+    assert case.ramp.instants == (0.5, 1.0, 1.5, 2.0)
+    assert case.ramp.value(2.0) == 1.0

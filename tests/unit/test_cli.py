@@ -1,0 +1,192 @@
+"""The command line as a person uses it: what it writes, prints, and returns."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.cli import main
+
+CASE = """
+title = "small spheres"
+kinematics = "axisymmetric"
+units = { length = "mm", force = "N", pressure = "MPa" }
+[mesh]
+generator = "half-spheres"
+element = "tri3"
+size = 6.0
+[[material]]
+E = 20000.0
+nu = 0.3
+[[support]]
+group = "A1A2"
+x = 0.0
+[[support]]
+group = "A2B2"
+y = -2.0
+[[support]]
+group = "A1B1"
+y = 2.0
+[contact.hertz]
+secondary = "CONT1"
+primary = "CONT2"
+[ramp]
+steps = 3
+[probes]
+C1 = "C1"
+[theory.hertz]
+kind = "hertz_point"
+E1 = 20000.0
+nu1 = 0.3
+R1 = 50.0
+E2 = 20000.0
+nu2 = 0.3
+R2 = 50.0
+approach = 4.0
+[theory.hertz.mesh_converged]
+kind = "finite_half_spheres"
+approach = 4.0
+[[check]]
+name = "pole"
+quantity = "C1.stress.yy"
+theory = "hertz"
+tolerance = 0.2
+"""
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cli")
+    (folder / "small.toml").write_text(CASE)
+    out, summary, picture = folder / "small.vtkhdf", folder / "small.json", folder / "small.png"
+    code = main(["run", str(folder / "small.toml"), "-o", str(out), "--json", str(summary), "--plot", str(picture)])
+    assert code == 0
+    return folder
+
+
+def test_the_summary_holds_what_it_promises(solved):
+    summary = json.loads((solved / "small.json").read_text())
+    last = fc.open_results(solved / "small.vtkhdf")[-1]
+    contact = summary["contact"]["hertz"]
+    assert summary["case"] == "small"
+    assert summary["n_dofs"] == 2 * summary["mesh"]["n_points"]
+    assert [step["load_factor"] for step in summary["steps"]] == pytest.approx([1 / 3, 2 / 3, 1.0])
+    assert all(step["active_set_iterations"] >= 1 and step["linear_iterations"] >= 1 for step in summary["steps"])
+    assert contact["force"] == pytest.approx(np.linalg.norm(last.contact["hertz"].force))
+    assert contact["radius"] == pytest.approx(list(last.contact["hertz"].radius))
+    assert contact["pressure_max"] == last.contact["hertz"].pressure.max()
+    assert summary["probes"]["C1"]["stress"][1] < -2000
+    assert len(summary["probes"]["C1"]["displacement"]) == 2
+    assert summary["von_mises_max"]["value"] == last.von_mises.max()
+    theory = summary["theory"]["hertz"]
+    assert theory["equal_approach"]["pressure_max"] == pytest.approx(2798.3286697)
+    assert theory["equal_approach"]["deviation"]["force"] == pytest.approx(contact["force"] / 586_080.586 - 1)
+    assert theory["equal_force"]["deviation"]["force"] == pytest.approx(0.0, abs=1e-12)
+    assert theory["mesh_converged"]["force"] == pytest.approx(659_773.142, rel=1e-6)
+    assert summary["checks"][0]["target"] == pytest.approx(-2798.3286697)
+    assert summary["checks"][0]["distance_to_mesh_converged"] is not None
+    assert set(summary) >= {"timings", "versions", "warnings"}
+
+
+def test_pictures_tables_and_exports(solved, tmp_path, capsys):
+    result = str(solved / "small.vtkhdf")
+    for name in ("p.csv", "p.agr", "p.png"):
+        assert main(["profile", result, f"--{name[2:]}", str(tmp_path / name)]) == 0
+    assert main(["plot", result, "--png", str(tmp_path / "d.png")]) == 0
+    assert main(["plot", result, "--history", "--png", str(tmp_path / "h.png")]) == 0
+    assert main(["export", result, "--med", str(tmp_path / "r.med"), "--xdmf", str(tmp_path / "r.xdmf")]) == 0
+    for name in ("p.png", "d.png", "h.png"):
+        assert (tmp_path / name).read_bytes()[:4] == b"\x89PNG"
+    times, values = fc.read_med_field(tmp_path / "r.med", "DEPL")
+    assert len(times) == 3
+    assert np.array_equal(values[-1], fc.open_results(result)[-1].displacement)
+    assert "pressure_Hertz_equal_approach" in (tmp_path / "p.csv").read_text().splitlines()[0]
+    capsys.readouterr()
+    assert main(["profile", result]) == 0
+    assert "pressure" in capsys.readouterr().out
+    assert main(["info", result]) == 0
+    assert "3 steps" in capsys.readouterr().out
+
+
+def test_a_mesh_is_made_and_described(tmp_path, capsys):
+    path = str(tmp_path / "c.med")
+    assert main(["mesh", "half-spheres", "--element", "quad4", "--arc-sizes", "2.0", "8.0", "-o", path]) == 0
+    assert "smallest angle" in capsys.readouterr().out
+    assert main(["info", path]) == 0
+    printed = capsys.readouterr().out
+    assert all(group in printed for group in ("SPHHAU", "CONT1", "C1", "quad4"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "missing.toml"], "does not exist"),
+        (["runn"], "invalid choice"),
+        (["info", "missing.vtkhdf"], "missing.vtkhdf"),
+        (["info", "missing.med"], "missing.med"),
+        (["mesh", "half-spheres", "--size", "-1", "-o", "x.med"], "size"),
+        (["mesh", "half-spheres", "--size", "two", "-o", "x.med"], "invalid float"),
+        (["mesh", "half-spheres", "--size", "2", "-o", "nowhere/x.med"], "nowhere"),
+    ],
+)
+def test_wrong_input_is_one_line_and_exit_code_one(arguments, message, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 1
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("error: ")
+    assert captured.err.count("\n") == 1
+    assert message in captured.err
+
+
+@pytest.mark.parametrize(
+    ("extra", "message"),
+    [
+        (["--linear", "amgg"], "'amgg'"),
+        (["--threads", "0"], "--threads 0"),
+        (["--json", "nowhere/s.json"], "nowhere"),
+        (["-o", "nowhere/s.vtkhdf"], "nowhere"),
+    ],
+)
+def test_wrong_options_of_run(extra, message, solved, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", str(solved / "small.toml"), *extra]) == 1
+    assert message in capsys.readouterr().err
+
+
+def test_no_convergence_is_exit_code_two_and_keeps_finished_steps(solved, tmp_path, capsys):
+    text = CASE.replace("[probes]", "[solve]\nmax_geometry_updates = 2\ngeometry = 1e-3\n[probes]")
+    case = tmp_path / "hard.toml"
+    case.write_text(text.replace("steps = 3", "instants = [0.001, 1.0]"))
+    code = main(["run", str(case), "-o", str(tmp_path / "hard.vtkhdf")])
+    assert code == 2
+    assert capsys.readouterr().err.startswith("no convergence: ")
+    assert len(fc.open_results(tmp_path / "hard.vtkhdf")) == 1
+
+
+def test_steps_and_pairs_that_do_not_exist(solved, capsys):
+    assert main(["profile", str(solved / "small.vtkhdf"), "--step", "9"]) == 1
+    assert "steps 1 to 3" in capsys.readouterr().err
+    assert main(["profile", str(solved / "small.vtkhdf"), "--contact", "herz"]) == 1
+    assert "'hertz'" in capsys.readouterr().err
+
+
+def test_nothing_is_printed_when_quiet(solved, tmp_path, capsys):
+    assert main(["run", str(solved / "small.toml"), "-q", "-o", str(tmp_path / "q.vtkhdf")]) == 0
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err == ""
+
+
+def test_environment_is_shown(capsys):
+    assert main(["env"]) == 0
+    assert "numba" in capsys.readouterr().out
+
+
+def test_import_is_light():
+    code = "import sys, fastcontact; print([m for m in ('matplotlib', 'meshio', 'pyamg', 'h5py', 'numba') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
