@@ -138,9 +138,17 @@ class Analysis:
         )  # fmt: skip
         modes = _near_nullspace(model)
         modes[self.fixed] = 0.0
-        self.solver.prepare(_with_supports(self.K, self.fixed), modes)
+        self.solver.prepare(_with_supports(self.K, self.fixed), modes, self._involved())
         self.u = np.zeros(model.n_dofs)
         self.active: Mask | None = None
+
+    def _involved(self) -> NDArray[np.intp]:
+        """Return the unsupported degrees of freedom of the contact surfaces."""
+        dim = self.model.mesh.dim
+        sides = [side.points for pair in self.pairs.values() for side in (pair.secondary, pair.primary)]
+        points = np.unique(np.concatenate(sides)) if sides else np.empty(0, np.intp)
+        dofs = (points[:, None] * dim + np.arange(dim)).ravel()
+        return dofs[~self.fixed[dofs]].astype(np.intp)
 
     def step(self, index: int, instant: float, value: float, last: bool = False) -> StepResult:
         """Solve for the loads at `instant` with multiplier `value` and return the state; see `solve`."""

@@ -1,4 +1,4 @@
-"""Quadrature rules on reference lines, triangles and squares."""
+"""Quadrature rules on reference lines, triangles, squares and solids."""
 
 from __future__ import annotations
 
@@ -48,6 +48,85 @@ def triangle_6() -> Rule:
     wa, wb = 0.223381589678011 / 2.0, 0.109951743655322 / 2.0
     points = [[a, a], [1 - 2 * a, a], [a, 1 - 2 * a], [b, b], [1 - 2 * b, b], [b, 1 - 2 * b]]
     return np.array(points), np.array([wa, wa, wa, wb, wb, wb])
+
+
+def triangle_3_sides() -> Rule:
+    """Middles of the three sides, exact to degree 2 (Strang and Fix, 1973)."""
+    return np.array([[1.0, 1.0], [0.0, 1.0], [1.0, 0.0]]) / 2.0, np.full(3, 1.0 / 6.0)
+
+
+def triangle_7() -> Rule:
+    """Seven interior points, exact to degree 5 (Radon, 1948)."""
+    root = np.sqrt(15.0)
+    points, weights = [[1.0 / 3.0, 1.0 / 3.0]], [9.0 / 80.0]
+    for sign in (1.0, -1.0):
+        a = (6.0 + sign * root) / 21.0
+        points += [[a, a], [1 - 2 * a, a], [a, 1 - 2 * a]]
+        weights += [(155.0 + sign * root) / 2400.0] * 3
+    return np.array(points), np.array(weights)
+
+
+def gauss_cube(n: int) -> Rule:
+    """Tensor Gauss rule with n x n x n points on [-1, 1]^3."""
+    x, w = np.polynomial.legendre.leggauss(n)
+    X, Y, Z = np.meshgrid(x, x, x, indexing="ij")
+    return np.column_stack([X.ravel(), Y.ravel(), Z.ravel()]), np.einsum("i,j,k->ijk", w, w, w).ravel()
+
+
+def tetrahedron_1() -> Rule:
+    """Centroid rule on the tetrahedron (0,0,0) (1,0,0) (0,1,0) (0,0,1), exact to degree 1."""
+    return np.full((1, 3), 0.25), np.array([1.0 / 6.0])
+
+
+def tetrahedron_5() -> Rule:
+    """Five points, exact to degree 3; the weight of the centroid is negative (Hammer, Marlowe and Stroud, 1956)."""
+    a, b = 1.0 / 6.0, 0.5
+    points = [[0.25, 0.25, 0.25], [a, a, a], [a, a, b], [a, b, a], [b, a, a]]
+    return np.array(points), np.array([-2.0 / 15.0] + [3.0 / 40.0] * 4)
+
+
+def prism(triangle: Rule, line: Rule) -> Rule:
+    """Product of a rule on the triangle, in x and y, with a rule on the line [-1, 1], in z."""
+    (xy, w), (z, v) = triangle, line
+    points = np.column_stack([np.tile(xy, (len(z), 1)), np.repeat(z[:, 0], len(xy))])
+    return points, np.outer(v, w).ravel()
+
+
+def pyramid_5() -> Rule:
+    """Five points on the pyramid with the base [-1, 1]^2 at z = 0 and the apex (0, 0, 1), exact to degree 2.
+
+    Four points over the half diagonals of the base and one on the axis, equal weights; the two heights h, k solve
+    4 h + k = 5/4 and 4 h^2 + k^2 = 1/2, which makes 1, z and z^2 exact. It is the rule of code_aster's PYRAM5.
+    """
+    h, k = (10.0 - np.sqrt(15.0)) / 40.0, 0.25 + np.sqrt(15.0) / 10.0
+    points = [[0.5, 0.5, h], [-0.5, 0.5, h], [-0.5, -0.5, h], [0.5, -0.5, h], [0.0, 0.0, k]]
+    return np.array(points), np.full(5, 4.0 / 15.0)
+
+
+def conical_pyramid(n: int) -> Rule:
+    """Conical product rule with n x n x n points on the pyramid of `pyramid_5`, exact to degree 2n - 1.
+
+    Gauss-Legendre in x / (1 - z) and y / (1 - z), Gauss-Jacobi with the weight (1 - z)^2 in z (Stroud, 1971, section
+    2.5). Rational shape functions of pyramids are polynomials in those coordinates, so it is exact for them too.
+    """
+    x, w = np.polynomial.legendre.leggauss(n)
+    z, v = _gauss_squared_complement(n)
+    A, B, Z = np.meshgrid(x, x, z, indexing="ij")
+    points = np.column_stack([(A * (1 - Z)).ravel(), (B * (1 - Z)).ravel(), Z.ravel()])
+    return points, np.einsum("i,j,k->ijk", w, w, v).ravel()
+
+
+def _gauss_squared_complement(n: int) -> tuple[Array, Array]:
+    """Gauss rule with `n` points on [0, 1] for the weight (1 - z)^2 (Golub and Welsch, 1969).
+
+    Eigenvalues of the recurrence of the Jacobi polynomials with exponents 2 and 0.
+    """
+    k = np.arange(n)
+    diagonal = -4.0 / ((2 * k + 2) * (2 * k + 4))
+    k = k[1:]
+    off = 2 * k * (k + 2) / ((2 * k + 2) * np.sqrt((2 * k + 1) * (2 * k + 3)))
+    roots, vectors = np.linalg.eigh(np.diag(diagonal) + np.diag(off, 1) + np.diag(off, -1))
+    return (1.0 + roots) / 2.0, vectors[0] ** 2 / 3.0
 
 
 def subdivided(rule: Rule, parts: int) -> Rule:

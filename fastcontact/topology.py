@@ -16,15 +16,6 @@ from fastcontact.mesh import Mesh
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
-# Node order of an element turned inside out, for cells read clockwise.
-_REVERSED = {
-    "tri3": [0, 2, 1],
-    "tri6": [0, 2, 1, 5, 4, 3],
-    "quad4": [0, 3, 2, 1],
-    "quad8": [0, 3, 2, 1, 7, 6, 5, 4],
-    "quad9": [0, 3, 2, 1, 7, 6, 5, 4, 8],
-}
-
 
 def corner_areas(mesh: Mesh, name: str) -> Array:
     """Return the signed area (n_cells,) of the corner polygons of the 2D cells of element `name` [length^2]."""
@@ -33,16 +24,36 @@ def corner_areas(mesh: Mesh, name: str) -> Array:
     return 0.5 * (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
 
 
+def corner_volumes(mesh: Mesh, name: str) -> Array:
+    """Return the signed volume (n_cells,) of the 3D cells of element `name` on their corners alone [length^3].
+
+    Faces of four corners are bilinear. The sum is that of the linear element's quadrature, which is exact.
+    """
+    linear = elements.get(elements.get(name).linear)
+    _, gradients, weights = linear.tables
+    corners = mesh.points[mesh.cells[name][:, : linear.n_nodes]]
+    volumes = np.zeros(len(corners))
+    # One quadrature point at a time keeps the memory at a few arrays of n_cells.
+    for gradient, weight in zip(gradients, weights, strict=True):
+        a, b, c = np.moveaxis(np.einsum("cni,nj->cij", corners, gradient), 2, 0)
+        volumes += weight * np.einsum("ci,ci->c", np.cross(a, b), c)
+    return volumes
+
+
 def oriented(mesh: Mesh) -> tuple[Mesh, int]:
-    """Return the mesh with every solid cell counter-clockwise, and how many cells were turned."""
+    """Return the mesh with every solid cell the right way round, and how many cells were turned.
+
+    Two-dimensional cells run counter-clockwise; in three dimensions the outer facets of `elements` look outward.
+    """
+    measure = corner_areas if mesh.dim == 2 else corner_volumes
     cells, turned = dict(mesh.cells), 0
     for name in mesh.solids:
-        clockwise = corner_areas(mesh, name) < 0
-        if clockwise.any():
+        inside_out = measure(mesh, name) < 0
+        if inside_out.any():
             block = mesh.cells[name].copy()
-            block[clockwise] = block[clockwise][:, _REVERSED[name]]
+            block[inside_out] = block[inside_out][:, elements.get(name).reversed]
             cells[name] = block
-            turned += int(clockwise.sum())
+            turned += int(inside_out.sum())
     return (mesh.replace(cells=cells) if turned else mesh), turned
 
 
@@ -69,15 +80,18 @@ def outer_facets(mesh: Mesh) -> dict[str, Indices]:
     found: dict[str, list[Indices]] = {}
     for name, block in mesh.solids.items():
         element = elements.get(name)
-        for facet in element.facets:
-            found.setdefault(element.facet, []).append(block[:, list(facet)])
-    outer = {}
-    for name, blocks in found.items():
-        facets = np.concatenate(blocks)
-        keys = np.sort(facets, axis=1)
-        _, first, count = np.unique(keys, axis=0, return_index=True, return_counts=True)
-        outer[name] = np.ascontiguousarray(facets[np.sort(first[count == 1])])
-    return outer
+        for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
+            found.setdefault(facet_element, []).append(block[:, list(facet)])
+    return {name: _single(np.concatenate(blocks)) for name, blocks in found.items()}
+
+
+def _single(facets: Indices) -> Indices:
+    """Return the facets whose nodes no other facet has, in the order given."""
+    keys = np.sort(facets, axis=1)
+    order = np.lexsort(keys.T)
+    differs = (keys[order[1:]] != keys[order[:-1]]).any(axis=1)
+    alone = np.concatenate([[True], differs]) & np.concatenate([differs, [True]])
+    return np.ascontiguousarray(facets[np.sort(order[alone])])
 
 
 @dataclass(frozen=True, eq=False)

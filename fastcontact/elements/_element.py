@@ -25,13 +25,14 @@ class Element:
     order : int
         1 for linear, 2 for quadratic.
     nodes : ndarray (n_nodes, dim)
-        Reference coordinates; corners first, then mid nodes in the order of `edges`, then a centre node.
+        Reference coordinates, in the order of VTK; corners first, then mid nodes in the order of `edges`, then centre
+        nodes of faces and of the cell.
     edges : tuple of (int, int)
         Corner pairs, one per edge; in 2D counter-clockwise.
     facets : tuple of tuple of int
         Local nodes of each boundary facet, oriented so that its normal points outward.
-    facet : str
-        Name of the facet's element; empty for lines.
+    facet_elements : tuple of str
+        Name of each facet's element; empty for lines.
     shape : callable
         ``shape(xi)`` maps (m, dim) to values (m, n_nodes).
     gradient : callable
@@ -44,6 +45,8 @@ class Element:
         The VTK cell type.
     linear, quadratic : str
         Name of the element on the same corners without, or with, mid nodes.
+    corner_shape : callable
+        Shape functions of the linear element on the same corners.
     """
 
     name: str
@@ -52,7 +55,7 @@ class Element:
     nodes: Array
     edges: tuple[tuple[int, int], ...]
     facets: tuple[tuple[int, ...], ...]
-    facet: str
+    facet_elements: tuple[str, ...]
     shape: Callable[[Array], Array]
     gradient: Callable[[Array], Array]
     quadrature: tuple[Array, Array]
@@ -72,6 +75,16 @@ class Element:
     def n_corners(self) -> int:
         """Number of corner nodes."""
         return self.corner_shape(self.nodes[:1]).shape[1]
+
+    @cached_property
+    def reversed(self) -> tuple[int, ...]:
+        """Node order of the same cell turned inside out: its mirror image with two reference coordinates swapped.
+
+        Two-dimensional cells keep their first node and run the other way round; lines swap their ends.
+        """
+        mirrored = -self.nodes if self.dim == 1 else self.nodes[:, [1, 0, 2][: self.dim]]
+        distance = np.abs(mirrored[:, None] - self.nodes[None]).max(axis=2)
+        return tuple(distance.argmin(axis=1).tolist())
 
     @cached_property
     def tables(self) -> tuple[Array, Array, Array]:

@@ -22,7 +22,7 @@ def gradient(xi: Array) -> Array:
 
 ELEMENT = Element(
     name="quad4", dim=2, order=1, nodes=NODES, edges=((0, 1), (1, 2), (2, 3), (3, 0)),
-    facets=((0, 1), (1, 2), (2, 3), (3, 0)), facet="line2",
+    facets=((0, 1), (1, 2), (2, 3), (3, 0)), facet_elements=("line2",) * 4,
     shape=shape, gradient=gradient, quadrature=gauss_square(2), meshio="quad", med="QU4", vtk=9,
     linear="quad4", quadratic="quad8", corner_shape=shape,
 )  # fmt: skip

@@ -27,7 +27,7 @@ def gradient(xi: Array) -> Array:
 
 ELEMENT = Element(
     name="quad9", dim=2, order=2, nodes=NODES, edges=((0, 1), (1, 2), (2, 3), (3, 0)),
-    facets=((0, 1, 4), (1, 2, 5), (2, 3, 6), (3, 0, 7)), facet="line3",
+    facets=((0, 1, 4), (1, 2, 5), (2, 3, 6), (3, 0, 7)), facet_elements=("line3",) * 4,
     shape=shape, gradient=gradient, quadrature=gauss_square(3), meshio="quad9", med="QU9", vtk=28,
     linear="quad4", quadratic="quad9", corner_shape=quad4.shape,
 )  # fmt: skip

@@ -67,7 +67,7 @@ def half_spheres(
         15 by default.
     radial_sizes : (float, float), optional
         Quadrangles only: segments of the radial line M-C at the contact C and at M, in geometric progression
-        between; by default `segments` equal ones [length].
+        between; by default `segments` of them, graded as much as the arc [length].
 
     Returns
     -------
@@ -176,8 +176,10 @@ def _of_quadrangles(
     near, far = (R / 250, R / 25) if arc_sizes is None else _sizes("arc_sizes", arc_sizes, length)
     along = geometric(length, near, far)
     equal = np.linspace(0.0, 1.0, n + 1)
-    outward = equal
-    if radial_sizes is not None:
+    if radial_sizes is None:
+        lengths = (near / far) ** (np.arange(n) / max(n - 1, 1))
+        outward = np.append(0.0, np.cumsum(lengths)) / lengths.sum()
+    else:
         at_contact, inside = _sizes("radial_sizes", radial_sizes, 0.5 * R)
         outward = geometric(0.5 * R, inside, at_contact)
     return _three_blocks(R, along, outward, equal)

@@ -34,6 +34,11 @@ class ComplianceCache:
         self._dofs = np.empty(0, np.intp)
         self._values = np.empty((0, 0))
 
+    def give(self, dofs: NDArray[np.intp], values: Array) -> None:
+        """Take rows and columns `dofs` (k,) of ``K^-1``, known by other means; only while nothing is kept yet."""
+        self._dofs, self._values = dofs, values
+        self._place[dofs] = np.arange(len(dofs))
+
     def of(self, dofs: NDArray[np.intp]) -> Array:
         """Return ``K^-1`` at the rows and columns `dofs` (k,), shape (k, k)."""
         new = dofs[self._place[dofs] < 0]

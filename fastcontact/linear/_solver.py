@@ -44,8 +44,11 @@ class LinearSolver(Protocol):
     tolerance: float
     counters: Counters
 
-    def prepare(self, K: bsr_array, rigid_modes: Array) -> None:
-        """Take the symmetric positive definite matrix K (n, n) and the rigid-body modes (n, n_modes) of its bodies."""
+    def prepare(self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None) -> None:
+        """Take the symmetric positive definite matrix K (n, n) and displacements (n, n_modes) that cost it little.
+
+        `involved` are the unknowns that equations may involve, a hint.
+        """
         ...
 
     def load(self, f: Array) -> Loaded:

@@ -47,7 +47,7 @@ class Amg:
         complexity = self._hierarchy.operator_complexity()
         return f"Amg({len(self._hierarchy.levels)} levels, unknowns {sizes}, operator complexity {complexity:.2f})"
 
-    def prepare(self, K: bsr_array, rigid_modes: Array) -> None:
+    def prepare(self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None) -> None:
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
         import pyamg
 

@@ -1,0 +1,107 @@
+"""The training case on our own meshes: near code_aster's meshes, and towards the mesh-converged solution."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.case import read_case
+
+# code_aster's meshes of the same letter, converged geometry (A, C: stress at C1; B: code_aster's multiplier).
+ON_CODE_ASTERS_MESH = {"a": 2773.57307445, "b": 2876.28674013, "c": 2928.76786014}
+FORCE, PRESSURE = 659_773.142, 2910.4071
+VON_MISES, DEPTH = 1738.4852, 5.645414
+
+
+@pytest.mark.parametrize("letter", ["a", "b", "c"])
+def test_the_shipped_meshes_are_those_of_the_generator(letter, root):
+    element = {"a": "tri3", "b": "tri6", "c": "quad4"}[letter]
+    made, shipped = fc.generate.half_spheres(element), fc.read_mesh(root / f"data/meshes/forma04{letter}.med")
+    assert np.abs(made.points - shipped.points).max() < 1e-9
+    assert {name: block.tolist() for name, block in made.cells.items()} == {
+        name: block.tolist() for name, block in shipped.cells.items()
+    }
+    for group in made.group_names:
+        assert np.array_equal(made.points_of(group), shipped.points_of(group))
+
+
+@pytest.mark.parametrize("letter", ["a", "b", "c"])
+def test_default_meshes_are_within_two_percent_of_code_asters(letter, root):
+    case = read_case(root / f"data/cases/forma04{letter}.toml")
+    last = fc.solve(case.model, case.ramp)[-1]
+    point = case.probes["C1"]
+    contact = last.contact["hertz"]
+    found = contact.pressure[np.flatnonzero(contact.points == point)[0]] if letter == "b" else -last.stress[point, 1]
+    assert found == pytest.approx(ON_CODE_ASTERS_MESH[letter], rel=0.02)
+
+
+def test_refined_quadratic_mesh_reaches_the_mesh_converged_solution(forma04):
+    mesh = fc.generate.half_spheres("quad8", arc_sizes=(0.15, 1.5), segments=24)
+    model = forma04(mesh, "continuous")
+    assert 40_000 < model.n_dofs < 50_000
+    last = fc.solve(model, fc.linear_ramp(1))[-1]
+    contact = last.contact["hertz"]
+    assert abs(contact.force[1]) == pytest.approx(FORCE, rel=5e-5)
+    assert contact.pressure[0] == pytest.approx(PRESSURE, rel=2e-4)
+    assert contact.radius[0] - 0.01 < 10.358557 < contact.radius[1] + 0.01
+    top = int(np.argmax(last.von_mises))
+    assert last.von_mises[top] == pytest.approx(VON_MISES, rel=2e-3)
+    assert mesh.points[top] == pytest.approx([0.0, np.copysign(DEPTH, mesh.points[top, 1])], abs=0.3)
+
+
+def test_force_and_pressure_converge_with_the_mesh(forma04):
+    errors = []
+    for k in (1, 2, 4):
+        mesh = fc.generate.half_spheres("quad8", arc_sizes=(0.8 / k, 8.0 / k), segments=5 * k)
+        contact = fc.solve(forma04(mesh, "continuous"), fc.linear_ramp(1))[-1].contact["hertz"]
+        errors.append((abs(contact.force[1]) / FORCE - 1, contact.pressure[0] / PRESSURE - 1))
+    sizes = np.abs(errors)
+    assert (sizes[-1] < [2e-4, 5e-4]).all()
+    assert (sizes[-1] < 0.2 * sizes[0]).all()
+
+
+def test_small_loads_approach_hertz(forma04):
+    """At a tenth of the load the finite body matters less: 3.2 instead of 10.36 mm radius."""
+    mesh = fc.generate.half_spheres("quad8", arc_sizes=(0.1, 2.0), segments=20)
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model.fix("A1A2", "x")
+    model.prescribe("A2B2", y=-0.2)
+    model.prescribe("A1B1", y=0.2)
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="continuous")
+    contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["hertz"]
+    exact = fc.analytic.finite_half_spheres(0.4)
+    assert abs(contact.force[1]) == pytest.approx(exact.force, rel=5e-4)
+    assert contact.pressure_max == pytest.approx(exact.pressure_max, rel=5e-4)
+
+
+def test_swapping_the_sides_changes_no_more_than_the_mesh_error(root):
+    mesh = fc.read_mesh(root / "data/meshes/forma04c.med")
+    forces = []
+    for secondary, primary in (("CONT1", "CONT2"), ("CONT2", "CONT1")):
+        model = fc.Model(mesh, "axisymmetric")
+        model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+        model.fix("A1A2", "x")
+        model.prescribe("A2B2", y=-2.0)
+        model.prescribe("A1B1", y=2.0)
+        model.add_contact("hertz", secondary=secondary, primary=primary)
+        forces.append(abs(fc.solve(model, fc.linear_ramp(1))[-1].contact["hertz"].force[1]))
+    assert forces[0] == pytest.approx(forces[1], rel=1e-8)  # the mesh is symmetric
+
+
+@pytest.mark.parametrize("scale", [(1e-3, 1e6), (1e6, 1e-9)])
+def test_units_do_not_matter(scale, forma04):
+    """Lengths and pressures in other units give the same numbers after scaling, with the same iterations."""
+    length, pressure = scale
+    mesh = fc.generate.half_spheres("tri3", size=5.0)
+    results = []
+    for a, p in ((1.0, 1.0), (length, pressure)):
+        model = fc.Model(mesh.replace(points=mesh.points * a), "axisymmetric")
+        model.add_material(fc.LinearElastic(E=20_000.0 * p, nu=0.3))
+        model.fix("A1A2", "x")
+        model.prescribe("A2B2", y=-2.0 * a)
+        model.prescribe("A1B1", y=2.0 * a)
+        model.add_contact("hertz", secondary="CONT1", primary="CONT2")
+        results.append(fc.solve(model, fc.linear_ramp(3)))
+    for one, other in zip(*results, strict=True):
+        assert np.abs(one.stress - other.stress / pressure).max() < 1e-9 * np.abs(one.stress).max()
+        assert one.iterations["active_set_iterations"] == other.iterations["active_set_iterations"]
