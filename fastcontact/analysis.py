@@ -140,7 +140,8 @@ class Analysis:
         modes[self.fixed] = 0.0
         self.solver.prepare(_with_supports(self.K, self.fixed), modes, self._involved())
         self.u = np.zeros(model.n_dofs)
-        self.active: Mask | None = None
+        self.active: dict[str, Mask] = {}
+        self.pressure: dict[str, Array] = {}
 
     def _involved(self) -> NDArray[np.intp]:
         """Return the unsupported degrees of freedom of the contact surfaces."""
@@ -185,10 +186,13 @@ class Analysis:
             self.sizes = {name: len(part.gap0) for name, part in parts.items()}
             constraints = stacked(list(parts.values()))
             in_loop = in_loop and update < SEMISMOOTH_UPDATES
-            state = self._inequalities(loaded, constraints, lift, 1 if in_loop else criteria.max_active_set_iterations)
+            active = self._initially_active(parts, displacement)
+            limit_now = 1 if in_loop else criteria.max_active_set_iterations
+            state = self._inequalities(loaded, constraints, lift, active, limit_now)
             change = np.abs(state.u + lift - self.u).max(initial=0.0)
             size = max(np.abs(state.u + lift).max(initial=0.0), np.abs(lift).max(initial=0.0))
-            self.u, self.active = state.u + lift, state.wanted
+            self.u = state.u + lift
+            self._remember(state)
             history.append(
                 {
                     "displacement_change": change / size if size else 0.0,
@@ -215,8 +219,27 @@ class Analysis:
             )
         return constraints, state
 
+    def _initially_active(self, parts: dict[str, Constraints], displacement: Array) -> Mask:
+        """Return the set to start from: that of the last solution, or what the pairs make of its pressures."""
+        sets = []
+        for name, part in parts.items():
+            found = None
+            if name in self.active:
+                found = self.pairs[name].initially_active(part, self.pressure[name], displacement)
+                found = self.active[name] if found is None else found
+            sets.append(np.zeros(len(part.gap0), bool) if found is None else found)
+        return np.concatenate(sets)
+
+    def _remember(self, state: active_set.Equilibrium) -> None:
+        """Keep, by pair, which constraints the solution wants active, and its nodal pressures."""
+        first = 0
+        for name, size in self.sizes.items():
+            self.active[name] = state.wanted[first : first + size]
+            self.pressure[name] = self.pairs[name].pressure(state.multiplier[first : first + size])
+            first += size
+
     def _inequalities(
-        self, loaded: linear.Loaded, constraints: Constraints, lift: Array, limit: int
+        self, loaded: linear.Loaded, constraints: Constraints, lift: Array, active: Mask, limit: int
     ) -> active_set.Equilibrium:
         """Solve with the supported displacements moved to the gaps."""
         B = constraints.B.copy()
@@ -227,7 +250,7 @@ class Analysis:
         noise = 10 * self.solver.tolerance
         return active_set.solve(
             loaded, B, gap0, np.diff(B.indptr) > 0,
-            active=np.zeros(len(gap0), bool) if self.active is None else self.active,
+            active=active,
             compliance=constraints.compliance,
             gap_tolerance=noise * scale, multiplier_tolerance=noise,
             max_iterations=limit, guess=self.u - lift,

@@ -62,6 +62,12 @@ class Formulation(ABC):
     def constraints(self, displacement: Array) -> Constraints:
         """Pair on the configuration displaced by `displacement` (n_points, dim) and return the constraints."""
 
+    def initially_active(
+        self, constraints: Constraints, pressure: Array, displacement: Array
+    ) -> NDArray[np.bool_] | None:
+        """Return the set to start from, given the last nodal `pressure`; None: constraints are the same as before."""
+        return None
+
     @abstractmethod
     def pressure(self, multiplier: Array) -> Array:
         """Return nodal pressures (n_nodes,) per reference area from the multipliers (m,) [pressure]."""

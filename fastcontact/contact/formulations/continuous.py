@@ -27,51 +27,18 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array, eye_array
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse.linalg import splu
 
 from fastcontact import elements, quadrature
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._formulation import Formulation
+from fastcontact.contact.formulations._projection import Projection
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.pairing import Candidates, gap_rows, pair
 from fastcontact.errors import ContactError, unknown
 
 Array = NDArray[np.float64]
 RULES = ("gauss", "simpson", "node")
-
-
-@dataclass(frozen=True, eq=False)
-class Projection:
-    """The compliance C of the module's formula.
-
-    Attributes
-    ----------
-    P : csr_array (m, k)
-        Functions of the multiplier field at the integration points.
-    areas : ndarray (m,)
-        W; a point without area (at the axis) never carries a force.
-    rho : float
-        Augmentation [pressure / length].
-    """
-
-    P: csr_array
-    areas: Array
-    rho: float
-    mass: SuperLU
-
-    def block(self, rows: NDArray[np.intp]) -> Array:
-        """Return rows and columns `rows` of C."""
-        P = self.P[rows].toarray()
-        return (np.diag(1.0 / self.areas[rows]) - P @ self.mass.solve(np.ascontiguousarray(P.T))) / self.rho
-
-    def apply(self, multiplier: Array) -> Array:
-        """Return ``C multiplier``."""
-        own = np.divide(multiplier, self.areas, out=np.zeros_like(multiplier), where=self.areas > 0)
-        return (own - self.P @ self.field(multiplier)) / self.rho
-
-    def field(self, multiplier: Array) -> Array:
-        """Return the independent values (k,) of the multiplier field [pressure] for point forces (m,) [force]."""
-        return self.mass.solve(self.P.T @ multiplier)
 
 
 @dataclass(eq=False)

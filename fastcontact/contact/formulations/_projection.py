@@ -1,0 +1,53 @@
+"""The multiplier field of weighted formulations: point forces, their field, and the compliance between the two.
+
+See the docstring of the continuous formulation for the formulas.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import SuperLU
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Projection:
+    """Projection of point forces on a multiplier field, and the compliance of what it cannot represent.
+
+    Attributes
+    ----------
+    P : csr_array (m, k)
+        Functions of the multiplier field at the integration points.
+    areas : ndarray (m,)
+        W; a point without area (at the axis) never carries a force.
+    rho : float
+        Augmentation [pressure / length].
+    mass : SuperLU, optional
+        Factors of ``P.T W P``; None where no point takes part.
+    """
+
+    P: csr_array
+    areas: Array
+    rho: float
+    mass: SuperLU | None
+
+    def block(self, rows: NDArray[np.intp]) -> Array:
+        """Return rows and columns `rows` of C."""
+        if self.mass is None:
+            return np.zeros((len(rows), len(rows)))
+        P = self.P[rows].toarray()
+        return (np.diag(1.0 / self.areas[rows]) - P @ self.mass.solve(np.ascontiguousarray(P.T))) / self.rho
+
+    def apply(self, multiplier: Array) -> Array:
+        """Return ``C multiplier``."""
+        own = np.divide(multiplier, self.areas, out=np.zeros_like(multiplier), where=self.areas > 0)
+        return (own - self.P @ self.field(multiplier)) / self.rho
+
+    def field(self, multiplier: Array) -> Array:
+        """Return the independent values (k,) of the multiplier field [pressure] for point forces (m,) [force]."""
+        return np.zeros(self.P.shape[1]) if self.mass is None else self.mass.solve(self.P.T @ multiplier)

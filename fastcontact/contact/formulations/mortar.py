@@ -1,0 +1,149 @@
+r"""Mortar contact: the continuous formulation, integrated exactly over the pieces where two facets face each other.
+
+The gap between facets that do not match has a kink wherever a node of the primary side stands opposite. Here every
+secondary facet is cut there, in each pairing, and every piece gets Gauss points of its own (Puso and Laursen, 2004;
+Popp, Gee and Wall, 2009). A uniform pressure then passes between meshes that do not match without error, which neither
+node-to-segment nor quadrature over whole facets achieves. Pieces that face nothing carry nothing, and the multiplier
+field is projected over the rest: where the primary surface ends inside a facet, the pressure ends there too.
+
+The pressure at a point and the complementarity are those of the continuous formulation, see there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array, diags_array
+from scipy.sparse.linalg import splu
+
+from fastcontact import elements, quadrature
+from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.formulations._formulation import Formulation
+from fastcontact.contact.formulations._projection import Projection
+from fastcontact.contact.integration import facet_measure
+from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair
+from fastcontact.errors import ContactError
+from fastcontact.search import closest
+
+Array = NDArray[np.float64]
+# Parts of a facet shorter than this, in its own length, are rounding errors of the cut.
+SLIVER = 1e-10
+# A facet that faces less than this part of its length takes no part: its multipliers would have next to no equation.
+COVERED = 1e-3
+
+
+@dataclass(eq=False)
+class Mortar(Formulation):
+    """Mortar contact with exact integration over cut facets; further parameters as in `Formulation`.
+
+    Parameters
+    ----------
+    n_gauss : int, optional
+        Gauss points per piece; by default 3 on linear and 4 on quadratic facets.
+    augmentation : float
+        rho times the length of the shortest facet over the modulus of the bodies [1].
+    """
+
+    projection_tolerance: float = 1e-6
+    normals: str = "averaged"
+    n_gauss: int | None = None
+    augmentation: float = 1.0
+
+    name: ClassVar[str] = "mortar"
+    geometry_in_loop: ClassVar[bool] = True
+    _projection: Projection = field(init=False, repr=False)
+    _field: csr_array = field(init=False, repr=False)
+    _facet: NDArray[np.intp] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.augmentation > 0:
+            raise ContactError(f"augmentation = {self.augmentation} must be positive; 1 suits most problems")
+        if self.n_gauss is not None and self.n_gauss < 2:
+            raise ContactError(f"n_gauss = {self.n_gauss} points per piece do not integrate it exactly: use at least 2")
+        facets, element = self.secondary.facets, self.secondary.element
+        xi, weights = quadrature.gauss_line(3)
+        lengths = facet_measure(facets, element, self.points, xi, False) @ weights
+        self._rho = self.augmentation * self.modulus / float(lengths.min())
+
+    def _cuts(self, deformed: Array) -> tuple[NDArray[np.intp], Array, Array]:
+        """Return (facet, begin, end) of the pieces of the secondary facets, in their reference coordinate."""
+        ends = np.unique(self.primary.facets[:, :2])
+        opposite = closest(deformed[ends], deformed[self.secondary.facets])
+        inside = (opposite.overhang == 0.0) & (np.abs(opposite.xi) < 1.0 - SLIVER)
+        n = len(self.secondary.facets)
+        facet = np.concatenate([np.arange(n), np.arange(n), opposite.facet[inside]])
+        xi = np.concatenate([np.full(n, -1.0), np.full(n, 1.0), opposite.xi[inside]])
+        order = np.lexsort((xi, facet))
+        facet, xi = facet[order], xi[order]
+        piece = (facet[1:] == facet[:-1]) & (np.diff(xi) > SLIVER)
+        return facet[:-1][piece], xi[:-1][piece], xi[1:][piece]
+
+    def _points(self, deformed: Array) -> tuple[NDArray[np.intp], Array, Array]:
+        """Return (facet, xi, area) of the integration points of all pieces."""
+        facet, begin, end = self._cuts(deformed)
+        n_nodes = self.secondary.facets.shape[1]
+        s, w = quadrature.gauss_line(n_nodes + 1 if self.n_gauss is None else self.n_gauss)
+        xi = (0.5 * (begin + end)[:, None] + 0.5 * (end - begin)[:, None] * s[:, 0]).ravel()
+        weight = (0.5 * (end - begin)[:, None] * w).ravel()
+        facet = np.repeat(facet, len(w))
+        element = elements.get(self.secondary.element)
+        corners = self.points[self.secondary.facets[facet]]
+        tangent = np.einsum("nk,nkd->nd", element.gradient(xi[:, None])[:, :, 0], corners)
+        area = np.linalg.norm(tangent, axis=1) * weight
+        if self.axisymmetric:
+            radius = np.einsum("nk,nk->n", element.shape(xi[:, None]), corners[:, :, 0])
+            area *= 2 * np.pi * np.maximum(radius, 0.0)
+        return facet, xi, area
+
+    def constraints(self, displacement: Array) -> Constraints:
+        """Cut and pair on the displaced configuration and return the gaps of the integration points."""
+        deformed = self.points + displacement
+        facet, xi, area = self._points(deformed)
+        shape = elements.get(self.secondary.element).shape(xi[:, None])
+        candidates = Candidates(self.secondary.facets[facet], shape)
+        found = pair(candidates.positions(deformed), self.primary, deformed, self.projection_tolerance, self.normals)
+        total = np.bincount(facet, weights=area)
+        covered = np.bincount(facet, weights=np.where(found.paired, area, 0.0))
+        kept = found.paired & (covered > COVERED * total)[facet] & (area > 0)
+        pairing = Pairing(found.facet, found.xi, found.normal, kept)
+        G, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
+        self._facet = facet
+        self._project(facet, shape, np.where(kept, area, 0.0))
+        return Constraints(G, gap0, candidates.positions(self.points), self._projection)
+
+    def _project(self, facet: NDArray[np.intp], shape: Array, area: Array) -> None:
+        """Set up the multiplier field on the nodes of facets that take part."""
+        column = self.secondary.local[facet]
+        row = np.broadcast_to(np.arange(len(shape))[:, None], shape.shape)
+        size = (len(shape), len(self.secondary.points))
+        P = coo_array((shape.ravel(), (row.ravel(), column.ravel())), shape=size).tocsr()
+        seen = np.zeros(size[1], bool)
+        seen[column[area > 0]] = True
+        keep = np.flatnonzero(seen)
+        self._field = csr_array((np.ones(len(keep)), (keep, np.arange(len(keep)))), shape=(size[1], len(keep)))
+        P = csr_array(P[:, keep])
+        mass = splu((P.T @ diags_array(area) @ P).tocsc()) if len(keep) else None
+        self._projection = Projection(P, area, self._rho, mass)
+
+    def initially_active(self, constraints: Constraints, pressure: Array, displacement: Array) -> NDArray[np.bool_]:
+        """Return the points where the field of nodal `pressure` exceeds rho times the gap: those cut anew have no past."""
+        nodal = self._field.T @ pressure
+        gap = constraints.gap0 + constraints.B @ displacement.ravel()
+        return (self._projection.areas > 0) & (self._projection.P @ nodal - self._rho * gap > 0)
+
+    def pressure(self, multiplier: Array) -> Array:
+        """Return the multiplier field at the nodes, zero on facets that face nothing."""
+        return self._field @ self._projection.field(multiplier)
+
+    def closed_nodes(self, active: NDArray[np.bool_], gap: Array, pressure: Array) -> NDArray[np.bool_]:
+        """Return the nodes where ``pressure - rho gap`` is positive, on facets with an active point."""
+        touched = np.zeros(len(gap), bool)
+        touched[self.secondary.local[self._facet[active]]] = True
+        return touched & (pressure - self._rho * gap > 0)
+
+
+FORMULATION = Mortar
