@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
-from fastcontact import active_set, linear, recovery
+from fastcontact import active_set, friction, linear, recovery
 from fastcontact.assembly import rigid_modes, stiffness
 from fastcontact.contact.constraints import Constraints, stacked
 from fastcontact.contact.formulations import Formulation
@@ -142,6 +142,7 @@ class Analysis:
         self.u = np.zeros(model.n_dofs)
         self.active: dict[str, Mask] = {}
         self.pressure: dict[str, Array] = {}
+        self.before = self.u  # at the beginning of the step, from where slip counts
 
     def _involved(self) -> NDArray[np.intp]:
         """Return the unsupported degrees of freedom of the contact surfaces."""
@@ -154,12 +155,13 @@ class Analysis:
     def step(self, index: int, instant: float, value: float, last: bool = False) -> StepResult:
         """Solve for the loads at `instant` with multiplier `value` and return the state; see `solve`."""
         lift = (self.prescribed * value).ravel()
+        self.before = self.u
         loaded = self.solver.load(np.where(self.fixed, 0.0, -(self.K @ lift)))
         before = self.solver.counters.iterations
         history: list[dict[str, Any]] = []
         if self.pairs:
             constraints, state = self._contact(loaded, lift, history)
-            force = constraints.B.T @ state.multiplier
+            force = constraints.force(state)
         else:
             self.u = loaded.solve(csr_array((0, len(lift))), np.empty(0), self.u - lift)[0] + lift
             constraints, state, force = None, None, np.zeros(len(lift))
@@ -174,7 +176,7 @@ class Analysis:
 
     def _contact(
         self, loaded: linear.Loaded, lift: Array, history: list[dict[str, Any]]
-    ) -> tuple[Constraints, active_set.Equilibrium]:
+    ) -> tuple[Constraints, active_set.State]:
         """Alternate pairing and active-set solution until both stand still; update `u` and `active`."""
         criteria = self.criteria
         fixed_updates = criteria.geometry_updates
@@ -183,7 +185,7 @@ class Analysis:
         for update in range(limit + 1):
             displacement = self.u.reshape(-1, self.model.mesh.dim)
             parts = {name: pair.constraints(displacement) for name, pair in self.pairs.items()}
-            self.sizes = {name: len(part.gap0) for name, part in parts.items()}
+            self.parts = parts
             constraints = stacked(list(parts.values()))
             in_loop = in_loop and update < SEMISMOOTH_UPDATES
             active = self._initially_active(parts, displacement)
@@ -230,33 +232,46 @@ class Analysis:
             sets.append(np.zeros(len(part.gap0), bool) if found is None else found)
         return np.concatenate(sets)
 
-    def _remember(self, state: active_set.Equilibrium) -> None:
+    def _remember(self, state: active_set.State) -> None:
         """Keep, by pair, which constraints the solution wants active, and its nodal pressures."""
         first = 0
-        for name, size in self.sizes.items():
+        for name, part in self.parts.items():
+            size = len(part.gap0)
             self.active[name] = state.wanted[first : first + size]
             self.pressure[name] = self.pairs[name].pressure(state.multiplier[first : first + size])
             first += size
 
     def _inequalities(
         self, loaded: linear.Loaded, constraints: Constraints, lift: Array, active: Mask, limit: int
-    ) -> active_set.Equilibrium:
+    ) -> active_set.State:
         """Solve with the supported displacements moved to the gaps."""
-        B = constraints.B.copy()
-        gap0 = constraints.gap0 + B @ lift
-        B.data[self.fixed[B.indices]] = 0.0
-        B.eliminate_zeros()
         scale = np.abs(lift).max(initial=0.0) + np.abs(self.u).max(initial=0.0)
         noise = 10 * self.solver.tolerance
+        B, gap0 = self._without_supports(constraints.B, constraints.gap0, lift)
+        usable = np.diff(B.indptr) > 0
+        if constraints.tangents:
+            pairs = [self._without_supports(T, -(T @ self.before), lift) for T in constraints.tangents]
+            return friction.solve(
+                loaded, B, tuple(T for T, _ in pairs), gap0, np.stack([slip for _, slip in pairs]),
+                constraints.friction if constraints.friction is not None else np.zeros(len(gap0)), usable,
+                compliance=constraints.compliance, closed=active,
+                gap_tolerance=noise * scale, multiplier_tolerance=noise,
+            )  # fmt: skip
         return active_set.solve(
-            loaded, B, gap0, np.diff(B.indptr) > 0,
-            active=active,
-            compliance=constraints.compliance,
+            loaded, B, gap0, usable, active=active, compliance=constraints.compliance,
             gap_tolerance=noise * scale, multiplier_tolerance=noise,
             max_iterations=limit, guess=self.u - lift,
         )  # fmt: skip
 
-    def _cycling(self, state: active_set.Equilibrium, constraints: Constraints) -> str:
+    def _without_supports(self, rows: csr_array, offset: Array, lift: Array) -> tuple[csr_array, Array]:
+        """Return rows without supported degrees of freedom, whose displacement `lift` goes to the offset."""
+        rows = rows.copy()
+        offset = offset + rows @ lift
+        rows.data[self.fixed[rows.indices]] = 0.0
+        rows.eliminate_zeros()
+        return rows, offset
+
+    def _cycling(self, state: active_set.State, constraints: Constraints) -> str:
         wrong = np.flatnonzero(state.active != state.wanted)
         return (
             f"the active set did not settle in {state.iterations} iterations: {len(wrong)} constraints still change "
@@ -284,7 +299,7 @@ class Analysis:
 
     def _result(
         self, index: int, instant: float, reaction: Array, constraints: Constraints | None,
-        state: active_set.Equilibrium | None, iterations: dict[str, Any], last: bool,
+        state: active_set.State | None, iterations: dict[str, Any], last: bool,
     ) -> StepResult:  # fmt: skip
         mesh, kinematics = self.model.mesh, self.model.kinematics
         u = self.u.reshape(-1, mesh.dim)
@@ -294,8 +309,8 @@ class Analysis:
         for name, pair in self.pairs.items():
             assert constraints is not None
             assert state is not None
-            rows = slice(first, first + self.sizes[name])
-            contact[name] = contact_result(name, pair, constraints, state, u, rows)
+            rows = slice(first, first + len(self.parts[name].gap0))
+            contact[name] = contact_result(name, pair, self.parts[name], state, u, rows)
             first = rows.stop
         return StepResult(
             index, instant, u.copy(), stress, recovery.von_mises(stress), recovery.von_mises_signed(stress),

@@ -11,7 +11,7 @@ from scipy.sparse import bsr_array
 from fastcontact import elements
 from fastcontact.errors import MeshError
 from fastcontact.kernels import pattern as pattern_kernels
-from fastcontact.kernels import solid2d
+from fastcontact.kernels import solid
 from fastcontact.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -59,9 +59,10 @@ def stiffness(
     ----------
     mesh : Mesh
     kinematics : str
-        ``"axisymmetric"`` (forces over the full circle), ``"plane_strain"`` or ``"plane_stress"`` (unit thickness).
-    moduli : ndarray (n_materials, 4, 4)
-        [pressure].
+        ``"axisymmetric"`` (forces over the full circle), ``"plane_strain"`` or ``"plane_stress"`` (unit thickness),
+        or ``"3d"``.
+    moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
+        Symmetric [pressure].
     material : dict of str to ndarray of int (n_cells,)
         By solid element: material number of each cell.
     pattern : Sparsity, optional
@@ -79,9 +80,10 @@ def stiffness(
     """
     pattern = pattern or sparsity(mesh)
     data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))
+    loops = solid.loops(mesh.dim)
     for name, block in mesh.solids.items():
         N, dN, weights = elements.get(name).tables
-        bad = solid2d.add_stiffness(
+        bad = loops.add_stiffness(
             mesh.points, block, N, dN, weights, moduli, material[name], kinematics == "axisymmetric",
             pattern.slots[name], data,
         )  # fmt: skip

@@ -49,7 +49,7 @@ class Model:
     ----------
     mesh : Mesh
     kinematics : str
-        ``"axisymmetric"`` (x is the radius, y the axis), ``"plane_strain"`` or ``"plane_stress"``.
+        ``"axisymmetric"`` (x is the radius, y the axis), ``"plane_strain"``, ``"plane_stress"`` or ``"3d"``.
     case_text : str
         Text kept in result files beside the numbers, usually the case file.
 
@@ -74,8 +74,9 @@ class Model:
     def __init__(self, mesh: Mesh, kinematics: str, case_text: str = "") -> None:
         if kinematics not in KINEMATICS:
             raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
-        if kinematics == "3d" or mesh.dim == 3:
-            raise ModelError("three-dimensional models are not supported yet: use a 2D mesh and 2D kinematics")
+        if (kinematics == "3d") != (mesh.dim == 3):
+            fitting = ", ".join(f"'{name}'" for name in KINEMATICS if (name == "3d") == (mesh.dim == 3))
+            raise ModelError(f"kinematics '{kinematics}' do not fit a mesh in {mesh.dim} dimensions: use {fitting}")
         if not mesh.solids:
             raise ModelError(f"the mesh has no solid cells, only {', '.join(mesh.cells) or 'points'}")
         check_cells(mesh)
@@ -117,9 +118,9 @@ class Model:
         self.materials.append((material, names))
 
     def fix(self, group: str, components: str) -> None:
-        """Hold displacement components (``"x"``, ``"y"`` or ``"xy"``) of all nodes of a group at zero."""
+        """Hold displacement components (``"x"``, ``"y"``, ``"xy"``, in 3D also ``"z"``) of a group's nodes at zero."""
         if not components:
-            raise ModelError(f"fix('{group}', ...) names no component: give 'x', 'y' or 'xy'")
+            raise ModelError(f"fix('{group}', ...) names no component: give for example 'x' or 'xy'")
         self.prescribe(group, **dict.fromkeys(components, 0.0))
 
     def prescribe(self, group: str, **components: float) -> None:
@@ -128,7 +129,7 @@ class Model:
         Raises
         ------
         MeshError, ModelError
-            If the group is unknown, a component is not x or y, or a value is not finite.
+            If the group is unknown, a component is not x, y (or z in 3D), or a value is not finite.
         """
         if not len(self.mesh.points_of(group)):
             raise ModelError(f"group '{group}' is empty: no displacement can be prescribed on it")
@@ -162,8 +163,10 @@ class Model:
         Raises
         ------
         ContactError
-            If a side is wrong, an option unknown, or the name taken.
+            If a side is wrong, an option unknown, the name taken, or the model three-dimensional.
         """
+        if self.mesh.dim == 3:
+            raise ContactError(f"contact '{name}' cannot be set up: contact between bodies is two-dimensional so far")
         if name in {pair.name for pair in self.contact}:
             raise ContactError(f"there is already a contact pair '{name}': names must differ")
         pair = ContactPair(name, secondary, primary, formulation, options)
@@ -186,7 +189,7 @@ class Model:
         return kind(*sides, self.mesh.points, self.kinematics == "axisymmetric", modulus, **pair.options)
 
     def material_numbers(self) -> tuple[Array, dict[str, NDArray[np.int32]]]:
-        """Return (moduli (n_materials, 4, 4), material number of every solid cell by element).
+        """Return moduli (n_materials, 4, 4), in 3D (n_materials, 6, 6), and by element every solid cell's material.
 
         Raises
         ------

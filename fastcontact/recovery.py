@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact import elements
-from fastcontact.kernels import solid2d
+from fastcontact.kernels import solid, solid2d
 from fastcontact.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -16,26 +16,24 @@ Materials = dict[str, NDArray[np.int32]]
 def stress_at_points(
     mesh: Mesh, kinematics: str, moduli: Array, material: Materials, displacement: Array
 ) -> dict[str, Array]:
-    """Return the stress (n_cells, n_q, 4) at the default quadrature points, by solid element [pressure].
+    """Return the stress (n_cells, n_q, 4), in 3D (n_cells, n_q, 6), at the default quadrature points [pressure].
 
-    Components xx, yy, zz, xy; axisymmetric: rr, yy, hoop, ry. Arguments as in `assembly.stiffness`, with the
-    displacement (n_points, 2) [length].
+    By solid element. Components xx, yy, zz, xy (then yz, xz in 3D); axisymmetric: rr, yy, hoop, ry. Arguments as in
+    `assembly.stiffness`, with the displacement (n_points, dim) [length].
     """
-    values = {}
+    loops, values = solid.loops(mesh.dim), {}
     for name, block in mesh.solids.items():
         N, dN, weights = elements.get(name).tables
-        out = np.empty((len(block), len(weights), 4))
-        solid2d.stress(
-            mesh.points, block, N, dN, moduli, material[name], kinematics == "axisymmetric", displacement, out
-        )
+        out = np.empty((len(block), len(weights), moduli.shape[1]))
+        loops.stress(mesh.points, block, N, dN, moduli, material[name], kinematics == "axisymmetric", displacement, out)
         values[name] = out
     return values
 
 
 def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:
-    """Extrapolate stresses at quadrature points to the nodes of each cell, (n_cells, n_nodes, 4), by element.
+    """Extrapolate stresses at quadrature points to the nodes of each cell (n_cells, n_nodes, n_components).
 
-    As SIEF_ELNO of code_aster: see `Element.extrapolation`.
+    By solid element, as SIEF_ELNO of code_aster: see `Element.extrapolation`.
     """
     return {
         name: np.einsum("aq,cqi->cai", elements.get(name).extrapolation, values) for name, values in at_points.items()
@@ -43,24 +41,25 @@ def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:
 
 
 def nodal_average(mesh: Mesh, at_points: dict[str, Array]) -> Array:
-    """Return nodal stresses (n_points, 4): element-node values, plainly averaged over the cells at each node.
+    """Return nodal stresses (n_points, n_components): the plain average over the cells at each node.
 
     As SIEF_NOEU of code_aster. Points without a solid cell get zero.
     """
     components = next(iter(at_points.values())).shape[2]
     total, count = np.zeros((mesh.n_points, components)), np.zeros(mesh.n_points)
     for name, values in at_points.items():
+        # Good for any dimension and number of components.
         solid2d.add_nodal(mesh.cells[name], elements.get(name).extrapolation, values, total, count)
     return total / np.maximum(count, 1.0)[:, None]
 
 
 def internal_force(mesh: Mesh, kinematics: str, at_points: dict[str, Array]) -> Array:
-    """Return the nodal forces (n_points, 2) that balance the stresses at the quadrature points [force]."""
-    force = np.zeros((mesh.n_points, mesh.dim))
+    """Return the nodal forces (n_points, dim) that balance the stresses at the quadrature points [force]."""
+    loops, force = solid.loops(mesh.dim), np.zeros((mesh.n_points, mesh.dim))
     for name, values in at_points.items():
         N, dN, weights = elements.get(name).tables
         axisymmetric = kinematics == "axisymmetric"
-        solid2d.add_internal_force(mesh.points, mesh.cells[name], N, dN, weights, axisymmetric, values, force)
+        loops.add_internal_force(mesh.points, mesh.cells[name], N, dN, weights, axisymmetric, values, force)
     return force
 
 

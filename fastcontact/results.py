@@ -43,6 +43,12 @@ class ContactResult:
     radius : (float, float)
         Bracket of the contact radius (half-width in plane problems): distance from the axis x = 0 of the outermost
         closed node and of the first open node beyond it [length]; NaN without contact.
+    shear : ndarray (m, dim)
+        Tangential traction on the secondary side, zero without friction [pressure].
+    sticking : ndarray of bool (m,)
+        Closed nodes that do not slide; all closed ones without friction.
+    dissipation : float
+        Work of friction in this step [energy].
     """
 
     name: str
@@ -58,6 +64,15 @@ class ContactResult:
     active: NDArray[np.bool_]
     force: Array
     radius: tuple[float, float]
+    shear: Array | None = None
+    sticking: NDArray[np.bool_] | None = None
+    dissipation: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.shear is None:
+            object.__setattr__(self, "shear", np.zeros_like(self.coordinates))
+        if self.sticking is None:
+            object.__setattr__(self, "sticking", self.active.copy())
 
     @property
     def pressure_max(self) -> float:

@@ -82,7 +82,8 @@ def outer_facets(mesh: Mesh) -> dict[str, Indices]:
         element = elements.get(name)
         for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
             found.setdefault(facet_element, []).append(block[:, list(facet)])
-    return {name: _single(np.concatenate(blocks)) for name, blocks in found.items()}
+    outer = {name: _single(np.concatenate(blocks)) for name, blocks in found.items()}
+    return {name: facets for name, facets in outer.items() if len(facets)}
 
 
 def _single(facets: Indices) -> Indices:

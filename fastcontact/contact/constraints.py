@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
-from fastcontact.active_set import Compliance
+from fastcontact.active_set import Compliance, State
 
 Array = NDArray[np.float64]
 
@@ -27,12 +27,28 @@ class Constraints:
         Where the gap is measured, on the reference surface [length].
     compliance : Compliance, optional
         C; None stands for zero.
+    tangents : tuple of csr_array (m, n_dofs)
+        Tangential motion relative to the primary side, a matrix for each tangent; empty without friction.
+    directions : tuple of ndarray (m, dim)
+        The tangents themselves.
+    friction : ndarray (m,), optional
+        Coefficient of friction of each constraint; None stands for zero.
     """
 
     B: csr_array
     gap0: Array
     positions: Array
     compliance: Compliance | None = None
+    tangents: tuple[csr_array, ...] = ()
+    directions: tuple[Array, ...] = ()
+    friction: Array | None = None
+
+    def force(self, state: State) -> Array:
+        """Return the nodal contact forces (n_dofs,) of a solution."""
+        total: Array = self.B.T @ state.multiplier
+        for tangent, along in zip(self.tangents, getattr(state, "tangential", np.empty((0, 0))).T, strict=True):
+            total += tangent.T @ along
+        return total
 
 
 def stacked(parts: list[Constraints]) -> Constraints:
@@ -47,6 +63,18 @@ def stacked(parts: list[Constraints]) -> Constraints:
         np.concatenate([part.gap0 for part in parts]),
         np.vstack([part.positions for part in parts]),
         compliance,
+        _stacked_tangents(parts),
+        (),
+        np.concatenate([np.zeros(len(p.gap0)) if p.friction is None else p.friction for p in parts]),
+    )
+
+
+def _stacked_tangents(parts: list[Constraints]) -> tuple[csr_array, ...]:
+    """Return the tangential rows of all parts; empty rows stand for parts without friction."""
+    count = max(len(part.tangents) for part in parts)
+    return tuple(
+        csr_array(vstack([p.tangents[j] if p.tangents else csr_array(p.B.shape) for p in parts], format="csr"))
+        for j in range(count)
     )
 
 

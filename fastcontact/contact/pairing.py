@@ -97,18 +97,35 @@ def gap_rows(candidates: Candidates, pairing: Pairing, primary: Surface, referen
     ``gap = n . (x_secondary - x_primary(xi))`` with the facet, xi and normal of `pairing` held fixed; `reference`
     (n_points, dim) are undeformed coordinates, u the displacements of all points, point by point.
     """
-    n_points, dim = reference.shape
+    G = rows_along(pairing.normal, candidates, pairing, primary, reference.size)
+    return G, G @ reference.ravel()
+
+
+def tangents(normal: Array) -> list[Array]:
+    """Return unit tangents (n, dim) that complete `normal` (n, dim): one in 2D, two in 3D."""
+    if normal.shape[1] == 2:
+        return [np.column_stack([normal[:, 1], -normal[:, 0]])]
+    smallest = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
+    first = np.cross(smallest, normal)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return [first, np.cross(normal, first)]
+
+
+def rows_along(
+    direction: Array, candidates: Candidates, pairing: Pairing, primary: Surface, n_dofs: int
+) -> csr_array:
+    """Return rows (n, n_dofs): motion of the candidates along `direction` (n, dim) relative to what they face.
+
+    Rows of unpaired candidates are empty.
+    """
+    dim = direction.shape[1]
     rows = np.flatnonzero(pairing.paired)
     facing = primary.facets[pairing.facet[rows]]
     shape = elements.get(primary.element).shape(pairing.xi[rows, None])
-    normal = pairing.normal[rows]
     nodes = np.hstack([candidates.nodes[rows], facing])
     weights = np.hstack([candidates.shape[rows], -shape])
-    values = weights[:, :, None] * normal[:, None, :]
+    values = weights[:, :, None] * direction[rows][:, None, :]
     columns = nodes[:, :, None] * dim + np.arange(dim)
     row = np.broadcast_to(rows[:, None, None], values.shape)
-    size = (len(candidates.nodes), n_points * dim)
-    G = coo_array((values.ravel(), (row.ravel(), columns.ravel())), shape=size).tocsr()
-    gap0 = np.zeros(size[0])
-    gap0[rows] = np.einsum("nkd,nkd->n", values, reference[nodes])
-    return G, gap0
+    size = (len(candidates.nodes), n_dofs)
+    return csr_array(coo_array((values.ravel(), (row.ravel(), columns.ravel())), shape=size).tocsr())

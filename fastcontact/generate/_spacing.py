@@ -64,10 +64,13 @@ def geometric(length: float, first: float, last: float) -> Array:
     """
     if first == last:
         return np.linspace(0.0, 1.0, segments_for(length, first) + 1)
-    if length <= max(first, last):
+    if length <= min(first, last):
         return np.array([0.0, 1.0])
-    ratio = (length - first) / (length - last)
-    n = 1 + math.ceil(math.log(last / first) / math.log(ratio) - 1e-9)
+    n = 2
+    if length > max(first, last):
+        # log(last / first) / log(q), without cancellation where the sizes are nearly the same.
+        ratios = math.log1p((last - first) / first) / math.log1p((last - first) / (length - last))
+        n = 1 + math.ceil(ratios - 1e-9)
     abscissa = np.concatenate([[0.0], np.cumsum(np.geomspace(first, last, n))])
     return abscissa / abscissa[-1]
 

@@ -16,12 +16,11 @@ from fastcontact.generate._spacing import Spacing
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 
-# Inner points stand closer than the longest edge allowed, for no triangulation has all its edges equal.
-_DENSITIES = (0.84, 0.82, 0.80, 0.78, 0.75, 0.7)
+# Inner points stand closer than the longest edge allowed, for no triangulation has all its edges equal: fractions
+# of it to try in turn, and the smallest angle [degrees] with which an attempt, or a better one before, is taken.
+_ATTEMPTS = ((0.84, 35.0), (0.82, 35.0), (0.80, 33.0), (0.78, 31.0), (0.75, 29.0), (0.70, 20.0))
 _ROUNDS = 8  # of adding points where edges are too long
 _AROUND = 3.0  # edge lengths from an added point within which points give way to it
-_GOOD_ANGLE = 35.0  # a triangulation whose smallest angle [degrees] reaches this is taken at once
-_LEAST_ANGLE = 20.0  # and one that does not reach this, never
 
 
 def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Numbers]:
@@ -47,22 +46,18 @@ def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Numbers]:
     MeshError
         If no well-shaped triangulation with edges that short is found.
     """
-    best, best_angle = None, _LEAST_ANGLE
-    for density in _DENSITIES:
+    best, best_angle = None, 0.0
+    for density, good_angle in _ATTEMPTS:
         points = _attempt(outline, spacing, density)
-        if points is None:
-            continue
-        angle = smallest_angle(points, delaunay(points))
+        angle = 0.0 if points is None else smallest_angle(points, delaunay(points))
         if angle > best_angle:
             best, best_angle = points, angle
-        if angle >= _GOOD_ANGLE:
-            break
-    if best is None:
-        raise MeshError(
-            f"no triangulation with edges up to {spacing.near:g} at the pole and {spacing.far:g} far from it was found: "
-            "change a size a little, or let it grow over a longer distance"
-        )
-    return best, _checked(delaunay(best), len(best), len(outline))
+        if best is not None and best_angle >= good_angle:
+            return best, _checked(delaunay(best), len(best), len(outline))
+    raise MeshError(
+        f"no triangulation with edges up to {spacing.near:g} at the pole and {spacing.far:g} far from it "
+        "was found: change a size a little, or let it grow over a longer distance"
+    )
 
 
 def smallest_angle(points: Array, triangles: Numbers) -> float:

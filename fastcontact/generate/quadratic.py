@@ -67,11 +67,13 @@ class Circle:
     def project(self, points: Array) -> Array:
         """Nearest points (n, 2) on the circle."""
         arms = points - np.asarray(self.centre)
-        return np.asarray(self.centre) + arms * (self.radius / np.hypot(arms[:, 0], arms[:, 1]))[:, None]
+        length = np.hypot(arms[:, 0], arms[:, 1])
+        # The centre itself has no nearest point: it stays, far from the circle.
+        return np.asarray(self.centre) + arms * (self.radius / np.where(length > 0.0, length, 1.0))[:, None]
 
 
 def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool = False) -> Mesh:
-    """Return the mesh with a mid node on every edge: tri3 to tri6, quad4 to quad8 or quad9, line2 to line3.
+    """Return the mesh with a mid node on every edge: tri3 to tri6, quad4 to quad8 or quad9, hex8 to hex20 ...
 
     A mid node stands half-way between its ends, but on the curve where the edge belongs to a facet of the curve's
     group and both its ends lie on the curve. Points keep their numbers, mid nodes follow, then centre nodes.
@@ -83,13 +85,13 @@ def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool
     curves : iterable of Curve
         True shapes of the boundary, for example `Circle`.
     centre_nodes : bool
-        Whether quadrangles get a centre node (quad9).
+        Whether quadrangles get a centre node (quad9); 2D only.
 
     Raises
     ------
     MeshError
-        If a cell is quadratic already, a curve's group has no edge on the curve, or a cell is folded by its curved
-        side (its Jacobian is not positive at a quadrature point).
+        If a cell is quadratic already, `centre_nodes` is asked of a 3D mesh, a curve's group has no edge on the
+        curve, or a cell is folded by its curved side (its Jacobian is not positive at a quadrature point).
     """
     names = _quadratic_names(mesh, centre_nodes)
     edges = _edges(mesh.cells, mesh.n_points)
@@ -122,6 +124,8 @@ def in_element(mesh: Mesh, element: str, curves: Iterable[Curve] = ()) -> Mesh:
 
 def _quadratic_names(mesh: Mesh, centre_nodes: bool) -> dict[str, str]:
     """Quadratic element of each element of the mesh."""
+    if centre_nodes and mesh.dim != 2:
+        raise MeshError("centre_nodes is for 2D meshes: leave it out, and cells get mid nodes on their edges only")
     names = {}
     for name in mesh.cells:
         element = elements.get(name)

@@ -67,16 +67,9 @@ def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None
     column = _AXES.index(one_of("axis", axis, _AXES[: mesh.dim]))
     points = mesh.points.copy()
     points[:, column] = 2.0 * number("at", at) - points[:, column]
-    cells = {name: block[:, _turned(name)] for name, block in mesh.cells.items()}
+    cells = {name: block[:, elements.get(name).reversed] for name, block in mesh.cells.items()}
     image = mesh.replace(points=points, cells=cells)
     return image if rename is None else renamed(image, rename)
-
-
-def _turned(name: str) -> list[int]:
-    """Node order of a reflected cell: the reference cell with its first two coordinates swapped, a line reversed."""
-    nodes = elements.get(name).nodes
-    image = -nodes if nodes.shape[1] == 1 else nodes[:, [1, 0, *range(2, nodes.shape[1])]]
-    return [int(np.flatnonzero(np.abs(nodes - node).max(axis=1) < 1e-12)[0]) for node in image]
 
 
 def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float = 1.0, rotate: float = 0.0) -> Mesh:

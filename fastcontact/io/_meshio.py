@@ -39,6 +39,13 @@ COMPLETE_FORMATS = ("vtk", "vtu", "gmsh22", "abaqus")
 # Formats that know points of two coordinates; the others get a zero, and reading drops it again.
 FLAT_FORMATS = ("gmsh22", "abaqus", "medit", "su2", "dolfin-xml")
 
+# Cells that meshio passes on in an order which is not the format's: node k of ours is node NODE_ORDER[..][..][k] of
+# meshio's, and the other way round. It takes the linear wedge of VTK for the mirror image it is no longer in VTK 9.7,
+# and leaves the order of Gmsh's wedge of 18 nodes as it is.
+_WEDGE_OF_VTK = {"wedge6": elements.get("wedge6").reversed}
+_WEDGE_OF_GMSH = {"wedge18": (0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16)}
+NODE_ORDER = {"vtk": _WEDGE_OF_VTK, "vtu": _WEDGE_OF_VTK, "gmsh": _WEDGE_OF_GMSH, "gmsh22": _WEDGE_OF_GMSH}
+
 KEEPS_ALL = "write a .med file to keep them"
 OTHER_FORMATS = "write .med, .vtu or .msh instead"
 
@@ -107,7 +114,7 @@ def read(path: Path) -> MeshioContent:
     with _contained("read", path):
         found = meshio.read(path, file_format=file_format)
     try:
-        blocks = merged(_blocks(found))
+        blocks = merged(_blocks(found, NODE_ORDER.get(file_format, {})))
         n_duplicates = 0
         if file_format == "gmsh":
             # Version 2 of that format repeats a cell for each of its groups.
@@ -130,7 +137,7 @@ def _cell_group_names(found: Any, file_format: str) -> list[str]:
     return names
 
 
-def _blocks(found: Any) -> list[Block]:
+def _blocks(found: Any, order: Mapping[str, tuple[int, ...]]) -> list[Block]:
     foreign: dict[str, int] = {}
     for block in found.cells:
         if block.type not in elements.BY_MESHIO and block.type != VERTEX:
@@ -139,10 +146,10 @@ def _blocks(found: Any) -> list[Block]:
         listed = ", ".join(f"{count} cells of kind {kind}" for kind, count in foreign.items())
         known = ", ".join(sorted(elements.BY_MESHIO))
         raise MeshError(f"it has {listed}, which fastcontact does not know: use only {known}")
-    return [_block(found, index, cells) for index, cells in enumerate(found.cells)]
+    return [_block(found, index, cells, order) for index, cells in enumerate(found.cells)]
 
 
-def _block(found: Any, index: int, cells: Any) -> Block:
+def _block(found: Any, index: int, cells: Any, order: Mapping[str, tuple[int, ...]]) -> Block:
     kind = VERTEX if cells.type == VERTEX else elements.BY_MESHIO[cells.type].name
     dim = 0 if kind == VERTEX else elements.get(kind).dim
     groups: dict[str, NDArray[Any]] = {}
@@ -154,7 +161,9 @@ def _block(found: Any, index: int, cells: Any) -> Block:
     for name, sets in found.cell_sets.items():
         if not name.startswith("gmsh:") and index < len(sets):
             _add(groups, {name: np.asarray(sets[index], np.intp).reshape(-1)})
-    return Block(kind, np.asarray(cells.data), {name: rows for name, rows in groups.items() if len(rows)})
+    nodes = np.asarray(cells.data)
+    nodes = nodes[:, order[kind]] if kind in order else nodes
+    return Block(kind, nodes, {name: rows for name, rows in groups.items() if len(rows)})
 
 
 def _add(groups: dict[str, NDArray[Any]], more: Mapping[str, NDArray[Any]]) -> None:
@@ -214,7 +223,7 @@ def _parts(mesh: Mesh, file_format: str) -> dict[str, Any]:
     """Return the arguments of meshio's Mesh, groups as the format can take them."""
     width = mesh.dim if file_format in FLAT_FORMATS else 3
     points = np.pad(mesh.points, [(0, 0), (0, width - mesh.dim)])
-    parts: dict[str, Any] = {"points": points, "cells": _meshio_cells(mesh)}
+    parts: dict[str, Any] = {"points": points, "cells": _meshio_cells(mesh, NODE_ORDER.get(file_format, {}))}
     if file_format in ARRAY_FORMATS:
         return _with_arrays(parts, mesh)
     if file_format == "gmsh22":
@@ -227,8 +236,11 @@ def _parts(mesh: Mesh, file_format: str) -> dict[str, Any]:
     return parts
 
 
-def _meshio_cells(mesh: Mesh) -> list[tuple[str, NDArray[Any]]]:
-    return [(elements.get(name).meshio, np.array(block)) for name, block in mesh.cells.items()]
+def _meshio_cells(mesh: Mesh, order: Mapping[str, tuple[int, ...]]) -> list[tuple[str, NDArray[Any]]]:
+    return [
+        (elements.get(name).meshio, block[:, np.argsort(order[name])] if name in order else np.array(block))
+        for name, block in mesh.cells.items()
+    ]
 
 
 def _warn(message: str) -> None:
@@ -307,7 +319,7 @@ def _check_complete(path: Path, temporary: Path, file_format: str, mesh: Mesh) -
 
     with _contained("read back", path):
         found = meshio.read(temporary, file_format=file_format)
-    wrong = [kind for kind, block in _meshio_cells(mesh) if not np.array_equal(found.get_cells_type(kind), block)]
+    wrong = [kind for kind, block in _meshio_cells(mesh, {}) if not np.array_equal(found.get_cells_type(kind), block)]
     if wrong or len(found.points) != mesh.n_points:
         listed = f"the {', '.join(wrong)} cells" if wrong else "the points"
         raise FileError(f"'{path}': meshio's {file_format} format does not keep {listed}; {OTHER_FORMATS}")

@@ -35,8 +35,12 @@ from fastcontact.results import StepResult
 
 Array = NDArray[np.float64]
 
-# Elements whose nodes MED numbers otherwise than we do: our node k is node NODE_ORDER[code][k] of MED.
-NODE_ORDER: dict[str, tuple[int, ...]] = {}
+# Elements whose nodes MED numbers otherwise than we do: our node k is node NODE_ORDER[code][k] of MED. MED sees the
+# base of a solid from outside, where we see it from inside: its cells are ours in the mirror.
+NODE_ORDER = {element.med: element.reversed for element in elements.ELEMENTS.values() if element.dim == 3}
+# The centres of faces follow in MED as bottom, sides round about, top; ours as -x, +x, -y, +y, bottom, top.
+_FACES_OF_H27 = dict(zip(range(20, 26), (24, 22, 21, 23, 20, 25)))
+NODE_ORDER["H27"] = tuple(_FACES_OF_H27.get(node, node) for node in NODE_ORDER["H27"])
 
 NAME_SIZE = 64
 COMPONENT_SIZE = 16

@@ -24,12 +24,12 @@ def _transposed(dN):
 
 
 @kernel
-def _gather(points, cell, x):
-    """Fill `x` (3, n_nodes) with the coordinates of a cell."""
-    for a in range(cell.shape[0]):
-        p = cell[a]
+def _gather(values, cells, c, x):
+    """Fill `x` (3, n_nodes) with the vectors of `values` (n_points, 3) at the nodes of cell `c`."""
+    for a in range(cells.shape[1]):
+        p = cells[c, a]
         for i in range(3):
-            x[i, a] = points[p, i]
+            x[i, a] = values[p, i]
 
 
 @kernel
@@ -64,62 +64,200 @@ def _map(x, slopes, q, gradient):
 @kernel
 def _is_isotropic(D):
     """Return whether the moduli are those of an isotropic material, but for round-off."""
-    shear, coupling = D[3, 3], D[0, 1]
     for i in range(6):
         for j in range(6):
             expected = 0.0
             if i < 3 and j < 3:
-                expected = coupling
+                expected = D[0, 1]
             if i == j:
-                expected += 2.0 * shear if i < 3 else shear
+                expected += 2.0 * D[3, 3] if i < 3 else D[3, 3]
             if not abs(D[i, j] - expected) <= 1e-14 * abs(D[0, 0]):
                 return False
     return True
 
 
 @kernel
-def _general_block(D, g, a, b, block):
-    """Fill `block` (9,) with K_ij = D_ikjl g_kl of a node pair, from `g` (3, 3, n_nodes, n_nodes)."""
-    for i in range(3):
-        for j in range(3):
-            total = 0.0
-            for k in range(3):
-                # Number of the stress component i, k in the order xx, yy, zz, xy, yz, xz.
-                row = i if i == k else (5 if i + k == 2 else i + k + 2 - (i + k) // 3)
-                for m in range(3):
-                    column = j if j == m else (5 if j + m == 2 else j + m + 2 - (j + m) // 3)
-                    total += D[row, column] * g[k, m, a, b]
-            block[3 * i + j] = total
+def _component(i, j):
+    """Return the number of a stress component in the order xx, yy, zz, xy, yz, xz."""
+    if i == j:
+        return i
+    if i + j == 1:
+        return 3
+    return 4 if i + j == 3 else 5
+
+
+@kernel
+def _tensors(moduli):
+    """Return the moduli as (n_materials, 9, 9): row 3 i + j, column 3 k + l holds D_ikjl, for K_ij = D_ikjl g_kl."""
+    tensors = np.empty((moduli.shape[0], 9, 9))
+    for m in range(moduli.shape[0]):
+        for row in range(9):
+            for column in range(9):
+                i, j, k, n = row // 3, row % 3, column // 3, column % 3
+                tensors[m, row, column] = moduli[m, _component(i, k), _component(j, n)]
+    return tensors
+
+
+@kernel
+def _integrate_products(x, slopes, weights, gradient, g):
+    """Fill `g` (6, n_nodes, n_nodes) with the integrals of dN_a/dx_i dN_b/dx_j for ij = 00, 01, 02, 11, 12, 22.
+
+    Returns whether the Jacobian is positive everywhere. One short loop for each ij: the compiler makes vectors of it.
+    """
+    n_nodes = x.shape[1]
+    g[:] = 0.0
+    for q in range(weights.shape[0]):
+        det = _map(x, slopes, q, gradient)
+        if not det > 0.0:
+            return False
+        weight = weights[q] * det
+        ij = 0
+        for i in range(3):
+            for j in range(i, 3):
+                for a in range(n_nodes):
+                    factor = weight * gradient[i, a]
+                    for b in range(n_nodes):
+                        g[ij, a, b] += factor * gradient[j, b]
+                ij += 1
+    return True
+
+
+@kernel
+def _add_block(flat, upper, lower, k00, k01, k02, k10, k11, k12, k20, k21, k22):
+    """Add a block of a node pair, and its transpose on the other side of the diagonal."""
+    u, v = 9 * upper, 9 * lower
+    flat[u] += k00
+    flat[u + 1] += k01
+    flat[u + 2] += k02
+    flat[u + 3] += k10
+    flat[u + 4] += k11
+    flat[u + 5] += k12
+    flat[u + 6] += k20
+    flat[u + 7] += k21
+    flat[u + 8] += k22
+    if u != v:
+        flat[v] += k00
+        flat[v + 1] += k10
+        flat[v + 2] += k20
+        flat[v + 3] += k01
+        flat[v + 4] += k11
+        flat[v + 5] += k21
+        flat[v + 6] += k02
+        flat[v + 7] += k12
+        flat[v + 8] += k22
+
+
+@kernel
+def _add_isotropic(g, coupling, shear, slots, c, flat):
+    """Add the blocks of a cell for Lame's constants: K_ij = lambda g_ij + mu g_ji + mu g_kk delta_ij."""
+    for b in range(g.shape[1]):
+        for a in range(b + 1):
+            xx, yy, zz = g[0, a, b], g[3, a, b], g[5, a, b]
+            xy, xz, yz = g[1, a, b], g[2, a, b], g[4, a, b]
+            yx, zx, zy = g[1, b, a], g[2, b, a], g[4, b, a]
+            trace, both = shear * (xx + yy + zz), coupling + shear
+            k01, k02, k12 = coupling * xy + shear * yx, coupling * xz + shear * zx, coupling * yz + shear * zy
+            k10, k20, k21 = coupling * yx + shear * xy, coupling * zx + shear * xz, coupling * zy + shear * yz
+            if a == b:  # equal but for round-off; K is symmetric to the last bit
+                k10, k20, k21 = k01, k02, k12
+            _add_block(
+                flat, slots[c, a, b], slots[c, b, a],
+                both * xx + trace, k01, k02, k10, both * yy + trace, k12, k20, k21, both * zz + trace,
+            )  # fmt: skip
+
+
+@kernel
+def _add_general(g, tensors, m, products, block, slots, c, flat):
+    """Add the blocks of a cell for any moduli: K_ij = D_ikjl g_kl; `products` and `block` (9,) are overwritten."""
+    for b in range(g.shape[1]):
+        for a in range(b + 1):
+            products[0], products[4], products[8] = g[0, a, b], g[3, a, b], g[5, a, b]
+            products[1], products[2], products[5] = g[1, a, b], g[2, a, b], g[4, a, b]
+            products[3], products[6], products[7] = g[1, b, a], g[2, b, a], g[4, b, a]
+            for row in range(9):
+                total = 0.0
+                for column in range(9):
+                    total += tensors[m, row, column] * products[column]
+                block[row] = total
+            if a == b:  # as above
+                block[3], block[6], block[7] = block[1], block[2], block[5]
+            _add_block(
+                flat, slots[c, a, b], slots[c, b, a],
+                block[0], block[1], block[2], block[3], block[4], block[5], block[6], block[7], block[8],
+            )  # fmt: skip
 
 
 @kernel
 def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric, slots, data):
     """Add element stiffness blocks to `data` (n_blocks, 3, 3), written in place at `slots`.
 
-    Returns the number of the first cell with a Jacobian that is not positive, or -1. Per cell, the products of
-    gradients are integrated first, once for all moduli; then K_ij = D_ikjl int dN_a/dx_k dN_b/dx_l dV.
+    Returns the number of the first cell with a Jacobian that is not positive, or -1. The products of gradients are
+    integrated first; the moduli, constant in a cell, come in once at the end.
     """
     n_cells, n_nodes = cells.shape
-    slopes = _transposed(dN)
-    x, gradient = np.empty((3, n_nodes)), np.empty((3, n_nodes))
-    g = np.empty((3, 3, n_nodes, n_nodes))
-    block = np.empty(9)
+    slopes, tensors = _transposed(dN), _tensors(moduli)
     isotropic = np.empty(moduli.shape[0], np.bool_)
     for m in range(moduli.shape[0]):
         isotropic[m] = _is_isotropic(moduli[m])
+    x, gradient = np.empty((3, n_nodes)), np.empty((3, n_nodes))
+    g, products, block = np.empty((6, n_nodes, n_nodes)), np.empty(9), np.empty(9)
     flat = data.reshape(-1)
     for c in range(n_cells):
-        _gather(points, cells[c], x)
-        g[:] = 0.0
-        for q in range(weights.shape[0]):
-            det = _map(x, slopes, q, gradient)
-            if not det > 0.0:
-                return c
-            weight = weights[q] * det
-            for a in range(n_nodes):
-                for i in range(3):
-                    scaled = weight * gradient[i, a]
-                    for j in range(i, 3):
-                        for b in range(n_nodes):
-                            g[i, j, a, b] += scaled * gradient[j, b]
+        _gather(points, cells, c, x)
+        if not _integrate_products(x, slopes, weights, gradient, g):
+            return c
+        m = material[c]
+        if isotropic[m]:
+            _add_isotropic(g, moduli[m, 0, 1], moduli[m, 3, 3], slots, c, flat)
+        else:
+            _add_general(g, tensors, m, products, block, slots, c, flat)
     return -1
+
+
+@kernel
+def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, out):
+    """Fill `out` (n_cells, n_q, 6) with the stress xx, yy, zz, xy, yz, xz at the points of the table dN."""
+    n_cells, n_nodes = cells.shape
+    slopes = _transposed(dN)
+    x, u, gradient = np.empty((3, n_nodes)), np.empty((3, n_nodes)), np.empty((3, n_nodes))
+    strain = np.empty(6)
+    for c in range(n_cells):
+        _gather(points, cells, c, x)
+        _gather(displacement, cells, c, u)
+        m = material[c]
+        for q in range(dN.shape[0]):
+            _map(x, slopes, q, gradient)
+            strain[:] = 0.0
+            for a in range(n_nodes):
+                gx, gy, gz = gradient[0, a], gradient[1, a], gradient[2, a]
+                strain[0] += gx * u[0, a]
+                strain[1] += gy * u[1, a]
+                strain[2] += gz * u[2, a]
+                strain[3] += gy * u[0, a] + gx * u[1, a]
+                strain[4] += gz * u[1, a] + gy * u[2, a]
+                strain[5] += gz * u[0, a] + gx * u[2, a]
+            for i in range(6):
+                value = 0.0
+                for j in range(6):
+                    value += moduli[m, i, j] * strain[j]
+                out[c, q, i] = value
+
+
+@kernel
+def add_internal_force(points, cells, N, dN, weights, axisymmetric, stresses, force):
+    """Add the nodal forces of `stresses` (n_cells, n_q, 6) to `force` (n_points, 3), in place."""
+    n_cells, n_nodes = cells.shape
+    slopes = _transposed(dN)
+    x, gradient = np.empty((3, n_nodes)), np.empty((3, n_nodes))
+    for c in range(n_cells):
+        _gather(points, cells, c, x)
+        for q in range(weights.shape[0]):
+            weight = weights[q] * _map(x, slopes, q, gradient)
+            xx, yy, zz = weight * stresses[c, q, 0], weight * stresses[c, q, 1], weight * stresses[c, q, 2]
+            xy, yz, xz = weight * stresses[c, q, 3], weight * stresses[c, q, 4], weight * stresses[c, q, 5]
+            for a in range(n_nodes):
+                p = cells[c, a]
+                gx, gy, gz = gradient[0, a], gradient[1, a], gradient[2, a]
+                force[p, 0] += xx * gx + xy * gy + xz * gz
+                force[p, 1] += xy * gx + yy * gy + yz * gz
+                force[p, 2] += xz * gx + yz * gy + zz * gz

@@ -63,14 +63,19 @@ class ComplianceCache:
         self._values = grown
 
 
+def reduced(cache: ComplianceCache, R: csr_array) -> Array:
+    """Return ``R K^-1 R.T`` (m, m)."""
+    dofs = np.unique(R.indices[R.data != 0.0]).astype(np.intp)
+    rows = R[:, dofs].toarray()
+    flexibility: Array = rows @ cache.of(dofs) @ rows.T
+    return 0.5 * (flexibility + flexibility.T)
+
+
 def multipliers(cache: ComplianceCache, B: csr_array, wanted: Array, C: Array | None) -> Array:
     """Return the multipliers (m,) with ``(B K^-1 B.T + C) multiplier = wanted``; C (m, m) may be None."""
-    dofs = np.unique(B.indices[B.data != 0.0]).astype(np.intp)
-    rows = B[:, dofs].toarray()
-    flexibility = rows @ cache.of(dofs) @ rows.T
+    flexibility = reduced(cache, B)
     if C is not None:
         flexibility += C
-    flexibility = 0.5 * (flexibility + flexibility.T)
     try:
         return cho_solve(cho_factor(flexibility), wanted)
     except LinAlgError:  # rows that repeat each other: any of their multipliers does, the smallest is taken

@@ -30,6 +30,14 @@ class Loaded(Protocol):
         """
         ...
 
+    def reduce(self, R: csr_array) -> tuple[Array, Array]:
+        """Return ``R K^-1 f`` (m,) and the compliance ``R K^-1 R.T`` (m, m) of rows R (m, n)."""
+        ...
+
+    def displacement(self, force: Array) -> Array:
+        """Return ``K^-1 (f + force)`` (n,)."""
+        ...
+
 
 class LinearSolver(Protocol):
     """Solves ``K u = f`` under linear equations, for one K and many right-hand sides and sets of equations.

@@ -16,7 +16,7 @@ from scipy.sparse import bsr_array, bsr_matrix, csr_array, csr_matrix, diags_arr
 from scipy.sparse.linalg import cg
 
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear._compliance import ComplianceCache, multipliers
+from fastcontact.linear._compliance import ComplianceCache, multipliers, reduced
 from fastcontact.linear._elimination import eliminate
 from fastcontact.linear._solver import Counters
 
@@ -135,10 +135,20 @@ class _Loaded:
             return self._unconstrained(self._f, guess), np.empty(0)
         if C is None:
             return self._eliminated(B, c, guess)
-        if self._free is None:
-            self._free = self._unconstrained(self._f, guess)
-        multiplier = multipliers(self._solver.compliance, B, c - B @ self._free, C)
+        multiplier = multipliers(self._solver.compliance, B, c - B @ self._unloaded(), C)
         return self._unconstrained(self._f + B.T @ multiplier, guess), multiplier
+
+    def reduce(self, R: csr_array) -> tuple[Array, Array]:
+        return R @ self._unloaded(), reduced(self._solver.compliance, R)
+
+    def displacement(self, force: Array) -> Array:
+        return self._unconstrained(self._f + force, None)
+
+    def _unloaded(self) -> Array:
+        """Return the displacement without contact forces."""
+        if self._free is None:
+            self._free = self._unconstrained(self._f, None)
+        return self._free
 
     def _unconstrained(self, f: Array, guess: Array | None) -> Array:
         solver = self._solver

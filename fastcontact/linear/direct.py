@@ -14,7 +14,7 @@ from scipy.sparse import bsr_array, csc_array, csr_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from fastcontact.errors import ModelError
-from fastcontact.linear._compliance import ComplianceCache, multipliers
+from fastcontact.linear._compliance import ComplianceCache, multipliers, reduced
 from fastcontact.linear._solver import Counters
 
 Array = NDArray[np.float64]
@@ -112,6 +112,12 @@ class _Loaded:
             return self._free, np.empty(0)
         multiplier = multipliers(self._solver.compliance, B, c - B @ self._free, C)
         return self._solver.back_substitute(self._f + B.T @ multiplier), multiplier
+
+    def reduce(self, R: csr_array) -> tuple[Array, Array]:
+        return R @ self._free, reduced(self._solver.compliance, R)
+
+    def displacement(self, force: Array) -> Array:
+        return self._solver.back_substitute(self._f + force)
 
 
 SOLVER = Direct

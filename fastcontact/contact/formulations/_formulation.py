@@ -9,8 +9,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.active_set import Compliance
 from fastcontact.contact.constraints import Constraints
-from fastcontact.contact.pairing import Candidates, gap_rows, pair
+from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair, rows_along, tangents
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 
@@ -33,6 +34,8 @@ class Formulation(ABC):
         Integrals run over the full circle.
     modulus : float
         Typical stiffness of the bodies, E / (1 - nu^2) [pressure].
+    friction : float
+        Coefficient of Coulomb friction, zero for none.
     projection_tolerance : float
         How far a point may stand out beyond the end of its facet and still be paired, in facet lengths.
     normals : str
@@ -45,6 +48,7 @@ class Formulation(ABC):
     axisymmetric: bool
     modulus: float
 
+    friction: float = 0.0
     projection_tolerance: float = 0.5
     normals: str = "facet"
 
@@ -55,6 +59,8 @@ class Formulation(ABC):
     def __post_init__(self) -> None:
         if self.normals not in NORMALS:
             raise ContactError(unknown("kind of normals", self.normals, NORMALS))
+        if not (np.isfinite(self.friction) and self.friction >= 0):
+            raise ContactError(f"the coefficient of friction {self.friction} must be a number >= 0")
         if not self.projection_tolerance >= 0:
             raise ContactError(f"projection_tolerance = {self.projection_tolerance} must not be negative")
 
@@ -75,6 +81,16 @@ class Formulation(ABC):
     @abstractmethod
     def closed_nodes(self, active: NDArray[np.bool_], gap: Array, pressure: Array) -> NDArray[np.bool_]:
         """Return which secondary nodes are in contact, from the active constraints and the nodal gap and pressure."""
+
+    def assembled(self, candidates: Candidates, pairing: Pairing, compliance: Compliance | None) -> Constraints:
+        """Return the constraints of paired candidates, with tangential rows where there is friction."""
+        B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
+        positions = candidates.positions(self.points)
+        if not self.friction:
+            return Constraints(B, gap0, positions, compliance)
+        directions = tuple(tangents(pairing.normal))
+        along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
+        return Constraints(B, gap0, positions, compliance, along, directions, np.full(len(gap0), self.friction))
 
     def nodal_gap(self, displacement: Array) -> tuple[Array, Array]:
         """Return the gap (n_nodes,) of the secondary nodes in the displaced configuration, and the normals faced.

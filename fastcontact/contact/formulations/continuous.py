@@ -34,7 +34,7 @@ from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._projection import Projection
 from fastcontact.contact.integration import facet_measure
-from fastcontact.contact.pairing import Candidates, gap_rows, pair
+from fastcontact.contact.pairing import Candidates, pair
 from fastcontact.errors import ContactError, unknown
 
 Array = NDArray[np.float64]
@@ -146,8 +146,7 @@ class Continuous(Formulation):
         pairing = pair(positions, self.primary, deformed, self.projection_tolerance, self.normals)
         usable = self._projection.areas > 1e-12 * self._projection.areas.max()
         pairing.paired[~usable] = False
-        G, gap0 = gap_rows(self._candidates, pairing, self.primary, self.points)
-        return Constraints(G, gap0, self._candidates.positions(self.points), self._projection)
+        return self.assembled(self._candidates, pairing, self._projection)
 
     def pressure(self, multiplier: Array) -> Array:
         """Return the multiplier field at the nodes; it may be slightly negative beyond the edge of the contact."""

@@ -24,7 +24,7 @@ from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._projection import Projection
 from fastcontact.contact.integration import facet_measure
-from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair
+from fastcontact.contact.pairing import Candidates, Pairing, pair
 from fastcontact.errors import ContactError
 from fastcontact.search import closest
 
@@ -110,10 +110,9 @@ class Mortar(Formulation):
         covered = np.bincount(facet, weights=np.where(found.paired, area, 0.0))
         kept = found.paired & (covered > COVERED * total)[facet] & (area > 0)
         pairing = Pairing(found.facet, found.xi, found.normal, kept)
-        G, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
         self._facet = facet
         self._project(facet, shape, np.where(kept, area, 0.0))
-        return Constraints(G, gap0, candidates.positions(self.points), self._projection)
+        return self.assembled(candidates, pairing, self._projection)
 
     def _project(self, facet: NDArray[np.intp], shape: Array, area: Array) -> None:
         """Set up the multiplier field on the nodes of facets that take part."""

@@ -18,7 +18,7 @@ from scipy.sparse.linalg import splu
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.integration import mass_matrix, nodal_areas
-from fastcontact.contact.pairing import Candidates, gap_rows, pair
+from fastcontact.contact.pairing import Candidates, pair
 
 Array = NDArray[np.float64]
 
@@ -41,8 +41,7 @@ class NodeToSegment(Formulation):
         deformed = self.points + displacement
         positions = self._candidates.positions(deformed)
         pairing = pair(positions, self.primary, deformed, self.projection_tolerance, self.normals)
-        B, gap0 = gap_rows(self._candidates, pairing, self.primary, self.points)
-        return Constraints(B, gap0, self.points[self.secondary.points])
+        return self.assembled(self._candidates, pairing, None)
 
     def pressure(self, multiplier: Array) -> Array:
         """Return nodal forces over nodal areas; on quadratic facets, solve with the surface mass matrix instead.
