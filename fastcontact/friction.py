@@ -224,7 +224,8 @@ def _linear_solution(problem: _Problem, y: Array, state: _State, bound: Array | 
     sliding = np.flatnonzero(state.closed & ~state.sticking)
     if len(sliding):
         _sliding_rows(problem, y, state, bound, sliding, index, A, right)
-    return np.linalg.solve(A, right.ravel()).reshape(parts, m)
+    solution: Array = np.linalg.solve(A, right.ravel()).reshape(parts, m)
+    return solution
 
 
 def _sliding_rows(

@@ -64,8 +64,8 @@ class ContactResult:
     active: NDArray[np.bool_]
     force: Array
     radius: tuple[float, float]
-    shear: Array | None = None
-    sticking: NDArray[np.bool_] | None = None
+    shear: Array = None  # type: ignore[assignment]
+    sticking: NDArray[np.bool_] = None  # type: ignore[assignment]
     dissipation: float = 0.0
 
     def __post_init__(self) -> None:

@@ -39,12 +39,16 @@ COMPLETE_FORMATS = ("vtk", "vtu", "gmsh22", "abaqus")
 # Formats that know points of two coordinates; the others get a zero, and reading drops it again.
 FLAT_FORMATS = ("gmsh22", "abaqus", "medit", "su2", "dolfin-xml")
 
-# Cells that meshio passes on in an order which is not the format's: node k of ours is node NODE_ORDER[..][..][k] of
-# meshio's, and the other way round. It takes the linear wedge of VTK for the mirror image it is no longer in VTK 9.7,
-# and leaves the order of Gmsh's wedge of 18 nodes as it is.
+# Cells that meshio gets in another order than ours: our node k is its node NODE_ORDER[format][element][k]. It mirrors
+# the linear wedge of VTK, as old VTK documents have it and VTK 9.7 has not, and leaves Gmsh's wedge of 18 nodes as it is.
 _WEDGE_OF_VTK = {"wedge6": elements.get("wedge6").reversed}
 _WEDGE_OF_GMSH = {"wedge18": (0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16)}
-NODE_ORDER = {"vtk": _WEDGE_OF_VTK, "vtu": _WEDGE_OF_VTK, "gmsh": _WEDGE_OF_GMSH, "gmsh22": _WEDGE_OF_GMSH}
+NODE_ORDER: dict[str, dict[str, tuple[int, ...]]] = {
+    "vtk": _WEDGE_OF_VTK,
+    "vtu": _WEDGE_OF_VTK,
+    "gmsh": _WEDGE_OF_GMSH,
+    "gmsh22": _WEDGE_OF_GMSH,
+}
 
 KEEPS_ALL = "write a .med file to keep them"
 OTHER_FORMATS = "write .med, .vtu or .msh instead"
@@ -58,6 +62,16 @@ class MeshioContent:
     format: str
     n_vertices: int
     n_duplicates: int
+
+
+def _library() -> Any:
+    """Return the package meshio, its table of dimensions completed: without some cells it can do nothing with them."""
+    import meshio
+    from meshio._mesh import topological_dimension
+
+    for element in elements.ELEMENTS.values():
+        topological_dimension.setdefault(element.meshio, element.dim)
+    return meshio
 
 
 @contextlib.contextmanager
@@ -78,8 +92,7 @@ def _contained(action: str, path: Path) -> Iterator[None]:
 
 def _format(path: Path, writing: bool) -> str:
     """Return meshio's name of the format of a file, by its suffix."""
-    import meshio
-
+    meshio = _library()
     suffixes = ["".join(path.suffixes[i:]).lower() for i in range(len(path.suffixes))]
     formats = meshio.extension_to_filetypes
     names = next((formats[suffix] for suffix in suffixes if suffix in formats), None)
@@ -106,8 +119,7 @@ def read(path: Path) -> MeshioContent:
     MeshError
         If the mesh has no cells or a kind of cells that fastcontact does not know.
     """
-    import meshio
-
+    meshio = _library()
     file_format = _format(path, writing=False)
     if file_format == "abaqus":
         _abaqus.check_readable(path)
@@ -203,8 +215,7 @@ def write(path: Path, temporary: Path, mesh: Mesh) -> None:
     FileError
         If meshio cannot write the mesh in this format, or would leave out cells.
     """
-    import meshio
-
+    meshio = _library()
     file_format = _format(path, writing=True)
     if file_format in ("tetgen", "svg"):
         raise FileError(f"'{path}': {file_format} is no mesh format of one file; {OTHER_FORMATS}")
@@ -315,8 +326,7 @@ def _warn_of_cuts(cut: Mapping[str, int]) -> None:
 
 def _check_complete(path: Path, temporary: Path, file_format: str, mesh: Mesh) -> None:
     """Read back what was written: several of meshio's writers leave out or change cells without an error."""
-    import meshio
-
+    meshio = _library()
     with _contained("read back", path):
         found = meshio.read(temporary, file_format=file_format)
     wrong = [kind for kind, block in _meshio_cells(mesh, {}) if not np.array_equal(found.get_cells_type(kind), block)]

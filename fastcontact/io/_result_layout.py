@@ -39,13 +39,14 @@ STEP_ROW = np.dtype(
 def contact_row(dim: int) -> np.dtype[Any]:
     """Return the type of one row of a contact table: one secondary node in one step."""
     scalars = [(name, "<f8") for name in ("abscissa", "gap", "pressure", "multiplier")]
-    vectors = [(name, "<f8", (dim,)) for name in ("coordinates", "force_vectors", "normal")]
-    return np.dtype([("points", "<i4"), ("active", "i1"), *scalars, *vectors])
+    vectors = [(name, "<f8", (dim,)) for name in ("coordinates", "force_vectors", "normal", "shear")]
+    return np.dtype([("points", "<i4"), ("active", "i1"), ("sticking", "i1"), *scalars, *vectors])
 
 
 def contact_step(dim: int) -> np.dtype[Any]:
-    """Return the type of the row that a contact pair has for each step: its rows, resultant and radius."""
-    return np.dtype([("first", "<i8"), ("count", "<i8"), ("force", "<f8", (dim,)), ("radius", "<f8", (2,))])
+    """Return the type of the row that a contact pair has for each step: its rows, resultant, radius, work."""
+    sums = [("force", "<f8", (dim,)), ("radius", "<f8", (2,)), ("dissipation", "<f8")]
+    return np.dtype([("first", "<i8"), ("count", "<i8"), *sums])
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,8 @@
 """MED files, as Salome and code_aster read and write them: meshes with groups, nodal results at all instants.
 
 With h5py alone. Arrays are stored component by component ("no interlace"), node numbers count from 1. Meshes
-of MED 2.3 to 4.x are read; what is written carries the stamp 3.0.0, which every later library reads.
+of MED 2.3 to 4.x are read; what is written carries the stamp 3.0.0, which every later library reads, or 4.0.0 where
+there are wedges of 18 nodes, which came with that version.
 """
 
 from __future__ import annotations
@@ -239,17 +240,31 @@ def write_med_mesh(path: PathLike, mesh: Mesh, *, mesh_name: str = "mesh") -> No
     FileError
         If the file cannot be written or a name is too long for MED (80 bytes for groups).
     """
-    with _new_file(path) as file:
+    with _new_file(path, mesh) as file:
         _write_mesh(file, mesh, mesh_name)
 
 
 @contextmanager
-def _new_file(path: PathLike) -> Iterator[Any]:
+def _new_file(path: PathLike, mesh: Mesh) -> Iterator[Any]:
     import h5py
 
-    with replacing(path) as temporary, h5py.File(temporary, "w") as file:
-        _set(file.create_group("INFOS_GENERALES"), MAJ=3, MIN=0, REL=0)
+    version = 4 if "wedge18" in mesh.cells else 3
+    with replacing(path) as temporary, _in_order(version >= 4), h5py.File(temporary, "w") as file:
+        _set(file.create_group("INFOS_GENERALES"), MAJ=version, MIN=0, REL=0)
         yield file
+
+
+@contextmanager
+def _in_order(wanted: bool) -> Iterator[None]:
+    """Let new HDF5 groups remember the order of their members, without which libraries refuse a file of version 4."""
+    import h5py
+
+    settings = h5py.get_config()
+    before, settings.track_order = settings.track_order, wanted
+    try:
+        yield
+    finally:
+        settings.track_order = before
 
 
 def _set(group: Any, **attributes: Any) -> None:
@@ -348,7 +363,7 @@ def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *
     MeshError
         If a step does not belong to the mesh.
     """
-    with _new_file(path) as file:
+    with _new_file(path, mesh) as file:
         _write_mesh(file, mesh, mesh_name)
         written: set[int] = set()
         for step in steps:

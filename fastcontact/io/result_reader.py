@@ -278,8 +278,14 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
     if len(rows) != count:
         raise ValueError(f"the contact table of '{name}' is cut off")
     columns = {column: np.ascontiguousarray(rows[column]) for column in rows.dtype.names}
-    columns["active"] = columns["active"].astype(bool)
+    for mask in ("active", "sticking"):
+        columns[mask] = columns[mask].astype(bool)
     inner, outer = step["radius"].tolist()
     return ContactResult(
-        name=name, formulation=formulation, force=step["force"].copy(), radius=(inner, outer), **columns
+        name=name,
+        formulation=formulation,
+        force=step["force"].copy(),
+        radius=(inner, outer),
+        dissipation=float(step["dissipation"]),
+        **columns,
     )

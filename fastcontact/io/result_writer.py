@@ -314,6 +314,7 @@ def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> No
             table[name] = getattr(contact, name)
         row["first"], row["count"] = len(pair["rows"]), len(table)
         row["force"], row["radius"] = contact.force, contact.radius
+        row["dissipation"] = contact.dissipation
         _extend(pair["rows"], table)
     _set_row(pair["steps"], number, row)
 

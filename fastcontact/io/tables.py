@@ -41,8 +41,8 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Tab
     -------
     structured ndarray (m,)
         ``point``; ``x``, ``y`` (``z``), ``abscissa``, ``radius`` (distance from the axis), ``gap`` [length];
-        ``pressure`` [pressure]; ``multiplier`` [force or pressure]; ``force_x`` ... [force]; ``active``. With
-        `step` also ``displacement_x`` ... [length], ``stress_xx`` ..., ``von_mises``, ``von_mises_signed``
+        ``pressure`` [pressure]; ``multiplier`` [force or pressure]; ``force_x`` ... [force]; ``shear_x`` ...
+        [pressure]; ``active``, ``sticking``. With `step` also ``displacement_x`` ... [length], ``stress_xx`` ..., ``von_mises``, ``von_mises_signed``
         [pressure].
     """
     columns = {
@@ -54,7 +54,9 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Tab
         "pressure": contact.pressure,
         "multiplier": contact.multiplier,
         **_by_axis("force_", contact.force_vectors),
+        **_by_axis("shear_", contact.shear),
         "active": contact.active,
+        "sticking": contact.sticking,
     }
     return _table(columns | (_fields(step, contact.points) if step is not None else {}))
 
