@@ -1,0 +1,128 @@
+"""Quality figures of meshes known by heart, and the cells that are refused."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fastcontact import elements
+from fastcontact.errors import MeshError
+from fastcontact.generate import block
+from fastcontact.mesh import Mesh
+from fastcontact.mesh_quality import check_cells, quality
+
+
+def one(name, points):
+    return Mesh(points, {name: [np.arange(len(points))]})
+
+
+def test_a_right_triangle():
+    found = quality(one("tri3", [[0, 0], [3, 0], [0, 4]]))
+    assert found.smallest_angle == pytest.approx(math.degrees(math.asin(3 / 5)))
+    assert found.largest_angle == pytest.approx(90.0)
+    assert (found.shortest_edge, found.longest_edge) == (3.0, 5.0)
+    assert found.worst_aspect == pytest.approx(5 / 3)
+    assert found.measure == pytest.approx(6.0)
+    assert (found.n_points, found.n_cells, found.n_bad, found.dim) == (3, {"tri3": 1}, 0, 2)
+
+
+def test_a_rhomb_and_a_dart():
+    rhomb = quality(one("quad4", [[0, 0], [2, 0], [3, math.sqrt(3)], [1, math.sqrt(3)]]))
+    assert (rhomb.smallest_angle, rhomb.largest_angle) == pytest.approx((60.0, 120.0))
+    dart = quality(one("quad4", [[0, 0], [4, 0], [1, 1], [0, 4]]))
+    assert dart.largest_angle > 180.0
+    assert dart.measure == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize("name", [name for name, element in elements.ELEMENTS.items() if element.dim > 1])
+def test_reference_cells_have_their_measure_and_are_accepted(name):
+    element = elements.get(name)
+    mesh = one(name, np.pad(element.nodes, ((0, 0), (0, max(0, 2 - element.dim)))))
+    check_cells(mesh)
+    assert quality(mesh).measure == pytest.approx(element.quadrature[1].sum())
+    assert quality(mesh).n_bad == 0
+
+
+def test_facets_of_a_cube_have_right_angles():
+    corners = elements.get("hex8").nodes
+    mesh = Mesh(corners, {"hex8": [range(8)], "quad4": [[0, 1, 2, 3]]})
+    found = quality(mesh)
+    assert (found.smallest_angle, found.largest_angle) == pytest.approx((90.0, 90.0))
+    assert "volume 8 [length^3]" in str(found)
+
+
+def test_a_curved_side_counts_in_the_area():
+    element = elements.get("tri6")
+    nodes = element.nodes.copy()
+    nodes[4] += 0.1  # outward, along the normal (1, 1): a parabola of height 0.1 sqrt(2) over a chord of sqrt(2)
+    assert quality(one("tri6", nodes)).measure == pytest.approx(0.5 + 2 / 3 * 0.1 * 2)
+
+
+@given(st.floats(0.1, 100.0), st.floats(-180.0, 180.0))
+@settings(max_examples=30, deadline=None)
+def test_angles_do_not_depend_on_size_and_direction(scale, degrees):
+    mesh = block((1.0, 1.0), (2, 2), "tri3", distortion=0.2)
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    turned = mesh.replace(points=scale * mesh.points @ np.array([[c, s], [-s, c]]))
+    before, after = quality(mesh), quality(turned)
+    assert after.smallest_angle == pytest.approx(before.smallest_angle)
+    assert after.worst_aspect == pytest.approx(before.worst_aspect)
+    assert after.measure == pytest.approx(scale**2)
+
+
+def test_the_first_inverted_cell_is_named_with_place_and_count():
+    points = [[0, 0], [1, 0], [0, 1], [1, 1], [2, 0]]
+    mesh = Mesh(points, {"line2": [[0, 1]], "tri3": [[0, 1, 2], [1, 2, 3], [1, 3, 4]]})
+    assert quality(mesh).n_bad == 2
+    with pytest.raises(MeshError) as error:
+        check_cells(mesh)
+    message = str(error.value)
+    assert "cell 2 (tri3 at (0.666667, 0.666667), area -0.5) is inverted, one of 2 such cells" in message
+    assert "topology.oriented" in message
+
+
+@pytest.mark.parametrize("height", [0.0, 1e-15])
+def test_a_flat_cell_is_degenerate(height):
+    mesh = one("tri3", [[0, 0], [1, 0], [0.5, height]])
+    assert quality(mesh).n_bad == 1
+    with pytest.raises(MeshError, match=r"cell 0 .* is degenerate, one of 1 such cells"):
+        check_cells(mesh)
+
+
+def test_a_cell_with_all_nodes_in_one_place_is_degenerate_and_does_not_warn():
+    with np.errstate(all="raise"):
+        assert quality(one("tri3", np.ones((3, 2)))).n_bad == 1
+
+
+def test_a_thin_cell_is_not_degenerate():
+    mesh = one("tri3", [[0, 0], [1, 0], [0.5, 1e-6]])
+    check_cells(mesh)
+    assert quality(mesh).n_bad == 0
+
+
+def test_a_folded_quadratic_cell_is_inverted_though_its_corners_are_fine():
+    nodes = elements.get("tri6").nodes.copy()
+    nodes[3] = [0.5, 0.6]
+    mesh = one("tri6", nodes)
+    assert quality(mesh).n_bad == 1
+    with pytest.raises(MeshError, match="inverted"):
+        check_cells(mesh)
+
+
+def test_a_mesh_without_solid_cells_has_no_figures():
+    found = quality(Mesh([[0, 0], [1, 0]], {"line2": [[0, 1]]}))
+    assert math.isnan(found.smallest_angle)
+    assert math.isnan(found.longest_edge)
+    assert (found.measure, found.n_bad) == (0.0, 0)
+
+
+def test_the_report_is_a_few_lines_with_units():
+    lines = str(quality(block((2.0, 1.0), (4, 2), "tri3"))).splitlines()
+    assert len(lines) == 4
+    assert lines[0].startswith("15 points, 16 tri3, 12 line2")
+    assert "45.0" in lines[1]
+    assert "degrees" in lines[1]
+    assert "[length]" in lines[2]
+    assert lines[3] == "area 2 [length^2]"
