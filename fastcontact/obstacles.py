@@ -1,0 +1,239 @@
+"""Rigid obstacles: shapes that a body may touch but not enter.
+
+An obstacle answers one question, in its own frame: how far from it is a point, and where is outside? Distances are
+signed, positive outside. Where only a height is given (paraboloid, cone, a function of position), the distance is the
+vertical one, times the cosine of the slope: exact in sign and on the surface, and to first order next to it, which is
+all that contact asks, since the pairing is renewed until the points lie on the surface.
+
+Coordinates are (x, y) in two dimensions (x the radius in axisymmetry) and (x, y, z) in three; the axis of a shape is
+the last coordinate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastcontact.errors import ContactError
+
+Array = NDArray[np.float64]
+
+
+class Obstacle(Protocol):
+    """A rigid shape."""
+
+    def distance(self, points: Array) -> tuple[Array, Array]:
+        """Return the signed distance (n,) of `points` (n, dim) and the unit outward normals (n, dim) there [length]."""
+        ...
+
+
+def _positive(**values: float) -> None:
+    for name, value in values.items():
+        if not (math.isfinite(value) and value > 0):
+            raise ContactError(f"{name} = {value} of a rigid obstacle must be a positive number")
+
+
+def _vector(name: str, values: ArrayLike, dim: int) -> Array:
+    vector = np.asarray(values, float)
+    if vector.shape != (dim,) or not np.isfinite(vector).all():
+        raise ContactError(f"{name} = {values} of a rigid obstacle must be {dim} finite numbers, one a coordinate")
+    return vector
+
+
+def _direction(side: str) -> float:
+    if side not in ("below", "above"):
+        raise ContactError(f"side = '{side}' of a rigid obstacle must be 'below' or 'above' the body")
+    return 1.0 if side == "below" else -1.0
+
+
+@dataclass(frozen=True)
+class HalfSpace:
+    """Everything behind a plane.
+
+    Parameters
+    ----------
+    point : sequence of float
+        A point of the plane [length].
+    normal : sequence of float
+        Outward direction, of any length.
+    """
+
+    point: tuple[float, ...]
+    normal: tuple[float, ...]
+
+    def distance(self, points: Array) -> tuple[Array, Array]:
+        """See `Obstacle.distance`."""
+        dim = points.shape[1]
+        normal = _vector("normal", self.normal, dim)
+        length = np.linalg.norm(normal)
+        if length == 0:
+            raise ContactError("the normal of a rigid half-space must not be zero")
+        normal = normal / length
+        return (points - _vector("point", self.point, dim)) @ normal, np.broadcast_to(normal, points.shape).copy()
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A ball, or with ``hollow`` everything but one. In two dimensions a circular cylinder, or a sphere on the axis.
+
+    Parameters
+    ----------
+    centre : sequence of float
+        [length].
+    R : float
+        Radius [length].
+    hollow : bool
+        The body lies inside.
+    """
+
+    centre: tuple[float, ...]
+    R: float
+    hollow: bool = False
+
+    def __post_init__(self) -> None:
+        _positive(R=self.R)
+
+    def distance(self, points: Array) -> tuple[Array, Array]:
+        """See `Obstacle.distance`."""
+        apart = points - _vector("centre", self.centre, points.shape[1])
+        length = np.linalg.norm(apart, axis=1)
+        away = np.zeros_like(apart)
+        away[:, -1] = 1.0  # at the centre itself every direction leads out
+        np.divide(apart, length[:, None], out=away, where=length[:, None] > 0)
+        return (self.R - length, -away) if self.hollow else (length - self.R, away)
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """A circular cylinder of any direction in three dimensions, or with ``hollow`` everything but one.
+
+    Parameters
+    ----------
+    point, axis : sequence of float
+        A point of the axis [length], and its direction.
+    R : float
+        Radius [length].
+    hollow : bool
+        The body lies inside.
+    """
+
+    point: tuple[float, float, float]
+    axis: tuple[float, float, float]
+    R: float
+    hollow: bool = False
+
+    def __post_init__(self) -> None:
+        _positive(R=self.R, length=float(np.linalg.norm(self.axis)))
+
+    def distance(self, points: Array) -> tuple[Array, Array]:
+        """See `Obstacle.distance`."""
+        if points.shape[1] != 3:
+            raise ContactError("a rigid cylinder needs a three-dimensional model; in two dimensions use a sphere")
+        axis = np.asarray(self.axis) / np.linalg.norm(self.axis)
+        apart = points - np.asarray(self.point)
+        apart -= np.outer(apart @ axis, axis)
+        return Sphere((0.0, 0.0, 0.0), self.R, self.hollow).distance(apart)
+
+
+@dataclass(frozen=True)
+class Height:
+    """Everything below (or above) a height over the other coordinates.
+
+    Parameters
+    ----------
+    function : callable
+        Height [length] for positions (n, dim - 1), and its slopes: ``f(x) -> (h (n,), slope (n, dim - 1))``.
+    side : str
+        ``"below"`` the body (the obstacle is what lies lower), or ``"above"`` it.
+    """
+
+    function: Callable[[Array], tuple[Array, Array]]
+    side: str = "below"
+
+    def __post_init__(self) -> None:
+        _direction(self.side)
+
+    def distance(self, points: Array) -> tuple[Array, Array]:
+        """See `Obstacle.distance`."""
+        sign = _direction(self.side)
+        height, slope = self.function(points[:, :-1])
+        normal = np.column_stack([-slope, np.ones(len(points))])
+        length = np.linalg.norm(normal, axis=1)
+        return sign * (points[:, -1] - height) / length, sign * normal / length[:, None]
+
+
+def paraboloid(R: float, tip: ArrayLike = 0.0, side: str = "above") -> Height:
+    """Return a paraboloid of revolution (a parabola in two dimensions) of radius `R` [length] at its tip.
+
+    `tip` is the height of its tip over the origin [length]; the obstacle lies `side` ("above" or "below") the body.
+    """
+    _positive(R=R)
+    sign, low = -_direction(side), float(np.asarray(tip))
+
+    def height(x: Array) -> tuple[Array, Array]:
+        return low + sign * (x * x).sum(axis=1) / (2 * R), sign * x / R
+
+    return Height(height, side)
+
+
+def cone(slope: float, tip: float = 0.0, side: str = "above") -> Height:
+    """Return a cone (a wedge in two dimensions) that rises by `slope` from its tip.
+
+    Slope is the tangent of the angle between its side and the plane. At the tip itself the normal is the axis.
+    """
+    _positive(slope=slope)
+    sign = -_direction(side)
+
+    def height(x: Array) -> tuple[Array, Array]:
+        r = np.linalg.norm(x, axis=1)
+        away = np.divide(x, r[:, None], out=np.zeros_like(x), where=r[:, None] > 0)
+        return tip + sign * slope * r, sign * slope * away
+
+    return Height(height, side)
+
+
+@dataclass(frozen=True)
+class FlatPunch:
+    """A flat punch of a given radius (half-width in plane problems): a face, and nothing beyond its edge.
+
+    Parameters
+    ----------
+    radius : float
+        [length].
+    height : float
+        Of the face over the origin [length].
+    side : str
+        ``"above"`` or ``"below"`` the body.
+    """
+
+    radius: float
+    height: float = 0.0
+    side: str = "above"
+
+    def __post_init__(self) -> None:
+        _positive(radius=self.radius)
+        _direction(self.side)
+
+    def distance(self, points: Array) -> tuple[Array, Array]:
+        """See `Obstacle.distance`; infinite beyond the edge, where a body may rise beside the punch."""
+        sign = _direction(self.side)
+        normal = np.zeros_like(points)
+        normal[:, -1] = sign
+        gap = sign * (points[:, -1] - self.height)
+        beside = np.linalg.norm(points[:, :-1], axis=1) > self.radius * (1 + 1e-12)
+        return np.where(beside, np.inf, gap), normal
+
+
+SHAPES: dict[str, Callable[..., Obstacle]] = {
+    "half_space": HalfSpace,
+    "sphere": Sphere,
+    "cylinder": Cylinder,
+    "paraboloid": paraboloid,
+    "cone": cone,
+    "flat_punch": FlatPunch,
+}
