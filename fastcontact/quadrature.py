@@ -27,9 +27,7 @@ def trapezium_line() -> Rule:
 
 def gauss_square(n: int) -> Rule:
     """Tensor Gauss rule with n x n points on [-1, 1]^2."""
-    x, w = np.polynomial.legendre.leggauss(n)
-    X, Y = np.meshgrid(x, x, indexing="xy")
-    return np.column_stack([X.ravel(), Y.ravel()]), np.outer(w, w).ravel()
+    return square(gauss_line(n))
 
 
 def triangle_1() -> Rule:
@@ -64,6 +62,75 @@ def triangle_7() -> Rule:
         points += [[a, a], [1 - 2 * a, a], [a, 1 - 2 * a]]
         weights += [(155.0 + sign * root) / 2400.0] * 3
     return np.array(points), np.array(weights)
+
+
+def triangle_12() -> Rule:
+    """Twelve interior points, exact to degree 6 (Dunavant, 1985)."""
+    return _symmetric(
+        [],
+        [(0.1167862757263978, 0.2492867451708992), (0.05084490637020978, 0.06308901449150417)],
+        [(0.08285107561836291, 0.05314504984480938, 0.3103524510337927)],
+    )
+
+
+def triangle_16() -> Rule:
+    """Sixteen interior points, exact to degree 8 (Dunavant, 1985)."""
+    return _symmetric(
+        [0.144315607677777],
+        [
+            (0.09509163426728974, 0.4592925882927181),
+            (0.1032173705347262, 0.1705693077517538),
+            (0.03245849762319998, 0.05054722831703223),
+        ],
+        [(0.0272303141744292, 0.008394777409941592, 0.2631128296346346)],
+    )
+
+
+def _symmetric(
+    centre: list[float], threes: list[tuple[float, float]], sixes: list[tuple[float, float, float]]
+) -> Rule:
+    """Return a rule on the triangle from its orbits: weights (of 1 in all), then coordinates equal up to permutation."""
+    points, weights = [[1.0 / 3.0, 1.0 / 3.0] for _ in centre], list(centre)
+    for weight, a in threes:
+        points += [[a, a], [1 - 2 * a, a], [a, 1 - 2 * a]]
+        weights += [weight] * 3
+    for weight, a, b in sixes:
+        c = 1 - a - b
+        points += [[a, b], [b, a], [a, c], [c, a], [b, c], [c, b]]
+        weights += [weight] * 6
+    return np.array(points), np.array(weights) / 2.0
+
+
+def triangle(degree: int) -> Rule:
+    """Return the symmetric rule on the triangle that is exact to `degree`: 2, 4, 6 or 8 with 3, 6, 12 or 16 points."""
+    return {2: triangle_3, 4: triangle_6, 6: triangle_12, 8: triangle_16}[degree]()
+
+
+def triangle_7_closed() -> Rule:
+    """Corners, middles of the sides and centre, exact to degree 3, all weights positive (Hammer and Stroud, 1956)."""
+    points = np.array([[0, 0], [6, 0], [0, 6], [3, 0], [3, 3], [0, 3], [2, 2]]) / 6.0
+    return points, np.array([3.0, 3.0, 3.0, 8.0, 8.0, 8.0, 27.0]) / 120.0
+
+
+def quartered_triangle(rule: Rule) -> Rule:
+    """Return a rule on the triangle applied on its four quarters; points that coincide are merged."""
+    points, weights = rule
+    shifts = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]])
+    pieces = [shift + 0.5 * points for shift in shifts] + [0.5 - 0.5 * points]
+    return _merged(np.concatenate(pieces), np.tile(weights / 4.0, 4))
+
+
+def square(rule: Rule) -> Rule:
+    """Return the product of a rule on [-1, 1] with itself."""
+    (x, w), (X, Y) = rule, np.meshgrid(rule[0][:, 0], rule[0][:, 0], indexing="xy")
+    return np.column_stack([X.ravel(), Y.ravel()]), np.outer(w, w).ravel()
+
+
+def _merged(points: Array, weights: Array) -> Rule:
+    unique, place = np.unique(np.round(points, 14), axis=0, return_inverse=True)
+    merged = np.zeros(len(unique))
+    np.add.at(merged, place.ravel(), weights)
+    return unique, merged
 
 
 def gauss_cube(n: int) -> Rule:
@@ -139,3 +206,26 @@ def subdivided(rule: Rule, parts: int) -> Rule:
     merged = np.zeros(len(unique))
     np.add.at(merged, place, all_weights)
     return unique[:, None], merged
+
+
+def collapsed_triangle(n: int) -> Rule:
+    """Product rule with n x n points on the triangle (0,0) (1,0) (0,1), exact to degree 2n - 2.
+
+    Gauss-Legendre in x and in y / (1 - x) (Stroud, 1971, section 2.4).
+    """
+    s, w = np.polynomial.legendre.leggauss(n)
+    s, w = (1.0 + s) / 2.0, w / 2.0
+    x, t = (a.ravel() for a in np.meshgrid(s, s, indexing="ij"))
+    return np.column_stack([x, (1.0 - x) * t]), np.outer(w * (1.0 - s), w).ravel()
+
+
+def collapsed_tetrahedron(n: int) -> Rule:
+    """Product rule with n x n x n points on the tetrahedron of `tetrahedron_1`, exact to degree 2n - 3.
+
+    The triangle's rule once more (Stroud, 1971, section 2.4).
+    """
+    s, w = np.polynomial.legendre.leggauss(n)
+    s, w = (1.0 + s) / 2.0, w / 2.0
+    face, v = collapsed_triangle(n)
+    points = np.column_stack([np.repeat(s, len(v)), np.kron((1.0 - s)[:, None], face)])
+    return points, np.outer(w * (1.0 - s) ** 2, v).ravel()

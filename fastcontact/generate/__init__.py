@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from fastcontact.generate.blocks import block, block_on_block, cylinder_on_block
+from fastcontact.generate.box import box
 from fastcontact.generate.half_spheres import half_spheres, quarter_disc
 from fastcontact.generate.quadratic import Circle, to_quadratic
+from fastcontact.generate.refine import circles, linearised, refined
 from fastcontact.generate.transform import merge_points, mirrored, renamed, transformed, union
 from fastcontact.mesh import Mesh
 
@@ -18,6 +20,7 @@ GENERATORS: dict[str, Callable[..., Mesh]] = {
     "half-spheres": half_spheres,
     "block-on-block": block_on_block,
     "cylinder-on-block": cylinder_on_block,
+    "box": box,
 }
 
 __all__ = [
@@ -25,11 +28,15 @@ __all__ = [
     "Circle",
     "block",
     "block_on_block",
+    "box",
+    "circles",
     "cylinder_on_block",
     "half_spheres",
+    "linearised",
     "merge_points",
     "mirrored",
     "quarter_disc",
+    "refined",
     "renamed",
     "to_quadratic",
     "transformed",

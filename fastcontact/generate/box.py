@@ -95,7 +95,7 @@ def _solids(solid: Element, shape: Indices) -> tuple[Indices, Indices]:
     # One number for each place of the lattice; they add up.
     n_y, n_z = STEPS * shape[1:] + 1
     weights = np.array([n_y * n_z, n_z, 1])
-    first = STEPS * np.indices(shape).reshape(3, -1).T @ weights
+    first = STEPS * np.indices(tuple(shape.tolist())).reshape(3, -1).T @ weights
     places = first[:, None, None] + np.rint(local).astype(np.int64) @ weights
     found, block = np.unique(places, return_inverse=True)
     lattice = np.column_stack([found // (n_y * n_z), found // n_z % n_y, found % n_z])

@@ -40,10 +40,11 @@ COMPLETE_FORMATS = ("vtk", "vtu", "gmsh22", "abaqus")
 FLAT_FORMATS = ("gmsh22", "abaqus", "medit", "su2", "dolfin-xml")
 
 # Cells that meshio gets in another order than ours: our node k is its node NODE_ORDER[format][element][k]. It mirrors
-# the linear wedge of VTK, as old VTK documents have it and VTK 9.7 has not, and leaves Gmsh's wedge of 18 nodes as it is.
-_WEDGE_OF_VTK = {"wedge6": elements.get("wedge6").reversed}
-_WEDGE_OF_GMSH = {"wedge18": (0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16)}
-NODE_ORDER: dict[str, dict[str, tuple[int, ...]]] = {
+# the linear wedge of VTK, as old documents of VTK want and VTK 9.7 does not, and leaves Gmsh's wedge of 18 nodes alone.
+Orders = Mapping[str, tuple[int, ...]]
+_WEDGE_OF_VTK: Orders = {"wedge6": elements.get("wedge6").reversed}
+_WEDGE_OF_GMSH: Orders = {"wedge18": (0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16)}
+NODE_ORDER: dict[str, Orders] = {
     "vtk": _WEDGE_OF_VTK,
     "vtu": _WEDGE_OF_VTK,
     "gmsh": _WEDGE_OF_GMSH,
@@ -149,7 +150,7 @@ def _cell_group_names(found: Any, file_format: str) -> list[str]:
     return names
 
 
-def _blocks(found: Any, order: Mapping[str, tuple[int, ...]]) -> list[Block]:
+def _blocks(found: Any, order: Orders) -> list[Block]:
     foreign: dict[str, int] = {}
     for block in found.cells:
         if block.type not in elements.BY_MESHIO and block.type != VERTEX:
@@ -161,7 +162,7 @@ def _blocks(found: Any, order: Mapping[str, tuple[int, ...]]) -> list[Block]:
     return [_block(found, index, cells, order) for index, cells in enumerate(found.cells)]
 
 
-def _block(found: Any, index: int, cells: Any, order: Mapping[str, tuple[int, ...]]) -> Block:
+def _block(found: Any, index: int, cells: Any, order: Orders) -> Block:
     kind = VERTEX if cells.type == VERTEX else elements.BY_MESHIO[cells.type].name
     dim = 0 if kind == VERTEX else elements.get(kind).dim
     groups: dict[str, NDArray[Any]] = {}
@@ -247,7 +248,7 @@ def _parts(mesh: Mesh, file_format: str) -> dict[str, Any]:
     return parts
 
 
-def _meshio_cells(mesh: Mesh, order: Mapping[str, tuple[int, ...]]) -> list[tuple[str, NDArray[Any]]]:
+def _meshio_cells(mesh: Mesh, order: Orders) -> list[tuple[str, NDArray[Any]]]:
     return [
         (elements.get(name).meshio, block[:, np.argsort(order[name])] if name in order else np.array(block))
         for name, block in mesh.cells.items()

@@ -33,7 +33,7 @@ class MeshReport:
     mesh_name : str
         Name of the mesh in the file; empty where the format has none.
     n_turned : int
-        Solid cells whose nodes were reordered so that they are counter-clockwise.
+        Solid cells whose nodes were reordered because they were inside out (clockwise in 2D).
     dropped : mapping of str to int
         Kinds of cells that are not in the mesh, with their number: ``"vertex"`` (cells of one node; their
         groups are now groups of points), ``"duplicate"`` (cells that Gmsh repeats for each of their groups).
@@ -66,7 +66,7 @@ def read_mesh(path: PathLike, *, mesh_name: str | None = None, orient: bool = Tr
     mesh_name : str, optional
         Which mesh to read, of a MED file with several.
     orient : bool
-        Turn solid cells so that all are counter-clockwise.
+        Turn solid cells that are inside out (clockwise in 2D); see `fastcontact.topology.oriented`.
 
     Returns
     -------

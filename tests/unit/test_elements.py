@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from fastcontact import elements
 from fastcontact.errors import MeshError
 
 ALL = list(elements.ELEMENTS.values())
-SOLID = [e for e in ALL if e.facet]
+SOLID = [e for e in ALL if e.facet_elements]
 
 
 def interior_points(element, n=7):
@@ -15,6 +16,20 @@ def interior_points(element, n=7):
     rng = np.random.default_rng(1)
     blend = rng.dirichlet(np.ones(element.n_corners), n)
     return blend @ element.nodes[: element.n_corners]
+
+
+def measure(element):
+    """Length, area or volume of the reference cell, from its corners alone."""
+    corners = element.nodes[: element.n_corners]
+    return np.ptp(corners) if element.dim == 1 else ConvexHull(corners).volume
+
+
+def normals(facet, nodes):
+    """Normals (n_q, dim) of a facet at its quadrature points: area per unit of its reference cell."""
+    tangents = np.einsum("qna,nd->qad", facet.tables[1], nodes)
+    if facet.dim == 1:
+        return np.column_stack([tangents[:, 0, 1], -tangents[:, 0, 0]])
+    return np.cross(tangents[:, 0], tangents[:, 1])
 
 
 @pytest.mark.parametrize("element", ALL, ids=lambda e: e.name)
@@ -44,10 +59,14 @@ def test_polynomials_of_the_element_order_are_reproduced(element):
 
 
 @pytest.mark.parametrize("element", ALL, ids=lambda e: e.name)
+def test_values_and_gradients_are_finite_at_the_nodes(element):
+    assert np.isfinite(element.gradient(element.nodes)).all()
+
+
+@pytest.mark.parametrize("element", ALL, ids=lambda e: e.name)
 def test_quadrature_measures_the_cell_and_extrapolation_keeps_linear_fields(element):
     points, weights = element.quadrature
-    measure = {1: 2.0, 2: 0.5 if element.n_corners == 3 else 4.0}[element.dim]
-    assert weights.sum() == pytest.approx(measure, rel=1e-14)
+    assert weights.sum() == pytest.approx(measure(element), rel=1e-14)
     if len(points) >= element.n_corners:
         linear = points @ np.arange(1.0, element.dim + 1) + 0.5
         expected = element.nodes @ np.arange(1.0, element.dim + 1) + 0.5
@@ -56,22 +75,64 @@ def test_quadrature_measures_the_cell_and_extrapolation_keeps_linear_fields(elem
 
 
 @pytest.mark.parametrize("element", SOLID, ids=lambda e: e.name)
-def test_facets_point_outward_and_have_their_mid_node_in_the_middle(element):
+def test_facets_are_the_outside_of_the_cell_with_normals_outward(element):
     centre = element.nodes[: element.n_corners].mean(axis=0)
-    for facet in element.facets:
-        nodes = element.nodes[list(facet)]
-        tangent = nodes[1] - nodes[0]
-        normal = np.array([tangent[1], -tangent[0]])
-        assert normal @ (nodes[:2].mean(axis=0) - centre) > 0
-        assert len(facet) == elements.get(element.facet).n_nodes
-        if len(facet) == 3:
-            assert np.allclose(nodes[2], nodes[:2].mean(axis=0))
+    assert len(element.facets) == len(element.facet_elements)
+    flux = 0.0
+    for local, name in zip(element.facets, element.facet_elements):
+        facet, nodes = elements.get(name), element.nodes[list(local)]
+        assert facet.dim == element.dim - 1
+        # Mid nodes and centres stand where the facet's own element has them between its corners.
+        corners = nodes[: facet.n_corners]
+        assert np.allclose(facet.corner_shape(facet.nodes) @ corners, nodes, atol=1e-15)
+        outward, (N, _, weights) = normals(facet, nodes), facet.tables
+        assert (np.einsum("qd,d->q", outward, corners.mean(axis=0) - centre) > 0).all()
+        flux += np.einsum("q,qd,qd->", weights, outward, N @ nodes)
+    assert flux / element.dim == pytest.approx(measure(element), rel=1e-14)  # divergence theorem
+
+
+@pytest.mark.parametrize("element", SOLID, ids=lambda e: e.name)
+def test_facet_shape_functions_are_those_of_the_cell_on_that_facet(element):
+    for local, name in zip(element.facets, element.facet_elements):
+        facet = elements.get(name)
+        xi = interior_points(facet)
+        values = element.shape(facet.shape(xi) @ element.nodes[list(local)])
+        assert np.abs(values[:, list(local)] - facet.shape(xi)).max() < 1e-14
+        others = np.setdiff1d(np.arange(element.n_nodes), local)
+        assert np.abs(values[:, others]).max(initial=0.0) < 1e-14
+
+
+@pytest.mark.parametrize("element", ALL, ids=lambda e: e.name)
+def test_mid_nodes_stand_in_the_order_of_the_edges(element):
+    edges = np.array(element.edges)
+    ends = element.nodes[edges]
+    assert len(np.unique(np.sort(edges, axis=1), axis=0)) == len(edges)
+    if element.order == 2:
+        found = element.nodes[element.n_corners : element.n_corners + len(edges)]
+        assert np.array_equal(found, ends.mean(axis=1))
+
+
+@pytest.mark.parametrize("element", ALL, ids=lambda e: e.name)
+def test_reversed_is_the_same_cell_inside_out(element):
+    order = list(element.reversed)
+    assert sorted(order) == list(range(element.n_nodes))
+    assert [order[i] for i in order] == list(range(element.n_nodes))
+    xi = interior_points(element)
+    mirrored = -xi if element.dim == 1 else xi[:, [1, 0, 2][: element.dim]]
+    assert np.abs(element.shape(xi) @ element.nodes[order] - mirrored).max() < 1e-14
+    sets = {frozenset(facet) for facet in element.facets}
+    assert {frozenset(order[i] for i in facet) for facet in element.facets} == sets
 
 
 def test_linear_and_quadratic_partners_share_their_corners():
     for element in ALL:
         linear, quadratic = elements.get(element.linear), elements.get(element.quadratic)
         assert np.array_equal(linear.nodes, quadratic.nodes[: linear.n_nodes])
+
+
+def test_names_in_other_programs_are_unique():
+    for table in (elements.BY_MED, elements.BY_MESHIO, elements.BY_VTK):
+        assert len(table) == len(ALL)
 
 
 def test_an_unknown_element_offers_near_names():

@@ -1,0 +1,328 @@
+"""Three dimensions: element loops against NumPy twins, patch tests, exact solutions, orientation, mixed meshes."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact import elements, recovery
+from fastcontact.assembly import rigid_modes, stiffness
+from fastcontact.generate.box import box
+from fastcontact.topology import corner_volumes, oriented, outer_facets
+
+SOLIDS = [e.name for e in elements.ELEMENTS.values() if e.dim == 3]
+QUADRATIC = [name for name in SOLIDS if elements.get(name).order == 2]
+E, NU = 210.0, 0.3
+D = fc.LinearElastic(E, NU).moduli("3d")
+# Displacement gradient of a linear field without symmetry, and its stress.
+SLOPE = np.array([[1.0, 0.4, -0.3], [-0.2, -2.0, 0.7], [0.5, 0.1, 0.6]]) * 1e-3
+STRAIN = [SLOPE[0, 0], SLOPE[1, 1], SLOPE[2, 2], SLOPE[0, 1] + SLOPE[1, 0], SLOPE[1, 2] + SLOPE[2, 1],
+          SLOPE[0, 2] + SLOPE[2, 0]]  # fmt: skip
+
+
+def distorted(mesh, amount=0.03):
+    """All points moved by a smooth field, mid nodes too, so that edges and faces curve."""
+    return mesh.replace(points=mesh.points + amount * np.sin(4.0 * mesh.points[:, [1, 2, 0]] + [0.3, 1.1, 2.0]))
+
+
+def patch(element, divisions=(2, 2, 2)):
+    return distorted(box((2.0, 1.5, 1.2), divisions, element, (0.5, -0.3, 0.2)))
+
+
+def mixed():
+    """Columns of hexahedra, wedges, pyramids, and pyramids with tetrahedra outside, around one inner line."""
+    n = np.arange(27).reshape(3, 3, 3)
+    points, cells = list(np.indices((3, 3, 3)).reshape(3, -1).T.astype(float)), {}
+
+    def add(name, *cell):
+        cells.setdefault(name, []).append(cell)
+
+    for i, j, k in np.ndindex(2, 2, 2):
+        corners = elements.get("hex8").nodes.astype(int) > 0
+        c = n[i + corners[:, 0], j + corners[:, 1], k + corners[:, 2]].tolist()
+        if (i, j) == (0, 0):
+            add("hex8", *c)
+        elif (i, j) == (1, 0):
+            add("wedge6", *(c[m] for m in (0, 1, 2, 4, 5, 6)))
+            add("wedge6", *(c[m] for m in (0, 2, 3, 4, 6, 7)))
+        else:
+            points.append(np.mean([points[m] for m in c], axis=0))
+            for facet in elements.get("hex8").facets:
+                base = [c[m] for m in reversed(facet)]
+                places = np.array([points[m] for m in base])
+                outside = (places == places[0]).all(axis=0) & np.isin(places[0], (0.0, 2.0))
+                if (i, j) == (1, 1) and outside.any():
+                    add("tet4", base[0], base[1], base[2], len(points) - 1)
+                    add("tet4", base[0], base[2], base[3], len(points) - 1)
+                else:
+                    add("pyramid5", *base, len(points) - 1)
+    return fc.Mesh(points, cells)
+
+
+MESHES = {name: lambda name=name: patch(name) for name in SOLIDS}
+MESHES["mixed linear"] = lambda: distorted(mixed())
+MESHES["mixed quadratic"] = lambda: distorted(fc.generate.to_quadratic(mixed()))
+
+
+@pytest.fixture(params=MESHES, scope="module")
+def any_mesh(request):
+    return MESHES[request.param]()
+
+
+def strain_operator(gradient):
+    """The strain-displacement matrix (6, 3 n) of shape derivatives (n, 3), written out."""
+    B = np.zeros((6, 3 * len(gradient)))
+    x, y, z = gradient.T
+    B[0, 0::3], B[1, 1::3], B[2, 2::3] = x, y, z
+    B[3, 0::3], B[3, 1::3] = y, x
+    B[4, 1::3], B[4, 2::3] = z, y
+    B[5, 0::3], B[5, 2::3] = z, x
+    return B
+
+
+def twin(mesh, moduli):
+    """Stiffness assembled densely, cell by cell."""
+    K = np.zeros((3 * mesh.n_points,) * 2)
+    for name, block in mesh.solids.items():
+        _, dN, weights = elements.get(name).tables
+        for cell in block:
+            dofs = (3 * cell[:, None] + [0, 1, 2]).ravel()
+            for q, weight in enumerate(weights):
+                J = dN[q].T @ mesh.points[cell]
+                B = strain_operator(dN[q] @ np.linalg.inv(J).T)
+                K[np.ix_(dofs, dofs)] += weight * np.linalg.det(J) * B.T @ moduli @ B
+    return K
+
+
+def one_material(mesh):
+    return {name: np.zeros(len(block), np.int32) for name, block in mesh.solids.items()}
+
+
+def assembled(mesh, moduli=D):
+    return stiffness(mesh, "3d", moduli[None], one_material(mesh))
+
+
+def stress_at_points(mesh, u):
+    return recovery.stress_at_points(mesh, "3d", D[None], one_material(mesh), u)
+
+
+def with_field(mesh, field):
+    """A model with the displacement `field` prescribed at every outer node, and the inner nodes."""
+    outer = np.unique(np.concatenate([facets.ravel() for facets in outer_facets(mesh).values()]))
+    model = fc.Model(mesh.with_groups(points={f"P{p}": [p] for p in outer}), "3d")
+    model.add_material(fc.LinearElastic(E, NU))
+    for p, (x, y, z) in zip(outer, field(mesh.points[outer])):
+        model.prescribe(f"P{p}", x=x, y=y, z=z)
+    return model, np.setdiff1d(np.arange(mesh.n_points), outer)
+
+
+# Exact solutions -----------------------------------------------------------------------------------------------------
+
+
+def test_linear_patch_test_through_the_solver(any_mesh):
+    model, inner = with_field(any_mesh, lambda x: x @ SLOPE.T + 1e-3)
+    (step,) = fc.solve(model, fc.linear_ramp(1))
+    assert len(inner)
+    assert np.abs(step.displacement - (any_mesh.points @ SLOPE.T + 1e-3)).max() < 1e-10 * 1e-3
+    assert np.abs(step.stress - D @ STRAIN).max() < 1e-10 * np.abs(D @ STRAIN).max()
+    assert np.abs(step.reaction[inner]).max() == 0.0
+
+
+@pytest.mark.parametrize("element", QUADRATIC)
+def test_pure_bending_is_exact_with_quadratic_cells(element):
+    # Sheared, not curved: cells stay affine images of the reference cell, on which quadratic fields are exact.
+    mesh = box((2.0, 1.0, 1.0), (2, 2, 2), element)
+    mesh = mesh.replace(points=mesh.points @ np.array([[1.0, 0.1, 0.0], [0.2, 1.0, 0.0], [0.1, 0.3, 1.0]]))
+    curvature = 1e-3
+
+    def bending(points):
+        x, y, z = points.T
+        return curvature * np.column_stack([x * y, -(x * x + NU * (y * y - z * z)) / 2, -NU * y * z])
+
+    model, inner = with_field(mesh, bending)
+    (step,) = fc.solve(model, fc.linear_ramp(1))
+    assert np.abs(step.displacement - bending(mesh.points))[inner].max() < 1e-10 * curvature
+    expected = np.zeros((mesh.n_points, 6))
+    expected[:, 0] = E * curvature * mesh.points[:, 1]
+    assert np.abs(step.stress - expected).max() < 1e-9 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("linear_solver", ["direct", "amg"])
+@pytest.mark.parametrize("element", SOLIDS)
+def test_bar_in_tension_is_exact(element, linear_solver):
+    size, strain = (3.0, 1.0, 2.0), 2e-3
+    model = fc.Model(box(size, (3, 2, 2), element), "3d")
+    model.add_material(fc.LinearElastic(E, NU), "BOX")
+    for group, axis in (("XMIN", "x"), ("YMIN", "y"), ("ZMIN", "z")):
+        model.fix(group, axis)
+    model.prescribe("XMAX", x=strain * size[0])
+    steps = fc.solve(model, fc.linear_ramp(2), linear_solver=linear_solver)
+    expected = model.mesh.points * [strain, -NU * strain, -NU * strain]
+    assert np.abs(steps[1].displacement - expected).max() < 1e-8 * strain
+    assert np.abs(steps[0].displacement - expected / 2).max() < 1e-8 * strain
+    assert np.abs(steps[1].stress - [E * strain, 0, 0, 0, 0, 0]).max() < 1e-7 * E * strain
+    assert steps[1].von_mises == pytest.approx(E * strain, rel=1e-7)
+    pulled = steps[1].reaction[model.mesh.points_of("XMAX")].sum(axis=0)
+    assert pulled == pytest.approx([E * strain * size[1] * size[2], 0, 0], abs=1e-7)
+
+
+@pytest.mark.parametrize("element", QUADRATIC)
+def test_cantilever_against_timoshenko(element):
+    length, tip = 10.0, 0.01
+    model = fc.Model(box((length, 1.0, 1.0), (10, 2, 2), element), "3d")
+    model.add_material(fc.LinearElastic(E, 0.0))  # no lateral strain for the clamped end to hinder
+    model.fix("XMIN", "xyz")
+    model.prescribe("XMAX", z=tip)
+    (step,) = fc.solve(model, fc.linear_ramp(1))
+    # Bending and shear; shear coefficient of a rectangle 10 (1 + nu) / (12 + 11 nu) (Cowper, 1966).
+    compliance = length**3 / (3 * E / 12) + length / (5 / 6 * E / 2)
+    force = step.reaction[model.mesh.points_of("XMAX")].sum(axis=0)
+    assert force[2] == pytest.approx(tip / compliance, rel=4e-3)
+    assert force[:2] == pytest.approx([0.0, 0.0], abs=1e-9)
+    middle = np.isclose(model.mesh.points[:, 0], 5.0)
+    bending = -6 * 2 * (model.mesh.points[middle, 2] - 0.5) * force[2] * (length - 5.0)
+    assert np.abs(step.stress[middle, 0] - bending).max() < 0.03 * np.abs(bending).max()
+
+
+# Element loops -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("element", SOLIDS)
+def test_stiffness_equals_its_numpy_twin(element):
+    mesh = patch(element, (2, 1, 1))
+    K, expected = assembled(mesh).toarray(), twin(mesh, D)
+    assert np.abs(K - expected).max() < 1e-12 * np.abs(expected).max()
+    assert np.array_equal(K, K.T)
+
+
+@pytest.mark.parametrize("element", ["tet4", "hex8", "wedge15", "pyramid13"])
+def test_stiffness_of_any_symmetric_moduli_equals_its_twin(element):
+    root = np.random.default_rng(3).normal(size=(6, 6))
+    moduli = root @ root.T
+    mesh = patch(element, (2, 1, 1))
+    K, expected = assembled(mesh, moduli).toarray(), twin(mesh, moduli)
+    assert np.abs(K - expected).max() < 1e-12 * np.abs(expected).max()
+    assert np.array_equal(K, K.T)
+
+
+def test_each_cell_has_its_own_material():
+    mesh = patch("hex8", (2, 1, 1))
+    orthotropic = D + np.diag([50.0, 0, 0, 0, 0, 20.0])
+    first, second = (
+        stiffness(mesh.replace(cells={"hex8": mesh.cells["hex8"][[i]]}, cell_groups={}), "3d", moduli[None],
+                  {"hex8": np.zeros(1, np.int32)}).toarray()
+        for i, moduli in enumerate((D, orthotropic))
+    )  # fmt: skip
+    both = stiffness(mesh, "3d", np.stack([orthotropic, D]), {"hex8": np.array([1, 0], np.int32)}).toarray()
+    assert np.abs(both - first - second).max() < 1e-12 * np.abs(both).max()
+
+
+def test_rigid_body_motion_needs_no_force_and_gives_no_stress(any_mesh):
+    K, modes = assembled(any_mesh), rigid_modes(any_mesh.points, "3d")
+    assert np.linalg.matrix_rank(modes) == 6
+    for mode in modes.T:
+        assert np.abs(K @ mode).max() < 1e-10 * np.abs(K.data).max()
+        at_points = stress_at_points(any_mesh, mode.reshape(-1, 3))
+        assert np.abs(recovery.nodal_average(any_mesh, at_points)).max() < 1e-10 * E
+
+
+@pytest.mark.parametrize("element", SOLIDS)
+def test_nothing_but_rigid_body_motion_is_free(element):
+    mesh = patch(element, (1, 1, 1))
+    values = np.linalg.eigvalsh(assembled(mesh).toarray())
+    assert np.abs(values[:6]).max() < 1e-12 * values[-1]
+    assert values[6] > 1e-4 * values[-1]
+
+
+def test_linear_displacements_give_the_exact_stress_everywhere(any_mesh):
+    at_points = stress_at_points(any_mesh, any_mesh.points @ SLOPE.T)
+    for values in (*at_points.values(), *recovery.stress_at_element_nodes(at_points).values()):
+        assert np.abs(values - D @ STRAIN).max() < 1e-11
+    assert np.abs(recovery.nodal_average(any_mesh, at_points) - D @ STRAIN).max() < 1e-11
+
+
+def test_internal_forces_are_stiffness_times_displacement(any_mesh):
+    u = np.random.default_rng(2).normal(size=any_mesh.points.shape)
+    force = recovery.internal_force(any_mesh, "3d", stress_at_points(any_mesh, u))
+    assert np.abs(force.ravel() - assembled(any_mesh) @ u.ravel()).max() < 1e-12 * np.abs(force).max()
+
+
+def test_assembly_gives_the_same_bits_each_time():
+    mesh = patch("hex20")
+    assert np.array_equal(assembled(mesh).data, assembled(mesh).data)
+
+
+# Topology ------------------------------------------------------------------------------------------------------------
+
+
+def enclosed(mesh):
+    """Volume inside the outer facets by the divergence theorem."""
+    total = 0.0
+    for name, facets in outer_facets(mesh).items():
+        N, dN, weights = elements.get(name).tables
+        corners = mesh.points[facets]
+        a, b = np.moveaxis(np.einsum("qnk,fnd->fqkd", dN, corners), 2, 0)
+        total += np.einsum("q,fqd,fqd->", weights, np.cross(a, b), np.einsum("qn,fnd->fqd", N, corners)) / 3
+    return total
+
+
+def test_outer_facets_enclose_the_volume_with_normals_outward(any_mesh):
+    assert enclosed(any_mesh) == pytest.approx(fc.quality(any_mesh).measure, rel=1e-3)
+    for facets in outer_facets(any_mesh).values():
+        assert len(np.unique(np.sort(facets, axis=1), axis=0)) == len(facets)
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_cells_turned_inside_out_are_turned_back(name):
+    mesh = MESHES[name]()
+    K, cells, random, n_turned = assembled(mesh), {}, np.random.default_rng(5), 0
+    for kind, block in mesh.solids.items():
+        turned = random.random(len(block)) < 0.5
+        turned[0] = True
+        cells[kind] = np.where(turned[:, None], block[:, elements.get(kind).reversed], block)
+        n_turned += turned.sum()
+    inside_out = mesh.replace(cells={**mesh.cells, **cells})
+    assert sum((corner_volumes(inside_out, kind) < 0).sum() for kind in cells) == n_turned
+    with pytest.raises(fc.MeshError, match=r"inverted"):
+        fc.Model(inside_out, "3d")
+    with pytest.raises(fc.MeshError, match=r"cell 0 of"):
+        assembled(inside_out)
+    back, count = oriented(inside_out)
+    assert count == n_turned
+    assert np.array_equal(assembled(back).toarray(), K.toarray())
+    assert oriented(back) == (back, 0)
+
+
+@pytest.mark.parametrize("element", SOLIDS)
+def test_corner_volumes_are_those_of_the_cells_with_straight_edges(element):
+    mesh = distorted(box((2.0, 1.5, 1.2), (2, 2, 2), elements.get(element).linear))
+    assert corner_volumes(mesh, elements.get(element).linear).sum() == pytest.approx(enclosed(mesh), rel=1e-13)
+    straight = box((2.0, 1.5, 1.2), (2, 2, 2), element)
+    assert corner_volumes(straight, element).sum() == pytest.approx(3.6, rel=1e-13)
+
+
+# Models --------------------------------------------------------------------------------------------------------------
+
+
+def test_kinematics_must_fit_the_dimension():
+    with pytest.raises(fc.ModelError, match=r"'plane_strain' do not fit a mesh in 3 dimensions: use '3d'"):
+        fc.Model(box(divisions=(1, 1, 1)), "plane_strain")
+    with pytest.raises(fc.ModelError, match=r"'3d' do not fit a mesh in 2 dimensions: use 'axisymmetric'"):
+        fc.Model(fc.generate.block(), "3d")
+
+
+def test_six_rigid_motions_are_counted_and_named():
+    model = fc.Model(box(divisions=(1, 1, 1)), "3d")
+    model.add_material(fc.LinearElastic(E, NU))
+    with pytest.raises(fc.ModelError, match=r"6 rigid-body motions .*'BOX'.*translation along z.*rotation about x"):
+        model.check()
+    model.fix("XMIN", "xy")
+    with pytest.raises(fc.ModelError, match=r"1 rigid-body motion .*translation along z"):
+        model.check()
+    model.fix("XMIN", "z")
+    model.check()
+
+
+def test_contact_in_three_dimensions_is_refused():
+    model = fc.Model(box(divisions=(1, 1, 1)), "3d")
+    with pytest.raises(fc.ContactError, match=r"'pair'.*two-dimensional"):
+        model.add_contact("pair", secondary="ZMAX", primary="ZMIN")
