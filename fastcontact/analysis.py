@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, csr_array
+from scipy.sparse import csr_array
 
 from fastcontact import active_set, friction, linear, recovery
 from fastcontact.assembly import rigid_modes, stiffness
@@ -17,11 +17,15 @@ from fastcontact.contact.constraints import Constraints, stacked
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.result import contact_result
 from fastcontact.errors import ConvergenceError, FastcontactWarning, ModelError
-from fastcontact.model import Model
+from fastcontact.floating import SLACK, Floating, Settled
+from fastcontact.model import Model, combined, multiplier
+from fastcontact.overlap import penetration
 from fastcontact.ramp import Ramp, linear_ramp
+from fastcontact.relations import stacked_rows
 from fastcontact.results import StepResult
+from fastcontact.rigid_motions import body_name, free_motions, generalised, resisting, stopped_at
+from fastcontact.system import System
 from fastcontact.topology import bodies
-from fastcontact.validation import body_name, penetration
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -39,7 +43,7 @@ class Criteria:
     Parameters
     ----------
     relative : float
-        Largest out-of-balance force over the largest support reaction or contact force (RESI_GLOB_RELA).
+        Largest out-of-balance force over the largest applied force, reaction or contact force (RESI_GLOB_RELA).
     absolute : float, optional
         Largest out-of-balance force [force] that is small enough by itself (RESI_GLOB_MAXI). Without forces a relative
         criterion is 0/0; then, and by default, the bound is the round-off of the internal forces.
@@ -108,11 +112,11 @@ def solve(
     FastcontactWarning
         If bodies interpenetrate where no contact is defined, or strains leave the range of linear kinematics.
     """
-    analysis = Analysis(model, linear_solver, linear_tolerance, criteria or Criteria())
     ramp = ramp or linear_ramp()
+    analysis = Analysis(model, linear_solver, linear_tolerance, criteria or Criteria(), ramp)
     steps = []
     for index, instant in enumerate(ramp.instants, start=1):
-        step = analysis.step(index, instant, ramp.value(instant), last=index == len(ramp))
+        step = analysis.step(index, instant, last=index == len(ramp))
         steps.append(step)
         if on_step is not None:
             on_step(step)
@@ -125,45 +129,64 @@ class Analysis:
     Parameters are those of `solve`. Attributes `u` (n_points * dim,) and `active` (m,) hold the current state.
     """
 
-    def __init__(self, model: Model, linear_solver: str, linear_tolerance: float, criteria: Criteria) -> None:
-        model.check()
+    def __init__(
+        self, model: Model, linear_solver: str, linear_tolerance: float, criteria: Criteria, ramp: Ramp | None = None
+    ) -> None:
+        self.ramp = ramp or linear_ramp()
+        model.check(self.ramp)
         self.model, self.criteria = model, criteria
         self.pairs: dict[str, Formulation] = {pair.name: model.bind(pair) for pair in model.contact}
         self.moduli, self.material = model.material_numbers()
-        fixed, self.prescribed = model.prescribed()
+        supported, self.prescribed = model.prescribed_by_ramp()
+        self.forces = model.forces_by_ramp()
         self.K = stiffness(model.mesh, model.kinematics, self.moduli, self.material)
-        self.fixed: Mask = fixed.ravel() | _without_stiffness(self.K)
+        self.system = System(self.K, supported.ravel(), model.relations)
+        involved = self._involved()
+        R = stacked_rows(model.relations, model.n_dofs)
+        motions = free_motions(model.mesh, model.kinematics, supported, R)
+        self.floating = Floating(motions, self.system, involved) if len(motions) else None
+        matrix = self.floating.with_springs(self.system.matrix) if self.floating else self.system.matrix
         self.solver = linear.make(
             linear_solver, dim=model.mesh.dim, n_dofs=model.n_dofs, tolerance=linear_tolerance
         )  # fmt: skip
-        modes = _near_nullspace(model)
-        modes[self.fixed] = 0.0
-        self.solver.prepare(_with_supports(self.K, self.fixed), modes, self._involved())
+        self.solver.prepare(matrix, self.system.unknowns_of(near_nullspace(model)), involved)
         self.u = np.zeros(model.n_dofs)
+        self.external = np.zeros(model.n_dofs)
         self.active: dict[str, Mask] = {}
         self.pressure: dict[str, Array] = {}
         self.before = self.u  # at the beginning of the step, from where slip counts
+        self.largest_force = self.largest_work = 0.0  # of all steps so far
+        # Gaps are differences of coordinates and no more accurate than those.
+        self.round_off = 8 * np.finfo(float).eps * float(np.abs(model.mesh.points).max())
 
     def _involved(self) -> NDArray[np.intp]:
-        """Return the unsupported degrees of freedom of the contact surfaces."""
+        """Return the unknowns that the contact surfaces depend on."""
         dim = self.model.mesh.dim
         sides = [side.points for pair in self.pairs.values() for side in (pair.secondary, pair.primary)]
         points = np.unique(np.concatenate(sides)) if sides else np.empty(0, np.intp)
-        dofs = (points[:, None] * dim + np.arange(dim)).ravel()
-        return dofs[~self.fixed[dofs]].astype(np.intp)
+        return self.system.involved((points[:, None].astype(np.intp) * dim + np.arange(dim)).ravel())
 
-    def step(self, index: int, instant: float, value: float, last: bool = False) -> StepResult:
-        """Solve for the loads at `instant` with multiplier `value` and return the state; see `solve`."""
-        lift = (self.prescribed * value).ravel()
+    def step(self, index: int, instant: float, last: bool = False) -> StepResult:
+        """Solve for the loads at `instant` and return the state; see `solve`."""
+        lift = self._lift(instant)
+        shape = self.model.mesh.points.shape
+        self.external = combined(self.forces, self.ramp, instant, shape).ravel()
+        self.largest_force = max(self.largest_force, np.abs(self.external).max(initial=0.0))
         self.before = self.u
-        loaded = self.solver.load(np.where(self.fixed, 0.0, -(self.K @ lift)))
+        self.settled: Settled | None = None
+        loaded = self.solver.load(self.system.right(self.external, lift))
         before = self.solver.counters.iterations
+        self.expected = 0.0  # displacement, for the first step under forces only
+        if self.pairs and self.external.any() and not (self.u.any() or lift.any()):
+            self.expected = float(np.abs(loaded.displacement(np.zeros(len(lift)))).max())
         history: list[dict[str, Any]] = []
         if self.pairs:
             constraints, state = self._contact(loaded, lift, history)
             force = constraints.force(state)
         else:
-            self.u = loaded.solve(csr_array((0, len(lift))), np.empty(0), self.u - lift)[0] + lift
+            guess = self.system.unknowns(self.u, lift)
+            v = loaded.solve(csr_array((0, len(lift))), np.empty(0), guess=guess)[0]
+            self.u = self.system.displacement(v, lift)
             constraints, state, force = None, None, np.zeros(len(lift))
         reaction = self._balance(force, index, history)
         iterations = {
@@ -172,7 +195,15 @@ class Analysis:
             "linear_iterations": self.solver.counters.iterations - before,
             "history": history,
         }
+        if self.floating is not None and self.settled is not None:
+            iterations["regularised"] = self.floating.report(self.settled, self.largest_work)
         return self._result(index, instant, reaction, constraints, state, iterations, last)
+
+    def _lift(self, instant: float) -> Array:
+        """Return what supports and relations prescribe at `instant`; see `System.lift`."""
+        prescribed = combined(self.prescribed, self.ramp, instant, self.model.mesh.points.shape)
+        factors = [multiplier(relation.ramp, self.ramp, instant) for relation in self.model.relations]
+        return self.system.lift(prescribed.ravel(), self.system.values(factors))
 
     def _contact(
         self, loaded: linear.Loaded, lift: Array, history: list[dict[str, Any]]
@@ -181,6 +212,7 @@ class Analysis:
         criteria = self.criteria
         fixed_updates = criteria.geometry_updates
         in_loop = fixed_updates is None and any(pair.geometry_in_loop for pair in self.pairs.values())
+        in_loop = in_loop and self.floating is None
         limit = criteria.max_geometry_updates if fixed_updates is None else fixed_updates
         for update in range(limit + 1):
             displacement = self.u.reshape(-1, self.model.mesh.dim)
@@ -190,10 +222,13 @@ class Analysis:
             in_loop = in_loop and update < SEMISMOOTH_UPDATES
             active = self._initially_active(parts, displacement)
             limit_now = 1 if in_loop else criteria.max_active_set_iterations
-            state = self._inequalities(loaded, constraints, lift, active, limit_now)
-            change = np.abs(state.u + lift - self.u).max(initial=0.0)
-            size = max(np.abs(state.u + lift).max(initial=0.0), np.abs(lift).max(initial=0.0))
-            self.u = state.u + lift
+            if self.floating is None:
+                state, u = self._inequalities(loaded, constraints, lift, active, limit_now)
+            else:
+                state, u = self._floating(loaded, constraints, lift, active, history)
+            change = np.abs(u - self.u).max(initial=0.0)
+            size = max(np.abs(u).max(initial=0.0), np.abs(lift).max(initial=0.0))
+            self.u = u
             self._remember(state)
             history.append(
                 {
@@ -206,11 +241,8 @@ class Analysis:
             if not (state.settled or in_loop):
                 raise ConvergenceError(self._cycling(state, constraints), history)
             # Iterative solvers leave a noise of their tolerance; asking for less would never end.
-            if (
-                fixed_updates is None
-                and state.settled
-                and change <= max(criteria.geometry, self.solver.tolerance) * size
-            ):
+            enough = max(max(criteria.geometry, self.solver.tolerance) * size, self.round_off)
+            if fixed_updates is None and state.settled and change <= enough:
                 return constraints, state
         if fixed_updates is None:
             raise ConvergenceError(
@@ -243,33 +275,91 @@ class Analysis:
 
     def _inequalities(
         self, loaded: linear.Loaded, constraints: Constraints, lift: Array, active: Mask, limit: int
-    ) -> active_set.State:
-        """Solve with the supported displacements moved to the gaps."""
-        scale = np.abs(lift).max(initial=0.0) + np.abs(self.u).max(initial=0.0)
-        noise = 10 * self.solver.tolerance
-        B, gap0 = self._without_supports(constraints.B, constraints.gap0, lift)
+    ) -> tuple[active_set.State, Array]:
+        """Solve in the unknowns that supports and relations leave; return the state and all displacements."""
+        noise, gap_tolerance = self._noise(lift)
+        B, gap0 = self.system.rows(constraints.B, constraints.gap0, lift)
         usable = np.diff(B.indptr) > 0
+        state: active_set.State
         if constraints.tangents:
-            pairs = [self._without_supports(T, -(T @ self.before), lift) for T in constraints.tangents]
-            return friction.solve(
+            pairs = [self.system.rows(T, -(T @ self.before), lift) for T in constraints.tangents]
+            state = friction.solve(
                 loaded, B, tuple(T for T, _ in pairs), gap0, np.stack([slip for _, slip in pairs]),
                 constraints.friction if constraints.friction is not None else np.zeros(len(gap0)), usable,
                 compliance=constraints.compliance, closed=active,
-                gap_tolerance=noise * scale, multiplier_tolerance=noise,
+                gap_tolerance=gap_tolerance, multiplier_tolerance=noise,
             )  # fmt: skip
-        return active_set.solve(
-            loaded, B, gap0, usable, active=active, compliance=constraints.compliance,
-            gap_tolerance=noise * scale, multiplier_tolerance=noise,
-            max_iterations=limit, guess=self.u - lift,
-        )  # fmt: skip
+        else:
+            state = active_set.solve(
+                loaded, B, gap0, usable, active=active, compliance=constraints.compliance,
+                gap_tolerance=gap_tolerance, multiplier_tolerance=noise,
+                max_iterations=limit, guess=self.system.unknowns(self.u, lift),
+            )  # fmt: skip
+        return state, self.system.displacement(state.u, lift)
 
-    def _without_supports(self, rows: csr_array, offset: Array, lift: Array) -> tuple[csr_array, Array]:
-        """Return rows without supported degrees of freedom, whose displacement `lift` goes to the offset."""
-        rows = rows.copy()
-        offset = offset + rows @ lift
-        rows.data[self.fixed[rows.indices]] = 0.0
-        rows.eliminate_zeros()
-        return rows, offset
+    def _noise(self, lift: Array) -> tuple[float, float]:
+        """Return the relative accuracy of a solution, and the absolute one of its gaps [length]."""
+        noise = 10 * self.solver.tolerance
+        scale = np.abs(lift).max(initial=0.0) + np.abs(self.u).max(initial=0.0)
+        return noise, max(noise * (scale or self.expected), self.round_off)
+
+    def _floating(
+        self, loaded: linear.Loaded, constraints: Constraints, lift: Array, active: Mask, history: list[dict[str, Any]]
+    ) -> tuple[active_set.State, Array]:
+        """Solve for bodies that only contact holds; return the state and all displacements."""
+        floating = self.floating
+        assert floating is not None
+        known = active
+
+        def solve_at(position: Array) -> active_set.State:
+            nonlocal known
+            at = lift + floating.rigid(position)
+            state, _ = self._inequalities(loaded, constraints, at, known, self.criteria.max_active_set_iterations)
+            known = state.wanted
+            return state
+
+        work = generalised(floating.motions, self.external)
+        self.largest_work = max(self.largest_work, float(np.abs(work).max()))
+        start = self.u[floating.dofs]
+        if not history:
+            moved = self._approach(constraints, work)
+            start = start if active.any() else start + moved
+        settled = floating.settle(solve_at, start, self.largest_work, self._noise(lift)[1])
+        if settled.state.settled and not settled.slack:
+            raise ConvergenceError(self._not_slack(settled), history)
+        self.settled = settled
+        at = lift + floating.rigid(settled.position)
+        return settled.state, self.system.displacement(settled.state.u, at)
+
+    def _approach(self, constraints: Constraints, work: Array) -> Array:
+        """Return how far (k,) rigid bodies move until the loads hold them in contact.
+
+        Raises
+        ------
+        ConvergenceError
+            If no contact stops them.
+        """
+        assert self.floating is not None
+        motions = self.floating.motions
+        rows, gap0 = resisting(constraints)
+        size = float(np.ptp(self.model.mesh.points, axis=0).max())
+        found = stopped_at(rows @ motions.displacement, gap0 + rows @ self.u, work, size)
+        if found is None:
+            moved = "; ".join(name for name, w in zip(motions.names(), work, strict=True) if w)
+            raise ConvergenceError(
+                f"the loads move bodies without end, no contact stops them ({moved}; work of the loads "
+                f"{', '.join(f'{w:.3g}' for w in work if w)} per unit of motion): reverse the loads or add supports"
+            )
+        return found
+
+    def _not_slack(self, settled: Settled) -> str:
+        assert self.floating is not None
+        worst = int(np.argmax(np.abs(settled.left)))
+        return (
+            f"contact does not hold {self.floating.motions.names()[worst]}: after {settled.positions} positions tried "
+            f"a force of {abs(settled.left[worst]):.3g} is still missing for equilibrium under a load of "
+            f"{self.largest_work:.3g}. Add a support, or use more load steps"
+        )
 
     def _cycling(self, state: active_set.State, constraints: Constraints) -> str:
         wrong = np.flatnonzero(state.active != state.wanted)
@@ -280,12 +370,12 @@ class Analysis:
 
     def _balance(self, contact_force: Array, index: int, history: list[dict[str, Any]]) -> Array:
         """Return the reactions (n_dofs,) and check that all other degrees of freedom are in balance."""
-        out = self.K @ self.u - contact_force
-        reaction = np.where(self.fixed, out, 0.0)
-        residual = np.abs(np.where(self.fixed, 0.0, out)).max(initial=0.0)
-        force = max(np.abs(reaction).max(initial=0.0), np.abs(contact_force).max(initial=0.0))
+        reaction, residual = self.system.balance(self.K @ self.u - contact_force - self.external)
+        force = max(float(np.abs(forces).max(initial=0.0)) for forces in (reaction, contact_force, self.external))
+        self.largest_force = max(self.largest_force, force)
         row_sums = np.asarray(abs(csr_array(self.K)) @ np.abs(self.u)).max(initial=0.0)
         round_off = max(1e-13, self.solver.tolerance) * 10 * row_sums
+        round_off = max(round_off, SLACK * self.largest_force)
         bound = max(self.criteria.relative * force, self.criteria.absolute or 0.0, round_off)
         if history:
             history[-1]["residual"] = float(residual / force) if force > round_off else 0.0
@@ -355,30 +445,7 @@ class Analysis:
         return [f"the largest equivalent strain is {strain:.3f}, beyond the {SMALL} where linear kinematics hold well"]
 
 
-def _without_stiffness(K: bsr_array) -> Mask:
-    """Return the degrees of freedom of points that belong to no solid cell."""
-    diagonal = K.diagonal()
-    return np.asarray(diagonal == 0.0)
-
-
-def _with_supports(K: bsr_array, fixed: Mask) -> bsr_array:
-    """Return K with the rows and columns of supported degrees of freedom cleared and their diagonal kept."""
-    data = K.data.copy()
-    size = data.shape[1]
-    supported = fixed.reshape(-1, size)
-    block_row = np.repeat(np.arange(len(K.indptr) - 1), np.diff(K.indptr))
-    data[supported[block_row][:, :, None] | supported[K.indices][:, None, :]] = 0.0
-    diagonal = K.diagonal()
-    typical = diagonal.max(initial=1.0)
-    on_diagonal = np.flatnonzero(block_row == K.indices)
-    for k in range(size):
-        held = on_diagonal[supported[:, k]]
-        kept = diagonal[k::size][supported[:, k]]
-        data[held, k, k] = np.where(kept > 0, kept, typical)
-    return bsr_array((data, K.indices, K.indptr), shape=K.shape)
-
-
-def _near_nullspace(model: Model) -> Array:
+def near_nullspace(model: Model) -> Array:
     """Return the displacements that cost little energy, for multigrid: rigid-body modes of the mesh.
 
     One set serves all bodies, since aggregates do not span them. In axisymmetry the in-plane motions are no rigid-body

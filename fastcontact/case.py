@@ -32,6 +32,21 @@ _SOLVE = {
     "max_active_set_iterations": int,
 }
 _CHECK = {"quantity": str, "theory": str, "tolerance": _NUMBER, "name": str}
+# What a mesh-convergence study or a sweep of this case needs to know; `fastcontact.convergence` reads it.
+_STUDY = {
+    "generator": str,
+    "triangles": dict,
+    "quadrangles": dict,
+    "halve": list,
+    "double": list,
+    "curves": list,
+    "load_steps": int,
+    "combinations": list,
+    "options": dict,
+    "contact": str,
+    "quantities": list,
+    "parameters": dict,
+}
 _TOP = {
     "title": str,
     "kinematics": str,
@@ -45,6 +60,7 @@ _TOP = {
     "probes": dict,
     "theory": dict,
     "check": list,
+    "study": dict,
 }
 
 
@@ -120,13 +136,38 @@ def read_case(path: str | Path) -> Case:
     except tomllib.TOMLDecodeError as error:
         raise CaseError(f"the case file '{path}' is not valid TOML: {error}") from error
     try:
-        return _build(path, text, data)
+        return build_case(data, name=path.stem, folder=path.parent, text=text)
     except CaseError as error:
         raise CaseError(f"{path}: {error}") from error
 
 
-def _build(path: Path, text: str, data: dict[str, Any]) -> Case:
+def build_case(
+    data: dict[str, Any], *, name: str, folder: str | Path = ".", text: str = "", mesh: Mesh | None = None
+) -> Case:
+    """Build a case from the parsed data of a case file.
+
+    Parameters
+    ----------
+    data : dict
+        As `tomllib` returns it.
+    name : str
+        Name of the case.
+    folder : path-like
+        Where the mesh file is looked for.
+    text : str
+        The case file, kept in result files.
+    mesh : Mesh, optional
+        Used instead of the one that ``[mesh]`` names.
+
+    Raises
+    ------
+    CaseError
+        If a key is unknown or a value wrong.
+    FastcontactError
+        If the mesh or the model is wrong.
+    """
     _check_keys("", data, _TOP)
+    _check_keys("study", data.get("study", {}), _STUDY)
     for key in ("kinematics", "mesh", "material"):
         if key not in data:
             raise CaseError(f"the key '{key}' is missing")
@@ -137,13 +178,14 @@ def _build(path: Path, text: str, data: dict[str, Any]) -> Case:
     ramp = _ramp(data.get("ramp", {}))
     criteria = Criteria(**{k: v for k, v in solve.items() if not k.startswith("linear_")})
     theories, approach = _theories(data.get("theory", {}), data.get("contact", {}))
-    mesh = _mesh(path, data["mesh"])
+    if mesh is None:
+        mesh = _mesh(Path(folder), data["mesh"])
     model = _model(mesh, data, text)
     probes = _probes(mesh, data.get("probes", {}))
     checks = [_check(i, entry, probes, theories) for i, entry in enumerate(_tables("check", data.get("check", [])))]
     return Case(
-        name=path.stem,
-        title=data.get("title", path.stem),
+        name=name,
+        title=data.get("title", name),
         text=text,
         mesh=mesh,
         model=model,
@@ -184,10 +226,10 @@ def _tables(where: str, entries: Any) -> list[dict[str, Any]]:
     return entries
 
 
-def _mesh(path: Path, data: dict[str, Any]) -> Mesh:
+def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:
     if "file" in data:
         _check_keys("mesh", data, {"file": str, "name": str})
-        return read_mesh(path.parent / data["file"], mesh_name=data.get("name"))
+        return read_mesh(folder / data["file"], mesh_name=data.get("name"))
     if "generator" not in data:
         raise CaseError("'mesh' needs either the key 'file' or the key 'generator'")
     name = data["generator"]

@@ -2,11 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from fastcontact.errors import ModelError
+
+# Points (instant, multiplier of the loads) of a piecewise linear function.
+Table = tuple[tuple[float, float], ...]
+
+
+def checked_table(rows: Iterable[Iterable[float]], what: str = "the ramp") -> Table:
+    """Return the points (instant, multiplier) of a piecewise linear function of time.
+
+    Raises
+    ------
+    ModelError
+        If there are fewer than two, their instants do not ascend, or a number is not finite; `what` names the culprit.
+    """
+    try:
+        table = tuple((float(time), float(value)) for time, value in rows)
+    except (TypeError, ValueError):
+        raise ModelError(f"the table of {what} must hold pairs (instant, multiplier of the loads)") from None
+    times = np.asarray([time for time, _ in table])
+    if len(table) < 2 or not (np.diff(times) > 0).all():
+        raise ModelError(f"the table of {what} needs at least two points with ascending instants")
+    if not np.isfinite(table).all():
+        raise ModelError(f"the table of {what} holds a number that is not finite: {table}")
+    return table
+
+
+def table_value(table: Table, instant: float) -> float:
+    """Return the piecewise linear function `table` at `instant`; constant beyond its ends."""
+    times, values = zip(*table, strict=True)
+    return float(np.interp(instant, times, values))
 
 
 @dataclass(frozen=True)
@@ -27,32 +57,30 @@ class Ramp:
     """
 
     instants: tuple[float, ...]
-    table: tuple[tuple[float, float], ...] = ((0.0, 0.0), (1.0, 1.0))
+    table: Table = ((0.0, 0.0), (1.0, 1.0))
 
     def __post_init__(self) -> None:
         instants = np.asarray(self.instants, float)
-        times = np.asarray([row[0] for row in self.table], float)
+        table = checked_table(self.table)
+        times = np.asarray([time for time, _ in table])
         if instants.ndim != 1 or not len(instants):
             raise ModelError("the ramp has no instants: give at least one load factor to solve at")
         if not (np.isfinite(instants).all() and (np.diff(instants) > 0).all()):
             raise ModelError(f"the instants of the ramp must ascend, not {self.instants}")
-        if len(times) < 2 or not (np.diff(times) > 0).all():
-            raise ModelError("the table of the ramp needs at least two points with ascending instants")
         outside = instants[(instants < times[0]) | (instants > times[-1])]
         if len(outside):
             raise ModelError(
                 f"instant {outside[0]:g} lies outside the table of the ramp, which covers {times[0]:g} to {times[-1]:g}"
             )
         object.__setattr__(self, "instants", tuple(float(t) for t in instants))
-        object.__setattr__(self, "table", tuple((float(t), float(v)) for t, v in self.table))
+        object.__setattr__(self, "table", table)
 
     def __len__(self) -> int:
         return len(self.instants)
 
     def value(self, instant: float) -> float:
         """Return the multiplier of the loads at `instant`."""
-        times, values = zip(*self.table, strict=True)
-        return float(np.interp(instant, times, values))
+        return table_value(self.table, instant)
 
 
 def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:

@@ -24,7 +24,9 @@ class ContactResult:
     coordinates : ndarray (m, dim)
         Reference coordinates [length].
     abscissa : ndarray (m,)
-        Length along the reference surface from its first node [length].
+        Length along the reference surface from its first node; in 3D the distance from the axis of first contact: the
+        line through the secondary node with the smallest gap before any load (of equally close ones that nearest to the
+        origin) along the normal faced there [length].
     gap : ndarray (m,)
         Open positive, closed zero [length].
     pressure : ndarray (m,)
@@ -41,8 +43,9 @@ class ContactResult:
     force : ndarray (dim,)
         Resultant on the secondary side [force].
     radius : (float, float)
-        Bracket of the contact radius (half-width in plane problems): distance from the axis x = 0 of the outermost
-        closed node and of the first open node beyond it [length]; NaN without contact.
+        Bracket of the contact radius (half-width in plane problems): distance from the axis x = 0, in 3D from the axis of
+        first contact, of the outermost closed constraint and of the first open one beyond it [length]; NaN without
+        contact.
     shear : ndarray (m, dim)
         Tangential traction on the secondary side, zero without friction [pressure].
     sticking : ndarray of bool (m,)

@@ -6,35 +6,64 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
-from fastcontact import elements
+from fastcontact import elements, quadrature
 from fastcontact.contact.surface import Surface
-from fastcontact.quadrature import gauss_line
 
 Array = NDArray[np.float64]
 
 
 def facet_measure(facets: NDArray[np.int32], element: str, points: Array, xi: Array, axisymmetric: bool) -> Array:
-    """Return the length (or, axisymmetric, the full-circle area) per unit of xi, (n_facets, n_q), at `xi` (n_q, 1)."""
+    """Return the length or area per unit of xi, (n_facets, n_q), at `xi` (n_q, dim - 1).
+
+    In axisymmetry, the area over the full circle.
+    """
     reference = elements.get(element)
     corners = points[facets]
-    tangent = np.einsum("qk,fkd->fqd", reference.gradient(xi)[:, :, 0], corners)
-    measure = np.linalg.norm(tangent, axis=2)
+    tangent = np.einsum("qkj,fkd->fqdj", reference.gradient(xi), corners)
+    if reference.dim == 2:
+        return np.linalg.norm(np.cross(tangent[..., 0], tangent[..., 1]), axis=2)
+    measure = np.linalg.norm(tangent[..., 0], axis=2)
     if axisymmetric:
         measure = measure * (2 * np.pi * np.einsum("qk,fk->fq", reference.shape(xi), corners[:, :, 0]))
     return measure
 
 
+def gauss_rule(element: str, n: int) -> quadrature.Rule:
+    """Return the Gauss rule of a facet: `n` points in each direction, exact to degree 2n - 1.
+
+    On triangles the symmetric rule of degree 2n - 2.
+
+    Raises
+    ------
+    ValueError
+        If `n` is larger than 5 on triangles.
+    """
+    if elements.get(element).dim == 1:
+        return quadrature.gauss_line(n)
+    if elements.get(element).n_corners == 4:
+        return quadrature.gauss_square(n)
+    return quadrature.triangle(2 * n - 2)
+
+
+def fine_rule(element: str) -> quadrature.Rule:
+    """Return a rule that integrates products of two shape functions over facets that are not much curved."""
+    return gauss_rule(element, elements.get(element).order + 2)
+
+
 def mass_matrix(surface: Surface, points: Array, axisymmetric: bool) -> csr_array:
     """Return the surface mass matrix (m, m) in the order of ``surface.points`` [area]."""
-    element = elements.get(surface.element)
-    xi, weights = gauss_line(element.n_nodes + 1)
-    N = element.shape(xi)
-    dA = facet_measure(surface.facets, surface.element, points, xi, axisymmetric) * weights
-    local = np.einsum("fq,qa,qb->fab", dA, N, N)
-    row = np.broadcast_to(surface.local[:, :, None], local.shape)
-    column = np.broadcast_to(surface.local[:, None, :], local.shape)
+    rows, columns, values = [], [], []
+    for block in surface.blocks:
+        xi, weights = fine_rule(block.element)
+        N = elements.get(block.element).shape(xi)
+        dA = facet_measure(block.facets, block.element, points, xi, axisymmetric) * weights
+        local = np.einsum("fq,qa,qb->fab", dA, N, N)
+        rows.append(np.broadcast_to(block.local[:, :, None], local.shape).ravel())
+        columns.append(np.broadcast_to(block.local[:, None, :], local.shape).ravel())
+        values.append(local.ravel())
+    place = np.concatenate(rows), np.concatenate(columns)
     size = len(surface.points)
-    return coo_array((local.ravel(), (row.ravel(), column.ravel())), shape=(size, size)).tocsr()
+    return coo_array((np.concatenate(values), place), shape=(size, size)).tocsr()
 
 
 def nodal_areas(surface: Surface, points: Array, axisymmetric: bool) -> Array:

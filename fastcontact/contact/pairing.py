@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
 from fastcontact import elements
-from fastcontact.contact.surface import Surface
-from fastcontact.search import closest
+from fastcontact.contact.surface import FacetBlock, Surface
+from fastcontact.search import closest_of_kinds
 
 Array = NDArray[np.float64]
 
@@ -42,9 +44,9 @@ class Pairing:
     Attributes
     ----------
     facet : ndarray of int (n,)
-        Row in the primary facets.
-    xi : ndarray (n,)
-        Reference coordinate of the projection.
+        Row in the primary facets, counted through their blocks.
+    xi : ndarray (n, dim - 1)
+        Reference coordinates of the projection.
     normal : ndarray (n, dim)
         Unit outward normal of the primary facet there.
     paired : ndarray of bool (n,)
@@ -64,31 +66,79 @@ def pair(
     projection_tolerance: float,
     normals: str = "facet",
 ) -> Pairing:
-    """Project candidate positions (n, 2) on the closest facet of `primary` at nodal `coordinates`.
+    """Project candidate positions (n, dim) on the closest facet of `primary` at nodal `coordinates`.
 
     A candidate farther out than `projection_tolerance` facet lengths beyond the end of its facet is not paired
     (TOLE_PROJ_EXT of code_aster). With `normals` ``"averaged"``, the normal is interpolated between nodal means of
     the facets' normals, so that it does not jump where facets meet.
+
+    Raises
+    ------
+    ContactError
+        If a projection does not converge; see `search.closest`.
     """
-    corners = coordinates[primary.facets]
-    found = closest(candidates, corners)
+    found = closest_of_kinds(candidates, primary.corners(coordinates))
     normal = found.normal
     if normals == "averaged":
-        normal = _interpolated_normals(primary, corners, found.facet, found.xi)
+        _, local, shape = _at(primary, found.facet, found.xi)
+        normal = np.einsum("nk,nkd->nd", shape, _nodal_normals(primary, coordinates)[local])
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     return Pairing(found.facet, found.xi, normal, found.overhang <= projection_tolerance)
 
 
-def _interpolated_normals(primary: Surface, corners: Array, facet: NDArray[np.intp], xi: Array) -> Array:
-    """Return unit normals (n, 2) at `xi` on `facet`, interpolated from nodal means."""
-    element = elements.get(primary.element)
-    tangent = np.einsum("ak,fkd->fad", element.gradient(element.nodes)[:, :, 0], corners)
-    at_nodes = np.stack([tangent[..., 1], -tangent[..., 0]], axis=2)
-    at_nodes /= np.linalg.norm(at_nodes, axis=2, keepdims=True)
-    total = np.zeros((len(primary.points), 2))
-    np.add.at(total, primary.local, at_nodes)
-    total /= np.linalg.norm(total, axis=1, keepdims=True)
-    normal = np.einsum("nk,nkd->nd", element.shape(xi[:, None]), total[primary.local[facet]])
-    return normal / np.linalg.norm(normal, axis=1, keepdims=True)
+def filled_up(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """Return arrays (n_i, k_i) as one, as wide as the widest: integers are repeated, floating-point numbers zero."""
+    width = max(part.shape[1] for part in parts)
+    missing = [((0, 0), (0, width - part.shape[1])) for part in parts]
+    integer = np.issubdtype(parts[0].dtype, np.integer)
+    return np.concatenate(
+        [np.pad(part, pad, mode="edge" if integer else "constant") for part, pad in zip(parts, missing, strict=True)]
+    )
+
+
+def _at(side: Surface, facet: NDArray[np.intp], xi: Array) -> tuple[NDArray[np.int32], NDArray[np.intp], Array]:
+    """Return nodes, positions in ``side.points`` and shape functions, each (n, k), of facets at reference coordinates.
+
+    Where facets of several kinds have unlike numbers of nodes, rows are filled up with weights of zero.
+    """
+    width = max(block.facets.shape[1] for block in side.blocks)
+    nodes, local = np.zeros((len(facet), width), np.int32), np.zeros((len(facet), width), np.intp)
+    shape = np.zeros((len(facet), width))
+    first = 0
+    for block in side.blocks:
+        mine = np.flatnonzero((facet >= first) & (facet < first + len(block.facets)))
+        rows, k = facet[mine] - first, block.facets.shape[1]
+        nodes[mine, :k], local[mine, :k] = block.facets[rows], block.local[rows]
+        shape[mine, :k] = elements.get(block.element).shape(xi[mine])
+        first += len(block.facets)
+    return nodes, local, shape
+
+
+def _nodal_normals(side: Surface, coordinates: Array) -> Array:
+    """Return the mean of the facets' unit normals at each node (m, dim), weighted by their angles there, normalised.
+
+    The angles make it depend on the surface alone, not on how it is cut into facets (Thuermer and Wuethrich, 1998).
+    """
+    total = np.zeros((len(side.points), coordinates.shape[1]))
+    for block in side.blocks:
+        np.add.at(total, block.local, _facet_normals(block, coordinates[block.facets]))
+    return total / np.linalg.norm(total, axis=1, keepdims=True)
+
+
+def _facet_normals(block: FacetBlock, corners: Array) -> Array:
+    """Return the unit normals at the nodes of facets (n_facets, n_nodes, dim), times their angles there in 3D."""
+    element = elements.get(block.element)
+    tangent = np.einsum("akj,fkd->fadj", element.gradient(element.nodes), corners)
+    if element.dim == 1:
+        normal = np.stack([tangent[..., 1, 0], -tangent[..., 0, 0]], axis=2)
+        return normal / np.linalg.norm(normal, axis=2, keepdims=True)
+    normal = np.cross(tangent[..., 0], tangent[..., 1])
+    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+    for corner in range(element.n_corners):
+        sides = [corners[:, b if a == corner else a] - corners[:, corner] for a, b in element.edges if corner in (a, b)]
+        sine = np.linalg.norm(np.cross(*sides), axis=1)
+        normal[:, corner] *= np.arctan2(sine, np.einsum("fd,fd->f", *sides))[:, None]
+    return normal
 
 
 def gap_rows(candidates: Candidates, pairing: Pairing, primary: Surface, reference: Array) -> tuple[csr_array, Array]:
@@ -120,8 +170,7 @@ def rows_along(
     """
     dim = direction.shape[1]
     rows = np.flatnonzero(pairing.paired)
-    facing = primary.facets[pairing.facet[rows]]
-    shape = elements.get(primary.element).shape(pairing.xi[rows, None])
+    facing, _, shape = _at(primary, pairing.facet[rows], pairing.xi[rows])
     nodes = np.hstack([candidates.nodes[rows], facing])
     weights = np.hstack([candidates.shape[rows], -shape])
     values = weights[:, :, None] * direction[rows][:, None, :]

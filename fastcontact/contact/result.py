@@ -42,7 +42,7 @@ def contact_result(
         formulation=pair.name,
         points=points,
         coordinates=pair.points[points],
-        abscissa=pair.secondary.abscissa,
+        abscissa=pair.secondary.abscissa if dim == 2 else _distance(pair, pair.points[points]),
         gap=gap,
         pressure=np.where(closed, np.maximum(field, 0.0), 0.0),
         multiplier=field,
@@ -50,7 +50,7 @@ def contact_result(
         normal=normal,
         active=closed,
         force=total,
-        radius=_radius(np.abs(part.positions[:, 0]), active),
+        radius=_radius(_distance(pair, part.positions), active),
         shear=np.where(closed[:, None], shear, 0.0),
         sticking=sticking,
         dissipation=dissipation,
@@ -77,8 +77,17 @@ def _mostly_sticking(
     return pair.pressure(np.where(sticking, multiplier, 0.0)) > 0.5 * field
 
 
+def _distance(pair: Formulation, positions: Array) -> Array:
+    """Return the distances (n,) of reference positions from the axis x = 0; in 3D from that of the first contact."""
+    if positions.shape[1] == 2:
+        return np.abs(positions[:, 0])
+    foot, axis = pair.first_contact
+    arm = positions - foot
+    return np.linalg.norm(arm - (arm @ axis)[:, None] * axis, axis=1)
+
+
 def _radius(distance: Array, active: NDArray[np.bool_]) -> tuple[float, float]:
-    """Return the distances from x = 0 of the outermost active constraint and of the next one beyond it."""
+    """Return the distance of the outermost active constraint and of the next one beyond it."""
     if not active.any():
         return float("nan"), float("nan")
     inside = distance[active].max()

@@ -17,31 +17,81 @@ Indices = NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
+class FacetBlock:
+    """Facets of one kind.
+
+    Attributes
+    ----------
+    element : str
+        Element of the facets.
+    facets : ndarray (n_facets, n_nodes)
+        Connectivity, normals pointing out of the solid.
+    local : ndarray (n_facets, n_nodes)
+        `facets` as positions in the points of the surface.
+    """
+
+    element: str
+    facets: Indices
+    local: NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
 class Surface:
-    """Facets of one side of a contact pair.
+    """Facets of one side of a contact pair, numbered through blocks of one kind each.
 
     Attributes
     ----------
     group : str
         Name of the group in the mesh.
-    element : str
-        Element of the facets, one kind.
-    facets : ndarray (n_facets, n_nodes)
-        Connectivity, normals pointing out of the solid.
+    blocks : tuple of FacetBlock
+        The facets; several blocks where triangles and quadrangles meet.
     points : ndarray (m,)
         The nodes; in order along the line where the facets form one open line, else ascending.
     abscissa : ndarray (m,)
         Length along the surface to each node [length]; zero where there is no such order.
-    local : ndarray (n_facets, n_nodes)
-        `facets` as positions in `points`.
     """
 
     group: str
-    element: str
-    facets: Indices
+    blocks: tuple[FacetBlock, ...]
     points: Indices
     abscissa: Array
-    local: NDArray[np.intp]
+
+    @property
+    def n_facets(self) -> int:
+        """Number of facets of all kinds."""
+        return sum(len(block.facets) for block in self.blocks)
+
+    @property
+    def order(self) -> int:
+        """Order of the facets: 1 where all are linear, 2 where any is quadratic."""
+        return max(elements.get(block.element).order for block in self.blocks)
+
+    @property
+    def element(self) -> str:
+        """Element of the facets, where they are of one kind."""
+        return self._only_block().element
+
+    @property
+    def facets(self) -> Indices:
+        """Connectivity (n_facets, n_nodes), where the facets are of one kind."""
+        return self._only_block().facets
+
+    @property
+    def local(self) -> NDArray[np.intp]:
+        """`facets` as positions in `points`, where they are of one kind."""
+        return self._only_block().local
+
+    def _only_block(self) -> FacetBlock:
+        if len(self.blocks) > 1:
+            raise ContactError(
+                f"group '{self.group}' mixes facets of {' and '.join(block.element for block in self.blocks)}, which this "
+                "formulation does not take: use 'continuous' or 'node_to_segment', or mesh the surface with one kind"
+            )
+        return self.blocks[0]
+
+    def corners(self, coordinates: Array) -> list[Array]:
+        """Return the nodes (n_facets, n_nodes, dim) of each block at nodal `coordinates` (n_points, dim)."""
+        return [coordinates[block.facets] for block in self.blocks]
 
 
 def surface(mesh: Mesh, group: str) -> Surface:
@@ -52,27 +102,26 @@ def surface(mesh: Mesh, group: str) -> Surface:
     MeshError
         If there is no such group.
     ContactError
-        If the group holds no facets, facets of several kinds, or a facet inside a solid or without one.
+        If the group holds no facets, or a facet inside a solid or without one.
     """
-    blocks = mesh.cells_of(group, dim=mesh.dim - 1)
-    if not blocks:
+    found = mesh.cells_of(group, dim=mesh.dim - 1)
+    if not found:
         raise ContactError(
             f"group '{group}' holds no facets (cells of dimension {mesh.dim - 1}): name a boundary group"
         )
-    if len(blocks) > 1:
-        raise ContactError(f"group '{group}' mixes facets of {' and '.join(blocks)}: make the mesh of one order there")
-    name, block = next(iter(blocks.items()))
-    facets = _outward(mesh, group, name, block)
+    outer = outer_facets(mesh)
+    facets = {name: _outward(mesh, group, name, block, outer) for name, block in found.items()}
     points, abscissa = _ordered(mesh, group, facets)
     position = np.full(mesh.n_points, -1, np.intp)
     position[points] = np.arange(len(points))
-    return Surface(group, name, facets, points, abscissa, position[facets])
+    blocks = tuple(FacetBlock(name, block, position[block]) for name, block in facets.items())
+    return Surface(group, blocks, points, abscissa)
 
 
-def _outward(mesh: Mesh, group: str, name: str, block: Indices) -> Indices:
-    """Return the outer facets of the solid that match `block`, with the solid's orientation."""
-    outer = outer_facets(mesh).get(name, np.empty((0, elements.get(name).n_nodes), np.int32))
-    keys = {tuple(sorted(facet)): row for row, facet in enumerate(outer.tolist())}
+def _outward(mesh: Mesh, group: str, name: str, block: Indices, outer: dict[str, Indices]) -> Indices:
+    """Return the facets `outer` of the solids that match `block`, with the solid's orientation."""
+    candidates = outer.get(name, np.empty((0, elements.get(name).n_nodes), np.int32))
+    keys = {tuple(sorted(facet)): row for row, facet in enumerate(candidates.tolist())}
     rows = [keys.get(tuple(sorted(facet)), -1) for facet in block.tolist()]
     missing = [i for i, row in enumerate(rows) if row < 0]
     if missing:
@@ -81,15 +130,15 @@ def _outward(mesh: Mesh, group: str, name: str, block: Indices) -> Indices:
             f"{len(missing)} of {len(block)} facets of '{group}' do not lie on the outside of a solid "
             f"(first near {where}): contact needs boundary facets that share their nodes with solid cells"
         )
-    return np.ascontiguousarray(outer[np.unique(rows)])
+    return np.ascontiguousarray(candidates[np.unique(rows)])
 
 
-def _ordered(mesh: Mesh, group: str, facets: Indices) -> tuple[Indices, Array]:
+def _ordered(mesh: Mesh, group: str, facets: dict[str, Indices]) -> tuple[Indices, Array]:
     if mesh.dim == 2:
         try:
             line = ordered_line(mesh, group)
             return line.points, line.abscissa
         except MeshError:  # closed, or in several pieces: no order along it
             pass
-    points = np.unique(facets)
+    points = np.unique(np.concatenate([block.ravel() for block in facets.values()]))
     return points, np.zeros(len(points))

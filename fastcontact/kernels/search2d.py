@@ -1,59 +1,12 @@
-"""Closest facet to a point in 2D: a tree of bounding boxes (broad phase) and projection on line facets (narrow phase).
+"""Closest facet to a point in 2D: projection on line facets (narrow phase) through a tree of boxes.
 
 Facets are straight (2 nodes) or quadratic (3 nodes, the middle last); ``corners`` below is (n_facets, n_nodes, 2).
-A tree is five arrays: ``low``, ``high`` (n_boxes, 2), ``child`` (n_boxes,) number of the left child (the right one
-follows it) or -1 at leaves, ``span`` (n_boxes, 2) range in ``order``, the facets sorted so that a box owns a range.
+The tree is that of `box_tree`.
 """
 
 import numpy as np
 
 from fastcontact._jit import kernel
-
-LEAF = 4
-
-
-@kernel
-def build_tree(corners):
-    """Return (low, high, child, span, order) of a median-split tree over the facets, built in O(n log^2 n)."""
-    n, n_nodes, _ = corners.shape
-    box_low, box_high = np.empty((n, 2)), np.empty((n, 2))
-    centre = np.empty((n, 2))
-    for f in range(n):
-        for d in range(2):
-            a, b = corners[f, 0, d], corners[f, 1, d]
-            low, high = min(a, b), max(a, b)
-            if n_nodes == 3:
-                # A quadratic curve lies in the hull of its Bezier control points.
-                control = 2.0 * corners[f, 2, d] - 0.5 * (a + b)
-                low, high = min(low, control), max(high, control)
-            box_low[f, d], box_high[f, d] = low, high
-            centre[f, d] = 0.5 * (low + high)
-    capacity = 2 * n + 1
-    low, high = np.empty((capacity, 2)), np.empty((capacity, 2))
-    child = np.full(capacity, -1, np.int64)
-    span = np.zeros((capacity, 2), np.int64)
-    order = np.arange(n)
-    span[0, 1] = n
-    count, box = 1, 0
-    while box < count:
-        begin, end = span[box, 0], span[box, 1]
-        for d in range(2):
-            low[box, d], high[box, d] = np.inf, -np.inf
-        for k in range(begin, end):
-            for d in range(2):
-                low[box, d] = min(low[box, d], box_low[order[k], d])
-                high[box, d] = max(high[box, d], box_high[order[k], d])
-        if end - begin > LEAF:
-            axis = 0 if high[box, 0] - low[box, 0] >= high[box, 1] - low[box, 1] else 1
-            part = order[begin:end].copy()
-            order[begin:end] = part[np.argsort(centre[part, axis], kind="mergesort")]
-            middle = (begin + end) // 2
-            child[box] = count
-            span[count, 0], span[count, 1] = begin, middle
-            span[count + 1, 0], span[count + 1, 1] = middle, end
-            count += 2
-        box += 1
-    return low[:count], high[:count], child[:count], span[:count], order
 
 
 @kernel

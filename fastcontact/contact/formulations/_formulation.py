@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -64,6 +65,11 @@ class Formulation(ABC):
         if not self.projection_tolerance >= 0:
             raise ContactError(f"projection_tolerance = {self.projection_tolerance} must not be negative")
 
+    @classmethod
+    def in_dimension(cls, dim: int) -> type[Formulation]:
+        """Return the class that does this formulation in 2 or 3 dimensions."""
+        return cls
+
     @abstractmethod
     def constraints(self, displacement: Array) -> Constraints:
         """Pair on the configuration displaced by `displacement` (n_points, dim) and return the constraints."""
@@ -91,6 +97,18 @@ class Formulation(ABC):
         directions = tuple(tangents(pairing.normal))
         along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
         return Constraints(B, gap0, positions, compliance, along, directions, np.full(len(gap0), self.friction))
+
+    @cached_property
+    def first_contact(self) -> tuple[Array, Array]:
+        """Where the bodies meet first, and the normal faced there, both (dim,).
+
+        The secondary node with the smallest gap before any load; of equally close ones that nearest to the origin.
+        """
+        positions = self.points[self.secondary.points]
+        gap, normal = self.nodal_gap(np.zeros_like(self.points))
+        close = np.flatnonzero(gap <= gap.min() + 1e-9 * np.ptp(positions, axis=0).max())
+        first = close[np.argmin(np.linalg.norm(positions[close], axis=1))]
+        return positions[first], normal[first]
 
     def nodal_gap(self, displacement: Array) -> tuple[Array, Array]:
         """Return the gap (n_nodes,) of the secondary nodes in the displaced configuration, and the normals faced.

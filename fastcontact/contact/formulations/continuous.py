@@ -33,8 +33,9 @@ from fastcontact import elements, quadrature
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._projection import Projection
-from fastcontact.contact.integration import facet_measure
-from fastcontact.contact.pairing import Candidates, pair
+from fastcontact.contact.integration import facet_measure, fine_rule, gauss_rule
+from fastcontact.contact.pairing import Candidates, filled_up, pair
+from fastcontact.contact.surface import FacetBlock
 from fastcontact.errors import ContactError, unknown
 
 Array = NDArray[np.float64]
@@ -48,11 +49,14 @@ class Continuous(Formulation):
     Parameters
     ----------
     integration : str
-        ``"gauss"``, ``"simpson"`` (on each half of a quadratic facet) or ``"node"``.
+        ``"gauss"``, ``"simpson"`` (on each half or quarter of a quadratic facet) or ``"node"``. On triangles Simpson's
+        place is taken by the closed rule of seven points. The nodes of six-node triangles and eight-node quadrangles
+        have no positive areas, so ``"node"`` is refused there.
     n_gauss : int, optional
-        Gauss points per facet; by default 3 on linear and 4 on quadratic facets, at least the number of its nodes.
+        Gauss points in each direction of a facet, on triangles 3, 6, 12 or 16 points in all for 2 to 5; by default 3 on
+        linear and 4 on quadratic facets. They must determine the field.
     augmentation : float
-        rho times the length of the shortest facet over the modulus of the bodies [1].
+        rho times the length of the shortest facet (the root of the smallest area) over the modulus of the bodies [1].
     normals : str
         ``"averaged"`` by default: with normals that jump between facets, a point opposite a node can flip for ever.
     """
@@ -66,6 +70,7 @@ class Continuous(Formulation):
     name: ClassVar[str] = "continuous"
     geometry_in_loop: ClassVar[bool] = True
     _candidates: Candidates = field(init=False, repr=False)
+    _local: NDArray[np.intp] = field(init=False, repr=False)
     _projection: Projection = field(init=False, repr=False)
     _field: csr_array = field(init=False, repr=False)
 
@@ -73,66 +78,82 @@ class Continuous(Formulation):
         super().__post_init__()
         if not self.augmentation > 0:
             raise ContactError(f"augmentation = {self.augmentation} must be positive; 1 suits most problems")
-        surface, element = self.secondary, elements.get(self.secondary.element)
-        xi, weights = self._rule(element.n_nodes)
-        shape = np.tile(element.shape(xi), (len(surface.facets), 1))
-        self._candidates = Candidates(np.repeat(surface.facets, len(xi), axis=0), shape)
-        areas = self._areas(xi, weights, element.n_nodes)
+        nodes, local, shapes, areas, shortest = [], [], [], [], np.inf
+        for block in self.secondary.blocks:
+            xi, weights = self._rule(block.element)
+            nodes.append(np.repeat(block.facets, len(xi), axis=0))
+            local.append(np.repeat(block.local, len(xi), axis=0))
+            shapes.append(np.tile(elements.get(block.element).shape(xi), (len(block.facets), 1)))
+            areas.append(self._areas(block, xi, weights))
+            size = facet_measure(block.facets, block.element, self.points, xi, False) @ weights
+            shortest = min(shortest, size.min() ** (1 / xi.shape[1]))
+        self._candidates = Candidates(filled_up(nodes), filled_up(shapes))
+        self._local = filled_up(local)
+        rho = self.augmentation * self.modulus / shortest
+        self._project(np.concatenate(areas), float(rho))
+
+    def _project(self, areas: Array, rho: float) -> None:
+        """Set up the multiplier field and its compliance."""
+        shape = self._candidates.shape
         row = np.broadcast_to(np.arange(len(shape))[:, None], shape.shape)
-        column = np.repeat(surface.local, len(xi), axis=0)
-        size = (len(shape), len(surface.points))
-        P = coo_array((shape.ravel(), (row.ravel(), column.ravel())), shape=size).tocsr()
+        size = (len(shape), len(self.secondary.points))
+        P = coo_array((shape.ravel(), (row.ravel(), self._local.ravel())), shape=size).tocsr()
         self._field = self._determined(P, areas)
         P = P @ self._field
         mass = splu((P.T @ diags_array(areas) @ P).tocsc())
-        shortest = facet_measure(surface.facets, surface.element, self.points, xi, False) @ weights
-        rho = self.augmentation * self.modulus / shortest.min()
-        self._projection = Projection(csr_array(P), areas, float(rho), mass)
+        self._projection = Projection(csr_array(P), areas, rho, mass)
 
-    def _rule(self, n_nodes: int) -> quadrature.Rule:
+    def _rule(self, element: str) -> quadrature.Rule:
         if self.integration not in RULES:
             raise ContactError(unknown("integration rule", self.integration, RULES))
         if self.integration == "simpson":
-            return quadrature.subdivided(quadrature.simpson_line(), n_nodes - 1)
+            return _simpson(element)
         if self.integration == "node":
-            return quadrature.trapezium_line() if n_nodes == 2 else quadrature.simpson_line()
-        count = n_nodes + 1 if self.n_gauss is None else self.n_gauss
-        if count < n_nodes:
-            raise ContactError(
-                f"n_gauss = {count} on facets with {n_nodes} nodes leaves a multiplier undetermined: "
-                f"use at least {n_nodes}"
-            )
-        return quadrature.gauss_line(count)
+            return _at_nodes(element)
+        return self._gauss(element)
 
-    def _areas(self, xi: Array, weights: Array, n_nodes: int) -> Array:
+    def _gauss(self, element: str) -> quadrature.Rule:
+        reference = elements.get(element)
+        smallest = reference.order + 1
+        count = reference.order + 2 if self.n_gauss is None else self.n_gauss
+        if count < smallest:
+            raise ContactError(
+                f"n_gauss = {count} on facets with {reference.n_nodes} nodes leaves a multiplier undetermined: "
+                f"use at least {smallest}"
+            )
+        if reference.n_corners == 3 and count > 5:
+            raise ContactError(f"n_gauss = {count} is too large for triangles: there are rules for 2 to 5")
+        return gauss_rule(element, count)
+
+    def _areas(self, block: FacetBlock, xi: Array, weights: Array) -> Array:
         """Return the area (n_facets * n_q,) of each integration point.
 
         At the nodes these are the integrals of the shape functions, so that a pressure field and its point forces have
         the same resultant also where the radius varies along the facet.
         """
-        surface = self.secondary
         if self.integration != "node":
-            measure = facet_measure(surface.facets, surface.element, self.points, xi, self.axisymmetric)
+            measure = facet_measure(block.facets, block.element, self.points, xi, self.axisymmetric)
             return np.maximum(measure * weights, 0.0).ravel()
-        fine, w = quadrature.gauss_line(n_nodes + 1)
-        measure = facet_measure(surface.facets, surface.element, self.points, fine, self.axisymmetric) * w
-        areas = measure @ elements.get(surface.element).shape(fine)
-        if n_nodes == 3:  # at the axis the integral vanishes, but for the curvature of the facet
+        fine, w = fine_rule(block.element)
+        measure = facet_measure(block.facets, block.element, self.points, fine, self.axisymmetric) * w
+        areas = measure @ elements.get(block.element).shape(fine)
+        if block.element == "line3":  # at the axis the integral vanishes, but for the curvature of the facet
             areas[np.abs(areas) < 1e-3 * areas[:, 2:]] = 0.0
         return areas.ravel()
 
     def _determined(self, P: csr_array, areas: Array) -> csr_array:
         """Return the matrix (n_nodes, k) from independent multipliers to nodal values of the field.
 
-        The identity, but for a quadratic facet that ends on the axis when the points are the nodes: that end has no
+        The identity, but for a quadratic line that ends on the axis when the points are the nodes: that end has no
         area and its value no equation. The field is even about the axis, which gives it by the two other nodes.
         """
         size = P.shape[1]
         seen = np.asarray((P.T @ diags_array(areas) @ P).diagonal())
         blind = np.flatnonzero(seen == 0.0)
         values = eye_array(size, format="lil")
-        for facet in self.secondary.local:
-            for end, other in ((0, 1), (1, 0)) if len(facet) == 3 else ():
+        lines = [block.local for block in self.secondary.blocks if block.element == "line3"]
+        for facet in np.concatenate(lines) if len(blind) and lines else ():
+            for end, other in ((0, 1), (1, 0)):
                 if facet[end] in blind:
                     values[facet[end], facet[end]] = 0.0
                     values[facet[end], facet[2]] = 4.0 / 3.0
@@ -154,10 +175,32 @@ class Continuous(Formulation):
 
     def closed_nodes(self, active: NDArray[np.bool_], gap: Array, pressure: Array) -> NDArray[np.bool_]:
         """Return the nodes where ``pressure - rho gap`` is positive, on facets with an active point."""
-        on_facet = active.reshape(len(self.secondary.facets), -1).any(axis=1)
         touched = np.zeros(len(gap), bool)
-        touched[self.secondary.local[on_facet]] = True
+        touched[self._local[active]] = True
         return touched & (pressure - self._projection.rho * np.where(np.isfinite(gap), gap, np.inf) > 0)
+
+
+def _simpson(element: str) -> quadrature.Rule:
+    """Return a closed rule on a facet: Simpson's on lines, its product on quadrangles, seven points on triangles."""
+    reference = elements.get(element)
+    if reference.n_corners == 3:
+        closed = quadrature.triangle_7_closed()
+        return closed if reference.order == 1 else quadrature.quartered_triangle(closed)
+    line = quadrature.subdivided(quadrature.simpson_line(), reference.order)
+    return line if reference.dim == 1 else quadrature.square(line)
+
+
+def _at_nodes(element: str) -> quadrature.Rule:
+    """Return the nodes of a facet with the integrals of their shape functions over the reference facet."""
+    reference = elements.get(element)
+    xi, weights = fine_rule(element)
+    areas = weights @ reference.shape(xi)
+    if areas.min() < 1e-6 * areas.max():
+        raise ContactError(
+            f"integration = 'node' makes no sense on facets of {element}: their corners have no positive area. Use "
+            "'gauss' or 'simpson'"
+        )
+    return reference.nodes, areas
 
 
 FORMULATION = Continuous

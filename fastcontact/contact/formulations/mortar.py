@@ -22,6 +22,7 @@ from scipy.sparse.linalg import splu
 from fastcontact import elements, quadrature
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._formulation import Formulation
+from fastcontact.contact.formulations._mortar_faces import MortarFaces
 from fastcontact.contact.formulations._projection import Projection
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.pairing import Candidates, Pairing, pair
@@ -69,14 +70,20 @@ class Mortar(Formulation):
         lengths = facet_measure(facets, element, self.points, xi, False) @ weights
         self._rho = self.augmentation * self.modulus / float(lengths.min())
 
+    @classmethod
+    def in_dimension(cls, dim: int) -> type[Formulation]:
+        """Faces are cut differently from lines."""
+        return MortarFaces if dim == 3 else cls
+
     def _cuts(self, deformed: Array) -> tuple[NDArray[np.intp], Array, Array]:
         """Return (facet, begin, end) of the pieces of the secondary facets, in their reference coordinate."""
         ends = np.unique(self.primary.facets[:, :2])
         opposite = closest(deformed[ends], deformed[self.secondary.facets])
-        inside = (opposite.overhang == 0.0) & (np.abs(opposite.xi) < 1.0 - SLIVER)
+        along = opposite.xi[:, 0]
+        inside = (opposite.overhang == 0.0) & (np.abs(along) < 1.0 - SLIVER)
         n = len(self.secondary.facets)
         facet = np.concatenate([np.arange(n), np.arange(n), opposite.facet[inside]])
-        xi = np.concatenate([np.full(n, -1.0), np.full(n, 1.0), opposite.xi[inside]])
+        xi = np.concatenate([np.full(n, -1.0), np.full(n, 1.0), along[inside]])
         order = np.lexsort((xi, facet))
         facet, xi = facet[order], xi[order]
         piece = (facet[1:] == facet[:-1]) & (np.diff(xi) > SLIVER)

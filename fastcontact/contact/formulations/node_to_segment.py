@@ -48,7 +48,7 @@ class NodeToSegment(Formulation):
 
         The nodal areas of quadratic facets are not positive (zero at the axis), so division by them means nothing.
         """
-        if self.secondary.local.shape[1] == 2:
+        if self.secondary.order == 1:
             return multiplier / nodal_areas(self.secondary, self.points, self.axisymmetric)
         mass = mass_matrix(self.secondary, self.points, self.axisymmetric)
         return splu(mass.tocsc()).solve(multiplier)

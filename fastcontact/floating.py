@@ -1,0 +1,197 @@
+"""Bodies that only contact holds: springs make their stiffness regular, and the solution is moved until they are slack.
+
+Each free motion gets one spring at one node, about as stiff as the body there. The springs hang on a rigid position y
+of the bodies; for every y the contact problem is regular. The elongations w(y) that it leaves are, but for their sign
+and stiffness, the gradient of a convex function of y (the Moreau envelope of the energy: Moreau, 1965; Rockafellar,
+1976). Newton's method with a line search brings them to zero; then the springs carry nothing, and the solution is that
+without them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import qr
+from scipy.sparse import bsr_array
+
+from fastcontact.active_set import State
+from fastcontact.rigid_motions import FreeMotions
+from fastcontact.system import System
+
+Array = NDArray[np.float64]
+# The springs carry less than this fraction of the loads; more where round-off or the linear solver leave more.
+SLACK = 1e-12
+# What is left when nothing improves any more counts as slack below this fraction.
+STAGNANT = 1e-8
+MAX_POSITIONS = 100
+# A motion that resists less than this fraction of its spring does not resist.
+UNRESISTED = 1e-9
+
+
+@dataclass(frozen=True)
+class Settled:
+    """A contact solution with slack springs.
+
+    Attributes
+    ----------
+    state : State
+        For the springs at `position`; its iterations are those of all positions tried.
+    position : ndarray (k,)
+        Rigid displacement at each spring [length].
+    left : ndarray (k,)
+        Force still carried by each spring [force].
+    positions : int
+        Positions tried.
+    slack : bool
+        Whether the springs are slack.
+    """
+
+    state: State
+    position: Array
+    left: Array
+    positions: int
+    slack: bool
+
+
+class Floating:
+    """Springs on the free motions of a system.
+
+    Parameters
+    ----------
+    motions : FreeMotions
+    system : System
+    avoid : ndarray of int
+        Displacements to keep the springs from if possible: those of the contact surfaces.
+    """
+
+    def __init__(self, motions: FreeMotions, system: System, avoid: NDArray[np.intp]) -> None:
+        diagonal = system.matrix.diagonal()
+        self.dofs = _sturdy(system.unknowns_of(motions.displacement), diagonal, avoid)
+        self.motions = motions.combined(np.linalg.inv(motions.displacement[self.dofs]))
+        self.stiffness = float(np.median(diagonal[system.free]))
+
+    def with_springs(self, matrix: bsr_array) -> bsr_array:
+        """Return the matrix with the springs added."""
+        data, size = matrix.data.copy(), matrix.blocksize[0]
+        for dof in self.dofs:
+            row, component = divmod(int(dof), size)
+            first, end = matrix.indptr[row], matrix.indptr[row + 1]
+            place = first + int(np.flatnonzero(matrix.indices[first:end] == row)[0])
+            data[place, component, component] += self.stiffness
+        return bsr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
+
+    def rigid(self, position: Array) -> Array:
+        """Return the displacements (n_dofs,) of the rigid position (k,)."""
+        return np.asarray(self.motions.displacement @ position)
+
+    def report(self, settled: Settled, load: float) -> list[dict[str, Any]]:
+        """Return what was regularised, and by how much, as plain numbers and strings."""
+        return [
+            {
+                "motion": name,
+                "spring_stiffness": self.stiffness,
+                "spring_force_left": float(abs(left)),
+                "relative_to_load": float(abs(left) / load) if load else 0.0,
+            }
+            for name, left in zip(self.motions.names(), settled.left, strict=True)
+        ]
+
+    def settle(self, solve_at: Callable[[Array], State], start: Array, load: float, noise: float) -> Settled:
+        """Find the position at which the springs are slack.
+
+        Parameters
+        ----------
+        solve_at : callable
+            Solves the contact problem with the springs at a position (k,).
+        start : ndarray (k,)
+        load : float
+            The forces to compare those of the springs with [force].
+        noise : float
+            Accuracy of displacements [length].
+
+        Returns
+        -------
+        Settled
+            The best found if the springs do not become slack, or a contact problem does not settle.
+        """
+        search = _Search(solve_at, self.dofs, start)
+        enough = max(SLACK * load / self.stiffness, noise)
+        derivative: Array | None = None
+        while search.settled and search.left > enough and search.positions < MAX_POSITIONS:
+            before = search.left
+            if derivative is None:
+                derivative = search.differences(max(0.1 * search.left, 1e3 * noise))
+            search.move(_step(derivative, search.elongation))
+            if search.left > 0.1 * before:
+                derivative = None
+                if search.left >= 0.5 * before and search.left <= STAGNANT * load / self.stiffness:
+                    break
+        slack = search.settled and search.left <= max(enough, STAGNANT * load / self.stiffness)
+        state = dataclasses.replace(search.state, iterations=search.iterations)  # type: ignore[type-var]
+        return Settled(state, search.position, self.stiffness * search.elongation, search.positions, slack)
+
+
+class _Search:
+    """Where the search for the position stands."""
+
+    def __init__(self, solve_at: Callable[[Array], State], dofs: NDArray[np.intp], start: Array) -> None:
+        self._solve_at, self._dofs = solve_at, dofs
+        self.positions = self.iterations = 0
+        self.settled = True
+        self.position = start
+        self.state, self.elongation = self._at(start)
+
+    @property
+    def left(self) -> float:
+        """Largest elongation [length]."""
+        return float(np.abs(self.elongation).max())
+
+    def _at(self, position: Array) -> tuple[State, Array]:
+        state = self._solve_at(position)
+        self.positions += 1
+        self.iterations += state.iterations
+        self.settled = self.settled and state.settled
+        return state, state.u[self._dofs]
+
+    def differences(self, by: float) -> Array:
+        """Return the derivative (k, k) of the elongations by the position, from differences in their direction."""
+        columns = []
+        for k, w in enumerate(self.elongation):
+            shift = np.zeros(len(self.position))
+            shift[k] = by if w >= 0 else -by
+            columns.append((self._at(self.position + shift)[1] - self.elongation) / shift[k])
+        return np.column_stack(columns)
+
+    def move(self, step: Array) -> None:
+        """Go along `step`, less far where the elongations turn round."""
+        slope, length = float(self.elongation @ step), 1.0
+        for _ in range(10):
+            state, elongation = self._at(self.position + length * step)
+            there = float(elongation @ step)
+            if there >= -0.5 * abs(slope):
+                break
+            length *= min(max(slope / (slope - there), 0.1), 0.9)
+        self.position = self.position + length * step
+        self.state, self.elongation = state, elongation
+
+
+def _step(derivative: Array, elongation: Array) -> Array:
+    """Return the Newton step; motions that nothing resists follow their springs."""
+    left, values, right = np.linalg.svd(derivative)
+    resisted = values > UNRESISTED
+    step = -right[resisted].T @ ((left[:, resisted].T @ elongation) / values[resisted])
+    free = right[~resisted]
+    return np.asarray(step + free.T @ (free @ elongation))
+
+
+def _sturdy(motions: Array, diagonal: Array, avoid: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return k unknowns that determine the motions (n, k): the stiffest ones far apart, none of `avoid` if possible."""
+    weights = np.sqrt(np.maximum(diagonal, 0.0))
+    weights[avoid] *= 1e-3
+    _, _, order = qr((motions * weights[:, None]).T, mode="economic", pivoting=True)
+    return np.sort(order[: motions.shape[1]]).astype(np.intp)

@@ -1,0 +1,156 @@
+"""Linear relations between displacements, and their elimination: ``R u = r`` becomes ``u = T w + S r``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, vstack
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Table = tuple[tuple[float, float], ...]
+# A coefficient below this fraction of the largest of its row has cancelled.
+ZERO = 1e-10
+Row = dict[int, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Relation:
+    """Equations ``rows @ u = value`` between displacement components.
+
+    Parameters
+    ----------
+    name : str
+        What the user asked for, for messages.
+    rows : csr_array (m, n_dofs)
+    value : float
+        At multiplier 1 of the ramp [length times the unit of the coefficients].
+    ramp : tuple of (float, float), optional
+        Points (instant, multiplier) of its own history; None: that of the analysis.
+    """
+
+    name: str
+    rows: csr_array
+    value: float = 0.0
+    ramp: Table | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Elimination:
+    """``u = T w + S r``, with w zero at the pivots, satisfies ``R u = r`` for every w that meets the conditions.
+
+    Attributes
+    ----------
+    pivots : ndarray of int
+        The displacement components expressed by the others.
+    T : csr_array (n, n)
+        Identity but for the rows of the pivots; the columns of the pivots are empty.
+    S : csr_array (n, m)
+        How the pivots depend on the right-hand sides.
+    conditions : csr_array (k, n + m)
+        Rows that bind only known components and right-hand sides: ``conditions @ (w, r) = 0`` or there is no solution.
+    origin : ndarray of int (k,)
+        The row of R that each condition comes from.
+    """
+
+    pivots: NDArray[np.intp]
+    T: csr_array
+    S: csr_array
+    conditions: csr_array
+    origin: NDArray[np.intp]
+
+
+def stacked_rows(relations: Sequence[Relation], n_dofs: int) -> csr_array:
+    """Return the rows of all relations as one matrix R (m, n_dofs)."""
+    if not relations:
+        return csr_array((0, n_dofs))
+    return csr_array(vstack([relation.rows for relation in relations], format="csr"))
+
+
+def eliminate(R: csr_array, known: Mask) -> Elimination:
+    """Express one unknown component by the others for each independent row of ``R u = r``.
+
+    Parameters
+    ----------
+    R : csr_array (m, n)
+        May repeat itself.
+    known : ndarray of bool (n,)
+        Components that are prescribed and never become pivots.
+    """
+    m, n = R.shape
+    uses = np.bincount(R.indices, minlength=n)
+    expressed: dict[int, Row] = {}
+    users: dict[int, set[int]] = {}
+    conditions: list[Row] = []
+    origin = []
+    for k in range(m):
+        row = _substituted(R, k, expressed)
+        row[n + k] = row.get(n + k, 0.0) - 1.0
+        largest = max((abs(c) for key, c in row.items() if key < n), default=0.0)
+        unknown = [key for key, c in row.items() if key < n and not known[key] and abs(c) > 0.1 * largest]
+        unknown = unknown or [key for key, c in row.items() if key < n and not known[key]]
+        if not unknown:
+            conditions.append(row)
+            origin.append(k)
+            continue
+        # The component in the fewest relations: a master that others follow stays.
+        pivot = min(unknown, key=lambda key: (uses[key], -abs(row[key]), key))
+        coefficient = row.pop(pivot)
+        _express(pivot, {key: -c / coefficient for key, c in row.items()}, expressed, users)
+    T, S = _matrices(expressed, n, m)
+    return Elimination(
+        np.fromiter(expressed, np.intp, len(expressed)), T, S, _rows(conditions, n + m), np.array(origin, np.intp)
+    )
+
+
+def _substituted(R: csr_array, k: int, expressed: dict[int, Row]) -> Row:
+    """Return row `k` of R with pivots replaced by what they are expressed by."""
+    row: Row = {}
+    size = 0.0
+    for place in range(R.indptr[k], R.indptr[k + 1]):
+        key, c = int(R.indices[place]), float(R.data[place])
+        size = max(size, abs(c))
+        for other, d in expressed.get(key, {key: 1.0}).items():
+            row[other] = row.get(other, 0.0) + c * d
+    return {key: c for key, c in row.items() if abs(c) > ZERO * size}
+
+
+def _express(pivot: int, by: Row, expressed: dict[int, Row], users: dict[int, set[int]]) -> None:
+    """Enter a new pivot, and replace it where earlier ones are expressed by it."""
+    expressed[pivot] = by
+    for key in by:
+        users.setdefault(key, set()).add(pivot)
+    for other in users.pop(pivot, set()):
+        row = expressed[other]
+        c = row.pop(pivot)
+        for key, d in by.items():
+            row[key] = row.get(key, 0.0) + c * d
+            users[key].add(other)
+
+
+def _matrices(expressed: dict[int, Row], n: int, m: int) -> tuple[csr_array, csr_array]:
+    """Return T (n, n) and S (n, m)."""
+    keep = np.ones(n, bool)
+    keep[list(expressed)] = False
+    kept = np.flatnonzero(keep)
+    entries = [(pivot, key, c) for pivot, row in expressed.items() for key, c in row.items()]
+    rows = np.array([entry[0] for entry in entries], np.intp)
+    columns = np.array([entry[1] for entry in entries], np.intp)
+    values = np.array([entry[2] for entry in entries], np.float64)
+    own = columns < n
+    T = csr_array(
+        (np.r_[np.ones(len(kept)), values[own]], (np.r_[kept, rows[own]], np.r_[kept, columns[own]])), shape=(n, n)
+    )
+    S = csr_array((values[~own], (rows[~own], columns[~own] - n)), shape=(n, m))
+    return T, S
+
+
+def _rows(rows: list[Row], width: int) -> csr_array:
+    """Return dictionaries as the rows of a matrix."""
+    row = np.array([i for i, entries in enumerate(rows) for _ in entries], np.intp)
+    column = np.array([key for entries in rows for key in entries], np.intp)
+    values = np.array([c for entries in rows for c in entries.values()], np.float64)
+    return csr_array((values, (row, column)), shape=(len(rows), width))

@@ -1,0 +1,203 @@
+"""The linear system of a model: from all displacements u to the unknowns v of the linear solver and back.
+
+``u = T v + t``: T is the identity but for the displacements that relations express by others, t holds the prescribed
+ones. The matrix for the solver is ``T.T K T`` with the rows and columns of everything that is no unknown cleared but
+for their diagonal, so that it keeps the size and blocks of K.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import bsr_array, csr_array, diags_array
+
+from fastcontact.errors import ModelError
+from fastcontact.relations import Elimination, Relation, eliminate, stacked_rows
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+# Supports and right-hand sides that miss a condition by less than this fraction meet it.
+CONFLICT = 1e-9
+
+
+class System:
+    """Stiffness, supports and relations of a model.
+
+    Parameters
+    ----------
+    K : bsr_array (n, n)
+        Stiffness [force / length].
+    supported : ndarray of bool (n,)
+        Displacement components that are prescribed.
+    relations : sequence of Relation
+
+    Attributes
+    ----------
+    matrix : bsr_array (n, n)
+        For the linear solver.
+    fixed : ndarray of bool (n,)
+        Supported components, and those of points without stiffness or relation, which stay at zero.
+    free : ndarray of bool (n,)
+        The unknowns.
+    held : ndarray of bool (n,)
+        Components that a support or a relation may exert a force on.
+    """
+
+    def __init__(self, K: bsr_array, supported: Mask, relations: Sequence[Relation] = ()) -> None:
+        self.K = K
+        R = stacked_rows(relations, K.shape[0])
+        related = np.zeros(K.shape[0], bool)
+        related[R.indices] = True
+        self.fixed: Mask = supported | (np.asarray(K.diagonal() == 0.0) & ~related)
+        self.held: Mask = self.fixed | related
+        self._constraints = ConstrainedMotion(self.fixed, relations)
+        self.T = self._constraints.T if relations else None
+        self.free: Mask = self._constraints.free
+        if self.T is None:
+            self.matrix = with_supports(K, self.fixed)
+        else:
+            condensed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
+            condensed.sort_indices()
+            self.free &= condensed.diagonal() > 0  # points that relations tie to nothing but each other
+            self.matrix = with_supports(condensed, ~self.free)
+
+    def lift(self, prescribed: Array, values: Array) -> Array:
+        """Return t for the prescribed displacements (n,) and the right-hand sides (m,) of the relations.
+
+        Raises
+        ------
+        ModelError
+            If relations and supports contradict each other.
+        """
+        return self._constraints.lift(prescribed, values)
+
+    def values(self, multiplier: Sequence[float]) -> Array:
+        """Return the right-hand sides (m,) of the relations, given the multiplier of each."""
+        return self._constraints.values(multiplier)
+
+    def right(self, f: Array, t: Array) -> Array:
+        """Return the right-hand side (n,) of the solver for the forces `f` (n,) on all displacements."""
+        return self.reduced(f - self.K @ t)
+
+    def reduced(self, force: Array) -> Array:
+        """Return the forces (n,) on the unknowns that `force` (n,) on all displacements amounts to."""
+        on_unknowns = force if self.T is None else self.T.T @ force
+        return np.where(self.free, on_unknowns, 0.0)
+
+    def rows(self, rows: csr_array, offset: Array, t: Array) -> tuple[csr_array, Array]:
+        """Return ``rows @ u + offset`` as rows and offset for the unknowns v."""
+        offset = offset + rows @ t
+        rows = rows.copy() if self.T is None else csr_array(rows @ self.T)
+        rows.data[~self.free[rows.indices]] = 0.0
+        rows.eliminate_zeros()
+        return rows, offset
+
+    def displacement(self, v: Array, t: Array) -> Array:
+        """Return all displacements (n,)."""
+        return (v if self.T is None else self.T @ v) + t
+
+    def unknowns(self, u: Array, t: Array | float = 0.0) -> Array:
+        """Return v (n,) of displacements u (n,) that obey the relations."""
+        return np.where(self.free, u - t, 0.0)
+
+    def unknowns_of(self, motions: Array) -> Array:
+        """Return the unknowns (n, k) of motions (n, k) that obey supports and relations."""
+        return np.where(self.free[:, None], motions, 0.0)
+
+    def involved(self, dofs: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Return the unknowns that the displacements `dofs` depend on, ascending."""
+        if self.T is not None:
+            dofs = np.unique(self.T[dofs].indices)
+        return dofs[self.free[dofs]].astype(np.intp)
+
+    def balance(self, out: Array) -> tuple[Array, float]:
+        """Return the forces (n,) of supports and relations, and the largest force that nothing holds.
+
+        `out` (n,) is the internal minus all other forces.
+        """
+        return np.where(self.held, out, 0.0), float(np.abs(self.reduced(out)).max(initial=0.0))
+
+
+class ConstrainedMotion:
+    """What supports and relations leave of the displacements, ``u = T v + t``; without stiffness.
+
+    Parameters
+    ----------
+    fixed : ndarray of bool (n,)
+    relations : sequence of Relation
+    """
+
+    def __init__(self, fixed: Mask, relations: Sequence[Relation]) -> None:
+        self.fixed, self.relations = fixed, list(relations)
+        self.free: Mask = ~fixed
+        if not relations:
+            return
+        self._tie: Elimination = eliminate(stacked_rows(relations, len(fixed)), fixed)
+        self.free[self._tie.pivots] = False
+        self.T = csr_array(self._tie.T @ diags_array(self.free.astype(float)))
+        self.T.eliminate_zeros()
+
+    def values(self, multiplier: Sequence[float]) -> Array:
+        """Return the right-hand sides (m,) for the multiplier of each relation."""
+        blocks = [
+            np.full(relation.rows.shape[0], relation.value * factor)
+            for relation, factor in zip(self.relations, multiplier, strict=True)
+        ]
+        return np.concatenate(blocks) if blocks else np.empty(0)
+
+    def lift(self, prescribed: Array, values: Array) -> Array:
+        """See `System.lift`."""
+        known: Array = np.where(self.fixed, prescribed, 0.0)
+        if not self.relations:
+            return known
+        given = np.concatenate([known, values])
+        off = np.abs(self._tie.conditions @ given)
+        scale = np.abs(self._tie.conditions) @ np.abs(given)
+        wrong = np.flatnonzero(off > CONFLICT * scale)
+        if len(wrong):
+            raise ModelError(
+                f"{self._name(int(self._tie.origin[wrong[0]]))} contradicts the supports or relations before it by "
+                f"{off[wrong[0]]:.3g}: remove one of them"
+            )
+        lift: Array = self._tie.T @ known + self._tie.S @ values
+        return lift
+
+    def _name(self, row: int) -> str:
+        ends = np.cumsum([relation.rows.shape[0] for relation in self.relations])
+        return self.relations[int(np.searchsorted(ends, row, side="right"))].name
+
+
+def with_supports(K: bsr_array, fixed: Mask) -> bsr_array:
+    """Return K with the rows and columns of supported degrees of freedom cleared and their diagonal kept."""
+    K = _with_diagonal(K)
+    data = K.data.copy()
+    size = data.shape[1]
+    supported = fixed.reshape(-1, size)
+    block_row = np.repeat(np.arange(len(K.indptr) - 1), np.diff(K.indptr))
+    data[supported[block_row][:, :, None] | supported[K.indices][:, None, :]] = 0.0
+    diagonal = K.diagonal()
+    typical = diagonal.max(initial=1.0)
+    on_diagonal = np.flatnonzero(block_row == K.indices)
+    for k in range(size):
+        held = on_diagonal[supported[:, k]]
+        kept = diagonal[k::size][supported[:, k]]
+        data[held, k, k] = np.where(kept > 0, kept, typical)
+    return bsr_array((data, K.indices, K.indptr), shape=K.shape)
+
+
+def _with_diagonal(K: bsr_array) -> bsr_array:
+    """Return K with a block on the diagonal of every block row, zero where there was none."""
+    present = np.zeros(len(K.indptr) - 1, bool)
+    block_row = np.repeat(np.arange(len(present)), np.diff(K.indptr))
+    present[block_row[block_row == K.indices]] = True
+    missing = np.flatnonzero(~present)
+    if not len(missing):
+        return K
+    size = K.blocksize[0]
+    rows, columns = np.r_[block_row, missing], np.r_[K.indices, missing]
+    order = np.lexsort((columns, rows))
+    data = np.concatenate([K.data, np.zeros((len(missing), size, size))])[order]
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(present)))])
+    return bsr_array((data, columns[order], indptr), shape=K.shape)
