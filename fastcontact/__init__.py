@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from fastcontact import analytic, generate, plot, recovery, topology
+    from fastcontact import analytic, generate, obstacles, plot, recovery, topology
     from fastcontact.errors import (
         CaseError,
         ContactError,
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from fastcontact.analysis import Criteria, solve
     from fastcontact.topology import ordered_line
 
-_MODULES = ("analytic", "generate", "plot", "recovery", "topology")
+_MODULES = ("analytic", "generate", "obstacles", "plot", "recovery", "topology")
 _HOME = {
     "CaseError": "errors",
     "ContactError": "errors",
@@ -92,6 +92,7 @@ __all__ = [
     "generate",
     "line_table",
     "linear_ramp",
+    "obstacles",
     "open_results",
     "ordered_line",
     "plot",

@@ -16,6 +16,8 @@ from fastcontact.assembly import rigid_modes, stiffness
 from fastcontact.contact.constraints import Constraints, stacked
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.result import contact_result
+from fastcontact.contact.rigid import RigidSide
+from fastcontact.contact.surface import Surface
 from fastcontact.errors import ConvergenceError, FastcontactWarning, ModelError
 from fastcontact.floating import SLACK, Floating, Settled
 from fastcontact.model import Model, combined, multiplier
@@ -173,6 +175,7 @@ class Analysis:
         self.external = combined(self.forces, self.ramp, instant, shape).ravel()
         self.largest_force = max(self.largest_force, np.abs(self.external).max(initial=0.0))
         self.before = self.u
+        self._move_obstacles(instant)
         self.settled: Settled | None = None
         loaded = self.solver.load(self.system.right(self.external, lift))
         before = self.solver.counters.iterations
@@ -198,6 +201,12 @@ class Analysis:
         if self.floating is not None and self.settled is not None:
             iterations["regularised"] = self.floating.report(self.settled, self.largest_work)
         return self._result(index, instant, reaction, constraints, state, iterations, last)
+
+    def _move_obstacles(self, instant: float) -> None:
+        for pair in self.model.contact:
+            side = self.pairs[pair.name].primary
+            if isinstance(side, RigidSide):
+                side.move(multiplier(pair.ramp, self.ramp, instant))
 
     def _lift(self, instant: float) -> Array:
         """Return what supports and relations prescribe at `instant`; see `System.lift`."""
@@ -227,7 +236,8 @@ class Analysis:
             else:
                 state, u = self._floating(loaded, constraints, lift, active, history)
             change = np.abs(u - self.u).max(initial=0.0)
-            size = max(np.abs(u).max(initial=0.0), np.abs(lift).max(initial=0.0))
+            # Rigid motions of bodies that only contact holds do not count.
+            size = max(np.abs(state.u).max(initial=0.0), np.abs(lift).max(initial=0.0))
             self.u = u
             self._remember(state)
             history.append(
@@ -248,7 +258,8 @@ class Analysis:
             raise ConvergenceError(
                 f"the contact geometry did not settle in {limit} updates: the displacement still changes by "
                 f"{history[-1]['displacement_change']:.1e} of its largest component, {history[-1]['active']} "
-                "constraints are active. Use more load steps, a finer mesh on the primary side, or a fixed number of updates",
+                "constraints are active. Use more load steps, a finer mesh on the primary side, or a fixed "
+                "number of updates",
                 history,
             )
         return constraints, state
@@ -282,7 +293,9 @@ class Analysis:
         usable = np.diff(B.indptr) > 0
         state: active_set.State
         if constraints.tangents:
-            pairs = [self.system.rows(T, -(T @ self.before), lift) for T in constraints.tangents]
+            drift = constraints.drift if constraints.drift is not None else np.zeros((len(constraints.tangents), 1))
+            rest = [own - T @ self.before for T, own in zip(constraints.tangents, drift, strict=True)]
+            pairs = [self.system.rows(T, slip, lift) for T, slip in zip(constraints.tangents, rest, strict=True)]
             state = friction.solve(
                 loaded, B, tuple(T for T, _ in pairs), gap0, np.stack([slip for _, slip in pairs]),
                 constraints.friction if constraints.friction is not None else np.zeros(len(gap0)), usable,
@@ -324,7 +337,7 @@ class Analysis:
         if not history:
             moved = self._approach(constraints, work)
             start = start if active.any() else start + moved
-        settled = floating.settle(solve_at, start, self.largest_work, self._noise(lift)[1])
+        settled = floating.settle(solve_at, start, self.largest_work, 10 * self.solver.tolerance, self.round_off)
         if settled.state.settled and not settled.slack:
             raise ConvergenceError(self._not_slack(settled), history)
         self.settled = settled
@@ -345,19 +358,17 @@ class Analysis:
         size = float(np.ptp(self.model.mesh.points, axis=0).max())
         found = stopped_at(rows @ motions.displacement, gap0 + rows @ self.u, work, size)
         if found is None:
-            moved = "; ".join(name for name, w in zip(motions.names(), work, strict=True) if w)
             raise ConvergenceError(
-                f"the loads move bodies without end, no contact stops them ({moved}; work of the loads "
-                f"{', '.join(f'{w:.3g}' for w in work if w)} per unit of motion): reverse the loads or add supports"
+                f"the loads pull bodies away, no contact stops them ({'; '.join(self.floating.names)}; resultant up to "
+                f"{np.abs(work).max():.3g}): reverse the loads or add supports",
             )
         return found
 
     def _not_slack(self, settled: Settled) -> str:
         assert self.floating is not None
-        worst = int(np.argmax(np.abs(settled.left)))
         return (
-            f"contact does not hold {self.floating.motions.names()[worst]}: after {settled.positions} positions tried "
-            f"a force of {abs(settled.left[worst]):.3g} is still missing for equilibrium under a load of "
+            f"contact does not hold {'; '.join(self.floating.unheld(settled))}: after {settled.positions} positions tried "
+            f"a force of {np.abs(settled.left).max():.3g} is still missing for equilibrium under a load of "
             f"{self.largest_work:.3g}. Add a support, or use more load steps"
         )
 
@@ -420,7 +431,9 @@ class Analysis:
         mesh = self.model.mesh
         _, body = bodies(mesh)
         joined = {
-            frozenset((int(body[p.secondary.points[0]]), int(body[p.primary.points[0]]))) for p in self.pairs.values()
+            frozenset((int(body[p.secondary.points[0]]), int(body[p.primary.points[0]])))
+            for p in self.pairs.values()
+            if isinstance(p.primary, Surface)
         }
         texts: list[str] = []
         seen: set[frozenset[int]] = set()

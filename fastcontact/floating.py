@@ -67,12 +67,26 @@ class Floating:
     system : System
     avoid : ndarray of int
         Displacements to keep the springs from if possible: those of the contact surfaces.
+
+    Attributes
+    ----------
+    names : list of str
+        Of the free motions.
+    dofs : ndarray of int (k,)
+        The displacement that each spring holds.
+    motions : FreeMotions
+        The free motions, each moving one of `dofs` by 1.
+    stiffness : float
+        Of each spring [force / length].
     """
 
     def __init__(self, motions: FreeMotions, system: System, avoid: NDArray[np.intp]) -> None:
         diagonal = system.matrix.diagonal()
+        self._dim = system.matrix.blocksize[0]
+        self.names = motions.names()
         self.dofs = _sturdy(system.unknowns_of(motions.displacement), diagonal, avoid)
-        self.motions = motions.combined(np.linalg.inv(motions.displacement[self.dofs]))
+        self._at_springs = motions.displacement[self.dofs]
+        self.motions = motions.combined(np.linalg.inv(self._at_springs))
         self.stiffness = float(np.median(diagonal[system.free]))
 
     def with_springs(self, matrix: bsr_array) -> bsr_array:
@@ -89,19 +103,31 @@ class Floating:
         """Return the displacements (n_dofs,) of the rigid position (k,)."""
         return np.asarray(self.motions.displacement @ position)
 
-    def report(self, settled: Settled, load: float) -> list[dict[str, Any]]:
-        """Return what was regularised, and by how much, as plain numbers and strings."""
-        return [
-            {
-                "motion": name,
-                "spring_stiffness": self.stiffness,
-                "spring_force_left": float(abs(left)),
-                "relative_to_load": float(abs(left) / load) if load else 0.0,
-            }
-            for name, left in zip(self.motions.names(), settled.left, strict=True)
-        ]
+    def report(self, settled: Settled, load: float) -> dict[str, Any]:
+        """Return what was regularised, and by how much, as plain numbers and strings.
 
-    def settle(self, solve_at: Callable[[Array], State], start: Array, load: float, noise: float) -> Settled:
+        Keys: ``motions``, names of the free motions; ``springs``, their places; ``spring_stiffness`` [force / length];
+        ``force_left``, what each spring still carries [force]; ``relative_to_load``, the largest over the load;
+        ``positions``, rigid positions tried.
+        """
+        left = np.abs(settled.left)
+        return {
+            "motions": self.names,
+            "springs": [f"{'xyz'[dof % self._dim]} of point {dof // self._dim}" for dof in self.dofs.tolist()],
+            "spring_stiffness": self.stiffness,
+            "force_left": left.tolist(),
+            "relative_to_load": float(left.max() / load) if load else 0.0,
+            "positions": settled.positions,
+        }
+
+    def unheld(self, settled: Settled) -> list[str]:
+        """Return the names of the free motions that the springs still hold most."""
+        work = np.abs(self._at_springs.T @ settled.left)
+        return [name for name, w in zip(self.names, work, strict=True) if w > 0.1 * work.max()]
+
+    def settle(
+        self, solve_at: Callable[[Array], State], start: Array, load: float, noise: float, round_off: float
+    ) -> Settled:
         """Find the position at which the springs are slack.
 
         Parameters
@@ -112,7 +138,9 @@ class Floating:
         load : float
             The forces to compare those of the springs with [force].
         noise : float
-            Accuracy of displacements [length].
+            Accuracy of displacements, as a fraction of the largest one.
+        round_off : float
+            Accuracy of gaps [length].
 
         Returns
         -------
@@ -120,18 +148,20 @@ class Floating:
             The best found if the springs do not become slack, or a contact problem does not settle.
         """
         search = _Search(solve_at, self.dofs, start)
+        noise *= float(np.abs(search.state.u).max())
         enough = max(SLACK * load / self.stiffness, noise)
+        tolerable = max(enough, STAGNANT * load / self.stiffness, round_off)
         derivative: Array | None = None
         while search.settled and search.left > enough and search.positions < MAX_POSITIONS:
             before = search.left
             if derivative is None:
-                derivative = search.differences(max(0.1 * search.left, 1e3 * noise))
+                derivative = search.differences(max(0.1 * search.left, 1e3 * noise, 1e3 * round_off))
             search.move(_step(derivative, search.elongation))
             if search.left > 0.1 * before:
                 derivative = None
-                if search.left >= 0.5 * before and search.left <= STAGNANT * load / self.stiffness:
+                if search.left >= 0.5 * before and search.left <= tolerable:
                     break
-        slack = search.settled and search.left <= max(enough, STAGNANT * load / self.stiffness)
+        slack = search.settled and search.left <= tolerable
         state = dataclasses.replace(search.state, iterations=search.iterations)  # type: ignore[type-var]
         return Settled(state, search.position, self.stiffness * search.elongation, search.positions, slack)
 

@@ -13,12 +13,14 @@ from scipy.sparse import csr_array
 
 from fastcontact import elements
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
+from fastcontact.contact.rigid import RigidSide
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.loads import BodyForce, Load, NodalForce, Pressure, TotalForce, Traction, Value, axes_of, evaluated
 from fastcontact.materials import KINEMATICS, LinearElastic
 from fastcontact.mesh import Mesh
 from fastcontact.mesh_quality import check_cells
+from fastcontact.obstacles import Obstacle
 from fastcontact.ramp import Ramp, Table, checked_table, table_value
 from fastcontact.relations import Relation, stacked_rows
 from fastcontact.rigid_motions import free_motions, generalised, resisting, unstopped
@@ -26,6 +28,8 @@ from fastcontact.system import ConstrainedMotion
 from fastcontact.validation import check_forces, check_motions, check_overlap, check_ramps
 
 Array = NDArray[np.float64]
+# Formulations that need no facets on the primary side.
+AGAINST_OBSTACLES = ("node_to_segment", "continuous")
 # A history of a single load: a ramp, whose table counts, or pairs (instant, multiplier).
 History = Ramp | Iterable[Iterable[float]] | None
 
@@ -50,13 +54,25 @@ class Support:
 
 @dataclass(frozen=True)
 class ContactPair:
-    """Two groups of facets that may touch, with a formulation and its options."""
+    """Two groups of facets that may touch, or one and a rigid obstacle, with a formulation and its options.
+
+    With an `obstacle`, `primary` is empty; `motion` is the obstacle's displacement at multiplier 1 [length], and `ramp`
+    a history of its own or None.
+    """
 
     name: str
     secondary: str
     primary: str
     formulation: str
     options: dict[str, Any] = field(default_factory=dict)
+    obstacle: Obstacle | None = None
+    motion: tuple[float, ...] = ()
+    ramp: Table | None = None
+
+    @property
+    def opposite(self) -> str:
+        """What the secondary side may touch, for messages."""
+        return self.primary if self.obstacle is None else "a rigid obstacle"
 
 
 class Model:
@@ -114,7 +130,7 @@ class Model:
         self.contact: list[ContactPair] = []
 
     def __repr__(self) -> str:
-        pairs = ", ".join(f"{p.name}: {p.secondary} on {p.primary}, {p.formulation}" for p in self.contact)
+        pairs = ", ".join(f"{p.name}: {p.secondary} on {p.opposite}, {p.formulation}" for p in self.contact)
         return f"Model({self.kinematics}, {self.mesh!r}, {self.n_dofs} degrees of freedom; contact: {pairs or 'none'})"
 
     @property
@@ -330,9 +346,52 @@ class Model:
         ContactError
             If a side is wrong, an option unknown, or the name taken.
         """
-        if name in {pair.name for pair in self.contact}:
-            raise ContactError(f"there is already a contact pair '{name}': names must differ")
-        pair = ContactPair(name, secondary, primary, formulation, options)
+        self._add_pair(ContactPair(name, secondary, primary, formulation, options))
+
+    def add_obstacle(
+        self,
+        name: str,
+        *,
+        secondary: str,
+        obstacle: Obstacle,
+        motion: Mapping[str, float] | None = None,
+        ramp: History = None,
+        formulation: str = "continuous",
+        **options: Any,
+    ) -> None:
+        """Let the facets of group `secondary` come into contact with a rigid obstacle.
+
+        Parameters
+        ----------
+        name, secondary
+            As in `add_contact`.
+        obstacle : Obstacle
+            A shape of `fastcontact.obstacles`, or any object with their ``distance`` method.
+        motion : mapping of str to float, optional
+            Its displacement at multiplier 1, e.g. ``{"y": -0.1}`` [length]; it stands still without.
+        ramp : Ramp or iterable of (float, float), optional
+            A history of its own for the motion; by default that of the analysis.
+        formulation : str
+            ``"node_to_segment"`` (then: node against obstacle) or ``"continuous"``.
+        **options
+            Fields of the formulation.
+
+        Raises
+        ------
+        ContactError, ModelError
+            If the group, an option or the motion is wrong, or the name taken.
+        """
+        moves = axes_of(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
+        displacement = tuple(float(moves.get(axis, 0.0)) for axis in range(self.mesh.dim))  # type: ignore[arg-type]
+        if not np.isfinite(displacement).all():
+            raise ModelError(f"the motion {motion} of obstacle '{name}' must be finite numbers")
+        obstacle.distance(self.mesh.points[:1])  # what does not fit this dimension shows at once
+        history = _table(ramp, f"the motion of obstacle '{name}'")
+        self._add_pair(ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history))
+
+    def _add_pair(self, pair: ContactPair) -> None:
+        if pair.name in {other.name for other in self.contact}:
+            raise ContactError(f"there is already a contact pair '{pair.name}': names must differ")
         self.bind(pair)
         self.contact.append(pair)
 
@@ -346,10 +405,19 @@ class Model:
         for option in pair.options:
             if option not in known:
                 raise ContactError(unknown(f"option of {pair.formulation}", option, known))
-        sides = surface(self.mesh, pair.secondary), surface(self.mesh, pair.primary)
-        _check_sides(self.mesh, pair, *sides)
+        secondary = surface(self.mesh, pair.secondary)
+        primary: Surface | RigidSide
+        if pair.obstacle is not None:
+            if pair.formulation not in AGAINST_OBSTACLES:
+                raise ContactError(
+                    unknown("contact formulation for a rigid obstacle", pair.formulation, AGAINST_OBSTACLES)
+                )
+            primary = RigidSide(pair.obstacle, np.array(pair.motion))
+        else:
+            primary = surface(self.mesh, pair.primary)
+            _check_sides(self.mesh, pair, secondary, primary)
         modulus = min((m.E / (1 - m.nu**2) for m, _ in self.materials), default=1.0)
-        return kind(*sides, self.mesh.points, self.kinematics == "axisymmetric", modulus, **pair.options)
+        return kind(secondary, primary, self.mesh.points, self.kinematics == "axisymmetric", modulus, **pair.options)
 
     def material_numbers(self) -> tuple[Array, dict[str, NDArray[np.int32]]]:
         """Return moduli (n_materials, 4, 4), in 3D (n_materials, 6, 6), and by element every solid cell's material.
@@ -450,14 +518,15 @@ class Model:
         forces = self.forces_by_ramp()
         if ramp is not None:
             named = [(item.name, item.ramp) for item in (*self.supports, *self.loads, *self.relations)]
+            named += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]
             check_ramps(named, ramp.instants)
         self._check_relations(fixed, prescribed, ramp or Ramp((1.0,)))
-        check_overlap(self.mesh, self.kinematics, [(pair.secondary, pair.primary) for pair in self.contact])
+        check_overlap(
+            self.mesh, self.kinematics, [(p.secondary, p.primary) for p in self.contact if p.obstacle is None]
+        )
         self._check_motions(fixed, list(forces.values()))
 
-    def _check_relations(
-        self, fixed: NDArray[np.bool_], prescribed: Mapping[Table | None, Array], ramp: Ramp
-    ) -> None:
+    def _check_relations(self, fixed: NDArray[np.bool_], prescribed: Mapping[Table | None, Array], ramp: Ramp) -> None:
         if not self.relations:
             return
         motion = ConstrainedMotion(fixed.ravel(), self.relations)
@@ -485,9 +554,7 @@ def multiplier(own: Table | None, ramp: Ramp, instant: float) -> float:
     return ramp.value(instant) if own is None else table_value(own, instant)
 
 
-def combined(
-    by_ramp: Mapping[Table | None, Array], ramp: Ramp, instant: float, shape: tuple[int, ...]
-) -> Array:
+def combined(by_ramp: Mapping[Table | None, Array], ramp: Ramp, instant: float, shape: tuple[int, ...]) -> Array:
     """Return the sum of the parts at `instant`, each times its multiplier."""
     return sum((multiplier(own, ramp, instant) * part for own, part in by_ramp.items()), np.zeros(shape))
 

@@ -31,6 +31,8 @@ class Constraints:
         Tangential motion relative to the primary side, a matrix for each tangent; empty without friction.
     directions : tuple of ndarray (m, dim)
         The tangents themselves.
+    drift : ndarray (len(tangents), m), optional
+        Slip of the step that the motion of a rigid primary side makes by itself [length]; None stands for zero.
     friction : ndarray (m,), optional
         Coefficient of friction of each constraint; None stands for zero.
     """
@@ -42,6 +44,7 @@ class Constraints:
     tangents: tuple[csr_array, ...] = ()
     directions: tuple[Array, ...] = ()
     friction: Array | None = None
+    drift: Array | None = None
 
     def force(self, state: State) -> Array:
         """Return the nodal contact forces (n_dofs,) of a solution."""
@@ -66,7 +69,16 @@ def stacked(parts: list[Constraints]) -> Constraints:
         _stacked_tangents(parts),
         (),
         np.concatenate([np.zeros(len(p.gap0)) if p.friction is None else p.friction for p in parts]),
+        _stacked_drift(parts),
     )
+
+
+def _stacked_drift(parts: list[Constraints]) -> Array | None:
+    """Return the drift of all parts, zero where a part has none."""
+    count = max(len(part.tangents) for part in parts)
+    if all(part.drift is None for part in parts):
+        return None
+    return np.hstack([np.zeros((count, len(p.gap0))) if p.drift is None else p.drift for p in parts])
 
 
 def _stacked_tangents(parts: list[Constraints]) -> tuple[csr_array, ...]:

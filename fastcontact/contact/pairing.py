@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
 from fastcontact import elements
+from fastcontact.contact.rigid import RigidSide
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.search import closest_of_kinds
 
@@ -51,17 +52,20 @@ class Pairing:
         Unit outward normal of the primary facet there.
     paired : ndarray of bool (n,)
         False where a candidate stands out beyond the end of the primary surface.
+    offset : ndarray (n,), optional
+        What the gap is besides ``normal . x`` where the primary side is a rigid obstacle [length]; None for facets.
     """
 
     facet: NDArray[np.intp]
     xi: Array
     normal: Array
     paired: NDArray[np.bool_]
+    offset: Array | None = None
 
 
 def pair(
     candidates: Array,
-    primary: Surface,
+    primary: Surface | RigidSide,
     coordinates: Array,
     projection_tolerance: float,
     normals: str = "facet",
@@ -77,6 +81,10 @@ def pair(
     ContactError
         If a projection does not converge; see `search.closest`.
     """
+    if isinstance(primary, RigidSide):
+        _, normal, paired, offset = primary.facing(candidates)
+        nowhere = np.zeros(len(candidates), np.intp)
+        return Pairing(nowhere, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)
     found = closest_of_kinds(candidates, primary.corners(coordinates))
     normal = found.normal
     if normals == "averaged":
@@ -141,14 +149,17 @@ def _facet_normals(block: FacetBlock, corners: Array) -> Array:
     return normal
 
 
-def gap_rows(candidates: Candidates, pairing: Pairing, primary: Surface, reference: Array) -> tuple[csr_array, Array]:
+def gap_rows(candidates: Candidates, pairing: Pairing, primary: Surface | RigidSide, reference: Array) -> tuple[csr_array, Array]:
     """Return (G, gap0): gap of the candidates = gap0 + G u; rows of unpaired candidates are empty.
 
     ``gap = n . (x_secondary - x_primary(xi))`` with the facet, xi and normal of `pairing` held fixed; `reference`
     (n_points, dim) are undeformed coordinates, u the displacements of all points, point by point.
     """
     G = rows_along(pairing.normal, candidates, pairing, primary, reference.size)
-    return G, G @ reference.ravel()
+    gap0 = G @ reference.ravel()
+    if pairing.offset is not None:
+        gap0 += np.where(pairing.paired, pairing.offset, 0.0)
+    return G, gap0
 
 
 def tangents(normal: Array) -> list[Array]:
@@ -162,7 +173,7 @@ def tangents(normal: Array) -> list[Array]:
 
 
 def rows_along(
-    direction: Array, candidates: Candidates, pairing: Pairing, primary: Surface, n_dofs: int
+    direction: Array, candidates: Candidates, pairing: Pairing, primary: Surface | RigidSide, n_dofs: int
 ) -> csr_array:
     """Return rows (n, n_dofs): motion of the candidates along `direction` (n, dim) relative to what they face.
 
@@ -170,9 +181,10 @@ def rows_along(
     """
     dim = direction.shape[1]
     rows = np.flatnonzero(pairing.paired)
-    facing, _, shape = _at(primary, pairing.facet[rows], pairing.xi[rows])
-    nodes = np.hstack([candidates.nodes[rows], facing])
-    weights = np.hstack([candidates.shape[rows], -shape])
+    nodes, weights = candidates.nodes[rows], candidates.shape[rows]
+    if not isinstance(primary, RigidSide):
+        facing, _, shape = _at(primary, pairing.facet[rows], pairing.xi[rows])
+        nodes, weights = np.hstack([nodes, facing]), np.hstack([weights, -shape])
     values = weights[:, :, None] * direction[rows][:, None, :]
     columns = nodes[:, :, None] * dim + np.arange(dim)
     row = np.broadcast_to(rows[:, None, None], values.shape)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fastcontact.active_set import Compliance
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair, rows_along, tangents
+from fastcontact.contact.rigid import RigidSide
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 
@@ -28,7 +29,8 @@ class Formulation(ABC):
 
     Parameters
     ----------
-    secondary, primary : Surface
+    secondary : Surface
+    primary : Surface or RigidSide
     points : ndarray (n_points, dim)
         Reference coordinates [length].
     axisymmetric : bool
@@ -44,7 +46,7 @@ class Formulation(ABC):
     """
 
     secondary: Surface
-    primary: Surface
+    primary: Surface | RigidSide
     points: Array
     axisymmetric: bool
     modulus: float
@@ -96,7 +98,10 @@ class Formulation(ABC):
             return Constraints(B, gap0, positions, compliance)
         directions = tuple(tangents(pairing.normal))
         along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
-        return Constraints(B, gap0, positions, compliance, along, directions, np.full(len(gap0), self.friction))
+        drift = None
+        if isinstance(self.primary, RigidSide):
+            drift = -np.stack([t @ (self.primary.now - self.primary.before) for t in directions])
+        return Constraints(B, gap0, positions, compliance, along, directions, np.full(len(gap0), self.friction), drift)
 
     @cached_property
     def first_contact(self) -> tuple[Array, Array]:

@@ -1,0 +1,130 @@
+"""Bodies against rigid obstacles: the half sphere on a plane, Hertz in a box, the flat punch, friction on a moving plane."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact import obstacles
+
+FORCE, PRESSURE, RADIUS = 659_773.142, 2910.4071, 10.358557
+
+
+def half_sphere_on_plane(mesh, formulation, **options):
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model.fix("A1A2", "x")
+    model.prescribe("A1B1", y=2.0)
+    plane = obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
+    model.add_obstacle("plane", secondary="CONT1", obstacle=plane, formulation=formulation, **options)
+    return model
+
+
+@pytest.mark.parametrize(("formulation", "element", "force", "pressure"), [
+    ("continuous", "quad8", 5e-5, 1e-4), ("node_to_segment", "quad4", 2e-3, 5e-3), ("continuous", "quad4", 2e-3, 5e-3),
+])  # fmt: skip
+def test_a_half_sphere_on_a_plane_reaches_the_mesh_converged_solution(formulation, element, force, pressure):
+    mesh = fc.generate.quarter_disc(element, arc_sizes=(0.2, 2.0), radial_sizes=(0.2, 3.0))
+    contact = fc.solve(half_sphere_on_plane(mesh, formulation), fc.linear_ramp(1))[-1].contact["plane"]
+    assert abs(contact.force[1]) == pytest.approx(FORCE, rel=force)
+    assert contact.pressure_max == pytest.approx(PRESSURE, rel=pressure)
+    assert contact.radius[0] - 0.7 < RADIUS < contact.radius[1] + 0.7  # a facet is 0.7 long there
+
+
+def test_moving_the_plane_is_moving_the_body():
+    mesh = fc.generate.quarter_disc("quad4")
+    held = half_sphere_on_plane(mesh, "continuous")
+    moved = fc.Model(mesh, "axisymmetric")
+    moved.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    moved.fix("A1A2", "x")
+    moved.fix("A1B1", "y")
+    plane = obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
+    moved.add_obstacle("plane", secondary="CONT1", obstacle=plane, motion={"y": -2.0})
+    one, other = (fc.solve(model, fc.linear_ramp(3))[-1] for model in (held, moved))
+    assert np.abs(one.stress - other.stress).max() < 1e-9 * np.abs(one.stress).max()
+
+
+class Bowl:
+    """The obstacle of the manufactured problem: its gap is measured along y, at the reference position."""
+
+    def __init__(self, height):
+        self.height = height
+
+    def distance(self, points):
+        normal = np.zeros_like(points)
+        normal[:, 1] = -1.0
+        return self.height(points[:, 0]) - points[:, 1], normal
+
+
+def hertz_box(element, n, kinematics="plane_strain"):
+    """The manufactured problem: exact displacements on all sides but the top, a rigid parabola above it."""
+    box = fc.analytic.hertz_box(kinematics=kinematics, E=1000.0, nu=0.3, radius=0.5123, pressure_max=50.0)
+    mesh = fc.generate.block((1.0, 1.0), (n, n), element, origin=(0.0, -1.0))
+    model = fc.Model(mesh, kinematics)
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("LEFT", "x")
+    for side in ("RIGHT", "BOTTOM"):
+        for k, axis in enumerate("xy"):
+            if (side, axis) != ("BOTTOM", "x"):
+                model.prescribe(side, **{axis: lambda x, k=k: box.displacement(x)[:, k]})
+    inner = mesh.with_groups(points={"REST": np.setdiff1d(mesh.points_of("BOTTOM"), mesh.points_of("LEFT"))})
+    model.mesh = inner
+    model.prescribe("REST", x=lambda x: box.displacement(x)[:, 0])
+    model.add_obstacle("bowl", secondary="TOP", obstacle=Bowl(box.obstacle))
+    return model, box
+
+
+@pytest.mark.parametrize("element", ["quad4", "tri3"])
+def test_rates_on_hertz_in_a_box(element):
+    """Displacements converge at second order, nodal errors over at least four meshes."""
+    errors = []
+    for n in (8, 16, 32, 64):
+        model, box = hertz_box(element, n)
+        last = fc.solve(model, fc.linear_ramp(1), criteria=fc.Criteria(geometry_updates=0))[-1]
+        exact = box.displacement(model.mesh.points)
+        errors.append(np.sqrt(np.mean((last.displacement - exact) ** 2)) / np.abs(exact).max())
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert errors[-1] < 5e-4
+    assert orders.mean() > 1.7
+
+
+def test_a_flat_punch_leaves_the_surface_beside_it_free():
+    mesh = fc.generate.block((4.0, 4.0), (32, 32), "quad4", origin=(0.0, -4.0))
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("LEFT", "x")
+    model.fix("BOTTOM", "y")
+    punch = obstacles.FlatPunch(0.5)
+    model.add_obstacle(
+        "punch", secondary="TOP", obstacle=punch, motion={"y": -0.01}, formulation="node_to_segment"
+    )
+    last = fc.solve(model, fc.linear_ramp(1))[-1]
+    contact = last.contact["punch"]
+    beneath = contact.coordinates[:, 0] <= 0.5
+    assert contact.active.tolist() == beneath.tolist()
+    assert last.displacement[contact.points[beneath], 1] == pytest.approx(-0.01, rel=1e-12)
+    half_space = fc.analytic.flat_punch(E=1000.0, nu=0.3, radius=0.5, approach=0.01).force
+    assert half_space < abs(contact.force[1]) < 1.4 * half_space  # a finite block is stiffer, the mesh too
+
+
+def test_a_plane_drawn_along_drags_by_friction():
+    mesh = fc.generate.block((1.0, 1.0), (4, 4), "quad4")
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    model.fix("TOP", "xy")
+    plane = obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    model.add_obstacle("plane", secondary="BOTTOM", obstacle=plane, motion={"x": 0.01, "y": 1e-3}, friction=0.2)
+    contact = fc.solve(model, fc.linear_ramp(5))[-1].contact["plane"]
+    assert contact.force[0] / contact.force[1] == pytest.approx(0.2, rel=1e-9)
+    assert contact.dissipation > 0
+
+
+def test_wrong_obstacles_are_refused():
+    model = fc.Model(fc.generate.block((1.0, 1.0), (2, 2), "quad4"), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    plane = obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    with pytest.raises(fc.ContactError, match="rigid obstacle 'mortar'"):
+        model.add_obstacle("p", secondary="BOTTOM", obstacle=plane, formulation="mortar")
+    with pytest.raises(fc.ModelError, match="motion of obstacle 'p'"):
+        model.add_obstacle("p", secondary="BOTTOM", obstacle=plane, motion={"z": 1.0})
+    with pytest.raises(fc.ContactError, match="2 finite numbers"):
+        model.add_obstacle("p", secondary="BOTTOM", obstacle=obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 1.0)))
