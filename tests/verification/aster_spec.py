@@ -434,9 +434,9 @@ def _check_frictionless_nodes(zone: Entry, mesh: fc.Mesh, supports: Sequence[_Su
     """Accept nodes without friction where a support already holds them, as on an axis: no force is left to friction."""
     place = {"GROUP_NO": zone.get("SANS_GROUP_NO_FR", ()), "NOEUD": zone.get("SANS_NOEUD_FR", ())}
     nodes = nodes_of(mesh, {key: value for key, value in place.items() if value})
-    if mesh.dim == 2 and all(any(node in support.nodes for support in supports) for node in nodes):
-        return
-    raise Missing("needs nodes without friction (SANS_GROUP_NO_FR)")
+    held = mesh.dim == 2 and all(any(node in support.nodes for support in supports) for node in nodes)
+    if len(nodes) and not held:
+        raise Missing("needs nodes without friction (SANS_GROUP_NO_FR)")
 
 
 def _criteria(contact: Entry) -> fc.Criteria:

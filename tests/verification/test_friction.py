@@ -1,5 +1,7 @@
 """Coulomb friction: stick, slip, partial slip after Cattaneo and Mindlin, residual tractions."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -66,3 +68,44 @@ def test_multigrid_solves_friction_too():
         results.append(fc.solve(model, fc.linear_ramp(2), linear_solver=solver, linear_tolerance=1e-12)[-1])
     one, other = results
     assert np.abs(one.stress - other.stress).max() < 1e-7 * np.abs(one.stress).max()
+
+
+def pressed_and_drawn(formulation, friction=0.3, nu=0.49):
+    """A wide block pressed against a rigid parabola, then drawn sideways; nearly incompressible, so uncoupled.
+
+    Returns the steps at full pressure: before, half-way along and at the end of the sideways motion.
+    """
+    block = fc.generate.block((2.0, 1.0), (100, 50), "quad4", origin=(-1.0, -1.0))
+    graded = np.sign(block.points) * np.sinh(6.0 * np.abs(block.points)) / np.sinh(6.0) * 8.0
+    model = fc.Model(block.replace(points=graded), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=nu))
+    model.prescribe("BOTTOM", y=0.06, ramp=[(0, 0), (1, 1), (2, 1)])
+    model.prescribe("BOTTOM", x=0.04, ramp=[(0, 0), (1, 0), (2, 1)])
+    model.add_obstacle(
+        "pair", secondary="TOP", obstacle=fc.obstacles.paraboloid(10.0), formulation=formulation, friction=friction
+    )
+    return fc.solve(model, fc.Ramp((0.5, 1.0, 1.5, 2.0), ((0, 0), (2, 2))))[1:]
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+def test_partial_slip_after_cattaneo_and_mindlin(formulation):
+    for step in pressed_and_drawn(formulation)[1:]:
+        contact = step.contact["pair"]
+        Q, P = np.abs(contact.force)
+        bodies = {"E1": 1000.0, "nu1": 0.49, "R1": np.inf, "R2": 10.0, "force": P}
+        normal = fc.analytic.hertz_line(**bodies)
+        with warnings.catch_warnings():  # of the little coupling that nu = 0.49 leaves
+            warnings.simplefilter("ignore", fc.FastcontactWarning)
+            theory = fc.analytic.cattaneo_mindlin_line(**bodies, friction=0.3, tangential_force=Q)
+        x = contact.coordinates[:, 0]
+        # What coupling there is acts oppositely left and right: the means of both sides are free of it.
+        stick, slip = contact.active & contact.sticking, contact.active & ~contact.sticking
+        edges = [np.abs(x[side]).max() for side in (stick & (x < 0), stick & (x > 0))]
+        facet = 0.08  # the length of the facets near the edge of the stick zone
+        assert np.mean(edges) == pytest.approx(theory.stick_radius, abs=facet)
+        assert slip.any()
+        near_edge = np.abs(np.abs(x) - theory.stick_radius) < 2 * facet  # the theory's traction has a vertical tangent
+        inner = (np.abs(x) < 0.85 * normal.radius) & ~near_edge
+        shear = np.abs(0.5 * (contact.shear[:, 0] + contact.shear[::-1, 0]))[inner]
+        assert np.abs(shear - theory.traction(x[inner])).max() < 0.05 * 0.3 * normal.pressure_max
+        assert contact.dissipation > 0

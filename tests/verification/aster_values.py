@@ -1,0 +1,260 @@
+"""Values that a spec of code_aster tests, taken from results of fastcontact, and how far they are from the reference.
+
+A value is read as code_aster writes it: LAGS_C and PRES are negative in compression, forces of axisymmetric models are
+per radian, a reduction runs over all nodes that carry the component.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from aster_spec import Missing, Problem, nodes_of
+
+import fastcontact as fc
+
+Entry = dict[str, Any]
+Field = dict[int, float]
+STRESS = {"SIXX": 0, "SIYY": 1, "SIZZ": 2, "SIXY": 3, "SIYZ": 4, "SIXZ": 5}
+REDUCTIONS: dict[str, Callable[[np.ndarray], float]] = {
+    "MIN": np.min,
+    "MAX": np.max,
+    "SOMM": np.sum,
+    "SOMM_ABS": lambda values: float(np.abs(values).sum()),
+    "MIN_ABS": lambda values: float(np.abs(values).min()),
+    "MAX_ABS": lambda values: float(np.abs(values).max()),
+}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A found value against an expected one; `ratio` is the deviation over the tolerance."""
+
+    label: str
+    found: float
+    expected: float
+    tolerance: float
+    relative: bool
+
+    @property
+    def deviation(self) -> float:
+        """Relative or absolute, as the criterion says."""
+        apart = abs(self.found - self.expected)
+        if self.relative and self.expected:
+            return apart / abs(self.expected)
+        return apart
+
+    @property
+    def ratio(self) -> float:
+        """One at the tolerance."""
+        return float(np.nan_to_num(self.deviation / self.tolerance, nan=np.inf))
+
+    def __str__(self) -> str:
+        kind = "relative" if self.relative else "absolute"
+        return (
+            f"{self.label}: found {self.found:.10g}, expected {self.expected:.10g}, {kind} deviation "
+            f"{self.deviation:.3e}, {self.ratio:.3g} times the tolerance {self.tolerance:g}"
+        )
+
+
+def verdict(test: Entry, problem: Problem, steps: Sequence[fc.StepResult], tolerance: float, reference: float) -> Verdict:
+    """Return the verdict on one tested value; of several values that all must hold, the worst.
+
+    Raises
+    ------
+    Missing
+        If the results do not hold the value.
+    """
+    relative = test["criterion"] == "RELATIF"
+    unsigned = test.get("VALE_ABS") == "OUI"
+    expected = abs(reference) if unsigned else reference
+    found = [abs(value) if unsigned else value for value in values(test, problem, steps)]
+    return max(
+        (Verdict(label(test), float(value), expected, tolerance, relative) for value in found), key=lambda v: v.ratio
+    )
+
+
+def label(test: Entry) -> str:
+    """Return what is tested, where and when."""
+    field, component = _field_of(test)
+    place = test.get("location") or {}
+    where = next((f"at {place[key]}" for key in ("GROUP_NO", "GROUP_MA", "NOEUD") if key in place), "")
+    return " ".join(part for part in (field, component, test.get("reduction", ""), where) if part)
+
+
+def values(test: Entry, problem: Problem, steps: Sequence[fc.StepResult]) -> list[float]:
+    """Return the tested value; several where a value must hold at several places."""
+    step = _step(test, problem, steps)
+    name, component = _field_of(test)
+    field = FIELDS.get(name)
+    if field is None:
+        raise Missing(f"needs the field {name}")
+    found = field(problem, step, component, test)
+    nodes = _location(test, problem, found)
+    outside = [node for node in nodes if node not in found]
+    if outside:
+        raise Missing(f"needs {name} {component} at points outside the contact surface (first: {outside[0] + 1})")
+    there = np.array([found[node] for node in nodes])
+    reduction = test.get("reduction")
+    if not reduction:
+        return there.tolist()
+    kind = reduction.split()[0]
+    if kind not in REDUCTIONS:
+        raise Missing(f"needs the reduction {kind}")
+    return [float(REDUCTIONS[kind](there))]
+
+
+def _field_of(test: Entry) -> tuple[str, str]:
+    """Return the field and the component, also of values that went through a table."""
+    if "field" in test:
+        return test["field"], test["component"]
+    extraction = test.get("extraction") or {}
+    if "NOM_CHAM" in extraction and extraction.get("OPERATION") == "EXTRACTION" and not test.get("filter"):
+        return extraction["NOM_CHAM"], test["table_column"]
+    named = {entry["NOM_PARA"]: entry for entry in test.get("filter") or ()}
+    if test.get("table_column") == "VALE" and {"NOM_CHAM", "NOM_CMP"} <= set(named):
+        return named["NOM_CHAM"]["VALE_K"], named["NOM_CMP"]["VALE_K"]
+    raise Missing(f"needs the table {test.get('result')}, column {test.get('table_column')}")
+
+
+def _step(test: Entry, problem: Problem, steps: Sequence[fc.StepResult]) -> fc.StepResult:
+    instant = test.get("instant")
+    if instant is None:
+        instant = problem.times[test["order"]]
+    for step in steps:
+        if abs(step.load_factor - instant) <= 1e-9 * max(1.0, abs(instant)):
+            return step
+    raise Missing(f"needs the instant {instant}")
+
+
+def _location(test: Entry, problem: Problem, found: Field) -> list[int]:
+    place = test.get("location") or {}
+    if "nodes_1based" in place:
+        return [number - 1 for number in place["nodes_1based"]]
+    unresolved = [
+        entry["unresolved_cell_group"]["NOM"]
+        for mesh in problem.spec["meshes"]
+        for entry in mesh.get("derived_groups") or ()
+        if "unresolved_cell_group" in entry
+    ]
+    if not place or place.get("GROUP_MA") in unresolved:
+        return sorted(found)  # a value without a known place must hold everywhere
+    return nodes_of(problem.mesh, place).tolist()
+
+
+# Fields: component by point
+
+
+def _displacement(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
+    if component == "LAGS_C":
+        return _contact_values(step, lambda contact: -contact.pressure)
+    axis = ("DX", "DY", "DZ").index(component) if component in ("DX", "DY", "DZ") else problem.mesh.dim
+    if axis >= problem.mesh.dim:
+        raise Missing(f"needs DEPL {component}")
+    return dict(enumerate(step.displacement[:, axis]))
+
+
+def _stress(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
+    if component not in STRESS or STRESS[component] >= step.stress.shape[1]:
+        raise Missing(f"needs SIEF_NOEU {component}")
+    solid = np.unique(np.concatenate([block.ravel() for block in problem.mesh.solids.values()]))
+    return dict(zip(solid.tolist(), step.stress[solid, STRESS[component]], strict=True))
+
+
+def _surface_pressure(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
+    """Return normal stresses n s n on the contact surfaces, n the mean normal of the deformed facets at each node."""
+    if component != "PRES":
+        raise Missing(f"needs PRES_NOEU {component}")
+    mesh, found = problem.mesh, {}
+    deformed = mesh.points + step.displacement
+    for pair in problem.model.contact:
+        for group in (pair.secondary, pair.primary):
+            for node, normal in _normals(mesh, group, deformed).items():
+                found[node] = float(normal @ _tensor(step.stress[node]) @ normal)
+    return found
+
+
+def _normals(mesh: fc.Mesh, group: str, coordinates: np.ndarray) -> dict[int, np.ndarray]:
+    """Return unit means of the facets' normals at the nodes of a group; the sign does not matter here."""
+    total: dict[int, np.ndarray] = {}
+    for name, block in fc.topology.outer_facets(mesh).items():
+        element = fc.elements.get(name)
+        inside = np.isin(block, nodes_of(mesh, {"GROUP_MA": group})).all(axis=1)
+        tangent = np.einsum("akj,fkd->fajd", element.gradient(element.nodes), coordinates[block[inside]])
+        if mesh.dim == 2:
+            normal = np.stack([tangent[:, :, 0, 1], -tangent[:, :, 0, 0]], axis=2)
+        else:
+            normal = np.cross(tangent[:, :, 0], tangent[:, :, 1])
+        normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+        for node, vector in zip(block[inside].ravel().tolist(), normal.reshape(-1, mesh.dim), strict=True):
+            total[node] = total.get(node, 0.0) + vector
+    return {node: vector / np.linalg.norm(vector) for node, vector in total.items()}
+
+
+def _tensor(stress: np.ndarray) -> np.ndarray:
+    if len(stress) == 4:
+        xx, yy, _, xy = stress
+        return np.array([[xx, xy], [xy, yy]])
+    xx, yy, zz, xy, yz, xz = stress
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _contact_values(step: fc.StepResult, of: Callable[[fc.ContactResult], np.ndarray]) -> Field:
+    """Return what a function gives for the secondary nodes of all pairs."""
+    found: Field = {}
+    for contact in step.contact.values():
+        found.update(zip(contact.points.tolist(), np.asarray(of(contact), float).tolist(), strict=True))
+    return found
+
+
+def _contact_element(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
+    """Return the fields of code_aster's mortar facets, at the nodes: a uniform one is the same there."""
+    if component == "PRES":
+        return _contact_values(step, lambda contact: -contact.pressure)
+    if component == "JEU":
+        return _contact_values(step, lambda contact: contact.gap)
+    if component == "CONT":
+        return _contact_values(step, lambda contact: contact.active)
+    raise Missing(f"needs CONT_ELEM {component}")
+
+
+def _contact_node(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
+    per_radian = 1 / (2 * np.pi) if problem.model.kinematics == "axisymmetric" else 1.0
+    if component == "JEU":
+        return _contact_values(step, lambda contact: contact.gap)
+    if component == "CONT":
+        return _contact_values(step, lambda contact: np.where(contact.active, 2 - contact.sticking, 0))
+    if component in ("RX", "RY", "RZ"):
+        axis = "XYZ".index(component[1])
+        return _contact_values(step, lambda contact: per_radian * contact.force_vectors[:, axis])
+    if component == "RN":
+        return _contact_values(
+            step, lambda contact: per_radian * np.einsum("nd,nd->n", contact.force_vectors, contact.normal)
+        )
+    raise Missing(f"needs CONT_NOEU {component}")
+
+
+def _reaction(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
+    """Return support reactions plus contact forces; those on the primary side are not in the results."""
+    axis = ("DX", "DY", "DZ").index(component)
+    per_radian = 1 / (2 * np.pi) if problem.model.kinematics == "axisymmetric" else 1.0
+    found = dict(enumerate(step.reaction[:, axis] * per_radian))
+    for node, force in _contact_values(step, lambda contact: per_radian * contact.force_vectors[:, axis]).items():
+        found[node] += force
+    for pair in problem.model.contact:
+        for node in nodes_of(problem.mesh, {"GROUP_MA": pair.primary}):
+            del found[int(node)]
+    return found
+
+
+FIELDS: dict[str, Callable[[Problem, fc.StepResult, str, Entry], Field]] = {
+    "DEPL": _displacement,
+    "SIEF_NOEU": _stress,
+    "SIGM_NOEU": _stress,
+    "PRES_NOEU": _surface_pressure,
+    "CONT_ELEM": _contact_element,
+    "CONT_NOEU": _contact_node,
+    "REAC_NODA": _reaction,
+}
