@@ -70,26 +70,26 @@ def test_multigrid_solves_friction_too():
     assert np.abs(one.stress - other.stress).max() < 1e-7 * np.abs(one.stress).max()
 
 
-def pressed_and_drawn(formulation, friction=0.3, nu=0.49):
-    """A wide block pressed against a rigid parabola, then drawn sideways; nearly incompressible, so uncoupled.
+def pressed_and_drawn(friction=0.3, nu=0.49):
+    """A large block pressed against a rigid parabola, then drawn sideways.
 
-    Returns the steps at full pressure: before, half-way along and at the end of the sideways motion.
+    Nearly incompressible, so that pressure and shear are hardly coupled; large, or its own bulging would draw along the
+    contact. Returns the steps at full pressure: before, half-way along and at the end of the sideways motion.
     """
-    block = fc.generate.block((2.0, 1.0), (100, 50), "quad4", origin=(-1.0, -1.0))
-    graded = np.sign(block.points) * np.sinh(6.0 * np.abs(block.points)) / np.sinh(6.0) * 8.0
+    block = fc.generate.block((2.0, 1.0), (120, 48), "quad8", origin=(-1.0, -1.0))  # quad4 would lock
+    graded = np.sign(block.points) * np.sinh(8.0 * np.abs(block.points)) / np.sinh(8.0) * 60.0
     model = fc.Model(block.replace(points=graded), "plane_strain")
     model.add_material(fc.LinearElastic(E=1000.0, nu=nu))
-    model.prescribe("BOTTOM", y=0.06, ramp=[(0, 0), (1, 1), (2, 1)])
-    model.prescribe("BOTTOM", x=0.04, ramp=[(0, 0), (1, 0), (2, 1)])
+    model.prescribe("BOTTOM", y=0.09, ramp=[(0, 0), (1, 1), (2, 1)])
+    model.prescribe("BOTTOM", x=0.03, ramp=[(0, 0), (1, 0), (2, 1)])
     model.add_obstacle(
-        "pair", secondary="TOP", obstacle=fc.obstacles.paraboloid(10.0), formulation=formulation, friction=friction
+        "pair", secondary="TOP", obstacle=fc.obstacles.paraboloid(10.0), formulation="continuous", friction=friction
     )
     return fc.solve(model, fc.Ramp((0.5, 1.0, 1.5, 2.0), ((0, 0), (2, 2))))[1:]
 
 
-@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
-def test_partial_slip_after_cattaneo_and_mindlin(formulation):
-    for step in pressed_and_drawn(formulation)[1:]:
+def test_partial_slip_after_cattaneo_and_mindlin():
+    for step in pressed_and_drawn()[1:]:
         contact = step.contact["pair"]
         Q, P = np.abs(contact.force)
         bodies = {"E1": 1000.0, "nu1": 0.49, "R1": np.inf, "R2": 10.0, "force": P}
@@ -101,7 +101,7 @@ def test_partial_slip_after_cattaneo_and_mindlin(formulation):
         # What coupling there is acts oppositely left and right: the means of both sides are free of it.
         stick, slip = contact.active & contact.sticking, contact.active & ~contact.sticking
         edges = [np.abs(x[side]).max() for side in (stick & (x < 0), stick & (x > 0))]
-        facet = 0.08  # the length of the facets near the edge of the stick zone
+        facet = 0.036  # the length of the facets near the edge of the stick zone
         assert np.mean(edges) == pytest.approx(theory.stick_radius, abs=facet)
         assert slip.any()
         near_edge = np.abs(np.abs(x) - theory.stick_radius) < 2 * facet  # the theory's traction has a vertical tangent
