@@ -38,7 +38,9 @@ def main() -> None:
             runs = [measured(command) for _ in range(options.runs)]
             seconds, memory = zip(*runs, strict=True)
             median = statistics.median(seconds)
-            print(f"{Path(case).stem:<24} {median:>14.2f} {min(seconds):>8.2f} {max(seconds):>8.2f} {max(memory):>9.0f}")
+            print(
+                f"{Path(case).stem:<24} {median:>14.2f} {min(seconds):>8.2f} {max(seconds):>8.2f} {max(memory):>9.0f}"
+            )
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from fastcontact import analytic, generate, obstacles, plot, recovery, topology
+    from fastcontact.analysis import Criteria, solve
     from fastcontact.errors import (
         CaseError,
         ContactError,
@@ -30,11 +31,10 @@ if TYPE_CHECKING:
     from fastcontact.io.xmgrace import write_agr
     from fastcontact.materials import LinearElastic
     from fastcontact.mesh import Mesh
-    from fastcontact.model import Model
     from fastcontact.mesh_quality import quality
+    from fastcontact.model import Model
     from fastcontact.ramp import Ramp, linear_ramp
     from fastcontact.results import ContactResult, StepResult
-    from fastcontact.analysis import Criteria, solve
     from fastcontact.topology import ordered_line
 
 _MODULES = ("analytic", "generate", "obstacles", "plot", "recovery", "topology")

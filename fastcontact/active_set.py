@@ -41,19 +41,39 @@ class State(Protocol):
     """What every inequality solver returns; see `Equilibrium`."""
 
     @property
-    def u(self) -> Array: ...
+    def u(self) -> Array:
+        """See `Equilibrium`."""
+        ...
+
     @property
-    def multiplier(self) -> Array: ...
+    def multiplier(self) -> Array:
+        """See `Equilibrium`."""
+        ...
+
     @property
-    def gap(self) -> Array: ...
+    def gap(self) -> Array:
+        """See `Equilibrium`."""
+        ...
+
     @property
-    def active(self) -> Active: ...
+    def active(self) -> Active:
+        """See `Equilibrium`."""
+        ...
+
     @property
-    def wanted(self) -> Active: ...
+    def wanted(self) -> Active:
+        """See `Equilibrium`."""
+        ...
+
     @property
-    def settled(self) -> bool: ...
+    def settled(self) -> bool:
+        """See `Equilibrium`."""
+        ...
+
     @property
-    def iterations(self) -> int: ...
+    def iterations(self) -> int:
+        """See `Equilibrium`."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)

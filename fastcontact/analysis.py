@@ -367,8 +367,8 @@ class Analysis:
     def _not_slack(self, settled: Settled) -> str:
         assert self.floating is not None
         return (
-            f"contact does not hold {'; '.join(self.floating.unheld(settled))}: after {settled.positions} positions tried "
-            f"a force of {np.abs(settled.left).max():.3g} is still missing for equilibrium under a load of "
+            f"contact does not hold {'; '.join(self.floating.unheld(settled))}: after {settled.positions} positions "
+            f"tried, a force of {np.abs(settled.left).max():.3g} is still missing for equilibrium under a load of "
             f"{self.largest_work:.3g}. Add a support, or use more load steps"
         )
 

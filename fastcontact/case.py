@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from fastcontact import analytic, generate
+from fastcontact.analysis import Criteria
 from fastcontact.errors import CaseError, FastcontactError, unknown
 from fastcontact.io.mesh_files import read_mesh
 from fastcontact.materials import LinearElastic
 from fastcontact.mesh import Mesh
 from fastcontact.model import Model
-from fastcontact.ramp import Ramp, linear_ramp
-from fastcontact.analysis import Criteria
+from fastcontact.ramp import Ramp, Table, linear_ramp
 
 _NUMBER = (int, float)
 _UNITS = {"length": str, "force": str, "pressure": str}
@@ -30,6 +30,16 @@ _SOLVE = {
     "geometry": _NUMBER,
     "max_geometry_updates": int,
     "max_active_set_iterations": int,
+}
+_AXES = {"x": _NUMBER, "y": _NUMBER, "z": _NUMBER}
+# Tables of loads and relations: their keys, the method of the model that takes them, and the keys they need.
+_LOADS: dict[str, tuple[dict[str, Any], Callable[..., None], tuple[str, ...]]] = {
+    "pressure": ({"group": str, "value": _NUMBER, "ramp": list}, Model.add_pressure, ("group", "value")),
+    "traction": ({"group": str, **_AXES, "ramp": list}, Model.add_traction, ("group",)),
+    "body_force": ({"groups": (list, str), **_AXES, "ramp": list}, Model.add_body_force, ()),
+    "force": ({"group": str, **_AXES, "distribute": bool, "ramp": list}, Model.add_force, ("group",)),
+    "couple": ({"group": str, "component": str}, Model.couple, ("group", "component")),
+    "relation": ({"terms": list, "value": _NUMBER, "ramp": list}, Model.relate, ("terms",)),
 }
 _CHECK = {"quantity": str, "theory": str, "tolerance": _NUMBER, "name": str}
 # What a mesh-convergence study or a sweep of this case needs to know; `fastcontact.convergence` reads it.
@@ -54,6 +64,7 @@ _TOP = {
     "mesh": dict,
     "material": list,
     "support": list,
+    **dict.fromkeys(_LOADS, list),
     "contact": dict,
     "ramp": dict,
     "solve": dict,
@@ -250,10 +261,11 @@ def _model(mesh: Mesh, data: dict[str, Any], text: str) -> Model:
                 raise CaseError(f"material[{i}] needs '{key}'")
         model.add_material(LinearElastic(E=float(entry["E"]), nu=float(entry["nu"])), entry.get("groups"))
     for i, entry in enumerate(_tables("support", data.get("support", []))):
-        _check_keys(f"support[{i}]", entry, {"group": str, "x": _NUMBER, "y": _NUMBER, "z": _NUMBER})
+        _check_keys(f"support[{i}]", entry, {"group": str, **_AXES, "ramp": list})
         if "group" not in entry:
             raise CaseError(f"support[{i}] needs 'group'")
-        model.prescribe(entry["group"], **{key: float(value) for key, value in entry.items() if key != "group"})
+        model.prescribe(**_arguments(f"support[{i}]", entry))
+    _add_loads(model, data)
     for name, entry in data.get("contact", {}).items():
         if not isinstance(entry, dict):
             raise CaseError(f"'contact' needs a name for each pair: write [contact.NAME] above its keys, not '{name}'")
@@ -262,6 +274,30 @@ def _model(mesh: Mesh, data: dict[str, Any], text: str) -> Model:
                 raise CaseError(f"contact.{name} needs '{key}', the name of a group of facets")
         model.add_contact(name, **entry)
     return model
+
+
+def _add_loads(model: Model, data: dict[str, Any]) -> None:
+    """Give the model the loads and relations of a case."""
+    for kind, (known, add, needed) in _LOADS.items():
+        for i, entry in enumerate(_tables(kind, data.get(kind, []))):
+            where = f"{kind}[{i}]"
+            _check_keys(where, entry, known)
+            for key in needed:
+                if key not in entry:
+                    raise CaseError(f"{where} needs '{key}'")
+            add(model, **_arguments(where, entry))
+
+
+def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
+    """Return an entry as arguments of a method of the model, its lists of numbers and terms checked."""
+    arguments = dict(entry)
+    if "ramp" in entry:
+        arguments["ramp"] = _points(entry["ramp"], f"{where}.ramp")
+    for term in entry.get("terms", []):
+        kinds: list[Any] = [(str, int), str, _NUMBER]
+        if not isinstance(term, list) or len(term) != 3 or not all(isinstance(v, k) for v, k in zip(term, kinds)):
+            raise CaseError(f"'{where}.terms' must be a list of [group or point, component, coefficient], not {term!r}")
+    return arguments
 
 
 def _ramp(data: dict[str, Any]) -> Ramp:
@@ -278,9 +314,10 @@ def _ramp(data: dict[str, Any]) -> Ramp:
     return Ramp(instants, table)
 
 
-def _points(table: list[Any]) -> tuple[tuple[float, float], ...]:
-    if not table or not all(isinstance(row, list) and len(row) == 2 and all(isinstance(v, _NUMBER) for v in row) for row in table):
-        raise CaseError("'ramp.table' must be a list of pairs [instant, multiplier of the loads]")
+def _points(table: list[Any], where: str = "ramp.table") -> Table:
+    pairs = all(isinstance(row, list) and len(row) == 2 and all(isinstance(v, _NUMBER) for v in row) for row in table)
+    if not table or not pairs:
+        raise CaseError(f"'{where}' must be a list of pairs [instant, multiplier of the loads]")
     return tuple((float(t), float(v)) for t, v in table)
 
 

@@ -86,7 +86,7 @@ class Floating:
         self.names = motions.names()
         self.dofs = _sturdy(system.unknowns_of(motions.displacement), diagonal, avoid)
         self._at_springs = motions.displacement[self.dofs]
-        self.motions = motions.combined(np.linalg.inv(self._at_springs))
+        self.motions = motions.combined(np.asarray(np.linalg.inv(self._at_springs), np.float64))
         self.stiffness = float(np.median(diagonal[system.free]))
 
     def with_springs(self, matrix: bsr_array) -> bsr_array:

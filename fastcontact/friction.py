@@ -8,9 +8,11 @@ with R the normal and tangential rows and C the compliance of the constraints th
 
 .. math:: n = [n - c_n g]_+, \qquad t = P_{|t| \le \mu n}(t - c_t s)
 
-with P the projection on the disc, for any positive c (Alart and Curnier, 1991): stick holds the slip of the step at zero
-exactly, slip returns to the cone exactly. A semismooth Newton method solves both. In two dimensions it is an active set
-of open, stick and slip forwards or backwards. Where its sets come back, block Gauss-Seidel sweeps give it a better start.
+with P the projection on the disc, for any positive c (Alart and Curnier, 1991): stick holds the slip of the step at
+zero
+exactly, slip returns to the cone exactly. A semismooth Newton method solves both. In two dimensions it is an active
+set of open, stick and slip forwards or backwards. Where its sets come back, block Gauss-Seidel sweeps give it a better
+start.
 """
 
 from __future__ import annotations
@@ -164,8 +166,8 @@ def _newton(
 ) -> tuple[Array, _State, bool, int]:
     """Iterate until the state stands still and the slip directions have turned into the forces.
 
-    Where states come back, block Gauss-Seidel sweeps, which are slow but sure, lead to a better state to start from; each
-    time they are made ten times more exact.
+    Where states come back, block Gauss-Seidel sweeps, which are slow but sure, lead to a better state to start from;
+    each time they are made ten times more exact.
     """
     seen: set[bytes] = set()
     y = np.zeros(problem.shape)
@@ -208,9 +210,7 @@ def _admissible_state(problem: _Problem, y: Array) -> _State:
     return _State(closed, ~sliding & (problem.mu > 0), direction, reach)
 
 
-def _state(
-    problem: _Problem, y: Array, gap_tolerance: float, force_tolerance: float, old: _State
-) -> _State:
+def _state(problem: _Problem, y: Array, gap_tolerance: float, force_tolerance: float, old: _State) -> _State:
     """Return the state that the signs of the solution of state `old` ask for."""
     gaps = problem.gaps(y)
     slack = force_tolerance * np.abs(y[0]).max(initial=0.0)
@@ -248,12 +248,17 @@ def _linear_solution(problem: _Problem, y: Array, state: _State) -> Array:
     sliding = np.flatnonzero(state.closed & ~state.sticking)
     if len(sliding):
         _sliding_rows(problem, y, state, sliding, index, A, right)
-    solution: Array = np.linalg.solve(A, right.ravel()).reshape(parts, m)
-    return solution
+    return np.asarray(np.linalg.solve(A, right.ravel()), float).reshape(parts, m)
 
 
 def _sliding_rows(
-    problem: _Problem, y: Array, state: _State, sliding: NDArray[np.intp], index: NDArray[np.intp], A: Array, right: Array
+    problem: _Problem,
+    y: Array,
+    state: _State,
+    sliding: NDArray[np.intp],
+    index: NDArray[np.intp],
+    A: Array,
+    right: Array,
 ) -> None:
     """Fill the rows ``t - mu n d = 0`` of sliding constraints, d turning with t - c s in three dimensions."""
     d = state.direction[:, sliding]
@@ -272,4 +277,3 @@ def _sliding_rows(
             scaled = (turn * problem.c[1 + b, sliding])[:, None]
             A[rows] += scaled * problem.F[columns]
             right[1 + a, sliding] -= (turn * problem.c[1 + b, sliding]) * problem.free[1 + b, sliding]
-

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, Protocol
 
 import numpy as np
@@ -78,7 +79,7 @@ class Pressure:
 
     def check(self, mesh: Mesh, kinematics: str) -> None:
         """See `Load`."""
-        _check_finite(self.name, self.value)
+        check_value(self.name, self.value)
         for element, block in facets_of(mesh, self.group).items():
             outward(mesh, self.group, element, block)
 
@@ -109,7 +110,7 @@ class Traction:
         """See `Load`."""
         facets_of(mesh, self.group)
         for value in self.components.values():
-            _check_finite(self.name, value)
+            check_value(self.name, value)
 
     def vector(self, mesh: Mesh, kinematics: str) -> Array:
         """See `Load`."""
@@ -140,7 +141,7 @@ class BodyForce:
             if not mesh.cells_of(group, dim=mesh.dim):
                 raise ModelError(f"group '{group}' holds no solid cells: no body force can act on it")
         for value in self.components.values():
-            _check_finite(self.name, value)
+            check_value(self.name, value)
 
     def vector(self, mesh: Mesh, kinematics: str) -> Array:
         """See `Load`."""
@@ -179,7 +180,7 @@ class NodalForce:
         if not len(mesh.points_of(self.group)):
             raise ModelError(f"group '{self.group}' is empty: no force can act on it")
         for value in self.components.values():
-            _check_finite(self.name, value)
+            check_number(self.name, value)
 
     def vector(self, mesh: Mesh, kinematics: str) -> Array:
         """See `Load`."""
@@ -211,7 +212,7 @@ class TotalForce:
                 "use add_pressure or add_traction for a radial load"
             )
         for value in self.components.values():
-            _check_finite(self.name, value)
+            check_number(self.name, value)
 
     def vector(self, mesh: Mesh, kinematics: str) -> Array:
         """See `Load`."""
@@ -290,6 +291,18 @@ def evaluated(value: Value, points: Array, name: str) -> Array:
     return found.astype(np.float64).reshape(points.shape[:-1])
 
 
+def check_number(name: str, value: Any) -> None:
+    """Raise ModelError if `value` is not a finite number; `name` names it."""
+    if not isinstance(value, Real) or isinstance(value, bool) or not math.isfinite(value):
+        raise ModelError(f"{name} is {value!r}, which is not a finite number")
+
+
+def check_value(name: str, value: Any) -> None:
+    """Raise ModelError if `value` is neither a finite number nor a function; `name` names it."""
+    if not callable(value):
+        check_number(name, value)
+
+
 def axes_of(what: str, components: Mapping[str, Any], dim: int) -> dict[int, Any]:
     """Return components given by the names of their axes, those that are not None, by number.
 
@@ -305,13 +318,6 @@ def axes_of(what: str, components: Mapping[str, Any], dim: int) -> dict[int, Any
         if name not in "xyz"[:dim]:
             raise ModelError(f"{what}: {unknown('component', name, 'xyz'[:dim])}")
     return {"xyz".index(name): value for name, value in given.items()}
-
-
-def _check_finite(name: str, value: Any) -> None:
-    if callable(value):
-        return
-    if isinstance(value, (str, bytes)) or np.ndim(value) != 0 or not math.isfinite(value):
-        raise ModelError(f"{name} is {value!r}: it must be a finite number or a function of position")
 
 
 def _mapped(mesh: Mesh, element: str, cells: Indices) -> tuple[Array, Array, Array, Array]:

@@ -16,7 +16,19 @@ from fastcontact.contact.formulations import FORMULATIONS, Formulation
 from fastcontact.contact.rigid import RigidSide
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.errors import ContactError, ModelError, unknown
-from fastcontact.loads import BodyForce, Load, NodalForce, Pressure, TotalForce, Traction, Value, axes_of, evaluated
+from fastcontact.loads import (
+    BodyForce,
+    Load,
+    NodalForce,
+    Pressure,
+    TotalForce,
+    Traction,
+    Value,
+    axes_of,
+    check_number,
+    check_value,
+    evaluated,
+)
 from fastcontact.materials import KINEMATICS, LinearElastic
 from fastcontact.mesh import Mesh
 from fastcontact.mesh_quality import check_cells
@@ -156,7 +168,7 @@ class Model:
         """Hold displacement components (``"x"``, ``"y"``, ``"xy"``, in 3D also ``"z"``) of a group's nodes at zero."""
         if not components:
             raise ModelError(f"fix('{group}', ...) names no component: give for example 'x' or 'xy'")
-        self.prescribe(group, **dict.fromkeys(components, 0.0))
+        self._support(group, dict.fromkeys(components, 0.0), None)
 
     def prescribe(self, group: str, *, ramp: History = None, **components: Value) -> None:
         """Prescribe displacement components of all nodes of a group, e.g. ``y=-2.0`` [length], times the ramp.
@@ -169,12 +181,14 @@ class Model:
         MeshError, ModelError
             If the group is unknown, a component is not x, y (or z in 3D), or a value is not finite.
         """
+        self._support(group, components, ramp)
+
+    def _support(self, group: str, components: Mapping[str, Value], ramp: History) -> None:
         if not len(self.mesh.points_of(group)):
             raise ModelError(f"group '{group}' is empty: no displacement can be prescribed on it")
         for axis, value in axes_of(f"prescribe('{group}')", components, self.mesh.dim).items():
             support = Support(group, axis, value, _table(ramp, f"the displacement prescribed on '{group}'"))
-            if not callable(value):
-                evaluated(value, self.mesh.points[:1], support.name)
+            check_value(support.name, value)
             self.supports.append(support)
 
     def add_pressure(self, group: str, value: Value, *, ramp: History = None) -> None:
@@ -302,9 +316,9 @@ class Model:
         row: dict[int, float] = {}
         listed = [(place, component, coefficient) for place, component, coefficient in terms]
         name = "the relation of " + ", ".join(f"{component} of '{place}'" for place, component, _ in listed)
-        evaluated(value, self.mesh.points[:1], name)
+        check_number(f"the value of {name}", value)
         for place, component, coefficient in listed:
-            evaluated(coefficient, self.mesh.points[:1], f"a coefficient of {name}")
+            check_number(f"a coefficient of {name}", coefficient)
             (axis,) = axes_of(name, {component: coefficient}, self.mesh.dim)
             for node in self._nodes(place):
                 dof = int(node) * self.mesh.dim + axis
@@ -517,7 +531,8 @@ class Model:
         fixed, prescribed = self.prescribed_by_ramp()
         forces = self.forces_by_ramp()
         if ramp is not None:
-            named = [(item.name, item.ramp) for item in (*self.supports, *self.loads, *self.relations)]
+            items: list[Support | Load | Relation] = [*self.supports, *self.loads, *self.relations]
+            named = [(item.name, item.ramp) for item in items]
             named += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]
             check_ramps(named, ramp.instants)
         self._check_relations(fixed, prescribed, ramp or Ramp((1.0,)))

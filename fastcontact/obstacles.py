@@ -41,7 +41,7 @@ def _positive(**values: float) -> None:
 def _vector(name: str, values: ArrayLike, dim: int) -> Array:
     vector = np.asarray(values, float)
     if vector.shape != (dim,) or not np.isfinite(vector).all():
-        raise ContactError(f"{name} = {values} of a rigid obstacle must be {dim} finite numbers, one a coordinate")
+        raise ContactError(f"{name} = {values!r} of a rigid obstacle must be {dim} finite numbers, one a coordinate")
     return vector
 
 

@@ -44,6 +44,7 @@ def summarise(
             for pair, theories in case.theories.items()
             if pair in last.contact
         },
+        "regularised": last.iterations.get("regularised"),
         "checks": [_checked(case, check, last) for check in case.checks],
         "timings": dict(timings),
         "versions": versions(),
@@ -155,11 +156,20 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     top = summary["von_mises_max"]
     where = ", ".join(f"{x:.4g}" for x in top["at"])
     found.append(f"  largest von Mises stress {top['value']:.6g} {unit['pressure']} at ({where}) {unit['length']}")
+    if summary["regularised"]:
+        found.append(_regularised_line(summary["regularised"], unit))
     for name, theory in summary["theory"].items():
         found.extend(_theory_lines(name, theory))
     for check in summary["checks"]:
         found.append(_check_line(check, unit["pressure"]))
     return found
+
+
+def _regularised_line(told: Mapping[str, Any], unit: Mapping[str, str]) -> str:
+    return (
+        f"  held by contact alone: {'; '.join(told['motions'])}. Regularised by springs of {told['spring_stiffness']:.3g} "
+        f"{unit['force']}/{unit['length']}, which carry {told['relative_to_load']:.1e} of the load in the end"
+    )
 
 
 def _theory_lines(pair: str, theory: Mapping[str, Any]) -> list[str]:

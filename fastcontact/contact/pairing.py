@@ -149,7 +149,9 @@ def _facet_normals(block: FacetBlock, corners: Array) -> Array:
     return normal
 
 
-def gap_rows(candidates: Candidates, pairing: Pairing, primary: Surface | RigidSide, reference: Array) -> tuple[csr_array, Array]:
+def gap_rows(
+    candidates: Candidates, pairing: Pairing, primary: Surface | RigidSide, reference: Array
+) -> tuple[csr_array, Array]:
     """Return (G, gap0): gap of the candidates = gap0 + G u; rows of unpaired candidates are empty.
 
     ``gap = n . (x_secondary - x_primary(xi))`` with the facet, xi and normal of `pairing` held fixed; `reference`

@@ -10,7 +10,9 @@ orders, and three meshes solved for three unknowns (Richardson 1911; Roache 1998
 and s are integrated out for every order p (Bayesian linear regression with weights :math:`h^{-2p}`; Zellner 1971, chapter
 3), and the orders are averaged with their evidence. The prior of p is log-normal about 1.6, with 95 % between 0.8 and
 3.2; that of s^2 weighs as much as one and a half meshes and stands at s = 0.2, so that few meshes that happen to agree
-are not believed blindly. The error bar is half of the 95 % interval of L, the greater half if they differ.
+are not believed blindly. Meshes too coarse for one power of h are allowed for: the first k meshes may be off by ten
+times s, with a prior probability of 1/2 for each further k, as long as three meshes are left. The error bar is half of
+the 95 % interval of L, the greater half if they differ.
 """
 
 from __future__ import annotations
@@ -25,9 +27,11 @@ from fastcontact.errors import CaseError
 
 Array = NDArray[np.float64]
 CONFIDENCE = 0.95
-ORDERS = np.geomspace(0.4, 6.0, 121)
+ORDERS = np.geomspace(0.4, 6.0, 81)
 PRIOR_ORDER, PRIOR_SPREAD = 1.6, 0.35
 PRIOR_NOISE, PRIOR_WEIGHT = 0.2, 1.5
+# How much more the first meshes may be off, and how probable it is for each that they are.
+COARSE_NOISE, COARSE_PROBABILITY = 10.0, 0.5
 # Solutions are never better than this, relatively.
 ROUND_OFF = 1e-12
 
@@ -90,16 +94,19 @@ def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
         return Limit(float(value[-1]), ROUND_OFF * float(np.abs(value).max()), np.nan, np.nan, len(value), True)
     x = size / np.exp(np.log(size).mean())
     floor = (ROUND_OFF * np.abs(value).max() / scale) ** 2
-    centre, width, evidence = _regressions(x, (value - value[-1]) / scale, floor)
+    centre, width, evidence = np.concatenate(
+        [_regressions(x, (value - value[-1]) / scale, floor, coarse) for coarse in range(len(value) - 2)], axis=1
+    )
     weight = np.exp(evidence - evidence.max())
     weight /= weight.sum()
     low, middle, high = _quantiles(centre, width, weight, len(value) - 2 + PRIOR_WEIGHT)
-    order = float(weight @ ORDERS)
+    orders = np.tile(ORDERS, len(value) - 2)
+    order = float(weight @ orders)
     return Limit(
         value=float(value[-1] + scale * middle),
         uncertainty=float(scale * max(high - middle, middle - low)),
         order=order,
-        order_uncertainty=float(np.sqrt(weight @ (ORDERS - order) ** 2)),
+        order_uncertainty=float(np.sqrt(weight @ (orders - order) ** 2)),
         n_levels=len(value),
         converging=bool(changes[-1] < changes[:-1].max()),
     )
@@ -120,22 +127,26 @@ def _checked(h: ArrayLike, values: ArrayLike) -> tuple[Array, Array]:
     return size, value
 
 
-def _regressions(x: Array, y: Array, floor: float) -> tuple[Array, Array, Array]:
-    """Return location and scale of the limit's Student distribution, and log evidence, for every order."""
-    centre, width, evidence = np.empty((3, len(ORDERS)))
+def _regressions(x: Array, y: Array, floor: float, coarse: int) -> Array:
+    """Return location and scale of the limit's Student distribution, and log evidence, (3, n_orders).
+
+    The first `coarse` meshes are taken to be too coarse.
+    """
+    result = np.empty((3, len(ORDERS)))
     dof = len(x) - 2 + PRIOR_WEIGHT
+    noise = np.where(np.arange(len(x)) < coarse, COARSE_NOISE, 1.0)
+    prior = coarse * np.log(COARSE_PROBABILITY / COARSE_NOISE)
     for i, p in enumerate(ORDERS):
-        scaled = x**p
-        A = np.column_stack([1.0 / scaled, np.ones_like(x)])
+        spread = noise * x**p
+        A = np.column_stack([1.0 / spread, 1.0 / noise])
         inverse = np.linalg.inv(A.T @ A)
-        solution = inverse @ (A.T @ (y / scaled))
-        residual = y / scaled - A @ solution
+        solution = inverse @ (A.T @ (y / spread))
+        residual = y / spread - A @ solution
         squares = residual @ residual + PRIOR_WEIGHT * (PRIOR_NOISE * solution[1]) ** 2 + floor
-        centre[i] = solution[0]
-        width[i] = np.sqrt(squares / dof * inverse[0, 0])
-        prior = -0.5 * (np.log(p / PRIOR_ORDER) / PRIOR_SPREAD) ** 2
-        evidence[i] = 0.5 * np.log(np.linalg.det(inverse)) - 0.5 * dof * np.log(squares) + prior
-    return centre, width, evidence
+        evidence = 0.5 * np.log(np.linalg.det(inverse)) - 0.5 * dof * np.log(squares)
+        evidence += prior - 0.5 * (np.log(p / PRIOR_ORDER) / PRIOR_SPREAD) ** 2
+        result[:, i] = solution[0], np.sqrt(squares / dof * inverse[0, 0]), evidence
+    return result
 
 
 def _quantiles(centre: Array, width: Array, weight: Array, dof: float) -> list[float]:

@@ -42,8 +42,8 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Tab
     structured ndarray (m,)
         ``point``; ``x``, ``y`` (``z``), ``abscissa``, ``radius`` (distance from the axis), ``gap`` [length];
         ``pressure`` [pressure]; ``multiplier`` [force or pressure]; ``force_x`` ... [force]; ``shear_x`` ...
-        [pressure]; ``active``, ``sticking``. With `step` also ``displacement_x`` ... [length], ``stress_xx`` ..., ``von_mises``, ``von_mises_signed``
-        [pressure].
+        [pressure]; ``active``, ``sticking``. With `step` also ``displacement_x`` ... [length],
+        ``stress_xx`` ..., ``von_mises``, ``von_mises_signed`` [pressure].
     """
     columns = {
         "point": contact.points,
@@ -166,18 +166,14 @@ def history_table(steps: Iterable[StepResult], contact: str | None = None) -> Ta
 def _pair(step: StepResult, name: str | None) -> ContactResult | None:
     if name is None:
         if len(step.contact) > 1:
-            raise ContactError(
-                f"there are the contact pairs {', '.join(step.contact)}: name the one to follow"
-            )
+            raise ContactError(f"there are the contact pairs {', '.join(step.contact)}: name the one to follow")
         return next(iter(step.contact.values()), None)
     if name not in step.contact:
         raise ContactError(unknown("contact pair", name, step.contact))
     return step.contact[name]
 
 
-def with_theory(
-    table: Table, name: str, function: Callable[[Any], ArrayLike], along: str = "radius"
-) -> Table:
+def with_theory(table: Table, name: str, function: Callable[[Any], ArrayLike], along: str = "radius") -> Table:
     """Return the table with one more column, a function of another column.
 
     Parameters
@@ -282,9 +278,7 @@ def read_csv(path: PathLike) -> tuple[Table, dict[str, str]]:
     header, rows = lines[0], lines[1:]
     for number, row in enumerate(rows, start=2):
         if len(row) != len(header):
-            raise FileError(
-                f"'{path}': line {number} has {len(row)} values, but the header names {len(header)}"
-            )
+            raise FileError(f"'{path}': line {number} has {len(row)} values, but the header names {len(header)}")
     columns, units = {}, {}
     for position, title in enumerate(header):
         named = re.fullmatch(r"(.*) \[(.*)\]", title, flags=re.DOTALL)
@@ -319,9 +313,7 @@ def _values(texts: list[str]) -> NDArray[Any]:
 
 def _table(columns: Mapping[str, NDArray[Any]]) -> Table:
     """Return columns of equal length as one structured array."""
-    table = np.empty(
-        len(next(iter(columns.values()))), dtype=[(name, c.dtype) for name, c in columns.items()]
-    )
+    table = np.empty(len(next(iter(columns.values()))), dtype=[(name, c.dtype) for name, c in columns.items()])
     for name, column in columns.items():
         table[name] = column
     return table
@@ -337,11 +329,7 @@ def _by_axis(prefix: str, vectors: NDArray[Any]) -> Columns:
 
 def _radius(coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the distance from the axis: of x = 0 in 2D, of the y axis in 3D [length]."""
-    return (
-        np.hypot.reduce(coordinates[:, ::2], axis=1)
-        if coordinates.shape[1] == 3
-        else np.abs(coordinates[:, 0])
-    )
+    return np.hypot.reduce(coordinates[:, ::2], axis=1) if coordinates.shape[1] == 3 else np.abs(coordinates[:, 0])
 
 
 def _fields(step: StepResult, points: NDArray[Any]) -> Columns:

@@ -60,7 +60,9 @@ class Direct:
         try:
             lu = splu(matrix, permc_spec=order, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         except RuntimeError as error:
-            raise ModelError("the stiffness matrix is singular: support the rigid-body motions of every body") from error
+            raise ModelError(
+                "the stiffness matrix is singular: support the rigid-body motions of every body"
+            ) from error
         self.counters.setups += 1
         return lu
 

@@ -119,3 +119,85 @@ def test_a_table_alone_sets_the_end_of_the_ramp(write):
     case = read_case(write(GOOD.replace("steps = 2", "steps = 4\ntable = [[0.0, 0.0], [2.0, 1.0]]")))
     assert case.ramp.instants == (0.5, 1.0, 1.5, 2.0)
     assert case.ramp.value(2.0) == 1.0
+
+
+LOADED = (
+    GOOD.split('[[support]]\ngroup = "A2B2"')[0]
+    + """
+[[support]]
+group = "A1B1"
+y = 2.0
+ramp = [[0.0, 1.0], [1.0, 1.0]]
+[[pressure]]
+group = "D2B2"
+value = 1
+[[traction]]
+group = "A2B2"
+y = -1.0
+ramp = [[0, 0], [1, 1]]
+[[body_force]]
+groups = "SPHHAU"
+y = -1e-3
+[[force]]
+group = "A2B2"
+y = -100.0
+distribute = true
+[[couple]]
+group = "A2B2"
+component = "y"
+[[relation]]
+terms = [["A2", "y", 1.0], ["B2", "y", -1.0]]
+[contact.hertz]
+secondary = "CONT1"
+primary = "CONT2"
+[ramp]
+steps = 2
+"""
+)
+
+
+def test_loads_and_relations_reach_the_model(write):
+    model = read_case(write(LOADED)).model
+    model.check()
+    assert [load.name for load in model.loads] == [
+        "the pressure on 'D2B2'",
+        "the traction on 'A2B2'",
+        "the body force on 'SPHHAU'",
+        "the total force on 'A2B2'",
+    ]
+    assert model.loads[1].ramp == ((0.0, 0.0), (1.0, 1.0))
+    assert [relation.name[:12] for relation in model.relations] == ["couple('A2B2", "the relation"]
+    assert model.supports[-1].ramp == ((0.0, 1.0), (1.0, 1.0))
+
+
+def test_a_case_driven_by_loads_runs(write):
+    case = read_case(write(LOADED))
+    last = fc.solve(case.model, case.ramp)[-1]
+    down = case.model.forces_by_ramp()
+    assert last.contact["hertz"].force[1] == pytest.approx(sum(f[:, 1].sum() for f in down.values()), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("value = 1\n", "", r"pressure\[0\] needs 'value'"),
+        ("value = 1\n", "vallue = 1\n", r"'pressure\[0\].vallue': did you mean 'pressure\[0\].value'"),
+        ("value = 1\n", 'value = "1"\n', r"'pressure\[0\].value' must be of type int or float"),
+        ("distribute = true", "distribute = 1", r"'force\[0\].distribute' must be of type bool"),
+        ("ramp = [[0, 0], [1, 1]]", "ramp = [0, 1]", r"'traction\[0\].ramp' must be a list of pairs"),
+        (
+            "ramp = [[0.0, 1.0], [1.0, 1.0]]",
+            "ramp = [[0.0]]",
+            r"'support\[0\].ramp' must be|'support\[1\].ramp' must be",
+        ),
+        ('component = "y"', "component = 2", r"'couple\[0\].component' must be of type str"),
+        ('component = "y"\n', "", r"couple\[0\] needs 'component'"),
+        ('["A2", "y", 1.0]', '["A2", "y"]', r"'relation\[0\].terms' must be a list of"),
+        ("[[pressure]]", "[[presure]]", r"unknown key 'presure': did you mean 'pressure'"),
+        ("[[couple]]", "[couple]", r"'couple' must be of type list"),
+    ],
+)
+def test_mistakes_in_loads_name_the_key(write, old, new, message):
+    assert old in LOADED
+    with pytest.raises(fc.CaseError, match=message):
+        read_case(write(LOADED.replace(old, new, 1)))

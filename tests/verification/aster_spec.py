@@ -38,6 +38,7 @@ IGNORED_ZONE = {
     "TYPE_PROJECTION", "GRAND_GLIS", "TYPE_JACOBIEN", "VECT_MAIT", "VECT_ESCL", "MAIT_VECT_Y", "ESCL_VECT_Y",
     "PENE_MAXI", "GLIS_MAXI", "RESOLUTION", "SANS_GROUP_NO_FR", "SANS_NOEUD_FR", "GLISSIERE", "TOLE_INTERP",
 }  # fmt: skip
+INTEGRATION = {"AUTO": "node", "GAUSS": "gauss", "SIMPSON": "simpson"}
 MESH_OPERATIONS = {"ORIE_PEAU", "DECOUPE_LAC", "DEFORME"}
 
 
@@ -380,21 +381,26 @@ def formulation(
 ) -> tuple[str, dict[str, Any]]:
     """Return the formulation that stands for a zone of DEFI_CONTACT, and its options.
 
-    The discrete method is node-to-segment; the continuous one is ours, and mortar where meshes do not match or facets
-    are quadratic. A penalty is replaced by the exact method: it only approximates that.
+    The discrete method is node-to-segment. The continuous one is mortar where code_aster integrates over cut facets,
+    where facets are quadratic, and where meshes do not match; elsewhere, and where the slave nodes are the integration
+    points (a value on a coarse mesh depends on that), it is the continuous one. A penalty, which only approximates the
+    exact method, is replaced by it.
     """
     _check_zone(contact, zone, mesh, supports)
     sides = [name for side in ("slave", "master") for name in mesh.cells_of(zone[side], dim=mesh.dim - 1)]
     quadratic = any(name not in ("line2", "tri3", "quad4") for name in sides)
+    rule = INTEGRATION.get(zone.get("INTEGRATION", "AUTO"), "gauss")
+    plain = not quadratic and zone.get("APPARIEMENT") != "MORTAR" and (rule == "node" or zone["interface"]["matching"])
+    options: dict[str, Any] = {}
     method = contact.get("FORMULATION", "DISCRETE")
     if method == "DISCRETE":
         name = "node_to_segment"
-    elif method == "CONTINUE":
-        plain = zone["interface"]["matching"] and not quadratic and zone.get("APPARIEMENT") != "MORTAR"
-        name = "continuous" if plain else "mortar"
-    else:
+    elif method != "CONTINUE":
         raise Missing(f"needs the contact FORMULATION {method}")
-    options: dict[str, Any] = {}
+    elif plain:
+        name, options["integration"] = "continuous", rule
+    else:
+        name = "mortar"
     if contact.get("LISSAGE") == "OUI":
         options["normals"] = "averaged"
     if "TOLE_PROJ_EXT" in zone and name != "mortar":

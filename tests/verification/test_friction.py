@@ -17,9 +17,7 @@ def pressed_block(formulation, friction, push, steps=4, nu=0.0):
     model.add_material(fc.LinearElastic(E=1000.0, nu=nu))
     model.fix("LOWER_BOTTOM", "xy")
     model.prescribe("UPPER_TOP", x=push, y=-1e-4)
-    model.add_contact(
-        "pair", secondary="CONT_UPPER", primary="CONT_LOWER", formulation=formulation, friction=friction
-    )
+    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", formulation=formulation, friction=friction)
     return fc.solve(model, fc.linear_ramp(steps))
 
 

@@ -94,9 +94,7 @@ def test_a_flat_punch_leaves_the_surface_beside_it_free():
     model.fix("LEFT", "x")
     model.fix("BOTTOM", "y")
     punch = obstacles.FlatPunch(0.5)
-    model.add_obstacle(
-        "punch", secondary="TOP", obstacle=punch, motion={"y": -0.01}, formulation="node_to_segment"
-    )
+    model.add_obstacle("punch", secondary="TOP", obstacle=punch, motion={"y": -0.01}, formulation="node_to_segment")
     last = fc.solve(model, fc.linear_ramp(1))[-1]
     contact = last.contact["punch"]
     beneath = contact.coordinates[:, 0] <= 0.5

@@ -1,9 +1,9 @@
-"""Mortar contact in three dimensions: weighted gaps, integrated exactly over the pieces where two facets face each other.
+"""Mortar contact in three dimensions: weighted gaps, integrated exactly over the pieces where facets face each other.
 
-Every secondary facet is cut by the primary facets opposite, in its own plane, and the pieces are integrated by triangles
-(Puso, 2004; Popp, Gitterle, Gee and Wall, 2010). The pressure field is linear between the corner nodes, also on quadratic
-facets, whose nodal functions are no help: those of corners have no area on flat triangles. One weighted gap belongs to
-each corner node; its multiplier is the force of the node's share of the pressure.
+Every secondary facet is cut by the primary facets opposite, in its own plane, and the pieces are integrated by
+triangles (Puso, 2004; Popp, Gitterle, Gee and Wall, 2010). The pressure field is linear between the corner nodes, also
+on quadratic facets, whose nodal functions are no help: those of corners have no area on flat triangles. One weighted
+gap belongs to each corner node; its multiplier is the force of the node's share of the pressure.
 
 Curved facets are cut by their corner polygons, an error of second order in the facet's length over its radius.
 """
@@ -11,7 +11,7 @@ Curved facets are cut by their corner polygons, an error of second order in the 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,10 +76,8 @@ class MortarFaces(Formulation):
         if not self.friction:
             return Constraints(B, gap0, positions)
         directions = tuple(tangents(self._mean_normals(W, pairing.normal)))
-        cartesian = [
-            W @ rows_along(np.broadcast_to(axis, pairing.normal.shape), candidates, pairing, self.primary, self.points.size)
-            for axis in np.eye(3)
-        ]
+        n_dofs, still = self.points.size, np.zeros_like(pairing.normal)
+        cartesian = [W @ rows_along(still + e, candidates, pairing, self.primary, n_dofs) for e in np.eye(3)]
         along = tuple(csr_array(sum(diags_array(t[:, k]) @ cartesian[k] for k in range(3))) for t in directions)
         return Constraints(B, gap0, positions, None, along, directions, np.full(m, self.friction))
 
@@ -93,6 +91,7 @@ class MortarFaces(Formulation):
     def _pieces(self, deformed: Array) -> tuple[NDArray[np.intp], Array]:
         """Return owners (n,) and corners (n, 3, 3) of the triangles into which facing facets cut each other."""
         secondary, n_secondary = _polygons(self.secondary, deformed)
+        assert isinstance(self.primary, Surface)
         primary, n_primary = _polygons(self.primary, deformed)
         pairs = _near(secondary, n_secondary, primary, n_primary)
         room = 8 * max(len(pairs), 1)
@@ -104,7 +103,7 @@ class MortarFaces(Formulation):
         self, owner: NDArray[np.intp], triangles: Array, deformed: Array
     ) -> tuple[Candidates, NDArray[np.intp], Array, Array]:
         """Return candidates, multiplier nodes (n, 4), their functions (n, 4) and reference areas (n,) of all points."""
-        found: list[tuple[Array, ...]] = []
+        found: list[tuple[NDArray[Any], ...]] = []
         first = 0
         for block in self.secondary.blocks:
             mine = (owner >= first) & (owner < first + len(block.facets))
@@ -116,7 +115,8 @@ class MortarFaces(Formulation):
 
     def _of_block(
         self, block: FacetBlock, owner: NDArray[np.intp], triangles: Array, deformed: Array
-    ) -> tuple[Array, ...]:
+    ) -> tuple[NDArray[Any], ...]:
+        """Return nodes, shape functions, multiplier nodes, multiplier functions and areas of one kind of facets."""
         element = elements.get(block.element)
         linear = elements.get(element.linear)
         bary, weights = quadrature.triangle(4 if element.order == 1 else 6)
@@ -167,8 +167,8 @@ def _near(
 ) -> NDArray[np.intp]:
     """Return pairs (n, 2) of facets near enough to face each other.
 
-    Along the way from a secondary facet to the primary side lies at least the closest primary facet; whatever else faces
-    it is no farther than that by more than the sizes of both.
+    Along the way from a secondary facet to the primary side lies at least the closest primary facet; whatever else
+    faces it is no farther than that by more than the sizes of both.
     """
     ours, theirs = _spheres(secondary, n_secondary), _spheres(primary, n_primary)
     tree = cKDTree(theirs[0])

@@ -26,6 +26,7 @@ from fastcontact.contact.formulations._mortar_faces import MortarFaces
 from fastcontact.contact.formulations._projection import Projection
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.pairing import Candidates, Pairing, pair
+from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.search import closest
 
@@ -77,6 +78,7 @@ class Mortar(Formulation):
 
     def _cuts(self, deformed: Array) -> tuple[NDArray[np.intp], Array, Array]:
         """Return (facet, begin, end) of the pieces of the secondary facets, in their reference coordinate."""
+        assert isinstance(self.primary, Surface)
         ends = np.unique(self.primary.facets[:, :2])
         opposite = closest(deformed[ends], deformed[self.secondary.facets])
         along = opposite.xi[:, 0]
@@ -136,7 +138,7 @@ class Mortar(Formulation):
         self._projection = Projection(P, area, self._rho, mass)
 
     def initially_active(self, constraints: Constraints, pressure: Array, displacement: Array) -> NDArray[np.bool_]:
-        """Return the points where the field of nodal `pressure` exceeds rho times the gap: those cut anew have no past."""
+        """Return the points where the field of nodal `pressure` exceeds rho times the gap; they have no other past."""
         nodal = self._field.T @ pressure
         gap = constraints.gap0 + constraints.B @ displacement.ravel()
         return (self._projection.areas > 0) & (self._projection.P @ nodal - self._rho * gap > 0)

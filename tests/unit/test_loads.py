@@ -1,0 +1,388 @@
+"""Loads: nodal forces against areas, volumes and fine integration; linear relations; messages."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.sparse import csr_array
+
+import fastcontact as fc
+from fastcontact import elements, quadrature
+from fastcontact.relations import eliminate
+from fastcontact.system import ConstrainedMotion
+from fastcontact.topology import outer_facets
+
+PLANE = ("tri3", "tri6", "quad4", "quad8", "quad9")
+SOLID = ("tet4", "tet10", "hex8", "hex20", "hex27", "wedge6", "wedge15", "wedge18", "pyramid5", "pyramid13")
+
+
+def block(element, bend=True):
+    """A block away from the axis; bent, so that quadratic sides are curved."""
+    mesh = fc.generate.block((2.0, 1.5), (3, 2), element, origin=(1.0, 0.5))
+    x, y = mesh.points.T
+    curved = np.column_stack([x + 0.1 * np.sin(y), y + 0.1 * np.cos(2 * x)])
+    return mesh.replace(points=curved) if bend else mesh
+
+
+def box(element, bend=True):
+    mesh = fc.generate.box((2.0, 1.5, 1.0), (2, 2, 1), element)
+    if not bend:
+        return mesh
+    x, y, z = mesh.points.T
+    return mesh.replace(points=np.column_stack([x + 0.1 * np.sin(y * z), y + 0.1 * np.cos(x), z + 0.05 * x * y]))
+
+
+def everywhere(mesh):
+    """The mesh with a group OUTSIDE of all its outer facets, some of them the wrong way round."""
+    blocks, outside, count = dict(mesh.solids), [], sum(map(len, mesh.solids.values()))
+    for name, facets in outer_facets(mesh).items():
+        turned = facets.copy()
+        turned[::2] = turned[::2][:, list(elements.get(name).reversed)]
+        blocks[name] = turned
+        outside += range(count, count + len(turned))
+        count += len(turned)
+    return fc.Mesh(mesh.points, blocks, {"OUTSIDE": outside})
+
+
+def model_on(mesh, kinematics):
+    model = fc.Model(mesh, kinematics)
+    model.add_material(fc.LinearElastic(1000.0, 0.3))
+    return model
+
+
+def total(model):
+    """Nodal forces of all loads."""
+    return sum(model.forces_by_ramp().values(), np.zeros(model.mesh.points.shape))
+
+
+@pytest.mark.parametrize("element", PLANE + SOLID)
+def test_uniform_pressure_all_around_has_no_resultant_and_no_moment(element):
+    mesh = everywhere(block(element) if element in PLANE else box(element))
+    model = model_on(mesh, "plane_strain" if mesh.dim == 2 else "3d")
+    model.add_pressure("OUTSIDE", 7.0)
+    forces = total(model)
+    assert np.abs(forces).max() > 0.1
+    assert np.abs(forces.sum(axis=0)).max() < 1e-12
+    x = mesh.points
+    moment = x[:, :, None] * forces[:, None, :]
+    assert np.abs((moment - moment.transpose(0, 2, 1)).sum(axis=0)).max() < 1e-12
+
+
+@pytest.mark.parametrize("element", PLANE + SOLID)
+def test_pressure_all_around_works_on_a_change_of_volume(element):
+    """The work of a pressure on a uniform growth is minus pressure times change of volume, on curved facets too."""
+    mesh = everywhere(block(element) if element in PLANE else box(element))
+    model = model_on(mesh, "plane_strain" if mesh.dim == 2 else "3d")
+    model.add_pressure("OUTSIDE", 7.0)
+    model.add_body_force(x=1.0)
+    forces = model.loads[0].vector(mesh, model.kinematics)
+    volume = model.loads[1].vector(mesh, model.kinematics)[:, 0].sum()
+    assert (forces * mesh.points).sum() == pytest.approx(-7.0 * mesh.dim * volume, rel=1e-12)
+
+
+@pytest.mark.parametrize("element", PLANE)
+def test_axisymmetric_pressure_is_over_the_full_circle(element):
+    mesh = block(element, bend=False)
+    model = model_on(mesh, "axisymmetric")
+    model.add_pressure("TOP", 3.0)
+    model.add_pressure("RIGHT", 2.0)
+    forces = total(model)
+    assert forces[:, 1].sum() == pytest.approx(-3.0 * np.pi * (3.0**2 - 1.0**2), rel=1e-13)
+    assert forces[:, 0].sum() == pytest.approx(-2.0 * 2 * np.pi * 3.0 * 1.5, rel=1e-13)
+    touched = np.union1d(mesh.points_of("TOP"), mesh.points_of("RIGHT"))
+    assert not np.delete(forces, touched, axis=0).any()
+
+
+@pytest.mark.parametrize("element", SOLID)
+def test_forces_on_faces_in_3d(element):
+    mesh = box(element, bend=False)
+    model = model_on(mesh, "3d")
+    model.add_pressure("ZMAX", 3.0)
+    model.add_traction("XMIN", y=5.0)
+    model.add_force("YMAX", x=11.0, z=13.0)
+    assert total(model).sum(axis=0) == pytest.approx([11.0, 5.0 * 1.5, 13.0 - 3.0 * 3.0], rel=1e-12)
+
+
+@pytest.mark.parametrize("element", ["quad8", "tri6"])
+@pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric"])
+def test_nodal_forces_of_curved_facets_against_fine_integration(element, kinematics):
+    mesh = block(element)
+    model = model_on(mesh, kinematics)
+    model.add_pressure("RIGHT", lambda x: 1.0 + x[:, 1])
+    expected = np.zeros(mesh.points.shape)
+    xi, weights = quadrature.gauss_line(40)
+    line = elements.get("line3")
+    for facet in mesh.cells_of("RIGHT")["line3"]:
+        corners = mesh.points[facet]
+        x, tangent = line.shape(xi) @ corners, line.gradient(xi)[:, :, 0] @ corners
+        normal = np.column_stack([tangent[:, 1], -tangent[:, 0]])
+        normal *= np.sign(normal[:, :1])  # the right side looks along +x
+        ring = 2 * np.pi * x[:, 0] if kinematics == "axisymmetric" else 1.0
+        density = -(weights * ring * (1.0 + x[:, 1]))[:, None] * normal
+        np.add.at(expected, facet, line.shape(xi).T @ density)
+    assert np.abs(total(model) - expected).max() < 1e-13 * np.abs(expected).max()
+
+
+def test_a_traction_that_varies_has_the_right_moments():
+    mesh = block("quad4", bend=False)
+    model = model_on(mesh, "plane_strain")
+    model.add_traction("TOP", y=lambda x: x[:, 0] ** 2, x=-1.0)
+    forces = total(model)
+    assert forces[:, 0].sum() == pytest.approx(-2.0, rel=1e-13)
+    assert forces[:, 1].sum() == pytest.approx((3.0**3 - 1.0) / 3, rel=1e-13)
+    assert forces[:, 1] @ mesh.points[:, 0] == pytest.approx((3.0**4 - 1.0) / 4, rel=1e-13)
+
+
+@pytest.mark.parametrize("element", PLANE)
+def test_body_force_by_group_and_over_the_full_circle(element):
+    lower, upper = fc.generate.block_on_block(element), "UPPER"
+    model = model_on(lower, "axisymmetric")
+    model.add_body_force(upper, y=-2.0)
+    model.add_body_force(y=lambda x: x[:, 0])
+    volume = np.pi * 10.0**2 * 5.0
+    first, both = (load.vector(lower, "axisymmetric")[:, 1] for load in model.loads)
+    assert first.sum() == pytest.approx(-2.0 * volume, rel=1e-13)
+    assert not first[lower.points_of("LOWER")].any()
+    assert both.sum() == pytest.approx(2 * np.pi * 10.0**3 / 3 * 10.0, rel=1e-13)
+
+
+def test_a_cell_in_two_groups_is_loaded_once():
+    mesh = block("quad4", bend=False)
+    mesh = mesh.with_groups(cells={"AGAIN": mesh.cell_groups["BLOCK"]})
+    model = model_on(mesh, "plane_strain")
+    model.add_body_force(["BLOCK", "AGAIN"], x=1.0)
+    assert total(model)[:, 0].sum() == pytest.approx(3.0, rel=1e-13)
+
+
+def test_a_total_force_is_split_consistently():
+    mesh = fc.generate.block((3.0, 1.0), (1, 1), "quad8")
+    model = model_on(mesh, "plane_strain")
+    model.add_force("TOP", y=-6.0)
+    forces = total(model)[:, 1]
+    ends = [mesh.point("TOP_LEFT"), mesh.point("TOP_RIGHT")]
+    middle = np.setdiff1d(mesh.points_of("TOP"), ends)
+    assert forces[ends] == pytest.approx([-1.0, -1.0], rel=1e-13)
+    assert forces[middle] == pytest.approx([-4.0], rel=1e-13)
+
+
+def test_the_group_decides_what_a_force_is():
+    mesh = block("quad4", bend=False)
+    mesh = mesh.with_groups(points={"NODES": mesh.points_of("TOP")})
+    model = model_on(mesh, "plane_strain")
+    model.add_force("NODES", x=1.0)
+    model.add_force("TOP", y=1.0)
+    model.add_force("BOTTOM", y=1.0, distribute=False)
+    forces = [load.vector(mesh, "plane_strain") for load in model.loads]
+    assert forces[0][mesh.points_of("TOP"), 0] == pytest.approx(1.0)
+    assert forces[1][:, 1].sum() == pytest.approx(1.0)
+    assert forces[2][mesh.points_of("BOTTOM"), 1] == pytest.approx(1.0)
+
+
+def test_loads_of_one_history_come_together():
+    model = model_on(block("quad4"), "plane_strain")
+    table = ((0.0, 0.0), (1.0, 2.0))
+    model.add_pressure("TOP", 1.0)
+    model.add_pressure("TOP", 2.0, ramp=table)
+    model.add_traction("TOP", x=1.0, ramp=fc.Ramp((0.5,), table))
+    assert set(model.forces_by_ramp()) == {None, table}
+
+
+# --- linear relations ---------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=80, deadline=None)
+@given(seed=st.integers(0, 10_000), n=st.integers(2, 12), m=st.integers(0, 8))
+def test_eliminated_relations_hold(seed, n, m):
+    """Whatever the free components are, the relations hold, where supports and repeated rows allow it."""
+    rng = np.random.default_rng(seed)
+    R = rng.integers(-2, 3, size=(m, n)) * (rng.random((m, n)) < 0.5)
+    known = rng.random(n) < 0.3
+    u = rng.normal(size=n)  # relations are consistent: some displacement obeys them
+    r = R @ u
+    tie = eliminate(csr_array(R.astype(float)), known)
+    w = rng.normal(size=n)
+    w[known] = u[known]
+    w[tie.pivots] = 0.0
+    if len(tie.origin):
+        assert np.abs(tie.conditions @ np.r_[w, r]).max() < 1e-9
+    assert not known[tie.pivots].any()
+    full = tie.T @ w + tie.S @ r
+    assert np.abs(R @ full - r).max(initial=0.0) < 1e-8
+    assert full[known] == pytest.approx(w[known])
+    rank = np.linalg.matrix_rank(R[:, ~known]) if m and not known.all() else 0
+    assert len(tie.pivots) == rank
+
+
+def test_a_coupled_group_follows_one_node():
+    mesh = block("quad4", bend=False)
+    model = model_on(mesh, "plane_strain")
+    model.couple("TOP", "y")
+    (relation,) = model.relations
+    tie = eliminate(relation.rows, np.zeros(model.n_dofs, bool))
+    assert len(tie.pivots) == len(mesh.points_of("TOP")) - 1
+    assert tie.T.nnz == model.n_dofs
+
+
+def test_coupling_to_a_support_prescribes_all():
+    mesh = block("quad4", bend=False)
+    model = model_on(mesh, "plane_strain")
+    model.couple("TOP", "y")
+    model.prescribe("TOP_LEFT", y=0.25)
+    fixed, values = model.prescribed()
+    motion = ConstrainedMotion(fixed.ravel(), model.relations)
+    lift = motion.lift(values.ravel(), motion.values([1.0])).reshape(-1, 2)
+    assert lift[mesh.points_of("TOP"), 1] == pytest.approx(0.25)
+
+
+# --- messages -----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def model():
+    mesh = block("quad4", bend=False)
+    mesh = mesh.with_groups(points={"NONE": [], "TOP_NODES": mesh.points_of("TOP")})
+    model = model_on(mesh, "plane_strain")
+    model.fix("BOTTOM", "xy")
+    return model
+
+
+@pytest.mark.parametrize(
+    ("method", "arguments", "message"),
+    [
+        ("add_pressure", {"group": "TOPP", "value": 1.0}, r"'TOPP': did you mean 'TOP'"),
+        ("add_pressure", {"group": "BLOCK", "value": 1.0}, r"'BLOCK' holds no facets"),
+        ("add_pressure", {"group": "TOP_NODES", "value": 1.0}, r"'TOP_NODES' holds points only"),
+        ("add_pressure", {"group": "TOP", "value": float("nan")}, r"pressure on 'TOP' is nan"),
+        ("add_pressure", {"group": "TOP", "value": "1.0"}, r"pressure on 'TOP' is '1.0'"),
+        ("add_pressure", {"group": "TOP", "value": 1.0, "ramp": [(0, 0)]}, r"at least two points"),
+        ("add_pressure", {"group": "TOP", "value": 1.0, "ramp": [(0, 0), (1, float("inf"))]}, r"not finite"),
+        ("add_pressure", {"group": "TOP", "value": 1.0, "ramp": [1, 2]}, r"pressure on 'TOP' must hold pairs"),
+        ("add_traction", {"group": "TOP"}, r"traction on 'TOP' has no component"),
+        ("add_traction", {"group": "TOP", "z": 1.0}, r"component 'z'"),
+        ("add_traction", {"group": "TOP", "x": float("inf")}, r"traction on 'TOP' is inf"),
+        ("add_body_force", {"groups": "TOP", "x": 1.0}, r"'TOP' holds no solid cells"),
+        ("add_body_force", {"groups": "BLOC", "x": 1.0}, r"'BLOC': did you mean 'BLOCK'"),
+        ("add_force", {"group": "NONE", "x": 1.0}, r"'NONE' is empty"),
+        ("add_force", {"group": "TOPP", "x": 1.0}, r"'TOPP': did you mean"),
+        ("add_force", {"group": "TOP_NODES", "x": 1.0, "distribute": True}, r"holds points only"),
+        ("add_force", {"group": "TOP", "x": lambda x: x[:, 0]}, r"not a finite number"),
+        ("couple", {"group": "TOP_LEFT", "component": "y"}, r"holds 1 points"),
+        ("couple", {"group": "TOP", "component": "z"}, r"component 'z'"),
+        ("couple", {"group": "TOP", "component": ""}, r"no component"),
+        ("relate", {"terms": []}, r"at least one displacement"),
+        ("relate", {"terms": [("TOP_LEFT", "y", float("nan"))]}, r"coefficient .* is nan"),
+        ("relate", {"terms": [(99, "y", 1.0)]}, r"point 99 is not in the mesh of 12 points"),
+        ("relate", {"terms": [("TOP_LEFT", "y", 1.0)], "value": float("nan")}, r"the value of .* is nan"),
+        ("prescribe", {"group": "TOP", "y": "a"}, r"prescribed on 'TOP' is 'a'"),
+    ],
+)
+def test_wrong_loads_are_refused_at_once(model, method, arguments, message):
+    with pytest.raises((fc.MeshError, fc.ModelError), match=message):
+        getattr(model, method)(**arguments)
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (lambda x: x, r"pressure on 'TOP' is a function that returned float64 numbers of shape \(\d+, 2\)"),
+        (lambda x: 1.0, r"shape \(\) for"),
+        (lambda x: x[:, 0] * np.nan, r"pressure on 'TOP' is nan at \["),
+        (lambda x: x[:, 0] * 1j, r"complex128"),
+    ],
+)
+def test_functions_are_checked_before_any_numerics(model, function, message):
+    model.add_pressure("TOP", function)
+    with pytest.raises(fc.ModelError, match=message):
+        model.check()
+
+
+def test_a_prescribed_function_is_checked_too(model):
+    model.prescribe("TOP", y=lambda x: x)
+    with pytest.raises(fc.ModelError, match=r"displacement y prescribed on 'TOP'.*shape \(4, 2\)"):
+        model.check()
+
+
+def test_a_radial_total_force_is_refused():
+    model = model_on(block("quad4"), "axisymmetric")
+    with pytest.raises(fc.ModelError, match=r"radial forces cancel"):
+        model.add_force("RIGHT", x=1.0)
+    model.add_force("TOP_LEFT", x=1.0)  # a ring is loaded all around
+
+
+def test_a_pressure_inside_the_solid_is_refused():
+    mesh = fc.generate.block((1.0, 1.0), (2, 1), "quad4")
+    inner = np.flatnonzero(np.abs(mesh.points[:, 0] - 0.5) < 1e-12)
+    lines = np.vstack([mesh.cells["line2"], inner])
+    inside = fc.Mesh(mesh.points, {"quad4": mesh.cells["quad4"], "line2": lines}, {"INNER": [2 + len(lines) - 1]})
+    model = model_on(inside, "plane_strain")
+    with pytest.raises(fc.ModelError, match=r"1 of 1 facets of 'INNER' do not lie on the outside.*add_traction"):
+        model.add_pressure("INNER", 1.0)
+    model.add_traction("INNER", x=2.0)
+    assert total(model)[:, 0].sum() == pytest.approx(2.0)
+
+
+def test_a_force_on_a_point_outside_all_solids_is_refused(model):
+    mesh = model.mesh.replace(points=np.vstack([model.mesh.points, [[2.0, 5.0]]]))
+    mesh = mesh.with_groups(points={"REFERENCE": [len(model.mesh.points)]})
+    lone = model_on(mesh, "plane_strain")
+    lone.fix("BOTTOM", "xy")
+    lone.add_force("REFERENCE", y=-1.0)
+    with pytest.raises(fc.ModelError, match=r"nodal force on 'REFERENCE' acts on 1 points"):
+        lone.check()
+    for node in mesh.points_of("TOP"):
+        lone.relate([(int(node), "y", 1.0), ("REFERENCE", "y", -1.0)])
+    lone.check()
+
+
+def test_a_ramp_of_its_own_must_cover_the_instants(model):
+    model.add_pressure("TOP", 1.0, ramp=[(0, 0), (1, 1)])
+    model.check(fc.linear_ramp(2))
+    with pytest.raises(fc.ModelError, match=r"pressure on 'TOP' covers 0 to 1, but the analysis has the instant 1.5"):
+        model.check(fc.Ramp((0.5, 1.5), ((0, 0), (2, 1))))
+
+
+def test_relations_that_contradict_supports_are_refused(model):
+    model.couple("BOTTOM", "y")
+    model.check()
+    model.relate([("BOTTOM_LEFT", "y", 1.0)], value=0.5)
+    with pytest.raises(fc.ModelError, match=r"the relation of y of 'BOTTOM_LEFT' contradicts .* by 0.5"):
+        model.check()
+
+
+def test_relations_that_contradict_each_other_are_refused(model):
+    model.relate([("TOP_LEFT", "y", 1.0), ("TOP_RIGHT", "y", -1.0)])
+    model.relate([("TOP_LEFT", "y", -2.0), ("TOP_RIGHT", "y", 2.0)])
+    model.check()
+    model.relate([("TOP_LEFT", "y", 1.0), ("TOP_RIGHT", "y", -1.0)], value=1e-3)
+    with pytest.raises(fc.ModelError, match=r"contradicts"):
+        model.check()
+
+
+def test_supports_with_other_histories_clash(model):
+    model.prescribe("TOP", x=0.1)
+    model.prescribe("TOP_LEFT", x=0.1)
+    model.check()
+    model.prescribe("TOP_RIGHT", x=0.1, ramp=[(0, 1), (1, 1)])
+    with pytest.raises(fc.ModelError, match=r"with another ramp"):
+        model.check()
+
+
+def test_motions_that_relations_stop_are_no_longer_free():
+    mesh = block("quad4", bend=False)
+    model = model_on(mesh, "plane_strain")
+    model.fix("BOTTOM_LEFT", "xy")
+    with pytest.raises(fc.ModelError, match=r"1 rigid-body motion is not supported: body 'BLOCK'.*rotation"):
+        model.check()
+    model.relate([("BOTTOM_RIGHT", "y", 1.0)])
+    model.check()
+
+
+def test_bodies_tied_by_relations_move_together():
+    model = model_on(fc.generate.block_on_block("quad4"), "plane_strain")
+    model.fix("LOWER_BOTTOM", "y")
+    model.fix("LOWER_LEFT", "x")
+    model.fix("UPPER_LEFT", "x")
+    with pytest.raises(fc.ModelError, match=r"1 rigid-body motion is not supported: body 'UPPER': translation along y"):
+        model.check()
+    model.relate([("LOWER_TOP_LEFT", "y", 1.0), ("UPPER_BOTTOM_LEFT", "y", -1.0)])
+    model.check()

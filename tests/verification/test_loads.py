@@ -1,0 +1,385 @@
+"""Loads in equilibrium: exact fields, thick cylinders, coupled faces, histories, bodies that only contact holds."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+
+PLANE = ("tri3", "tri6", "quad4", "quad8", "quad9")
+SOLID = ("tet4", "tet10", "hex8", "hex20", "hex27", "wedge6", "wedge15", "pyramid5", "pyramid13")
+E, NU = 1000.0, 0.3
+
+
+def model_on(mesh, kinematics):
+    model = fc.Model(mesh, kinematics)
+    model.add_material(fc.LinearElastic(E, NU))
+    return model
+
+
+def one_step(model, **options):
+    return fc.solve(model, fc.linear_ramp(1), **options)[-1]
+
+
+# --- exact fields -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress", "axisymmetric"])
+@pytest.mark.parametrize("element", PLANE)
+def test_uniform_pressure_gives_a_uniform_stress(element, kinematics):
+    mesh = fc.generate.block((2.0, 3.0), (3, 4), element, distortion=0.2 if element in PLANE[:3] else 0.0)
+    model = model_on(mesh, kinematics)
+    model.fix("LEFT", "x")
+    model.fix("BOTTOM", "y")
+    model.add_pressure("TOP", 5.0)
+    model.add_pressure("RIGHT", 2.0)
+    last = one_step(model)
+    expected = {"plane_strain": NU * -7.0, "plane_stress": 0.0, "axisymmetric": -2.0}[kinematics]
+    assert np.abs(last.stress - [-2.0, -5.0, expected, 0.0]).max() < 1e-12 * 5.0
+    area = np.pi * 4.0 if kinematics == "axisymmetric" else 2.0
+    assert last.reaction[mesh.points_of("BOTTOM"), 1].sum() == pytest.approx(5.0 * area, rel=1e-12)
+
+
+@pytest.mark.parametrize("element", SOLID)
+def test_uniform_pressure_gives_a_uniform_stress_in_3d(element):
+    mesh = fc.generate.box((2.0, 3.0, 1.0), (2, 2, 2), element)
+    model = model_on(mesh, "3d")
+    for group, axis in (("XMIN", "x"), ("YMIN", "y"), ("ZMIN", "z")):
+        model.fix(group, axis)
+    model.add_pressure("XMAX", 2.0)
+    model.add_traction("YMAX", y=3.0)
+    model.add_force("ZMAX", z=-4.0 * 6.0)
+    last = one_step(model)
+    assert np.abs(last.stress - [-2.0, 3.0, -4.0, 0.0, 0.0, 0.0]).max() < 2e-12 * 4.0
+
+
+def ring(element, n):
+    """A quarter of the ring 1 < r < 2, mid nodes on the circles."""
+    mesh = fc.generate.block((1.0, 1.0), (n, 2 * n), element, origin=(1.0, 0.0))
+    r, angle = mesh.points[:, 0], 0.5 * np.pi * mesh.points[:, 1]
+    return mesh.replace(points=np.column_stack([r * np.cos(angle), r * np.sin(angle)]))
+
+
+@pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress"])
+@pytest.mark.parametrize(("element", "order"), [("tri3", 1.9), ("quad4", 1.9), ("tri6", 2.9), ("quad8", 2.9)])
+def test_a_thick_cylinder_converges_to_lame(element, order, kinematics):
+    exact = fc.analytic.thick_cylinder(
+        E=E, nu=NU, inner_radius=1.0, outer_radius=2.0, inner_pressure=10.0, kinematics=kinematics
+    )
+    sizes, errors = (4, 8, 16), []
+    for n in sizes:
+        mesh = ring(element, n)
+        model = model_on(mesh, kinematics)
+        model.fix("BOTTOM", "y")
+        model.fix("TOP", "x")
+        model.add_pressure("LEFT", 10.0)  # the bore
+        u = one_step(model).displacement
+        r = np.linalg.norm(mesh.points, axis=1)
+        difference = u - (exact.displacement(r) / r)[:, None] * mesh.points
+        errors.append(np.sqrt((difference**2).mean()) / exact.displacement(1.0))
+    fitted = -np.polyfit(np.log(sizes), np.log(errors), 1)[0]
+    assert fitted > order
+    assert errors[-1] < (1e-3 if order < 2 else 1e-5)
+
+
+def test_an_axisymmetric_cylinder_under_internal_pressure():
+    """The same ring turned about the axis; free ends: the stresses of plane stress."""
+    exact = fc.analytic.thick_cylinder(
+        E=E, nu=NU, inner_radius=1.0, outer_radius=2.0, inner_pressure=10.0, kinematics="plane_stress"
+    )
+    mesh = fc.generate.block((1.0, 0.2), (16, 2), "quad8", origin=(1.0, 0.0))
+    model = model_on(mesh, "axisymmetric")
+    model.fix("BOTTOM", "y")
+    model.add_pressure("LEFT", 10.0)
+    last = one_step(model)
+    r = mesh.points[:, 0]
+    assert np.abs(last.displacement[:, 0] / exact.displacement(r) - 1).max() < 1e-5
+    assert np.abs(last.stress[:, 2] - exact.hoop_stress(r)).max() < 2e-2
+
+
+@pytest.mark.parametrize("element", ["quad8", "tri6", "hex20", "tet10"])
+def test_a_column_under_its_weight(element):
+    """Without lateral contraction ``u_y = -w (L y - y^2 / 2) / E``, which quadratic elements hold exactly."""
+    if element in PLANE:
+        mesh, axis = fc.generate.block((1.0, 4.0), (1, 3), element), 1
+        sides, kinematics = {"bottom": "BOTTOM", "left": "LEFT"}, "plane_strain"
+    else:
+        mesh, axis = fc.generate.box((1.0, 1.0, 4.0), (1, 1, 3), element), 2
+        sides, kinematics = {"bottom": "ZMIN", "left": "XMIN"}, "3d"
+    model = fc.Model(mesh, kinematics)
+    model.add_material(fc.LinearElastic(E, 0.0))
+    model.fix(sides["bottom"], "xyz"[axis])
+    model.fix(sides["left"], "x")
+    if axis == 2:
+        model.fix("YMIN", "y")
+    model.add_body_force(**{"xyz"[axis]: -2.0})
+    last = one_step(model)
+    y = mesh.points[:, axis]
+    assert np.abs(last.displacement[:, axis] + 2.0 * (4.0 * y - y * y / 2) / E).max() < 1e-14
+    assert last.reaction[:, axis].sum() == pytest.approx(8.0, rel=1e-12)
+
+
+def test_prescribed_functions_give_the_linear_field_they_name():
+    mesh = fc.generate.block((2.0, 1.0), (3, 2), "quad8")
+    edge = np.unique(np.concatenate([mesh.points_of(side) for side in ("LEFT", "RIGHT", "TOP", "BOTTOM")]))
+    model = model_on(mesh.with_groups(points={"EDGE": edge}), "plane_strain")
+    model.prescribe("EDGE", x=lambda p: 1e-3 * p[:, 0] + 2e-3 * p[:, 1], y=lambda p: -1e-3 * p[:, 1])
+    last = one_step(model)
+    x, y = mesh.points.T
+    assert np.abs(last.displacement - np.column_stack([1e-3 * x + 2e-3 * y, -1e-3 * y])).max() < 1e-16 * 1e3
+
+
+# --- relations ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+def test_a_coupled_face_under_a_force_is_a_rigid_plate(solver):
+    """Coupled nodes under a total force move as a face does that is pushed by the same amount."""
+    mesh = fc.generate.block((2.0, 1.0), (6, 4), "quad8")
+    top = mesh.points_of("TOP")
+
+    def prepared():
+        model = model_on(mesh, "plane_strain")
+        model.fix("BOTTOM", "xy")
+        return model
+
+    forced = prepared()
+    forced.couple("TOP", "y")
+    forced.add_force("TOP", y=-30.0)
+    first = one_step(forced, linear_solver=solver, linear_tolerance=1e-13)
+    assert np.ptp(first.displacement[top, 1]) < 1e-15
+    assert first.reaction[mesh.points_of("BOTTOM"), 1].sum() == pytest.approx(30.0, rel=1e-10)
+    assert abs(first.reaction[top, 1].sum()) < 1e-10 * 30.0  # what couples the face adds no resultant
+    assert np.abs(first.reaction[top, 1]).max() > 0.1
+
+    moved = prepared()
+    moved.prescribe("TOP", y=float(first.displacement[top[0], 1]))
+    second = one_step(moved, linear_solver=solver, linear_tolerance=1e-13)
+    assert second.reaction[top, 1].sum() == pytest.approx(-30.0, rel=1e-9)
+    assert np.abs(second.stress - first.stress).max() < 1e-9 * np.abs(first.stress).max()
+
+
+def test_a_reference_point_carries_the_force_of_a_face():
+    mesh = fc.generate.block((2.0, 1.0), (4, 2), "quad4")
+    top = mesh.points_of("TOP")
+    mesh = mesh.replace(points=np.vstack([mesh.points, [[1.0, 9.0]]]))
+    mesh = mesh.with_groups(points={"PILOT": [mesh.n_points - 1]})
+    results = []
+    for pilot in (False, True):
+        model = model_on(mesh, "plane_stress")
+        model.fix("BOTTOM", "xy")
+        if pilot:
+            for node in top:
+                model.relate([(int(node), "y", 1.0), ("PILOT", "y", -1.0)])
+            model.add_force("PILOT", y=-3.0)
+        else:
+            model.couple("TOP", "y")
+            model.add_force("TOP", y=-3.0)
+        results.append(one_step(model).displacement)
+    assert np.abs(results[0][:-1] - results[1][:-1]).max() < 1e-12 * np.abs(results[0]).max()
+    assert results[1][-1, 1] == pytest.approx(results[1][top[0], 1], rel=1e-12)
+
+
+def test_a_relation_with_a_right_hand_side_and_its_reactions():
+    """Two halves pulled apart by a given amount: the relation's forces are equal and opposite."""
+    mesh = fc.generate.block_on_block("quad4", divisions_lower=(4, 2), divisions_upper=(4, 2))
+    model = model_on(mesh, "plane_stress")
+    model.fix("LOWER_BOTTOM", "xy")
+    model.fix("UPPER_TOP", "xy")
+    lower, upper = mesh.points_of("CONT_LOWER"), mesh.points_of("CONT_UPPER")
+    order = [points[np.argsort(mesh.points[points, 0])] for points in (lower, upper)]
+    for a, b in zip(*order, strict=True):
+        model.relate([(int(b), "y", 1.0), (int(a), "y", -1.0)], value=0.1)
+        model.relate([(int(b), "x", 1.0), (int(a), "x", -1.0)])
+    last = one_step(model)
+    below, above = order
+    assert last.displacement[above, 1] - last.displacement[below, 1] == pytest.approx(0.1, rel=1e-12)
+    assert last.reaction[below, 1] == pytest.approx(-last.reaction[above, 1], rel=1e-9)
+    assert last.reaction[below, 1].sum() == pytest.approx(
+        -last.reaction[mesh.points_of("LOWER_BOTTOM"), 1].sum(), rel=1e-9
+    )
+
+
+# --- histories ----------------------------------------------------------------------------------------------------
+
+
+def test_loads_with_their_own_histories():
+    mesh = fc.generate.block((2.0, 1.0), (3, 2), "quad8")
+    model = model_on(mesh, "plane_strain")
+    model.fix("BOTTOM", "y")
+    model.fix("LEFT", "x")
+    model.add_pressure("TOP", 5.0, ramp=[(0, 0), (1, 1), (3, 1)])
+    model.add_pressure("RIGHT", 2.0, ramp=[(0, 0), (1, 0), (2, 1), (3, 0)])
+    steps = fc.solve(model, fc.Ramp((0.5, 1.0, 2.0, 3.0), ((0, 0), (3, 7))))
+    for step, top, right in zip(steps, (2.5, 5.0, 5.0, 5.0), (0.0, 0.0, 2.0, 0.0), strict=True):
+        assert np.abs(step.stress[:, :2] - [-right, -top]).max() < 1e-12 * 5.0
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+def test_load_and_unload_return_to_zero(formulation, forma04):
+    mesh = fc.generate.half_spheres("tri3", size=5.0)
+    model = forma04(mesh, formulation)
+    steps = fc.solve(model, fc.Ramp((0.5, 1.0, 1.5, 2.0), ((0, 0), (1, 0.5), (2, 0))))
+    assert np.abs(steps[0].stress - steps[2].stress).max() < 1e-8 * np.abs(steps[1].stress).max()
+    assert np.abs(steps[3].stress).max() < 1e-9 * np.abs(steps[1].stress).max()
+    assert np.abs(steps[3].displacement).max() < 1e-10
+
+
+# --- bodies that only contact holds -------------------------------------------------------------------------------
+
+
+def driven_by_force(mesh, formulation, force, gap=0.0, **load):
+    """Half-spheres, the upper one pushed down by a force on its coupled top face, the lower one raised."""
+    points = mesh.points.copy()
+    if gap:
+        points[mesh.points_of("SPHHAU"), 1] += gap
+    model = fc.Model(mesh.replace(points=points), "axisymmetric")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model.fix("A1A2", "x")
+    model.prescribe("A1B1", y=2.0)
+    model.couple("A2B2", "y")
+    model.add_force("A2B2", y=-force, **load)
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation=formulation)
+    return model
+
+
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+@pytest.mark.parametrize("steps", [1, 4])
+def test_force_driven_is_displacement_driven(formulation, solver, steps, forma04):
+    mesh = fc.generate.half_spheres("tri3", size=4.0)
+    options = {"linear_solver": solver, "linear_tolerance": 1e-12}
+    moved = one_step(forma04(mesh, formulation), **options)
+    force = abs(moved.contact["hertz"].force[1])
+    last = fc.solve(driven_by_force(mesh, formulation, force), fc.linear_ramp(steps), **options)[-1]
+    assert np.abs(last.displacement - moved.displacement).max() < 1e-8 * 2.0
+    assert np.abs(last.stress - moved.stress).max() < 1e-8 * np.abs(moved.stress).max()
+    assert last.displacement[mesh.points_of("A2B2"), 1] == pytest.approx(-2.0, rel=1e-8)
+    told = last.iterations["regularised"]
+    assert told["motions"] == ["body 'SPHHAU': translation along y (the axis)"]
+    assert told["spring_stiffness"] > 0
+    assert told["relative_to_load"] < (1e-11 if solver == "direct" else 1e-8)
+
+
+@pytest.mark.parametrize(
+    ("letter", "formulation", "stress"), [("a", "node_to_segment", -2773.57307445), ("b", "continuous", None)]
+)
+def test_forma04_driven_by_its_force(letter, formulation, stress, cases, forma04):
+    mesh = fc.read_mesh(cases / f"forma04{letter}.med")
+    moved = one_step(forma04(mesh, formulation))
+    last = one_step(driven_by_force(mesh, formulation, abs(moved.contact["hertz"].force[1])))
+    assert np.abs(last.displacement - moved.displacement).max() < 1e-8 * 2.0
+    assert np.abs(last.stress - moved.stress).max() < 1e-8 * np.abs(moved.stress).max()
+    if stress is not None:
+        assert last.stress[mesh.point("C1"), 1] == pytest.approx(stress, rel=1e-8)
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+@pytest.mark.parametrize("gap", [0.5, 30.0])
+def test_a_body_comes_from_afar(gap, formulation):
+    """With a gap at the start the body moves through it, and then presses as without."""
+    mesh = fc.generate.half_spheres("tri3", size=5.0)
+    near, far = (fc.solve(driven_by_force(mesh, formulation, 2e5, gap=g), fc.linear_ramp(2))[-1] for g in (0.0, gap))
+    upper = mesh.points_of("SPHHAU")
+    expected = near.displacement.copy()
+    expected[upper, 1] -= gap
+    assert np.abs(far.displacement - expected).max() < 1e-9 * 30.0
+    assert np.abs(far.stress - near.stress).max() < 1e-8 * np.abs(near.stress).max()
+
+
+def test_a_body_pulled_away_is_told_clearly():
+    mesh = fc.generate.half_spheres("tri3", size=8.0)
+    done = []
+    with pytest.raises(fc.ConvergenceError, match=r"pull bodies away.*'SPHHAU': translation along y"):
+        fc.solve(
+            driven_by_force(mesh, "node_to_segment", 1e5, ramp=[(0, 0), (0.5, 1), (1, -1)]),
+            fc.linear_ramp(4), on_step=done.append,
+        )  # fmt: skip
+    assert [step.load_factor for step in done] == [0.25, 0.5, 0.75]
+
+
+def test_a_force_goes_and_the_contact_force_with_it():
+    mesh = fc.generate.half_spheres("tri3", size=5.0)
+    model = driven_by_force(mesh, "node_to_segment", 2e5, ramp=[(0, 0), (0.5, 1), (1, 0)])
+    steps = fc.solve(model, fc.linear_ramp(4))
+    forces = [step.contact["hertz"].force[1] for step in steps]
+    assert forces[:3] == pytest.approx([-1e5, -2e5, -1e5], rel=1e-9)
+    assert abs(forces[3]) < 1e-9 * 2e5
+    assert np.abs(steps[0].stress - steps[2].stress).max() < 1e-7 * np.abs(steps[1].stress).max()
+    assert np.abs(steps[3].stress).max() < 1e-9 * np.abs(steps[1].stress).max()
+
+
+def stack(load, motion):
+    """Three blocks, each on the one below; the middle one is held sideways only."""
+    two = fc.generate.block_on_block("quad4", divisions_lower=(4, 2), divisions_upper=(4, 2))
+    top = fc.generate.block((10.0, 5.0), (4, 2), "quad4", (0.0, 5.0), name="CAP")
+    names = {"CAP": "CAP", "BOTTOM": "CONT_CAP", "TOP": "CAP_TOP", "LEFT": "CAP_LEFT", "RIGHT": "CAP_RIGHT"}
+    mesh = fc.generate.transform.union(
+        two, fc.generate.transform.renamed(top, lambda name: names.get(name, "C" + name))
+    )
+    model = model_on(mesh, "plane_strain")
+    model.fix("LOWER_BOTTOM", "y")
+    for side in ("LOWER_LEFT", "UPPER_LEFT", "CAP_LEFT"):
+        model.fix(side, "x")
+    if motion:
+        model.prescribe("CAP_TOP", y=-motion)
+    if load:
+        model.add_pressure("CAP_TOP", load)
+    model.add_contact("below", secondary="CONT_LOWER", primary="CONT_UPPER", formulation="continuous")
+    model.add_contact("above", secondary="CONT_CAP", primary="UPPER_TOP", formulation="continuous")
+    return model
+
+
+def test_a_body_between_two_others_is_held_by_contact_alone():
+    modulus = E / (1 - NU**2)
+    moved = one_step(stack(0.0, 0.15))
+    assert np.abs(moved.stress[:, 1] + modulus * 0.01).max() < 1e-9 * modulus * 0.01
+    pressed = one_step(stack(modulus * 0.01, 0.0))
+    assert np.abs(pressed.displacement - moved.displacement).max() < 1e-9 * 0.15
+    motions = ["body 'UPPER': translation along y", "body 'CAP': translation along y"]
+    assert pressed.iterations["regularised"]["motions"] == motions
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+def test_friction_and_weight_hold_a_block(formulation):
+    """A block free to move, turn and slide stays on its friction; its tangential force is what is applied."""
+    mesh = fc.generate.block_on_block("quad4", divisions_lower=(6, 3), divisions_upper=(6, 3))
+    model = model_on(mesh, "plane_strain")
+    model.fix("LOWER_BOTTOM", "xy")
+    model.add_pressure("UPPER_TOP", 10.0, ramp=[(0, 0), (0.5, 1), (1, 1)])
+    model.add_force("UPPER_LEFT", x=10.0, ramp=[(0, 0), (0.5, 0), (1, 1)])
+    model.add_contact("base", secondary="CONT_UPPER", primary="CONT_LOWER", formulation=formulation, friction=0.3)
+    for step in fc.solve(model, fc.linear_ramp(4)):
+        applied = [-20.0 * max(step.load_factor - 0.5, 0.0), 100.0 * min(2 * step.load_factor, 1.0)]
+        assert step.contact["base"].force == pytest.approx(applied, abs=1e-9 * 100.0)
+        assert len(step.iterations["regularised"]["springs"]) == 3
+
+
+def test_a_motion_that_nothing_stops_is_refused():
+    mesh = fc.generate.block_on_block("quad4")
+    model = model_on(mesh, "plane_strain")
+    model.fix("LOWER_BOTTOM", "xy")
+    model.add_contact("base", secondary="CONT_UPPER", primary="CONT_LOWER")
+    with pytest.raises(fc.ModelError, match=r"not supported: body 'UPPER'"):
+        model.check()  # no load
+    model.add_pressure("UPPER_TOP", 1.0)
+    with pytest.raises(fc.ModelError, match=r"1 rigid-body motion is not supported: body 'UPPER': translation along x"):
+        model.check()  # pressed, but free to slide
+    model.fix("UPPER_TOP_LEFT", "x")
+    model.check()
+
+
+@pytest.mark.parametrize(("length", "pressure"), [(1e-3, 1e6), (1e6, 1e-9)])
+def test_units_do_not_matter_for_floating_bodies(length, pressure):
+    mesh = fc.generate.half_spheres("tri3", size=5.0)
+    results = []
+    for a, p in ((1.0, 1.0), (length, pressure)):
+        model = fc.Model(mesh.replace(points=mesh.points * a), "axisymmetric")
+        model.add_material(fc.LinearElastic(E=20_000.0 * p, nu=0.3))
+        model.fix("A1A2", "x")
+        model.fix("A1B1", "y")
+        model.add_pressure("A2B2", 50.0 * p)
+        model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="continuous")
+        results.append(one_step(model))
+    one, other = results
+    assert np.abs(one.stress - other.stress / pressure).max() < 1e-9 * np.abs(one.stress).max()
+    assert one.iterations["active_set_iterations"] == other.iterations["active_set_iterations"]
