@@ -158,6 +158,7 @@ class Analysis:
         self.pressure: dict[str, Array] = {}
         self.before = self.u  # at the beginning of the step, from where slip counts
         self.largest_force = self.largest_work = 0.0  # of all steps so far
+        self.settled: Settled | None = None
         # Gaps are differences of coordinates and no more accurate than those.
         self.round_off = 8 * np.finfo(float).eps * float(np.abs(model.mesh.points).max())
 
@@ -176,7 +177,7 @@ class Analysis:
         self.largest_force = max(self.largest_force, np.abs(self.external).max(initial=0.0))
         self.before = self.u
         self._move_obstacles(instant)
-        self.settled: Settled | None = None
+        self.settled = None
         loaded = self.solver.load(self.system.right(self.external, lift))
         before = self.solver.counters.iterations
         self.expected = 0.0  # displacement, for the first step under forces only
@@ -419,10 +420,10 @@ class Analysis:
         )  # fmt: skip
 
     def _warn(self, stress: Array, last: bool) -> list[str]:
-        """Warn, at the last step, of interpenetration without contact and of large strains."""
+        """Warn, at the last step, of interpenetration without contact, large strains and springs that still carry."""
         if not last:
             return []
-        found = self._interpenetration() + self._large_strain(stress)
+        found = self._interpenetration() + self._large_strain(stress) + self._carrying_springs()
         for text in found:
             warnings.warn(text, FastcontactWarning, stacklevel=4)
         return found
@@ -449,6 +450,17 @@ class Analysis:
                     "add_contact for the groups that meet"
                 )
         return texts
+
+    def _carrying_springs(self) -> list[str]:
+        if self.floating is None or self.settled is None:
+            return []
+        told = self.floating.report(self.settled, self.largest_work)
+        if told["relative_to_load"] <= self.criteria.relative:
+            return []
+        return [
+            f"the springs that regularise {'; '.join(told['motions'])} still carry {told['relative_to_load']:.1e} of "
+            "the load: rigid motions are so much larger than deformations that round-off leaves no more"
+        ]
 
     def _large_strain(self, stress: Array) -> list[str]:
         stiffest = min(material.shear_modulus for material, _ in self.model.materials)

@@ -16,6 +16,7 @@ from fastcontact.io.mesh_files import read_mesh
 from fastcontact.materials import LinearElastic
 from fastcontact.mesh import Mesh
 from fastcontact.model import Model
+from fastcontact.obstacles import SHAPES
 from fastcontact.ramp import Ramp, Table, linear_ramp
 
 _NUMBER = (int, float)
@@ -66,6 +67,7 @@ _TOP = {
     "support": list,
     **dict.fromkeys(_LOADS, list),
     "contact": dict,
+    "obstacle": dict,
     "ramp": dict,
     "solve": dict,
     "probes": dict,
@@ -188,7 +190,7 @@ def build_case(
     _check_keys("solve", solve, _SOLVE)
     ramp = _ramp(data.get("ramp", {}))
     criteria = Criteria(**{k: v for k, v in solve.items() if not k.startswith("linear_")})
-    theories, approach = _theories(data.get("theory", {}), data.get("contact", {}))
+    theories, approach = _theories(data.get("theory", {}), {**data.get("contact", {}), **data.get("obstacle", {})})
     if mesh is None:
         mesh = _mesh(Path(folder), data["mesh"])
     model = _model(mesh, data, text)
@@ -273,7 +275,31 @@ def _model(mesh: Mesh, data: dict[str, Any], text: str) -> Model:
             if not isinstance(entry.get(key), str):
                 raise CaseError(f"contact.{name} needs '{key}', the name of a group of facets")
         model.add_contact(name, **entry)
+    for name, entry in data.get("obstacle", {}).items():
+        _add_obstacle(model, name, entry)
     return model
+
+
+def _add_obstacle(model: Model, name: str, entry: Any) -> None:
+    """Give the model a rigid obstacle: its shape by kind and arguments, the rest as for `Model.add_obstacle`."""
+    where = f"obstacle.{name}"
+    if not isinstance(entry, dict) or not isinstance(entry.get("secondary"), str):
+        raise CaseError(f"{where} needs 'secondary', the name of a group of facets")
+    shape = entry.get("shape")
+    if not isinstance(shape, dict) or shape.get("kind") not in SHAPES:
+        kind = shape.get("kind", "") if isinstance(shape, dict) else ""
+        raise CaseError(unknown(f"{where}.shape.kind", str(kind), SHAPES))
+    factory = SHAPES[shape["kind"]]
+    arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in shape.items() if key != "kind"}
+    _check_keys(f"{where}.shape", arguments, dict.fromkeys(_parameters(factory)))
+    try:
+        obstacle = factory(**arguments)
+    except (TypeError, ValueError) as error:
+        raise CaseError(f"'{where}.shape': {error}") from error
+    rest = {key: value for key, value in entry.items() if key != "shape"}
+    if "motion" in rest:
+        _check_keys(f"{where}.motion", rest["motion"], _AXES)
+    model.add_obstacle(name, obstacle=obstacle, **_arguments(where, rest))
 
 
 def _add_loads(model: Model, data: dict[str, Any]) -> None:
@@ -361,7 +387,7 @@ def described(data: dict[str, Any]) -> dict[str, Any]:
 
     `data` is the parsed text kept in a result file; it may be empty.
     """
-    theories, approach = _theories(data.get("theory", {}), data.get("contact", {}))
+    theories, approach = _theories(data.get("theory", {}), {**data.get("contact", {}), **data.get("obstacle", {})})
     return {
         "title": data.get("title", ""),
         "units": {"length": "-", "force": "-", "pressure": "-", **data.get("units", {})},

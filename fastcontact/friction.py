@@ -141,15 +141,19 @@ def solve(
     k, m = len(tangents), len(gap0)
     R = csr_array(vstack([matrix[rows] for matrix in (B, *tangents)], format="csr"))
     free, F = loaded.reduce(R)
+    idle = _idle(F, k)
     if compliance is not None and len(rows):
         C = compliance.block(rows)
         for j in range(1 + k):
             part = slice(j * len(rows), (j + 1) * len(rows))
             F[part, part] += C
-    offset = np.vstack([gap0[rows], *(slip0[:, rows])])
+    free = free.reshape(1 + k, -1) + np.vstack([gap0[rows], *(slip0[:, rows])])
+    if len(idle):
+        F[idle], F[:, idle], free.ravel()[idle] = 0.0, 0.0, 0.0
+        F[idle, idle] = np.diag(F).max()
     c = 1.0 / np.maximum(np.diag(F), 1e-300).reshape(1 + k, -1)
     c[1:] = c[1:].min(axis=0)
-    problem = _Problem(F, free.reshape(1 + k, -1) + offset, friction[rows], c)
+    problem = _Problem(F, free, friction[rows], c)
     start = _State(closed[rows], np.ones(len(rows), bool), np.zeros((k, len(rows))), np.zeros(len(rows)))
     y, state, settled, iterations = _newton(problem, start, gap_tolerance, multiplier_tolerance, max_iterations)
     full, gaps = np.zeros((1 + k, m)), np.full((1 + k, m), np.inf)
@@ -159,6 +163,17 @@ def solve(
     active[rows], sticking[rows] = state.closed, state.sticking & state.closed
     u = loaded.displacement(R.T @ y.ravel())
     return FrictionalEquilibrium(u, full[0], gaps[0], full[1:].T, gaps[1:].T, active, sticking, settled, iterations)
+
+
+def _idle(F: Array, k: int) -> NDArray[np.intp]:
+    """Return the rows of tangents along which supports leave no motion, or none but that of the gap.
+
+    At an axis and in a plane of symmetry friction has nothing to do there, and its equation would be no equation.
+    """
+    m = len(F) // (1 + k)
+    tangent, normal = np.arange(m, (1 + k) * m), np.tile(np.arange(m), k)
+    own, gap, both = F[tangent, tangent], F[normal, normal], F[tangent, normal]
+    return tangent[own * gap - both * both <= 1e-10 * gap * np.maximum(own, gap)]
 
 
 def _newton(

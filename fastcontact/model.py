@@ -302,7 +302,8 @@ class Model:
         Parameters
         ----------
         terms : iterable of (str or int, str, float)
-            Group or point number, component, coefficient. A group of several nodes stands for their sum.
+            Group or point number, component, coefficient. A group of several nodes stands for their sum; a long sum
+            costs much, since it ties every displacement in it to every other.
         value : float
             [length times the unit of the coefficients].
         ramp : Ramp or iterable of (float, float), optional

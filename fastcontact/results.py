@@ -101,11 +101,12 @@ class StepResult:
     von_mises, von_mises_signed : ndarray (n_points,)
         Equivalent stress of `stress`; the same with the sign of its trace [pressure].
     reaction : ndarray (n_points, dim)
-        Support reactions, zero at free degrees of freedom; axisymmetric: over the full circle [force].
+        Forces of supports and linear relations, zero elsewhere; axisymmetric: over the full circle [force].
     contact : dict of str to ContactResult
         By contact pair.
     iterations : dict
-        ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``, ``history`` (list of dict).
+        ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``, ``history`` (list of dict). If contact
+        alone holds bodies, ``regularised``: what was made regular, and by how much; see `floating.Floating.report`.
     warnings : tuple of str
         What the step warned of.
     """

@@ -167,8 +167,9 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
 
 def _regularised_line(told: Mapping[str, Any], unit: Mapping[str, str]) -> str:
     return (
-        f"  held by contact alone: {'; '.join(told['motions'])}. Regularised by springs of {told['spring_stiffness']:.3g} "
-        f"{unit['force']}/{unit['length']}, which carry {told['relative_to_load']:.1e} of the load in the end"
+        f"  held by contact alone: {'; '.join(told['motions'])}. Regularised by springs of "
+        f"{told['spring_stiffness']:.3g} {unit['force']}/{unit['length']}, which carry {told['relative_to_load']:.1e} "
+        "of the load in the end"
     )
 
 

@@ -12,6 +12,13 @@ ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let other folders of code_aster's cases be tried."""
+    parser.addoption(
+        "--cases", type=Path, default=SHARED / "cases", help="folder of validation specs (JSON) with their meshes (MED)"
+    )
+
+
 @pytest.fixture(scope="session")
 def root() -> Path:
     """The checkout."""

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
-from fastcontact import elements
+from fastcontact.contact.projection import along_normals, interpolated, nodal_normals, places
 from fastcontact.contact.rigid import RigidSide
-from fastcontact.contact.surface import FacetBlock, Surface
+from fastcontact.contact.surface import Surface
 from fastcontact.search import closest_of_kinds
 
 Array = NDArray[np.float64]
@@ -74,7 +74,7 @@ def pair(
 
     A candidate farther out than `projection_tolerance` facet lengths beyond the end of its facet is not paired
     (TOLE_PROJ_EXT of code_aster). With `normals` ``"averaged"``, the normal is interpolated between nodal means of
-    the facets' normals, so that it does not jump where facets meet.
+    the facets' normals, so that it does not jump where facets meet; in 3D the candidates are then projected along it.
 
     Raises
     ------
@@ -86,12 +86,14 @@ def pair(
         nowhere = np.zeros(len(candidates), np.intp)
         return Pairing(nowhere, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)
     found = closest_of_kinds(candidates, primary.corners(coordinates))
-    normal = found.normal
-    if normals == "averaged":
-        _, local, shape = _at(primary, found.facet, found.xi)
-        normal = np.einsum("nk,nkd->nd", shape, _nodal_normals(primary, coordinates)[local])
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return Pairing(found.facet, found.xi, normal, found.overhang <= projection_tolerance)
+    if normals == "facet":
+        return Pairing(found.facet, found.xi, found.normal, found.overhang <= projection_tolerance)
+    at_nodes = nodal_normals(primary, coordinates)
+    facet, xi, overhang = found.facet, found.xi, found.overhang
+    if coordinates.shape[1] == 3:
+        facet, xi, overhang = along_normals(candidates, primary, coordinates, at_nodes, found)
+    normal = interpolated(at_nodes, places(primary, facet, xi))
+    return Pairing(facet, xi, normal, overhang <= projection_tolerance)
 
 
 def filled_up(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
@@ -102,51 +104,6 @@ def filled_up(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
     return np.concatenate(
         [np.pad(part, pad, mode="edge" if integer else "constant") for part, pad in zip(parts, missing, strict=True)]
     )
-
-
-def _at(side: Surface, facet: NDArray[np.intp], xi: Array) -> tuple[NDArray[np.int32], NDArray[np.intp], Array]:
-    """Return nodes, positions in ``side.points`` and shape functions, each (n, k), of facets at reference coordinates.
-
-    Where facets of several kinds have unlike numbers of nodes, rows are filled up with weights of zero.
-    """
-    width = max(block.facets.shape[1] for block in side.blocks)
-    nodes, local = np.zeros((len(facet), width), np.int32), np.zeros((len(facet), width), np.intp)
-    shape = np.zeros((len(facet), width))
-    first = 0
-    for block in side.blocks:
-        mine = np.flatnonzero((facet >= first) & (facet < first + len(block.facets)))
-        rows, k = facet[mine] - first, block.facets.shape[1]
-        nodes[mine, :k], local[mine, :k] = block.facets[rows], block.local[rows]
-        shape[mine, :k] = elements.get(block.element).shape(xi[mine])
-        first += len(block.facets)
-    return nodes, local, shape
-
-
-def _nodal_normals(side: Surface, coordinates: Array) -> Array:
-    """Return the mean of the facets' unit normals at each node (m, dim), weighted by their angles there, normalised.
-
-    The angles make it depend on the surface alone, not on how it is cut into facets (Thuermer and Wuethrich, 1998).
-    """
-    total = np.zeros((len(side.points), coordinates.shape[1]))
-    for block in side.blocks:
-        np.add.at(total, block.local, _facet_normals(block, coordinates[block.facets]))
-    return total / np.linalg.norm(total, axis=1, keepdims=True)
-
-
-def _facet_normals(block: FacetBlock, corners: Array) -> Array:
-    """Return the unit normals at the nodes of facets (n_facets, n_nodes, dim), times their angles there in 3D."""
-    element = elements.get(block.element)
-    tangent = np.einsum("akj,fkd->fadj", element.gradient(element.nodes), corners)
-    if element.dim == 1:
-        normal = np.stack([tangent[..., 1, 0], -tangent[..., 0, 0]], axis=2)
-        return normal / np.linalg.norm(normal, axis=2, keepdims=True)
-    normal = np.cross(tangent[..., 0], tangent[..., 1])
-    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
-    for corner in range(element.n_corners):
-        sides = [corners[:, b if a == corner else a] - corners[:, corner] for a, b in element.edges if corner in (a, b)]
-        sine = np.linalg.norm(np.cross(*sides), axis=1)
-        normal[:, corner] *= np.arctan2(sine, np.einsum("fd,fd->f", *sides))[:, None]
-    return normal
 
 
 def gap_rows(
@@ -185,8 +142,8 @@ def rows_along(
     rows = np.flatnonzero(pairing.paired)
     nodes, weights = candidates.nodes[rows], candidates.shape[rows]
     if not isinstance(primary, RigidSide):
-        facing, _, shape = _at(primary, pairing.facet[rows], pairing.xi[rows])
-        nodes, weights = np.hstack([nodes, facing]), np.hstack([weights, -shape])
+        facing = places(primary, pairing.facet[rows], pairing.xi[rows])
+        nodes, weights = np.hstack([nodes, facing.nodes]), np.hstack([weights, -facing.shape])
     values = weights[:, :, None] * direction[rows][:, None, :]
     columns = nodes[:, :, None] * dim + np.arange(dim)
     row = np.broadcast_to(rows[:, None, None], values.shape)

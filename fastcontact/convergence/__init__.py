@@ -1,0 +1,10 @@
+"""Studies of many runs: mesh convergence with model error told from mesh error, and parameter sweeps."""
+
+from __future__ import annotations
+
+from fastcontact.convergence.execute import Progress
+from fastcontact.convergence.fit import Limit, fit_limit
+from fastcontact.convergence.split import Split, split
+from fastcontact.convergence.study import Study, convergence_study
+
+__all__ = ["Limit", "Progress", "Split", "Study", "convergence_study", "fit_limit", "split"]

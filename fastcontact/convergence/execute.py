@@ -78,7 +78,7 @@ def run_all(
     CaseError
         If the number of workers is wrong.
     FastcontactError
-        If the worker processes die.
+        If no worker process can start.
     """
     results: list[Result | None] = [None] * len(jobs)
     waiting = {index: job.label for index, job in enumerate(jobs)}
@@ -112,22 +112,53 @@ def _run_rest(
         raise CaseError(f"workers = {workers} must be at least 1, the number of processes")
     count = min(workers or _processors(), len(rest))
     if executor is not None:
-        yield from _on_executor(executor, jobs, rest, threads=1)
+        yield from _on_executor(executor, jobs, rest)
     elif count <= 1:
         for index in rest:
             yield index, run(jobs[index])
     else:
-        # Forked children of a process with OpenMP threads die, so workers are spawned.
-        pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"))
-        try:
-            yield from _on_executor(pool, jobs, rest, threads=1)
-        except BrokenProcessPool as error:
-            raise FastcontactError(
-                "a worker process ended before its run: in a script, put what calls the study under "
-                "if __name__ == '__main__':, or use workers=1; a run too large for the memory ends like this, too"
-            ) from error
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+        yield from _on_processes(count, jobs, rest)
+
+
+def _on_processes(count: int, jobs: Sequence[Job], rest: list[int]) -> Iterator[tuple[int, Result]]:
+    """Run on processes of this machine; a run that kills its worker is tried once more alone, then reported."""
+    left = list(rest)
+    pool = _pool(count)
+    try:
+        for index, result in _on_executor(pool, jobs, rest):
+            left.remove(index)
+            yield index, result
+    except BrokenProcessPool:
+        for index in left:
+            yield index, _alone(jobs[index])
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _pool(count: int) -> ProcessPoolExecutor:
+    """Start workers that are known to live."""
+    # Forked children of a process with OpenMP threads die, so workers are spawned.
+    pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"))
+    try:
+        with _environment(_ONE_THREAD, "1"):
+            pool.submit(os.getpid).result()
+    except BrokenProcessPool as error:
+        raise FastcontactError(
+            "no worker process could start: in a script, put what calls the study under if __name__ == '__main__':, "
+            "or use workers=1"
+        ) from error
+    return pool
+
+
+def _alone(job: Job) -> Result:
+    pool = _pool(1)
+    try:
+        return pool.submit(run, job, 1).result()
+    except BrokenProcessPool:
+        text = "its worker process was killed, as the system does when the memory is full: use coarser meshes"
+        return {"error": text, "kind": "BrokenProcessPool"}
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _processors() -> int:
@@ -137,15 +168,13 @@ def _processors() -> int:
     return os.cpu_count() or 1
 
 
-def _on_executor(
-    executor: Executor, jobs: Sequence[Job], rest: list[int], threads: int
-) -> Iterator[tuple[int, Result]]:
+def _on_executor(executor: Executor, jobs: Sequence[Job], rest: list[int]) -> Iterator[tuple[int, Result]]:
     futures: dict[Future[Result], int] = {}
     try:
         with _environment(_ONE_THREAD, "1"):
             # The last job is the largest mesh: started first, it does not keep the others waiting at the end.
             for index in reversed(rest):
-                futures[executor.submit(run, jobs[index], threads)] = index
+                futures[executor.submit(run, jobs[index], 1)] = index
         for future in as_completed(futures):
             yield futures[future], future.result()
     except BaseException:

@@ -14,6 +14,7 @@ from fastcontact.contact.surface import Surface, surface
 from fastcontact.mesh import Mesh
 from fastcontact.mesh_quality import quality
 from fastcontact.results import ContactResult, StepResult
+from fastcontact.topology import bodies
 
 Array = NDArray[np.float64]
 
@@ -104,26 +105,24 @@ def contact_radius(contact: ContactResult) -> float:
     """Return the distance from the axis at which the pressure goes to zero [length]; NaN without contact.
 
     Near the edge of a smooth contact the square of the pressure is linear in the square of the distance (Hertz: over
-    the whole contact). A parabola, or with few nodes a line, through the closed nodes of the outer half gives where it
-    ends; the bracket of the outermost closed and the first open point bounds it. Where the pressure does not fall
-    towards the edge (a punch), the end of the bracket is the answer.
+    the whole contact). A line through the closed nodes beyond 0.4 of the radius, but for the last two, where the edge
+    cuts through a facet, tells where it ends; the bracket of the outermost closed and the first open point bounds it.
+    Where the pressure does not fall towards the edge (a punch), the end of the bracket is the answer.
     """
     inside, outside = contact.radius
     if not np.isfinite(inside):
         return float("nan")
     outside = outside if np.isfinite(outside) else inside
     r = np.abs(contact.coordinates[:, 0])
-    used = contact.active & (contact.pressure > 0) & (r > 0.5 * inside) & (r < 0.999 * outside)
-    if used.sum() < 4:
+    used = np.flatnonzero(contact.active & (contact.pressure > 0) & (r > 0.4 * inside) & (r < outside))
+    used = used[np.argsort(r[used])]
+    if len(used) < 3:
         return float(0.5 * (inside + outside))
-    x = (r[used] / outside) ** 2
-    y = (contact.pressure[used] / contact.pressure[used].max()) ** 2
-    roots = np.roots(np.polyfit(x, y, 2 if used.sum() >= 8 else 1))
-    real = roots[np.isreal(roots)].real
-    ahead = real[real > x.mean()]
-    if not len(ahead):
+    kept = used[:-2] if len(used) >= 5 else used
+    slope, start = np.polyfit((r[kept] / outside) ** 2, (contact.pressure[kept] / contact.pressure.max()) ** 2, 1)
+    if slope >= 0:
         return float(outside)
-    return float(np.clip(outside * np.sqrt(ahead.min()), inside, outside))
+    return float(np.clip(outside * np.sqrt(max(-start / slope, 0.0)), inside, outside))
 
 
 def pressure_error(case: Case, side: Surface, contact: ContactResult, theory: Any) -> float:
@@ -141,18 +140,46 @@ def pressure_error(case: Case, side: Surface, contact: ContactResult, theory: An
 def peak(mesh: Mesh, values: Array, axisymmetric: bool) -> tuple[float, Array]:
     """Return the largest value of a nodal field and where it is, between the nodes.
 
-    A quadratic function is fitted to the nodes around the largest one (on the axis: even in the radius). Its vertex
-    counts if it is a maximum within the ring of these nodes; else the node does.
+    On the axis, a polynomial is fitted to the nodes along it that reach 97 % of the largest value, where there are
+    enough of them. Else a quadratic function is fitted to the nodes around the largest one (on the axis: even in the
+    radius); its vertex counts if it is a maximum within the ring of these nodes, and else the node does.
     """
     top = int(np.argmax(values))
+    on_axis = axisymmetric and abs(mesh.points[top, 0]) <= 1e-9 * np.abs(mesh.points).max()
+    found = _along_axis(mesh, values, top) if on_axis else None
+    if found is not None:
+        return found
     ring = _around(mesh, top)
     x = (mesh.points[ring] - mesh.points[top]).T
     size = np.abs(x).max()
-    on_axis = axisymmetric and abs(mesh.points[top, 0]) <= 1e-9 * np.abs(mesh.points).max()
     vertex = _vertex(x / size, values[ring], on_axis) if mesh.dim == 2 and size > 0 else None
     if vertex is None:
         return float(values[top]), mesh.points[top].copy()
     return vertex[0], mesh.points[top] + size * vertex[1]
+
+
+def _along_axis(mesh: Mesh, values: Array, top: int) -> tuple[float, Array] | None:
+    """Return the maximum of a quartic through the axis nodes near `top` in its body; None with fewer than eight."""
+    line = np.flatnonzero(np.abs(mesh.points[:, 0]) <= 1e-9 * np.abs(mesh.points).max())
+    _, body = bodies(mesh)
+    line = line[body[line] == body[top]]
+    line = line[np.argsort(mesh.points[line, 1])]
+    low = values[line] < 0.97 * values[top]
+    here = int(np.flatnonzero(line == top)[0])
+    first = int(np.flatnonzero(low[:here])[-1]) + 1 if low[:here].any() else 0
+    last = here + int(np.flatnonzero(low[here:])[0]) if low[here:].any() else len(line)
+    near = line[first:last]
+    if len(near) < 8 or not first <= here - 2 or not here + 2 < last:
+        return None
+    y, size = mesh.points[near, 1] - mesh.points[top, 1], np.ptp(mesh.points[near, 1])
+    curve = np.polynomial.Polynomial.fit(y / size, values[near], 4)
+    turning = curve.deriv().roots()
+    inside = turning[np.isreal(turning)].real
+    inside = inside[(inside > (y / size).min()) & (inside < (y / size).max())]
+    if not len(inside):
+        return None
+    best = inside[np.argmax(curve(inside))]
+    return float(curve(best)), mesh.points[top] + np.array([0.0, best * size])
 
 
 def _around(mesh: Mesh, point: int) -> NDArray[np.int32]:

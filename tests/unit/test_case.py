@@ -201,3 +201,51 @@ def test_mistakes_in_loads_name_the_key(write, old, new, message):
     assert old in LOADED
     with pytest.raises(fc.CaseError, match=message):
         read_case(write(LOADED.replace(old, new, 1)))
+
+
+OBSTACLE = """
+kinematics = "axisymmetric"
+[mesh]
+generator = "quarter-disc"
+size = 10.0
+[[material]]
+E = 20000.0
+nu = 0.3
+[[support]]
+group = "A1A2"
+x = 0.0
+[[support]]
+group = "A1B1"
+y = 0.0
+[obstacle.plane]
+secondary = "CONT1"
+shape = { kind = "half_space", point = [0.0, 0.0], normal = [0.0, -1.0] }
+motion = { y = -2.0 }
+ramp = [[0.0, 0.0], [1.0, 1.0]]
+friction = 0.1
+"""
+
+
+def test_a_rigid_obstacle_is_read(write):
+    case = read_case(write(OBSTACLE))
+    pair = case.model.contact[0]
+    assert pair.motion == (0.0, -2.0)
+    assert pair.obstacle == fc.obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
+    assert pair.options == {"friction": 0.1}
+    case.model.check()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('secondary = "CONT1"\n', "", r"obstacle.plane needs 'secondary'"),
+        ("half_space", "half_spaces", r"did you mean 'half_space'"),
+        ("normal =", "normals =", r"'obstacle.plane.shape.normals'"),
+        (", normal = [0.0, -1.0]", "", r"'obstacle.plane.shape': .*normal"),
+        ("y = -2.0 }", 'y = "down" }', r"'obstacle.plane.motion.y' must be of type"),
+    ],
+)
+def test_mistakes_in_an_obstacle_name_the_key(write, old, new, message):
+    assert old in OBSTACLE
+    with pytest.raises(fc.CaseError, match=message):
+        read_case(write(OBSTACLE.replace(old, new, 1)))

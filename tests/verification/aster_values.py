@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from aster_spec import Missing, Problem, nodes_of
+from aster_mesh import Entry, MissingError, nodes_of
+from aster_spec import Problem
 
 import fastcontact as fc
 
-Entry = dict[str, Any]
 Field = dict[int, float]
 STRESS = {"SIXX": 0, "SIYY": 1, "SIZZ": 2, "SIXY": 3, "SIYZ": 4, "SIXZ": 5}
 REDUCTIONS: dict[str, Callable[[np.ndarray], float]] = {
@@ -59,12 +58,14 @@ class Verdict:
         )
 
 
-def verdict(test: Entry, problem: Problem, steps: Sequence[fc.StepResult], tolerance: float, reference: float) -> Verdict:
+def verdict(
+    test: Entry, reference: float, tolerance: float, problem: Problem, steps: Sequence[fc.StepResult]
+) -> Verdict:
     """Return the verdict on one tested value; of several values that all must hold, the worst.
 
     Raises
     ------
-    Missing
+    MissingError
         If the results do not hold the value.
     """
     relative = test["criterion"] == "RELATIF"
@@ -90,19 +91,19 @@ def values(test: Entry, problem: Problem, steps: Sequence[fc.StepResult]) -> lis
     name, component = _field_of(test)
     field = FIELDS.get(name)
     if field is None:
-        raise Missing(f"needs the field {name}")
+        raise MissingError(f"needs the field {name}")
     found = field(problem, step, component, test)
     nodes = _location(test, problem, found)
     outside = [node for node in nodes if node not in found]
     if outside:
-        raise Missing(f"needs {name} {component} at points outside the contact surface (first: {outside[0] + 1})")
+        raise MissingError(f"needs {name} {component} at points outside the contact surface (first: {outside[0] + 1})")
     there = np.array([found[node] for node in nodes])
     reduction = test.get("reduction")
     if not reduction:
         return there.tolist()
     kind = reduction.split()[0]
     if kind not in REDUCTIONS:
-        raise Missing(f"needs the reduction {kind}")
+        raise MissingError(f"needs the reduction {kind}")
     return [float(REDUCTIONS[kind](there))]
 
 
@@ -116,7 +117,7 @@ def _field_of(test: Entry) -> tuple[str, str]:
     named = {entry["NOM_PARA"]: entry for entry in test.get("filter") or ()}
     if test.get("table_column") == "VALE" and {"NOM_CHAM", "NOM_CMP"} <= set(named):
         return named["NOM_CHAM"]["VALE_K"], named["NOM_CMP"]["VALE_K"]
-    raise Missing(f"needs the table {test.get('result')}, column {test.get('table_column')}")
+    raise MissingError(f"needs the table {test.get('result')}, column {test.get('table_column')}")
 
 
 def _step(test: Entry, problem: Problem, steps: Sequence[fc.StepResult]) -> fc.StepResult:
@@ -126,7 +127,7 @@ def _step(test: Entry, problem: Problem, steps: Sequence[fc.StepResult]) -> fc.S
     for step in steps:
         if abs(step.load_factor - instant) <= 1e-9 * max(1.0, abs(instant)):
             return step
-    raise Missing(f"needs the instant {instant}")
+    raise MissingError(f"needs the instant {instant}")
 
 
 def _location(test: Entry, problem: Problem, found: Field) -> list[int]:
@@ -152,25 +153,43 @@ def _displacement(problem: Problem, step: fc.StepResult, component: str, test: E
         return _contact_values(step, lambda contact: -contact.pressure)
     axis = ("DX", "DY", "DZ").index(component) if component in ("DX", "DY", "DZ") else problem.mesh.dim
     if axis >= problem.mesh.dim:
-        raise Missing(f"needs DEPL {component}")
+        raise MissingError(f"needs DEPL {component}")
     return dict(enumerate(step.displacement[:, axis]))
 
 
 def _stress(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
     if component not in STRESS or STRESS[component] >= step.stress.shape[1]:
-        raise Missing(f"needs SIEF_NOEU {component}")
+        raise MissingError(f"needs SIEF_NOEU {component}")
     solid = np.unique(np.concatenate([block.ravel() for block in problem.mesh.solids.values()]))
     return dict(zip(solid.tolist(), step.stress[solid, STRESS[component]], strict=True))
 
 
+def _equivalent(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
+    """Return nodal means of the equivalent stresses of the elements, not those of the mean stress."""
+    equivalent = {"VMIS": fc.recovery.von_mises, "VMIS_SG": fc.recovery.von_mises_signed}.get(component)
+    if equivalent is None:
+        raise MissingError(f"needs SIEQ_NOEU {component}")
+    mesh, kinematics = problem.mesh, problem.model.kinematics
+    moduli, material = problem.model.material_numbers()
+    at_points = fc.recovery.stress_at_points(mesh, kinematics, moduli, material, step.displacement)
+    total, count = np.zeros(mesh.n_points), np.zeros(mesh.n_points)
+    for name, stress in fc.recovery.stress_at_element_nodes(at_points).items():
+        np.add.at(total, mesh.cells[name], equivalent(stress))
+        np.add.at(count, mesh.cells[name], 1.0)
+    return {int(node): float(total[node] / count[node]) for node in np.flatnonzero(count)}
+
+
 def _surface_pressure(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
-    """Return normal stresses n s n on the contact surfaces, n the mean normal of the deformed facets at each node."""
+    """Return normal stresses n s n on the contact surfaces, n the mean normal of the facets at each node.
+
+    Facets are those of the deformed mesh, as code_aster takes them, unless the test says otherwise.
+    """
     if component != "PRES":
-        raise Missing(f"needs PRES_NOEU {component}")
+        raise MissingError(f"needs PRES_NOEU {component}")
     mesh, found = problem.mesh, {}
-    deformed = mesh.points + step.displacement
+    deformed = mesh.points if test.get("geometry") == "reference" else mesh.points + step.displacement
     for pair in problem.model.contact:
-        for group in (pair.secondary, pair.primary):
+        for group in filter(None, (pair.secondary, pair.primary)):
             for node, normal in _normals(mesh, group, deformed).items():
                 found[node] = float(normal @ _tensor(step.stress[node]) @ normal)
     return found
@@ -217,7 +236,7 @@ def _contact_element(problem: Problem, step: fc.StepResult, component: str, test
         return _contact_values(step, lambda contact: contact.gap)
     if component == "CONT":
         return _contact_values(step, lambda contact: contact.active)
-    raise Missing(f"needs CONT_ELEM {component}")
+    raise MissingError(f"needs CONT_ELEM {component}")
 
 
 def _contact_node(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
@@ -233,7 +252,16 @@ def _contact_node(problem: Problem, step: fc.StepResult, component: str, test: E
         return _contact_values(
             step, lambda contact: per_radian * np.einsum("nd,nd->n", contact.force_vectors, contact.normal)
         )
-    raise Missing(f"needs CONT_NOEU {component}")
+    if component in ("PROJ_X", "PROJ_Y", "PROJ_Z"):
+        axis = "XYZ".index(component[-1])
+        return _contact_values(step, lambda contact: _projection(contact, step)[:, axis])
+    raise MissingError(f"needs CONT_NOEU {component}")
+
+
+def _projection(contact: fc.ContactResult, step: fc.StepResult) -> np.ndarray:
+    """Return where the secondary nodes project to, (m, dim)."""
+    position = contact.coordinates + step.displacement[contact.points]
+    return position - contact.gap[:, None] * contact.normal
 
 
 def _reaction(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
@@ -244,8 +272,8 @@ def _reaction(problem: Problem, step: fc.StepResult, component: str, test: Entry
     for node, force in _contact_values(step, lambda contact: per_radian * contact.force_vectors[:, axis]).items():
         found[node] += force
     for pair in problem.model.contact:
-        for node in nodes_of(problem.mesh, {"GROUP_MA": pair.primary}):
-            del found[int(node)]
+        for node in nodes_of(problem.mesh, {"GROUP_MA": pair.primary or []}):
+            found.pop(int(node), None)
     return found
 
 
@@ -253,6 +281,7 @@ FIELDS: dict[str, Callable[[Problem, fc.StepResult, str, Entry], Field]] = {
     "DEPL": _displacement,
     "SIEF_NOEU": _stress,
     "SIGM_NOEU": _stress,
+    "SIEQ_NOEU": _equivalent,
     "PRES_NOEU": _surface_pressure,
     "CONT_ELEM": _contact_element,
     "CONT_NOEU": _contact_node,

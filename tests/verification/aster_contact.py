@@ -1,0 +1,145 @@
+"""Contact zones of code_aster's specs: formulation, options, rigid surfaces, and what is missing for them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from aster_loads import Support, constant
+from aster_mesh import Entry, MissingError, nodes_of
+
+import fastcontact as fc
+from fastcontact.obstacles import HalfSpace
+
+# How code_aster iterates, how it describes the same thing to itself, and what an exact method does not need.
+IGNORED_CONTACT = {
+    "command", "name", "zones", "FORMULATION", "FROTTEMENT", "REAC_GEOM", "NB_ITER_GEOM", "LISSAGE", "VERI_NORM",
+    "ALGO_RESO_CONT", "ALGO_RESO_GEOM", "ALGO_RESO_FROT", "ITER_GEOM_MAXI", "ITER_CONT_MAXI", "ITER_CONT_MULT",
+    "ITER_FROT_MAXI", "ITER_CONT_TYPE", "RESI_GEOM", "RESI_FROT", "RESI_CONT", "RESI_ABSO", "STOP_SINGULIER",
+    "NB_RESOL", "LISS", "MODELE", "INFO", "STOP_INTERP", "ITER_GCP_MAXI", "PRE_COND", "COEF_RESI", "RECH_LINEAIRE",
+}  # fmt: skip
+IGNORED_ZONE = {
+    "master", "slave", "interface", "ALGO_CONT", "ALGO_FROT", "APPARIEMENT", "NORMALE", "INTEGRATION", "ORDRE_INT",
+    "CONTACT_INIT", "COEF_CONT", "COEF_FROT", "COEF_PENA_CONT", "COEF_PENA_FROT", "E_N", "E_T", "COEF_MATR_FROT",
+    "COULOMB", "TOLE_PROJ_EXT", "TOLE_PROJ_INT", "TOLE_APPA", "ADAPTATION", "SEUIL_INIT", "SEUIL_AUTO", "TYPE_APPA",
+    "TYPE_PROJECTION", "GRAND_GLIS", "TYPE_JACOBIEN", "VECT_MAIT", "VECT_ESCL", "MAIT_VECT_Y", "ESCL_VECT_Y",
+    "PENE_MAXI", "GLIS_MAXI", "RESOLUTION", "SANS_GROUP_NO_FR", "SANS_NOEUD_FR", "GLISSIERE", "TOLE_INTERP",
+}  # fmt: skip
+INTEGRATION = {"AUTO": "node", "GAUSS": "gauss", "SIMPSON": "simpson"}
+OFFSETS = ("DIST_ESCL", "DIST_MAIT", "DIST_POUTRE", "DIST_COQUE")
+EXCLUSIONS = ("SANS_GROUP_NO", "SANS_NOEUD", "SANS_GROUP_MA", "SANS_MAILLE")
+
+
+def add_zone(model: fc.Model, name: str, contact: Entry, zone: Entry, supports: Sequence[Support]) -> None:
+    """Add a zone of DEFI_CONTACT as a contact pair, or as an obstacle where no solid lies behind the master side.
+
+    The discrete method is node-to-segment. The continuous one is mortar where code_aster integrates over cut facets,
+    where facets are quadratic, and where meshes do not match; elsewhere, and where the slave nodes are the integration
+    points (a value on a coarse mesh depends on that), it is the continuous one. A penalty, which only approximates the
+    exact method, is replaced by it.
+    """
+    mesh = model.mesh
+    _check_frictionless_nodes(zone, mesh, supports)
+    options: dict[str, Any] = {}
+    if contact.get("LISSAGE") == "OUI":
+        options["normals"] = "averaged"
+    if contact.get("FROTTEMENT", "SANS") == "COULOMB":
+        options["friction"] = constant(zone.get("COULOMB", 0.0), "COULOMB of a contact zone")
+    solid = np.unique(np.concatenate([block.ravel() for block in mesh.solids.values()]))
+    behind, backed = (np.isin(nodes_of(mesh, {"GROUP_MA": zone[side]}), solid).all() for side in ("slave", "master"))
+    if not behind:
+        raise MissingError(f"needs a rigid meshed surface without solid as the secondary side ({zone['slave']})")
+    options |= _formulation(contact, zone, mesh, against_obstacle=not backed)
+    _check_excluded_nodes(zone, mesh, supports, options, against_obstacle=not backed)
+    if backed:
+        model.add_contact(name, secondary=zone["slave"], primary=zone["master"], **options)
+    else:
+        model.add_obstacle(name, secondary=zone["slave"], obstacle=_obstacle(mesh, zone, supports), **options)
+
+
+def _formulation(contact: Entry, zone: Entry, mesh: fc.Mesh, *, against_obstacle: bool) -> dict[str, Any]:
+    facets = mesh.cells_of(zone["slave"], dim=mesh.dim - 1) | mesh.cells_of(zone["master"], dim=mesh.dim - 1)
+    quadratic = not set(facets) <= {"line2", "tri3", "quad4"}
+    rule = INTEGRATION.get(zone.get("INTEGRATION", "AUTO"), "gauss")
+    matching = zone.get("interface", {}).get("matching", False)
+    if contact.get("FORMULATION", "DISCRETE") == "DISCRETE":
+        options: dict[str, Any] = {"formulation": "node_to_segment"}
+    elif against_obstacle:
+        options = {"formulation": "continuous", "integration": "gauss" if quadratic else rule}
+    elif not quadratic and zone.get("APPARIEMENT") != "MORTAR" and (rule == "node" or matching):
+        options = {"formulation": "continuous", "integration": rule}
+    else:
+        return {"formulation": "mortar"}
+    if "TOLE_PROJ_EXT" in zone and not against_obstacle:
+        options["projection_tolerance"] = float(zone["TOLE_PROJ_EXT"])
+    return options
+
+
+def missing_in_contact(contact: Entry) -> Iterator[str]:
+    if not contact.get("zones"):
+        yield "contact zones"
+    if contact.get("FORMULATION", "DISCRETE") not in ("DISCRETE", "CONTINUE"):
+        yield f"the contact FORMULATION {contact['FORMULATION']}"
+    if contact.get("FROTTEMENT", "SANS") not in ("SANS", "COULOMB"):
+        yield f"the friction law {contact['FROTTEMENT']}"
+    yield from (f"{key} of DEFI_CONTACT" for key in contact if key not in IGNORED_CONTACT)
+    for zone in contact.get("zones", ()):
+        yield from (f"gap offsets {key}" for key in OFFSETS if zone.get(key, "NON") != "NON")
+        yield from (f"{key} of a contact zone" for key in zone if key not in {*IGNORED_ZONE, *OFFSETS, *EXCLUSIONS})
+        if zone.get("GLISSIERE") == "OUI":
+            yield "bilateral contact GLISSIERE"
+        if zone.get("RESOLUTION", "OUI") != "OUI":
+            yield "contact that is only checked, RESOLUTION = NON"
+
+
+def _check_frictionless_nodes(zone: Entry, mesh: fc.Mesh, supports: Sequence[Support]) -> None:
+    """Accept nodes without friction where a support already holds them, as on an axis: no force is left to friction."""
+    place = {"GROUP_NO": zone.get("SANS_GROUP_NO_FR", ()), "NOEUD": zone.get("SANS_NOEUD_FR", ())}
+    nodes = nodes_of(mesh, {key: value for key, value in place.items() if value})
+    held = mesh.dim == 2 and all(any(node in support.nodes for support in supports) for node in nodes)
+    if len(nodes) and not held:
+        raise MissingError("needs nodes without friction SANS_GROUP_NO_FR")
+
+
+def _check_excluded_nodes(
+    zone: Entry, mesh: fc.Mesh, supports: Sequence[Support], options: Entry, *, against_obstacle: bool
+) -> None:
+    """Accept excluded nodes that could not carry a force: held, each with its own gap to what stands still."""
+    place = {key.removeprefix("SANS_"): zone[key] for key in EXCLUSIONS if key in zone}
+    excluded = np.intersect1d(nodes_of(mesh, place), nodes_of(mesh, {"GROUP_MA": zone["slave"]}))
+    nodal = options["formulation"] == "node_to_segment" or options.get("integration") == "node"
+    held = all(
+        any(node in support.nodes and support.component == axis for support in supports)
+        for node in excluded
+        for axis in "xyz"[: mesh.dim]
+    )
+    if len(excluded) and not (nodal and against_obstacle and held):
+        raise MissingError(f"needs nodes excluded from contact ({', '.join(key for key in EXCLUSIONS if key in zone)})")
+
+
+def _obstacle(mesh: fc.Mesh, zone: Entry, supports: Sequence[Support]) -> HalfSpace:
+    """Return the half space behind a flat master surface without a solid that stands still."""
+    nodes, slave = (nodes_of(mesh, {"GROUP_MA": zone[side]}) for side in ("master", "slave"))
+    for axis in "xyz"[: mesh.dim]:
+        holding = [s for s in supports if s.component == axis and not callable(s.value) and s.value == 0.0]
+        if not np.isin(nodes, np.concatenate([np.empty(0, int), *(s.nodes for s in holding)])).all():
+            raise MissingError(f"needs a rigid meshed surface without solid that moves ({zone['master']})")
+    centre = mesh.points[nodes].mean(axis=0)
+    spread, directions = np.linalg.svd(mesh.points[nodes] - centre)[1:]
+    if spread[-1] > 1e-9 * spread[0]:
+        raise MissingError(f"needs a rigid meshed surface without solid that is not flat ({zone['master']})")
+    # The body lies on the side where its own solid is.
+    behind = np.concatenate([b[np.isin(b, slave).any(axis=1)].ravel() for b in mesh.solids.values()])
+    normal = directions[-1] * np.sign((mesh.points[behind].mean(axis=0) - centre) @ directions[-1])
+    return HalfSpace(tuple(centre), tuple(normal))
+
+
+def criteria_of(contact: Entry) -> fc.Criteria:
+    """Return how often to pair: fixed numbers where code_aster's user asks for one, otherwise until it stands still."""
+    updates = str(contact.get("REAC_GEOM", "AUTOMATIQUE")).split()[0]
+    if updates == "SANS":
+        return fc.Criteria(geometry_updates=0)
+    if updates == "CONTROLE":
+        return fc.Criteria(geometry_updates=int(contact.get("NB_ITER_GEOM", 2)))
+    return fc.Criteria()
