@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import NDArray
+
 from fastcontact.case import Case, read_case
 from fastcontact.convergence.execute import Progress, run_all
 from fastcontact.convergence.fit import Limit, fit_limit, step_orders
@@ -166,6 +168,12 @@ class Study:
         from fastcontact.convergence.output import as_dict
 
         return as_dict(self)
+
+    def table(self) -> NDArray[Any]:
+        """Return a structured array, one row a level of a combination, as ``--csv`` writes it."""
+        from fastcontact.convergence.output import table
+
+        return table(self)
 
     def lines(self) -> list[str]:
         """Return tables and sentences for a person."""

@@ -13,6 +13,7 @@ from fastcontact.generate.box import box
 from fastcontact.generate.half_spheres import half_spheres, quarter_disc
 from fastcontact.generate.quadratic import Circle, to_quadratic
 from fastcontact.generate.refine import circles, linearised, refined
+from fastcontact.generate.sphere import sphere_octant, sphere_on_block
 from fastcontact.generate.transform import merge_points, mirrored, renamed, transformed, union
 from fastcontact.mesh import Mesh
 
@@ -22,6 +23,7 @@ GENERATORS: dict[str, Callable[..., Mesh]] = {
     "block-on-block": block_on_block,
     "cylinder-on-block": cylinder_on_block,
     "box": box,
+    "sphere-on-block": sphere_on_block,
 }
 
 __all__ = [
@@ -39,6 +41,8 @@ __all__ = [
     "quarter_disc",
     "refined",
     "renamed",
+    "sphere_octant",
+    "sphere_on_block",
     "to_quadratic",
     "transformed",
     "union",

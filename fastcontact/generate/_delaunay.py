@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -15,6 +14,8 @@ def delaunay(points: Array) -> Numbers:
 
     Nodes in line on the hull give triangles of zero area by rounding; they are dropped.
     """
+    from scipy.spatial import Delaunay
+
     triangles = Delaunay(points).simplices.astype(np.intp)
     first, second, third = (points[triangles[:, i]] for i in range(3))
     u, v = second - first, third - first

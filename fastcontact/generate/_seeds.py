@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from fastcontact.generate._spacing import Spacing
 
@@ -16,6 +15,8 @@ _CLEAR = 0.6  # seeds stay this many edge lengths off the outline
 
 def inner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
     """Points (m, 2) inside the convex polygon `outline` (n, 2), about ``density * spacing`` apart [length]."""
+    from scipy.spatial import cKDTree
+
     corners = _apart(_corner_seeds(outline, spacing, density), outline, spacing, density)
     low, high = outline.min(axis=0), outline.max(axis=0)
     field = _lattice(spacing, density, low, high) if spacing.uniform else _rings(spacing, density, low, high)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from fastcontact.errors import MeshError
 from fastcontact.generate._delaunay import delaunay, edges_of
@@ -70,6 +69,8 @@ def smallest_angle(points: Array, triangles: Numbers) -> float:
 
 def _attempt(outline: Array, spacing: Spacing, density: float) -> Array | None:
     """Points of a triangulation whose edges are short enough, or None."""
+    from scipy.spatial import cKDTree
+
     n_fixed = len(outline)
     points = np.vstack([outline, inner_seeds(outline, spacing, density)])
     movable = np.arange(len(points)) >= n_fixed

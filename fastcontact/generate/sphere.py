@@ -176,9 +176,7 @@ def _graded(length: float, spacing: Spacing) -> Array:
     return divided(lambda s: np.column_stack([length * s, np.zeros(len(s))]), length, spacing)[:, 0]
 
 
-def _mapped(
-    element: str, grid: tuple[Array, Array, Array], place: Map, solid: str, names: Mapping[str, str]
-) -> Mesh:
+def _mapped(element: str, grid: tuple[Array, Array, Array], place: Map, solid: str, names: Mapping[str, str]) -> Mesh:
     """Return a box with the given grid lines, mapped; of its groups and outer facets those that `names` lists."""
     divisions = tuple(len(lines) - 1 for lines in grid)
     lattice = box((1.0, 1.0, 1.0), (divisions[0], divisions[1], divisions[2]), element, name=solid)

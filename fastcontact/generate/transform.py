@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from fastcontact import elements
 from fastcontact.errors import MeshError
@@ -173,6 +172,8 @@ def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
     MeshError
         If two nodes of one cell fall together: the tolerance is larger than an edge.
     """
+    from scipy.spatial import cKDTree
+
     if not number("tolerance", tolerance) >= 0.0:
         raise MeshError(f"tolerance = {tolerance:g} is out of range: it must be at least 0")
     pairs = cKDTree(mesh.points).query_pairs(tolerance, output_type="ndarray")

@@ -320,9 +320,3 @@ def test_six_rigid_motions_are_counted_and_named():
         model.check()
     model.fix("XMIN", "z")
     model.check()
-
-
-def test_contact_in_three_dimensions_is_refused():
-    model = fc.Model(box(divisions=(1, 1, 1)), "3d")
-    with pytest.raises(fc.ContactError, match=r"'pair'.*two-dimensional"):
-        model.add_contact("pair", secondary="ZMAX", primary="ZMIN")

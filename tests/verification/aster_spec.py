@@ -55,7 +55,7 @@ class Problem:
 def specs(folder: Path) -> Iterator[tuple[Path, int]]:
     """Yield (file, number of the run) of every run in the specs of a folder."""
     for path in sorted(folder.glob("*.json")):
-        for run in read(path)["runs"]:
+        for run in read(path).get("runs", ()):
             yield path, run["run"]
 
 
@@ -91,11 +91,26 @@ def problem(path: Path, number: int) -> Problem:
     for support in supports:
         model.prescribe(support.group, ramp=support.history, **{support.component: support.value})
     for load in run["loads"]:
-        add_loads(model, spec, run, load, times)
+        add_loads(model, spec, load, times)
     for index, zone in enumerate(run["contact"]["zones"]):
         add_zone(model, f"zone {index}", run["contact"], zone, supports)
     ramp = fc.Ramp(tuple(times[1:]), ((times[0], 1.0), (times[-1], 1.0)))
     return Problem(spec, run, mesh, model, ramp, criteria_of(run["contact"]), times)
+
+
+def solve(problem: Problem) -> list[fc.StepResult]:
+    """Return the states at all instants of a run.
+
+    Where the geometry is frozen (REAC_GEOM = 'SANS') code_aster keeps the first pairing through all steps, while ours
+    begins each with a new one: without friction, which remembers, every instant is then solved on its own.
+    """
+    instants = problem.ramp.instants
+    if problem.criteria.geometry_updates != 0 or len(instants) == 1:
+        return fc.solve(problem.model, problem.ramp, criteria=problem.criteria)
+    if any(pair.options.get("friction") for pair in problem.model.contact):
+        raise MissingError("needs one pairing for several steps (REAC_GEOM = 'SANS') with friction")
+    ramps = [fc.Ramp((instant,), problem.ramp.table) for instant in instants]
+    return [fc.solve(problem.model, ramp, criteria=problem.criteria)[0] for ramp in ramps]
 
 
 def _missing_in_run(spec: Entry, run: Entry) -> Iterator[str]:

@@ -286,6 +286,22 @@ def test_a_body_comes_from_afar(gap, formulation):
     assert np.abs(far.stress - near.stress).max() < 1e-8 * np.abs(near.stress).max()
 
 
+def test_what_was_regularised_is_kept_in_result_files(tmp_path):
+    model = driven_by_force(fc.generate.half_spheres("tri3", size=8.0), "node_to_segment", 1e5)
+    with fc.ResultWriter(tmp_path / "forced.vtkhdf", model) as out:
+        last = one_step(model, on_step=out.write)
+    kept = fc.open_results(tmp_path / "forced.vtkhdf")[-1].iterations["regularised"]
+    assert kept == last.iterations["regularised"]
+    assert set(kept) == {"motions", "springs", "spring_stiffness", "force_left", "relative_to_load", "positions"}
+
+
+def test_a_load_lost_in_round_off_is_told_in_numbers():
+    """A millionth of a newton over a gap of 30 mm: the deformations are below the accuracy of the coordinates."""
+    mesh = fc.generate.half_spheres("tri3", size=8.0)
+    with pytest.warns(fc.FastcontactWarning, match=r"springs that regularise .* still carry \d\.\de-0\d of the load"):
+        one_step(driven_by_force(mesh, "node_to_segment", 1e-6, gap=30.0))
+
+
 def test_a_body_pulled_away_is_told_clearly():
     mesh = fc.generate.half_spheres("tri3", size=8.0)
     done = []

@@ -41,8 +41,9 @@ class Formulation(ABC):
         Coefficient of Coulomb friction, zero for none.
     projection_tolerance : float
         How far a point may stand out beyond the end of its facet and still be paired, in facet lengths.
-    normals : str
-        ``"facet"``: of the primary facet at the projection; ``"averaged"``: interpolated between nodal means.
+    normals : str, optional
+        ``"facet"``: of the primary facet at the projection; ``"averaged"``: interpolated between nodal means. By default
+        the former in 2D and the latter in 3D, where a point opposite an edge between facets often flips for ever.
     """
 
     secondary: Surface
@@ -53,13 +54,15 @@ class Formulation(ABC):
 
     friction: float = 0.0
     projection_tolerance: float = 0.5
-    normals: str = "facet"
+    normals: str | None = None
 
     name: ClassVar[str]
     # Re-pair after every active-set iteration (True), or after the active set has settled (False).
     geometry_in_loop: ClassVar[bool]
 
     def __post_init__(self) -> None:
+        if self.normals is None:
+            self.normals = "facet" if self.points.shape[1] == 2 else "averaged"
         if self.normals not in NORMALS:
             raise ContactError(unknown("kind of normals", self.normals, NORMALS))
         if not (np.isfinite(self.friction) and self.friction >= 0):

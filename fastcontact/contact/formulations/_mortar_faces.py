@@ -16,7 +16,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
-from scipy.spatial import cKDTree
 
 from fastcontact import elements, quadrature
 from fastcontact.contact.constraints import Constraints
@@ -170,6 +169,8 @@ def _near(
     Along the way from a secondary facet to the primary side lies at least the closest primary facet; whatever else
     faces it is no farther than that by more than the sizes of both.
     """
+    from scipy.spatial import cKDTree
+
     ours, theirs = _spheres(secondary, n_secondary), _spheres(primary, n_primary)
     tree = cKDTree(theirs[0])
     away, _ = tree.query(ours[0])

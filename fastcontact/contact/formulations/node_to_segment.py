@@ -3,7 +3,8 @@
 One constraint per secondary node, enforced exactly; the multiplier is the nodal contact force. The pairing, the
 normal of the primary facet and the projection are held during an active-set solution (code_aster, R5.03.50,
 formulation DISCRETE with ALGO_CONT='CONTRAINTE'). It does not pass the patch test on meshes that do not match, and
-oscillates on quadratic facets: there, the continuous formulation is the better choice.
+oscillates on quadratic facets: there, the continuous formulation is the better choice. Under a uniform pressure the
+corner forces of six-node triangles vanish and those of eight-node quadrangles pull: they are refused.
 """
 
 from __future__ import annotations
@@ -15,10 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
+from fastcontact import elements
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.integration import mass_matrix, nodal_areas
+from fastcontact.contact.integration import fine_rule, mass_matrix, nodal_areas
 from fastcontact.contact.pairing import Candidates, pair
+from fastcontact.errors import ContactError
 
 Array = NDArray[np.float64]
 
@@ -33,8 +36,20 @@ class NodeToSegment(Formulation):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        for block in self.secondary.blocks:
+            self._check_areas(block.element)
         nodes = self.secondary.points[:, None]
         self._candidates = Candidates(nodes, np.ones(nodes.shape))
+
+    def _check_areas(self, element: str) -> None:
+        """Refuse facets whose nodes do not all push under a uniform pressure."""
+        xi, weights = fine_rule(element)
+        areas = weights @ elements.get(element).shape(xi)
+        if areas.min() < 1e-6 * areas.max():
+            raise ContactError(
+                f"node_to_segment cannot have facets of {element} on its secondary side '{self.secondary.group}', "
+                "whose corner nodes carry no pressure: use formulation 'continuous' or 'mortar', or swap the sides"
+            )
 
     def constraints(self, displacement: Array) -> Constraints:
         """Pair on the displaced configuration and return one gap per secondary node."""
