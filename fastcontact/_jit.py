@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import numba
 
 log = logging.getLogger("fastcontact")
-F = TypeVar("F", bound=Callable[..., Any])
 
 # Contraction to fused multiply-add only: NaN, infinities and the order of sums stay as written.
 FASTMATH = {"contract"}
@@ -21,20 +20,20 @@ FASTMATH = {"contract"}
 _cache_reported = False
 
 
-def kernel(function: F) -> F:
+def kernel(function: Callable[..., Any]) -> Any:
     """Compile `function` lazily in nopython mode, with the disk cache where one can be had."""
     return _compile(function, parallel=False)
 
 
-def parallel_kernel(function: F) -> F:
+def parallel_kernel(function: Callable[..., Any]) -> Any:
     """Like `kernel`, with `prange` loops spread over threads; iterations must write disjoint memory."""
     return _compile(function, parallel=True)
 
 
-def _compile(function: F, parallel: bool) -> F:
+def _compile(function: Callable[..., Any], parallel: bool) -> Any:
     options: dict[str, Any] = {"fastmath": FASTMATH, "parallel": parallel, "nogil": True, "error_model": "numpy"}
     try:
-        return numba.njit(cache=True, **options)(function)  # type: ignore[return-value]
+        return numba.njit(cache=True, **options)(function)
     except RuntimeError as error:  # numba: "cannot cache function ...: no locator available for file ..."
         if "cannot cache" not in str(error):
             raise
@@ -42,7 +41,7 @@ def _compile(function: F, parallel: bool) -> F:
         if not _cache_reported:
             _cache_reported = True
             log.info("no writable folder for compiled kernels (set NUMBA_CACHE_DIR): compiling in every process")
-        return numba.njit(cache=False, **options)(function)  # type: ignore[return-value]
+        return numba.njit(cache=False, **options)(function)
 
 
 def set_threads(count: int) -> None:

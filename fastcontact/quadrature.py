@@ -86,9 +86,7 @@ def triangle_16() -> Rule:
     )
 
 
-def _symmetric(
-    centre: list[float], threes: list[tuple[float, float]], sixes: list[tuple[float, float, float]]
-) -> Rule:
+def _symmetric(centre: list[float], threes: list[tuple[float, float]], sixes: list[tuple[float, float, float]]) -> Rule:
     """Return a rule on the triangle from its orbits: weights (of 1 in all), then coordinates equal up to permutation."""
     points, weights = [[1.0 / 3.0, 1.0 / 3.0] for _ in centre], list(centre)
     for weight, a in threes:
@@ -122,7 +120,8 @@ def quartered_triangle(rule: Rule) -> Rule:
 
 def square(rule: Rule) -> Rule:
     """Return the product of a rule on [-1, 1] with itself."""
-    (x, w), (X, Y) = rule, np.meshgrid(rule[0][:, 0], rule[0][:, 0], indexing="xy")
+    x, w = rule
+    X, Y = np.meshgrid(x[:, 0], x[:, 0], indexing="xy")
     return np.column_stack([X.ravel(), Y.ravel()]), np.outer(w, w).ravel()
 
 

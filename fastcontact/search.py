@@ -137,7 +137,9 @@ def _on_faces(points: Array, corners: Array) -> Closest:
 def _refuse(points: Array, facet: NDArray[np.intp], corners: Array) -> None:
     """Raise ContactError for points whose projection failed."""
     if facet[0] < 0:
-        raise ContactError(f"{len(points)} points to project are not finite (first: {points[0]}): the solution diverged")
+        raise ContactError(
+            f"{len(points)} points to project are not finite (first: {points[0]}): the solution diverged"
+        )
     raise ContactError(
         f"the projection of {len(points)} points did not converge (first: {points[0]} on facet {facet[0]} near "
         f"{corners[facet[0]].mean(axis=0)}): the facet is folded or collapsed, so refine or repair the mesh there"
@@ -151,7 +153,7 @@ def _tables(n_nodes: int) -> tuple[Array, Array, Array, Array, Array]:
         raise ContactError(f"there are no facets of {n_nodes} nodes in three dimensions: known are {sorted(_FLAT)}")
     triangle = n_nodes in (3, 6)
     nodes = (_TRIANGLE if triangle else _SQUARE)[:n_nodes]
-    to_terms = np.linalg.inv(_terms(nodes, n_nodes))
+    to_terms = np.asarray(np.linalg.inv(_terms(nodes, n_nodes)), float)
     sides = _TRIANGLE_SIDES if triangle else _SQUARE_SIDES
     return nodes, sides, to_terms, _hull(n_nodes, to_terms), _bend(nodes)
 

@@ -66,5 +66,6 @@ def check_overlap(mesh: Mesh, kinematics: str, paired: Iterable[tuple[str, str]]
         if depth > 1e-6 * size and frozenset((number, other)) not in joined:
             names = body_name(mesh, body, number), body_name(mesh, body, other)
             raise ModelError(
-                f"body {names[0]} overlaps body {names[1]} by {depth:.3g} near {where} before any load, and no contact pair joins them: add the contact or move one of them"
+                f"body {names[0]} overlaps body {names[1]} by {depth:.3g} near {where} before any load, "
+                "and no contact pair joins them: add the contact or move one of them"
             )

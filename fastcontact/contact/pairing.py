@@ -68,7 +68,7 @@ def pair(
     primary: Surface | RigidSide,
     coordinates: Array,
     projection_tolerance: float,
-    normals: str = "facet",
+    normals: str | None = "facet",
 ) -> Pairing:
     """Project candidate positions (n, dim) on the closest facet of `primary` at nodal `coordinates`.
 

@@ -53,7 +53,10 @@ def places(side: Surface, facet: Indices, xi: Array) -> Places:
     width = max(block.facets.shape[1] for block in side.blocks)
     n = len(facet)
     found = Places(
-        np.empty((n, width), np.int32), np.empty((n, width), np.intp), np.zeros((n, width)), np.zeros((n, width, xi.shape[1]))
+        np.empty((n, width), np.int32),
+        np.empty((n, width), np.intp),
+        np.zeros((n, width)),
+        np.zeros((n, width, xi.shape[1])),
     )
     first = 0
     for block in side.blocks:
@@ -89,8 +92,8 @@ def _facet_normals(block: FacetBlock, corners: Array) -> Array:
     normal /= np.linalg.norm(normal, axis=2, keepdims=True)
     for corner in range(element.n_corners):
         sides = [corners[:, b if a == corner else a] - corners[:, corner] for a, b in element.edges if corner in (a, b)]
-        sine = np.linalg.norm(np.cross(*sides), axis=1)
-        normal[:, corner] *= np.arctan2(sine, np.einsum("fd,fd->f", *sides))[:, None]
+        sine = np.linalg.norm(np.cross(sides[0], sides[1]), axis=1)
+        normal[:, corner] *= np.arctan2(sine, np.einsum("fd,fd->f", sides[0], sides[1]))[:, None]
     return normal
 
 

@@ -139,10 +139,10 @@ def _numbered(mesh: Mesh) -> tuple[Indices, dict[str, Indices], dict[str, Indice
         numbers[name] = np.empty((len(block), len(pattern.shape)), np.int64)
         numbers[name][:, : block.shape[1]] = block
         ends = block[:, elements.get(name).edges].astype(np.int64)
-        for point in np.flatnonzero(pattern.on_edge >= 0):
+        for point in np.flatnonzero(pattern.on_edge >= 0).tolist():
             a, b = ends[:, pattern.on_edge[point]].T
             codes.append(_keys(a, b, int(pattern.along[point]), mesh.n_points))
-            sources.append((name, int(point)))
+            sources.append((name, point))
     lengths = [len(code) for code in codes]
     flat = np.concatenate(codes) if codes else np.empty(0, np.int64)
     keys, first, rank = np.unique(flat, return_index=True, return_inverse=True)

@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact import elements
 from fastcontact.generate._check import count, one_of, pair, positive
 from fastcontact.generate._places import with_points_at
 from fastcontact.generate._spacing import Spacing, divided, segments_for

@@ -132,9 +132,7 @@ def _growing_field(parent: Any, name: str, n_points: int, width: int) -> None:
 def growing_table(parent: Any, name: str, dtype: Any, width: int = 0, rows: int = ROWS) -> Any:
     """Create an empty table; uncompressed, so that growing never moves the rows that are there."""
     tail = (width,) if width else ()
-    return parent.create_dataset(
-        name, shape=(0, *tail), maxshape=(None, *tail), chunks=(rows, *tail), dtype=dtype
-    )
+    return parent.create_dataset(name, shape=(0, *tail), maxshape=(None, *tail), chunks=(rows, *tail), dtype=dtype)
 
 
 def as_json(value: Any) -> str:

@@ -31,9 +31,7 @@ POINT_FIELDS = {
 # Element codes of the XDMF format by VTK cell type, for cells whose nodes stand in the same order in both.
 XDMF_TYPES = {5: 0x4, 9: 0x5, 10: 0x6, 12: 0x9, 22: 0x24, 23: 0x25, 24: 0x26, 28: 0x23}
 
-STEP_ROW = np.dtype(
-    [("index", "<i8"), ("load_factor", "<f8"), ("notes_first", "<i8"), ("notes_count", "<i8")]
-)
+STEP_ROW = np.dtype([("index", "<i8"), ("load_factor", "<f8"), ("notes_first", "<i8"), ("notes_count", "<i8")])
 
 
 def contact_row(dim: int) -> np.dtype[Any]:
@@ -76,9 +74,7 @@ def solid_cells(mesh: Mesh) -> SolidCells:
     nodes = [block.ravel().astype(np.int64) for block in blocks.values()]
     return SolidCells(
         connectivity=np.concatenate([np.empty(0, np.int64), *nodes]),
-        offsets=np.concatenate([[0], np.cumsum(np.concatenate([np.empty(0, np.int64), *sizes]))]).astype(
-            np.int64
-        ),
+        offsets=np.concatenate([[0], np.cumsum(np.concatenate([np.empty(0, np.int64), *sizes]))]).astype(np.int64),
         types=np.concatenate([np.empty(0, np.uint8), *types]),
     )
 

@@ -77,9 +77,7 @@ class PathLock:
                 file.seek(0)
                 holder = file.read().strip() or "unknown"
                 file.close()
-                raise FileError(
-                    f"'{target}' is being written by process {holder}: let it end or name another file"
-                )
+                raise FileError(f"'{target}' is being written by process {holder}: let it end or name another file")
             if self._is_current(file):
                 break
             file.close()  # its holder removed it between our open and our lock

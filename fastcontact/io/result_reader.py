@@ -123,9 +123,7 @@ class Results(Sequence[StepResult]):
             return [self._read_step(position) for position in range(*number.indices(self._n_steps))]
         position = range(self._n_steps)[number] if -self._n_steps <= number < self._n_steps else -1
         if position < 0:
-            raise IndexError(
-                f"'{self.path}' has {self._n_steps} steps, so there is no step at position {number}"
-            )
+            raise IndexError(f"'{self.path}' has {self._n_steps} steps, so there is no step at position {number}")
         return self._read_step(position)
 
     def __enter__(self) -> Results:
@@ -217,9 +215,7 @@ class Results(Sequence[StepResult]):
             yield
         except (OSError, RuntimeError, KeyError, ValueError, IndexError, TypeError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise FileError(
-                f"'{self.path}' {_DAMAGED} ({reason}): compute it again or restore a copy"
-            ) from error
+            raise FileError(f"'{self.path}' {_DAMAGED} ({reason}): compute it again or restore a copy") from error
 
 
 def _opened(path: Path) -> Any:
@@ -244,12 +240,8 @@ def _opened(path: Path) -> Any:
     if schema is None or schema > layout.SCHEMA:
         file.close()
         if schema is None:
-            raise FileError(
-                f"'{path}' holds no fastcontact results: name a file that fastcontact wrote (.vtkhdf)"
-            )
-        raise FileError(
-            f"'{path}' has schema {schema}, this fastcontact reads up to {layout.SCHEMA}: update it"
-        )
+            raise FileError(f"'{path}' holds no fastcontact results: name a file that fastcontact wrote (.vtkhdf)")
+        raise FileError(f"'{path}' has schema {schema}, this fastcontact reads up to {layout.SCHEMA}: update it")
     return file
 
 

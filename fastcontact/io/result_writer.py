@@ -172,9 +172,7 @@ class ResultWriter:
         try:
             yield
         except (OSError, RuntimeError) as error:
-            reason = getattr(error, "strerror", None) or next(
-                iter(str(error).splitlines()), type(error).__name__
-            )
+            reason = getattr(error, "strerror", None) or next(iter(str(error).splitlines()), type(error).__name__)
             raise FileError(
                 f"'{self.path}' cannot be {what} ({reason}), {self.n_steps} steps are complete: "
                 "see whether the disk is full or the folder protected"
@@ -279,9 +277,7 @@ def _check_shapes(mesh: Mesh, step: StepResult) -> None:
     for name, shape in expected.items():
         found = np.shape(getattr(step, name))
         if found != shape:
-            raise FileError(
-                f"step {step.index}: {name} has shape {found}, but the mesh of the file needs {shape}"
-            )
+            raise FileError(f"step {step.index}: {name} has shape {found}, but the mesh of the file needs {shape}")
     for name, contact in step.contact.items():
         _check_contact(f"step {step.index}, contact '{name}'", contact, mesh)
 

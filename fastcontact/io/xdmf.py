@@ -45,14 +45,10 @@ def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
     topology = layout.xdmf_topology(mesh)
     if topology is None:
         names = ", ".join(mesh.solids) or "no solid cells"
-        raise FileError(
-            f"XDMF cannot show '{result_path}' with {names}: open the .vtkhdf file itself (ParaView 5.12)"
-        )
+        raise FileError(f"XDMF cannot show '{result_path}' with {names}: open the .vtkhdf file itself (ParaView 5.12)")
     reference = os.path.relpath(os.path.realpath(os.fspath(result_path)), target.parent)
     if ":" in reference or not reference.isascii():
-        raise FileError(
-            f"XDMF readers find no '{reference}': name it without colons and with ASCII letters only"
-        )
+        raise FileError(f"XDMF readers find no '{reference}': name it without colons and with ASCII letters only")
     sizes = {"points": mesh.n_points, "topology": len(topology), "cells": sum(map(len, mesh.solids.values()))}
     static = {
         "Node": {name: values.dtype for name, values in layout.point_flags(mesh).items()},
@@ -91,9 +87,7 @@ def _child(parent: Node, tag: str, **attributes: str) -> Node:
 
 
 def _hdf(parent: Node, address: str, dimensions: str, kind: str, precision: int) -> None:
-    item = _child(
-        parent, "DataItem", Format="HDF", Dimensions=dimensions, NumberType=kind, Precision=str(precision)
-    )
+    item = _child(parent, "DataItem", Format="HDF", Dimensions=dimensions, NumberType=kind, Precision=str(precision))
     item.text = address
 
 
@@ -109,9 +103,7 @@ def _fields(grid: Node, reference: str, n_points: int, number: int, n_steps: int
         address, rows = f"{reference}:/VTKHDF/PointData/{name}", n_points * n_steps
         if name == "stress":
             for column, component in enumerate(STRESS_COMPONENTS):
-                attribute = _child(
-                    grid, "Attribute", Name=f"stress_{component}", AttributeType="Scalar", Center="Node"
-                )
+                attribute = _child(grid, "Attribute", Name=f"stress_{component}", AttributeType="Scalar", Center="Node")
                 selection = ((number * n_points, column), (1, 1), (n_points, 1))
                 _hyperslab(attribute, address, (rows, width), selection)
             continue
@@ -123,9 +115,7 @@ def _fields(grid: Node, reference: str, n_points: int, number: int, n_steps: int
             _hyperslab(attribute, address, (rows, width), ((number * n_points, 0), (1, 1), (n_points, width)))
 
 
-def _hyperslab(
-    parent: Node, address: str, shape: tuple[int, ...], selection: tuple[tuple[int, ...], ...]
-) -> None:
+def _hyperslab(parent: Node, address: str, shape: tuple[int, ...], selection: tuple[tuple[int, ...], ...]) -> None:
     """Refer to a part of a data set: where it starts, its stride, its size."""
     item = _child(parent, "DataItem", ItemType="HyperSlab", Dimensions=_words(selection[2]), Type="HyperSlab")
     part = _child(item, "DataItem", Format="XML", Dimensions=f"3 {len(shape)}")

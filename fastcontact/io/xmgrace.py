@@ -168,9 +168,7 @@ def _known(letter: str) -> str:
 def _axis(name: str, label: str, axis: tuple[float, float, float]) -> list[str]:
     low, high, distance = axis
     largest = max(abs(low), abs(high))
-    digits = max(
-        math.floor(math.log10(largest)) - math.floor(math.log10(distance)), 0
-    )  # that tell ticks apart
+    digits = max(math.floor(math.log10(largest)) - math.floor(math.log10(distance)), 0)  # that tell ticks apart
     style = "exponential" if largest >= 1e6 or largest < 1e-3 else "general"
     return [
         f'@    {name}axis  label "{escaped(label)}"',

@@ -167,6 +167,38 @@ def _newton_step(sides, s, t, gs, gt, hss, hst, htt):
 
 
 @kernel
+def _downhill(terms, f, s, t, sides, point, value, hss, hst, htt):
+    """Return a step down from a stationary point (s, t) that is no minimum, else zeros.
+
+    Candidates are the direction in which the Hessian is smallest, and those along the sides.
+    """
+    middle, radius = 0.5 * (hss + htt), np.sqrt(0.25 * (hss - htt) ** 2 + hst * hst)
+    if middle - radius >= -1e-9 * (abs(middle) + radius):
+        return 0.0, 0.0
+    us, ut = (hst, middle - radius - hss) if abs(hst) > 0.0 else (0.0, 1.0)
+    if abs(hst) == 0.0 and hss < htt:
+        us, ut = 1.0, 0.0
+    for k in range(-1, sides.shape[0]):
+        if k >= 0:
+            us, ut = -sides[k, 1], sides[k, 0]
+        length = 0.1 / np.sqrt(us * us + ut * ut)
+        for sign in (length, -length):
+            ps, pt = sign * us, sign * ut
+            if _fits(sides, s + ps, t + pt) and _half_square(terms, f, s + ps, t + pt, point) < value * (1.0 - 1e-12):
+                return ps, pt
+    return 0.0, 0.0
+
+
+@kernel
+def _fits(sides, s, t):
+    """Return whether (s, t) lies in the domain."""
+    for k in range(sides.shape[0]):
+        if sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t < -ON_SIDE:
+            return False
+    return True
+
+
+@kernel
 def _descend(terms, f, s, t, sides, point):
     """Return the local minimum (s, t) of the distance from `point` to facet `f`, and whether the iteration converged.
 
@@ -178,6 +210,10 @@ def _descend(terms, f, s, t, sides, point):
         ps, pt = _newton_step(sides, s, t, gs, gt, hss, hst, htt)
         size = max(abs(ps), abs(pt))
         if not size > STEP:
+            ps, pt = _downhill(terms, f, s, t, sides, point, value, hss, hst, htt)
+            if size <= STEP and (ps != 0.0 or pt != 0.0):
+                s, t = s + ps, t + pt
+                continue
             return s, t, size <= STEP
         length = 1.0
         for k in range(sides.shape[0]):

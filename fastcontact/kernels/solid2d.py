@@ -1,8 +1,8 @@
 """Element loops of 2D and axisymmetric solids: stiffness, stress at quadrature points, nodal averages.
 
 Shared arguments: ``points`` (n_points, 2); ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes),
-``dN`` (n_q, n_nodes, 2), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 4, 4) for strains (xx, yy, zz, 2xy);
-``material`` (n_cells,). Axisymmetric integrals run over the full circle: weight 2 pi r det J w.
+``dN`` (n_q, n_nodes, 2), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 4, 4) for strains
+(xx, yy, zz, 2xy); ``material`` (n_cells,). Axisymmetric integrals run over the full circle: weight 2 pi r det J w.
 """
 
 import numpy as np

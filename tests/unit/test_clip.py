@@ -65,9 +65,9 @@ def test_a_triangle_and_a_quadrangle_share_their_common_part():
 def test_facets_that_look_the_same_way_or_lie_apart_share_nothing():
     square = grid(1, 1, 0.0, True)
     assert len(cut(square, grid(1, 1, 0.1, True))[0]) == 0
-    apart = [polygon + [5.0, 0, 0] for polygon in grid(1, 1, 0.1, False)]
+    apart = [polygon + np.array([5.0, 0, 0]) for polygon in grid(1, 1, 0.1, False)]
     assert len(cut(square, apart)[0]) == 0
-    touching = [polygon + [1.0, 0, 0] for polygon in grid(1, 1, 0.1, False)]
+    touching = [polygon + np.array([1.0, 0, 0]) for polygon in grid(1, 1, 0.1, False)]
     assert len(cut(square, touching)[0]) == 0
 
 

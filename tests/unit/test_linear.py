@@ -6,8 +6,8 @@ from scipy.sparse import csr_array
 
 import fastcontact as fc
 from fastcontact import linear
-from fastcontact.errors import ModelError
 from fastcontact.analysis import Analysis, Criteria
+from fastcontact.errors import ModelError
 
 
 @pytest.fixture(scope="module")

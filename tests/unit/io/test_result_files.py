@@ -258,9 +258,7 @@ def test_readers_trust_the_number_of_steps_and_no_length(path: Path) -> None:
     write(path, 2)
     with h5py.File(path, "r+") as file:  # as if a third step had been cut off before its count was written
         tables = [file["fastcontact/steps"], file["fastcontact/notes"], *file["VTKHDF/PointData"].values()]
-        tables += [
-            table for pair in file["fastcontact/contact"].values() for table in pair.values() if table.shape
-        ]
+        tables += [table for pair in file["fastcontact/contact"].values() for table in pair.values() if table.shape]
         for table in tables:
             if table.maxshape[0] is None:
                 table.resize(len(table) + 5, axis=0)
@@ -280,9 +278,7 @@ def test_steps_can_be_followed_while_they_are_written(path: Path) -> None:
         results = open_results(path)
         assert not results.complete
         assert_same(results[1], step_result(1))
-        other = subprocess.run(
-            [sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True
-        )
+        other = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)
         assert other.stdout.strip() == "2"
         out.write(step_result(2))
     assert_same(open_results(path)[2], step_result(2))
@@ -334,12 +330,8 @@ def assert_grid_shows(grid: object, step: StepResult) -> None:
     points = vtk_to_numpy(grid.GetPoints().GetData())
     np.testing.assert_array_equal(points, np.column_stack([MESH.points, np.zeros(MESH.n_points)]))
     cells = map(grid.GetCell, range(grid.GetNumberOfCells()))
-    found = [
-        (cell.GetCellType(), [cell.GetPointId(i) for i in range(cell.GetNumberOfPoints())]) for cell in cells
-    ]
-    assert found == [
-        (elements.get(name).vtk, row) for name, block in MESH.solids.items() for row in block.tolist()
-    ]
+    found = [(cell.GetCellType(), [cell.GetPointId(i) for i in range(cell.GetNumberOfPoints())]) for cell in cells]
+    assert found == [(elements.get(name).vtk, row) for name, block in MESH.solids.items() for row in block.tolist()]
     for data, expected in (
         (grid.GetPointData(), expected_point_data(step)),
         (grid.GetCellData(), {name: np.array(values) for name, values in CELL_DATA.items()}),
@@ -436,9 +428,7 @@ def test_an_exception_leaves_all_steps_and_its_message(path: Path) -> None:
     assert os.listdir(path.parent) == [path.name], "neither lock nor temporary file may stay"
 
 
-def test_a_step_interrupted_half_way_can_be_written_again(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_step_interrupted_half_way_can_be_written_again(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with ResultWriter(path, MESH) as out:
         out.write(step_result(0))
         with monkeypatch.context() as patch:
@@ -550,9 +540,7 @@ def test_a_second_writer_is_refused_and_damages_nothing(path: Path) -> None:
         link.symlink_to(path)
         with pytest.raises(FileError, match="is being written"):
             ResultWriter(link, MESH)
-        code = (
-            f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); import test_result_files as t; "
-        )
+        code = f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); import test_result_files as t; "
         code += f"t.ResultWriter({str(path)!r}, t.MESH)"
         other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
         assert f"is being written by process {os.getpid()}" in other.stderr.splitlines()[-1]
@@ -670,9 +658,7 @@ def test_steps_that_do_not_fit(path: Path) -> None:
         return {"c": dataclasses.replace(contact, **change)}
 
     bad = {
-        rf"displacement has shape \({n - 1}, 2\), but .* needs \({n}, 2\)": {
-            "displacement": np.zeros((n - 1, 2))
-        },
+        rf"displacement has shape \({n - 1}, 2\), but .* needs \({n}, 2\)": {"displacement": np.zeros((n - 1, 2))},
         rf"stress has shape \({n}, 3\)": {"stress": good.stress[:, :3]},
         r"contact 'c': gap has shape": {"contact": contact_with(gap=np.zeros(99))},
         rf"point {n + contact.points[0]} is not": {"contact": contact_with(points=contact.points + n)},

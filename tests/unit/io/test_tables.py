@@ -184,9 +184,7 @@ def test_theory_may_be_any_callable(function) -> None:
 
 def test_theory_along_another_column_and_its_errors() -> None:
     table = contact_table(contact_result("c", 3))
-    np.testing.assert_array_equal(
-        with_theory(table, "twice", lambda s: 2 * s, "abscissa")["twice"], [0, 5, 10]
-    )
+    np.testing.assert_array_equal(with_theory(table, "twice", lambda s: 2 * s, "abscissa")["twice"], [0, 5, 10])
     np.testing.assert_array_equal(with_theory(table, "flat", lambda s: 7.0)["flat"], [7, 7, 7])
     with pytest.raises(CaseError, match="unknown column 'abcissa': did you mean 'abscissa'"):
         with_theory(table, "t", np.sqrt, "abcissa")
@@ -236,9 +234,7 @@ def test_csv_loses_no_bit(values: np.ndarray, tmp_path_factory: pytest.TempPathF
 
 def test_csv_is_what_the_standard_says(tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
-    table = np.array(
-        [(1, 0.1, True, 'a "b", c')], [("n", int), ("x", float), ("active", bool), ("group", "U9")]
-    )
+    table = np.array([(1, 0.1, True, 'a "b", c')], [("n", int), ("x", float), ("active", bool), ("group", "U9")])
     write_csv(path, table, {"x": "mm"})
     text = path.read_bytes().decode("utf-8")
     assert text == 'n,x [mm],active,group\r\n1,0.10000000000000001,true,"a ""b"", c"\r\n'

@@ -68,9 +68,7 @@ def test_every_reference_leads_to_the_right_numbers(sidecar: Path) -> None:
     for number, grid in enumerate(steps):
         step = step_result(number)
         assert float(grid.find("Time").get("Value")) == step.load_factor
-        np.testing.assert_array_equal(
-            values_of(grid.find("Geometry/DataItem"), sidecar.parent)[:, :2], MESH.points
-        )
+        np.testing.assert_array_equal(values_of(grid.find("Geometry/DataItem"), sidecar.parent)[:, :2], MESH.points)
         cells = unpacked(values_of(grid.find("Topology/DataItem"), sidecar.parent))
         assert cells == [(codes[name], row) for name, block in MESH.solids.items() for row in block.tolist()]
         found, on_cells = {}, {}

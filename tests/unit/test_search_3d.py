@@ -1,0 +1,209 @@
+"""The closest facet in three dimensions against brute force, and the frame of the projection."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from fastcontact import ContactError, elements
+from fastcontact.kernels import box_tree
+from fastcontact.search import _tables, _terms, closest, closest_of_kinds, flat_triangles
+
+KINDS = ("tri3", "tri6", "quad4", "quad8", "quad9")
+BY_SIZE = {elements.get(name).n_nodes: elements.get(name) for name in KINDS}
+
+
+def triangular(name):
+    return name.startswith("tri")
+
+
+def grid(name, n):
+    """Reference coordinates (m, 2) all over a facet, its sides included."""
+    if triangular(name):
+        s, t = (a.ravel() for a in np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, n), indexing="ij"))
+        inside = s + t <= 1 + 1e-12
+        return np.column_stack([s[inside], t[inside]])
+    s, t = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n), indexing="ij")
+    return np.column_stack([s.ravel(), t.ravel()])
+
+
+def scattered(name, seed, n, bend=0.05):
+    """Facets (n, n_nodes, 3) of about unit size anywhere in a cube, bent at random, and points near them."""
+    rng, element = np.random.default_rng(seed), elements.get(name)
+    flat = np.column_stack([element.nodes / (1 if triangular(name) else 2), np.zeros(element.n_nodes)])
+    turns = Rotation.random(n, random_state=seed).as_matrix()
+    facets = (flat * rng.uniform(0.5, 1.5, (n, 1, 3)) + bend * rng.normal(size=(n, *flat.shape))) @ turns
+    facets += rng.uniform(-2, 2, (n, 1, 3))
+    points = facets[rng.integers(n, size=20)].mean(axis=1) + rng.uniform(-0.7, 0.7, (20, 3))
+    return np.ascontiguousarray(facets), points
+
+
+def on_facets(corners, facet, xi):
+    return np.einsum("nk,nkd->nd", BY_SIZE[corners.shape[1]].shape(xi), corners[facet])
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 10_000), n=st.integers(1, 30), name=st.sampled_from(KINDS))
+def test_the_closest_facet_is_found(seed, n, name):
+    corners, points = scattered(name, seed, n)
+    found = closest(points, corners)
+    samples = np.einsum("qk,nkd->nqd", elements.get(name).shape(grid(name, 61)), corners).reshape(-1, 3)
+    expected = cKDTree(samples).query(points)[0]
+    assert np.abs(on_facets(corners, found.facet, found.xi) - found.position).max() < 1e-11
+    assert np.abs(np.linalg.norm(points - found.position, axis=1) - found.distance).max() < 1e-15
+    assert (found.distance <= expected + 1e-12).all()
+    assert (found.distance >= expected - 0.06).all()
+    assert np.abs(np.linalg.norm(found.normal, axis=1) - 1).max() < 1e-14
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10_000), name=st.sampled_from(KINDS))
+def test_a_projection_inside_a_facet_is_perpendicular_to_it(seed, name):
+    corners, points = scattered(name, seed, 6, bend=0.03)
+    found = closest(points, corners)
+    s, t = found.xi.T
+    inside = (
+        np.minimum.reduce([s, t, 1 - s - t]) > 1e-9 if triangular(name) else np.abs(found.xi).max(axis=1) < 1 - 1e-9
+    )
+    assert (found.overhang[inside] == 0).all()
+    gap = np.einsum("nd,nd->n", points - found.position, found.normal)
+    assert np.abs(np.abs(gap) - found.distance)[inside].max(initial=0.0) < 1e-11
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_facets_of_a_sphere_have_outward_normals_of_their_order(name):
+    """Patches of the sphere of radius 10 about the x axis, seen from points outside and inside."""
+    element, n = elements.get(name), 8
+    step = 0.8 / n
+    lower = np.array([[-0.4 + step * i, -0.4 + step * j] for i in range(n) for j in range(n)])
+    local = element.nodes if triangular(name) else 0.5 * (1 + element.nodes)
+    angles = [lower[:, None] + step * local]
+    if triangular(name):
+        angles.append(lower[:, None] + step * (1 - local))
+    theta, phi = np.moveaxis(np.concatenate(angles), 2, 0)
+
+    def ball(theta, phi, radius):
+        return radius * np.stack([np.cos(theta) * np.cos(phi), np.sin(theta) * np.cos(phi), np.sin(phi)], axis=-1)
+
+    rng = np.random.default_rng(1)
+    angle = rng.uniform(-0.39, 0.39, (2, 200))
+    for radius in (11.0, 9.5):
+        found = closest(ball(*angle, radius), ball(theta, phi, 10.0))
+        assert np.abs(found.distance - abs(radius - 10)).max() < (3e-2 if element.order == 1 else 2e-4)
+        assert np.abs(found.normal - ball(*angle, 1.0)).max() < (0.08 if element.order == 1 else 4e-3)
+
+
+def test_the_saddle_is_exact():
+    """The facet z = x y: seen from a point above its middle that is stationary, but the ridges come closer."""
+    corners = np.array([[[-1.0, -1, 1], [1, -1, -1], [1, 1, 1], [-1, 1, -1]]])
+    found = closest(np.array([[0.0, 0.0, 3.0], [0.3, -0.2, -0.06], [2.0, 2.0, 1.0]]), corners)
+    # Minimise 2 x^2 + (x^2 - 3)^2 along x = y: x^2 = 2, beyond the corner (1, 1).
+    assert np.abs(found.xi[0]) == pytest.approx([1.0, 1.0], abs=0)
+    assert found.distance[0] == pytest.approx(np.sqrt(6), rel=1e-15)
+    assert found.xi[1] == pytest.approx([0.3, -0.2], abs=1e-12)
+    assert found.distance[1] == pytest.approx(0.0, abs=1e-14)
+    assert found.normal[1] == pytest.approx(np.array([0.2, -0.3, 1.0]) / np.sqrt(1.13), abs=1e-12)
+    assert found.xi[2] == pytest.approx([1.0, 1.0], abs=0)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_facets_that_share_the_closest_point_are_ties_for_the_first(name):
+    element = elements.get(name)
+    rng = np.random.default_rng(3)
+    turns = [Rotation.from_rotvec([0.0, 0.0, angle]).as_matrix() for angle in rng.permutation(6)]
+    start = np.column_stack([element.nodes - element.nodes[0], np.zeros(element.n_nodes)])
+    facets = np.stack([start @ turn.T for turn in turns])  # all meet at the origin
+    points = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1e-13], [0.0, 0.0, 0.0]])
+    for order in (np.arange(6), rng.permutation(6)):
+        found = closest(points, facets[order])
+        assert found.facet.tolist() == [0, 0, 0]
+        assert found.xi == pytest.approx(np.tile(element.nodes[0], (3, 1)), abs=1e-9)
+
+
+def test_overhang_counts_facet_lengths_beyond_the_sides():
+    quad = np.array([[[0.0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]]])
+    triangle = np.array([[[0.0, 0, 0], [2, 0, 0], [0, 1, 0]]])
+    points = np.array([[3.0, 0.5, 1], [1.0, -0.25, 0], [-1.0, 1.5, 0.1], [0.5, 0.2, 5]])
+    assert closest(points, quad).overhang == pytest.approx([0.5, 0.25, 0.5, 0.0], abs=1e-15)
+    # Beyond the third side s + t = 1 of the triangle: (3, 0.5) has s = 1.5, t = 0.5; its foot is the corner (2, 0).
+    assert closest(points, triangle).overhang == pytest.approx([1.0, 0.25, 0.5, 0.0], abs=1e-15)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_turning_and_scaling_everything_changes_only_rounding(name):
+    corners, points = scattered(name, 5, 25)
+    turn, shift, scale = Rotation.random(random_state=6).as_matrix(), np.array([3.0, -20.0, 7.0]), 1e-6
+    one = closest(points, corners)
+    other = closest(scale * (points @ turn.T + shift), scale * (corners @ turn.T + shift))
+    assert np.array_equal(one.facet, other.facet)
+    assert np.abs(one.xi - other.xi).max() < 1e-11
+    assert np.abs(one.overhang - other.overhang).max() < 1e-11
+    assert np.abs(one.distance - other.distance / scale).max() < 1e-12
+    assert np.abs(one.normal @ turn.T - other.normal).max() < 1e-11
+
+
+def test_several_kinds_are_one_surface():
+    kinds = [scattered(name, 7, 9)[0] for name in ("tri3", "quad8", "tri6")]
+    points = scattered("quad4", 8, 30)[1]
+    found = closest_of_kinds(points, kinds)
+    alone = [closest(points, corners) for corners in kinds]
+    assert found.distance == pytest.approx(np.min([one.distance for one in alone], axis=0), abs=0)
+    for i, facet in enumerate(found.facet):
+        kind, row = divmod(facet, 9)
+        assert alone[kind].facet[i] == row
+        assert alone[kind].xi[i] == pytest.approx(found.xi[i], abs=0)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_tables_are_those_of_the_elements(name):
+    element = elements.get(name)
+    nodes, sides, to_terms, hull, bend = _tables(element.n_nodes)
+    assert np.array_equal(nodes, element.nodes)
+    xi = grid(name, 31)
+    assert np.abs(_terms(xi, element.n_nodes) @ to_terms - element.shape(xi)).max() < 1e-14
+    assert (xi @ sides[:, :2].T <= sides[:, 2] + 1e-14).all()
+    # Facets lie in the box of their hull, and no farther than their bend from the flat triangles between their nodes.
+    corners = np.random.default_rng(2).normal(size=(50, element.n_nodes, 3))
+    on = np.einsum("qk,nkd->nqd", element.shape(xi), corners)
+    box = hull @ corners
+    assert (on.min(axis=1) >= box.min(axis=1) - 1e-12).all()
+    assert (on.max(axis=1) <= box.max(axis=1) + 1e-12).all()
+    allowed = np.linalg.norm(to_terms @ corners, axis=2) @ bend
+    weights = np.array([[1, 1, 1], [2, 1, 0], [0, 1, 2], [3, 1, 2]]) / np.array([[3], [3], [3], [6]])
+    for flat in flat_triangles(element.n_nodes):
+        curved = np.einsum("qk,nkd->nqd", element.shape(weights @ nodes[flat]), corners)
+        assert (np.linalg.norm(curved - weights @ corners[:, flat], axis=2) <= allowed[:, None] + 1e-12).all()
+    areas = [np.linalg.det(nodes[flat[1:]] - nodes[flat[0]]) / 2 for flat in flat_triangles(element.n_nodes)]
+    assert min(areas) > 0
+    assert sum(areas) == pytest.approx(0.5 if triangular(name) else 4.0)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_tree_holds_every_facet_once_and_its_boxes_hold_theirs(dim):
+    rng = np.random.default_rng(4)
+    low = np.round(rng.uniform(0, 3, (203, dim)))  # many equal centres
+    high = low + rng.integers(0, 3, (203, dim))
+    box_low, box_high, child, span, order = box_tree.build(low, high)
+    assert np.array_equal(np.sort(order), np.arange(203))
+    for box in range(len(child)):
+        mine = order[span[box, 0] : span[box, 1]]
+        assert np.array_equal(box_low[box], low[mine].min(axis=0))
+        assert np.array_equal(box_high[box], high[mine].max(axis=0))
+        if child[box] < 0:
+            assert len(mine) <= box_tree.LEAF
+        else:
+            halves = span[child[box] : child[box] + 2]
+            assert halves.ravel().tolist() == [span[box, 0], halves[0, 1], halves[0, 1], span[box, 1]]
+            assert abs(np.diff(halves, axis=1).ravel() @ [1, -1]) <= 1
+
+
+def test_what_cannot_be_projected_is_told():
+    corners, points = scattered("quad4", 1, 3)
+    with pytest.raises(ContactError, match="1 points to project are not finite"):
+        closest(np.vstack([points, [np.nan, 0, 0]]), corners)
+    with pytest.raises(ContactError, match=r"did not converge .* folded or collapsed"):
+        closest(points, np.ones((1, 4, 3)))
+    with pytest.raises(ContactError, match=r"no facets of 5 nodes .* \[3, 4, 6, 8, 9\]"):
+        closest(points, np.ones((1, 5, 3)))
