@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from fastcontact import elements, generate
 from fastcontact.convergence.settings import Settings, makeable, shape_of
 from fastcontact.errors import CaseError, FastcontactError, unknown
 from fastcontact.generate import Circle, circles, linearised, refined, to_quadratic
+from fastcontact.generate.quadratic import Curve
 from fastcontact.mesh import Mesh
 
 Arguments = dict[str, Any]
@@ -35,6 +36,9 @@ def _counts(*names: str) -> Callable[..., tuple[Arguments, tuple[str, ...], tupl
 
     return rule
 
+
+# Free triangles are made anew up to this level and halved from there on, which takes a thousandth of the time.
+FREE_UP_TO = 3
 
 # By generator: defaults that depend on other arguments, arguments to halve, arguments to double.
 RULES = {
@@ -67,7 +71,12 @@ def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
     # Where level 0 is given by shape, it is that of quadratic cells; linear ones stand on the same nodes.
     finer = level + int(shape in settings.arguments and elements.get(element).order == 1)
     given = settings.arguments.get(shape, settings.arguments.get("", {}))
-    return {"generator": settings.generator, "arguments": _finer(settings, element, given, finer)}
+    made = min(finer, FREE_UP_TO) if shape == "triangles" else finer
+    return {
+        "generator": settings.generator,
+        "arguments": _finer(settings, element, given, made),
+        "refinements": finer - made,
+    }
 
 
 def _not_makeable(settings: Settings, element: str) -> str:
@@ -120,7 +129,8 @@ def make_mesh(recipe: Recipe, base: Mesh | None) -> Mesh:
     """
     if "generator" in recipe:
         arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in recipe["arguments"].items()}
-        return generate.GENERATORS[recipe["generator"]](**arguments)
+        mesh = generate.GENERATORS[recipe["generator"]](**arguments)
+        return _refined(mesh, recipe["refinements"], circles(mesh) if recipe["refinements"] else [])
     if base is None:
         raise FastcontactError("a mesh that is refined needs the mesh to start from")
     return _from_file(recipe, base)
@@ -134,8 +144,14 @@ def _from_file(recipe: Recipe, base: Mesh) -> Mesh:
     mesh = base
     if element is not None and elements.get(element).order == 1 and orders != {1}:
         mesh = linearised(mesh)
-    for _ in range(recipe["refinements"]):
-        mesh = refined(mesh, curves)
+    mesh = _refined(mesh, recipe["refinements"], curves)
     if element is not None and elements.get(element).order == 2 and (orders == {1} or element not in mesh.solids):
         mesh = to_quadratic(linearised(mesh), curves, centre_nodes=element == "quad9")
+    return mesh
+
+
+def _refined(mesh: Mesh, times: int, curves: Iterable[Curve]) -> Mesh:
+    kept = list(curves)
+    for _ in range(times):
+        mesh = refined(mesh, kept)
     return mesh
