@@ -19,11 +19,9 @@ from fastcontact.mesh_quality import check_cells
 Array = NDArray[np.float64]
 Map = Callable[[Array, Array, Array], Array]
 
-# The apex of a pyramid in a thin curved cell would stand outside it.
-SOLIDS = ("hex8", "hex20", "hex27", "tet4", "tet10", "wedge6", "wedge15", "wedge18")
+# Wedges of different blocks would not match, and the apex of a pyramid in a thin curved cell would stand outside it.
+SOLIDS = ("hex8", "hex20", "hex27", "tet4", "tet10")
 
-# Growth of the edges per distance beyond the contact.
-GROWTH = 0.4
 # Middle of the faces of the inner block over the radius, and how far its faces bulge from a cube to a ball.
 INNER, BULGE = 0.45, 0.5
 
@@ -36,6 +34,7 @@ def sphere_on_block(
     size: float | None = None,
     contact_size: float | None = None,
     contact_radius: float | None = None,
+    growth: float = 0.4,
 ) -> Mesh:
     """Lower half of a sphere on a block, the quarter x >= 0, z >= 0 of both.
 
@@ -47,7 +46,7 @@ def sphere_on_block(
 
     Parameters
     ----------
-    element : {"hex8", "hex20", "hex27", "tet4", "tet10", "wedge6", "wedge15", "wedge18"}
+    element : {"hex8", "hex20", "hex27", "tet4", "tet10"}
         Element of both solids. All nodes of the surface lie on the sphere.
     R : float
         Radius of the sphere [length].
@@ -60,6 +59,9 @@ def sphere_on_block(
     contact_radius : float, optional
         Distance from the pole up to which `contact_size` holds, R/10 by default; half as deep below the surfaces
         [length].
+    growth : float
+        Increase of the edges over the distance beyond, until they reach `size`. It bounds the accuracy that a smaller
+        `contact_size` brings.
 
     Raises
     ------
@@ -75,9 +77,10 @@ def sphere_on_block(
     one_of("element", element, SOLIDS)
     R = positive("R", R)
     width, height = (R, R) if block_size is None else pair("block_size", block_size)
-    sizes = {"size": size, "contact_size": contact_size, "contact_radius": contact_radius}
-    sphere = sphere_octant(element, R=R, **sizes)
-    spacing = _spacing(R, **sizes)
+    sphere = sphere_octant(
+        element, R=R, size=size, contact_size=contact_size, contact_radius=contact_radius, growth=growth
+    )
+    spacing = _spacing(R, size, contact_size, contact_radius, growth)
     across = _graded(positive("block_size[0]", width), spacing)
     down = _graded(positive("block_size[1]", height), _shallow(spacing))
     names = {"BLOCK": "BLOCK", "XMIN": "SYMMETRY_X", "YMIN": "SYMMETRY_Z", "ZMIN": "CONT_BLOCK", "ZMAX": "BLOCK_BOTTOM"}
@@ -95,6 +98,7 @@ def sphere_octant(
     size: float | None = None,
     contact_size: float | None = None,
     contact_radius: float | None = None,
+    growth: float = 0.4,
 ) -> Mesh:
     """Lower half of a sphere, the quarter x >= 0, z >= 0: the upper body of `sphere_on_block`, with its groups.
 
@@ -102,7 +106,7 @@ def sphere_octant(
 
     Parameters
     ----------
-    element, R, size, contact_size, contact_radius
+    element, R, size, contact_size, contact_radius, growth
         As for `sphere_on_block`.
 
     Raises
@@ -112,7 +116,7 @@ def sphere_octant(
     """
     one_of("element", element, SOLIDS)
     R = positive("R", R)
-    spacing = _spacing(R, size, contact_size, contact_radius)
+    spacing = _spacing(R, size, contact_size, contact_radius, growth)
     eighth = math.pi / 4
     around = _graded(R * eighth, spacing) / R
     outward = 1.0 - _graded((1.0 - INNER) * R, _shallow(spacing))[::-1] / ((1.0 - INNER) * R)
@@ -157,11 +161,13 @@ def _ball(cube: Array) -> Array:
     return cube * np.sqrt(1.0 - next_ / 2 - last / 2 + next_ * last / 3)
 
 
-def _spacing(R: float, size: float | None, contact_size: float | None, contact_radius: float | None) -> Spacing:
+def _spacing(
+    R: float, size: float | None, contact_size: float | None, contact_radius: float | None, growth: float
+) -> Spacing:
     far = R / 4 if size is None else positive("size", size, R / 2, "R/2")
     near = min(R / 50, far) if contact_size is None else positive("contact_size", contact_size, far, "size")
     plateau = R / 10 if contact_radius is None else positive("contact_radius", contact_radius, R / 2, "R/2")
-    return Spacing(near, far, plateau=plateau, reach=plateau + max(far - near, near) / GROWTH)
+    return Spacing(near, far, plateau=plateau, reach=plateau + max(far - near, near) / positive("growth", growth, 1.0))
 
 
 def _shallow(spacing: Spacing) -> Spacing:

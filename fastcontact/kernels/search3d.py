@@ -262,6 +262,15 @@ def _project(terms, corners, f, bend, nodes, triangles, sides, point, reach):
         value = _half_square(terms, f, a, b, point)
         if value < best:
             s, t, best, converged = a, b, value, good
+    size = 0.0
+    for d in range(3):
+        size += (corners[f, 1, d] - corners[f, 0, d]) ** 2
+    # Near the centres of curvature the distance has several minima on one triangle: start from every node too.
+    for k in range(nodes.shape[0] if np.sqrt(2.0 * best) * 16.0 * bend > size else 0):
+        a, b, good = _descend(terms, f, nodes[k, 0], nodes[k, 1], sides, point)
+        value = _half_square(terms, f, a, b, point)
+        if value < best:
+            s, t, best, converged = a, b, value, good
     return s, t, best, converged
 
 

@@ -1,0 +1,294 @@
+"""Node-to-segment and continuous contact in three dimensions: patch tests, spheres, equilibrium, invariance."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import fastcontact as fc
+from fastcontact.generate import box, merge_points, renamed, sphere_octant, sphere_on_block, union
+
+LINEAR = ("hex8", "tet4", "wedge6", "pyramid5")
+QUADRATIC = ("hex20", "hex27", "tet10", "wedge15", "wedge18", "pyramid13")
+E, NU = 1000.0, 0.3
+
+
+def body(name, element, divisions, z):
+    """A unit cube with its groups; "mixed" stands for hexahedra and wedges side by side."""
+    if element in ("mixed", "mixed quadratic"):
+        left, right = ("hex8", "wedge6") if element == "mixed" else ("hex20", "wedge15")
+        halves = [
+            renamed(box((0.5, 1.0, 1.0), divisions, kind, (x, 0.0, z), name=name), {inner: None})
+            for kind, x, inner in ((left, 0.0, "XMAX"), (right, 0.5, "XMIN"))
+        ]
+        part = merge_points(union(*halves), tolerance=1e-9)
+    else:
+        part = box((1.0, 1.0, 1.0), divisions, element, (0.0, 0.0, z), name=name)
+    return renamed(part, lambda group: group if group == name else f"{name}_{group}")
+
+
+def two_cubes(lower, upper, divisions=((2, 3, 2), (2, 3, 2))):
+    return union(body("LOWER", lower, divisions[0], -1.0), body("UPPER", upper, divisions[1], 0.0))
+
+
+def pressed(mesh, formulation, swap=False, push=0.01, **options):
+    model = fc.Model(mesh, "3d")
+    model.add_material(fc.LinearElastic(E=E, nu=NU))
+    for name in ("LOWER", "UPPER"):
+        model.fix(f"{name}_XMIN", "x")
+        model.fix(f"{name}_YMIN", "y")
+    model.fix("LOWER_ZMIN", "z")
+    model.prescribe("UPPER_ZMAX", z=-push)
+    sides = ("UPPER_ZMIN", "LOWER_ZMAX") if swap else ("LOWER_ZMAX", "UPPER_ZMIN")
+    model.add_contact("pair", secondary=sides[0], primary=sides[1], formulation=formulation, **options)
+    return model
+
+
+def is_uniform(last, pressure, tolerance=1e-10):
+    assert np.abs(last.stress[:, 2] + pressure).max() < tolerance * pressure
+    assert np.abs(last.stress[:, [0, 1, 3, 4, 5]]).max() < tolerance * pressure
+    assert last.contact["pair"].pressure == pytest.approx(pressure, rel=tolerance)
+    assert last.contact["pair"].active.all()
+
+
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize(
+    ("element", "formulation"),
+    [(e, "node_to_segment") for e in (*LINEAR, "hex27", "mixed")]
+    + [(e, "continuous") for e in (*LINEAR, *QUADRATIC, "mixed", "mixed quadratic")],
+)
+def test_matching_meshes_transmit_a_uniform_pressure_exactly(element, formulation, swap):
+    last = fc.solve(pressed(two_cubes(element, element), formulation, swap), fc.linear_ramp(2))[-1]
+    is_uniform(last, E * 0.01 / 2.0)
+
+
+# Where they make sense: two points do not determine quadratic fields, some corners have no area.
+RULES = [(e, {"integration": "simpson"}) for e in ("hex8", "tet4", "hex20", "tet10", "hex27")]
+RULES += [(e, {"n_gauss": 5}) for e in ("hex8", "tet4", "hex20", "tet10", "hex27")]
+RULES += [(e, {"n_gauss": 2}) for e in ("hex8", "tet4")] + [(e, {"n_gauss": 3}) for e in ("hex20", "tet10", "hex27")]
+RULES += [(e, {"integration": "node"}) for e in ("hex8", "tet4", "hex27")]
+
+
+@pytest.mark.parametrize(("element", "options"), RULES)
+def test_the_continuous_pressure_is_exact_with_every_rule(element, options):
+    is_uniform(fc.solve(pressed(two_cubes(element, element), "continuous", **options), fc.linear_ramp(1))[-1], 5.0)
+
+
+@pytest.mark.parametrize(("lower", "upper"), [("hex8", "hex20"), ("hex27", "hex8")])
+def test_a_finer_field_on_a_flat_primary_side_is_exact_too(lower, upper):
+    """Facets nested in those of the other side: every rule integrates their gap exactly."""
+    mesh = two_cubes(lower, upper, ((4, 4, 2), (2, 2, 2)))
+    is_uniform(fc.solve(pressed(mesh, "continuous"), fc.linear_ramp(1))[-1], 5.0)
+
+
+def test_meshes_that_do_not_match_transmit_the_force():
+    """Neither formulation passes the patch test there; the resultant is that of the pressure, the error bounded."""
+    mesh = two_cubes("hex8", "hex8", ((3, 3, 2), (4, 4, 2)))
+    for formulation, force, pressure in (("node_to_segment", 1e-2, 0.3), ("continuous", 5e-4, 0.1)):
+        contact = fc.solve(pressed(mesh, formulation), fc.linear_ramp(1))[-1].contact["pair"]
+        assert -contact.force[2] == pytest.approx(5.0, rel=force)
+        assert contact.pressure == pytest.approx(5.0, rel=pressure)
+
+
+def test_bodies_apart_stay_open_and_carry_nothing():
+    last = fc.solve(pressed(two_cubes("hex8", "hex8"), "node_to_segment", push=-0.25), fc.linear_ramp(2))[-1]
+    contact = last.contact["pair"]
+    assert not contact.active.any()
+    assert contact.gap == pytest.approx(0.25, rel=1e-12)
+    assert np.abs(last.stress).max() < 1e-12 * E
+    assert np.isnan(contact.radius).all()
+
+
+# Spheres: R = 50, E = 20 000, nu = 0.3.
+
+
+def sphere_model(mesh, formulation, swap=False, push=0.5, **options):
+    model = fc.Model(mesh, "3d")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model.fix("SYMMETRY_X", "x")
+    model.fix("SYMMETRY_Z", "z")
+    model.prescribe("SPHERE_TOP", y=-push)
+    sides = ("CONT_BLOCK", "CONT_SPHERE") if swap else ("CONT_SPHERE", "CONT_BLOCK")
+    model.add_contact("hertz", secondary=sides[0], primary=sides[1], formulation=formulation, **options)
+    return model
+
+
+def on_rigid_plate(element, formulation, contact_size):
+    """The sphere on a plate all of whose nodes are held: half of two equal spheres. All sizes fall together."""
+    sizes = {"size": 8.0 * contact_size, "contact_size": contact_size, "growth": 0.2 * contact_size}
+    sphere = sphere_octant(element, contact_radius=6.0, **sizes)
+    plate = box((30.0, 10.0, 30.0), (1, 1, 1), "hex8", (0.0, -10.0, 0.0), name="PLATE")
+    model = sphere_model(union(sphere, renamed(plate, {"YMAX": "CONT_BLOCK"})), formulation)
+    model.fix("PLATE", "xyz")
+    return model
+
+
+def on_elastic_block(element, formulation, contact_size, swap=False):
+    mesh = sphere_on_block(element, size=12.5, contact_size=contact_size, contact_radius=6.0)
+    model = sphere_model(mesh, formulation, swap)
+    model.fix("BLOCK_BOTTOM", "y")
+    return model
+
+
+def measured(contact):
+    """Force over all four quarters, pressure at the pole, and radius from the first moment of the pressure.
+
+    Under Hertz's pressure the mean distance of the force from the axis is 3 pi / 16 of the radius.
+    """
+    push = contact.force_vectors[:, 1] * np.sign(contact.force[1])
+    radius = 16 / (3 * np.pi) * (push @ contact.abscissa) / push.sum()
+    return 4 * push.sum(), contact.pressure[np.argmin(contact.abscissa)], radius
+
+
+@cache
+def plate_contact(element, formulation, contact_size):
+    model = on_rigid_plate(element, formulation, contact_size)
+    return fc.solve(model, fc.linear_ramp(1), linear_solver="direct")[-1].contact["hertz"]
+
+
+@pytest.mark.parametrize(
+    ("element", "formulation", "contact_size", "tolerances"),
+    [
+        ("hex8", "node_to_segment", 1.4, (0.01, 0.01, 0.01)),
+        ("hex8", "continuous", 1.2, (0.01, 0.02, 0.01)),
+        pytest.param("hex27", "continuous", 1.5, (0.01, 0.02, 0.01), marks=pytest.mark.slow),
+        pytest.param("hex20", "continuous", 1.5, (0.01, 0.02, 0.01), marks=pytest.mark.slow),
+    ],
+)
+def test_a_sphere_on_a_rigid_plate_is_half_of_two_spheres(element, formulation, contact_size, tolerances):
+    """Force, pressure and radius of the mesh-converged finite bodies, not of Hertz: a/R is 0.1 here."""
+    exact = fc.analytic.finite_half_spheres(1.0)
+    contact = plate_contact(element, formulation, contact_size)
+    for value, reference, tolerance in zip(
+        measured(contact), (exact.force, exact.pressure_max, exact.radius), tolerances, strict=True
+    ):
+        assert value == pytest.approx(reference, rel=tolerance)
+    inner, outer = contact.radius
+    assert inner - contact_size < exact.radius < outer + contact_size
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+def test_errors_fall_with_the_mesh(formulation):
+    """Of force, pressure and radius together: each alone may pass through zero."""
+    exact = fc.analytic.finite_half_spheres(1.0)
+    reference = np.array([exact.force, exact.pressure_max, exact.radius])
+    errors = [
+        np.linalg.norm(np.array(measured(plate_contact("hex8", formulation, size))) / reference - 1)
+        for size in (2.8, 2.0, 1.4)
+    ]
+    assert errors[2] < errors[1] < errors[0]
+    assert errors[2] < 0.4 * errors[0]
+
+
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+def test_a_sphere_on_an_elastic_block_agrees_with_hertz_at_equal_force(formulation, swap):
+    model = on_elastic_block("hex8", formulation, 1.4, swap)
+    contact = fc.solve(model, fc.linear_ramp(1), linear_solver="direct")[-1].contact["hertz"]
+    force, pressure, radius = measured(contact)
+    hertz = fc.analytic.hertz_point(E1=20_000.0, nu1=0.3, R1=50.0, E2=20_000.0, nu2=0.3, force=force)
+    assert pressure == pytest.approx(hertz.pressure_max, rel=0.02)
+    assert radius == pytest.approx(hertz.radius, rel=0.02)
+
+
+def test_swapping_the_sides_changes_no_more_than_the_mesh_error():
+    forces = []
+    for swap in (False, True):
+        model = on_elastic_block("hex8", "continuous", 1.8, swap)
+        forces.append(measured(fc.solve(model, fc.linear_ramp(1), linear_solver="direct")[-1].contact["hertz"]))
+    assert forces[0][0] == pytest.approx(forces[1][0], rel=0.01)
+    assert forces[0][2] == pytest.approx(forces[1][2], rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("element", "formulation"),
+    [(e, "node_to_segment") for e in ("hex8", "tet4")]
+    + [(e, "continuous") for e in ("hex8", "hex20", "tet4", "tet10")],
+)
+def test_forces_are_in_equilibrium(element, formulation):
+    mesh = sphere_on_block(element, size=25.0, contact_size=5.0, contact_radius=5.0)
+    model = sphere_model(mesh, formulation)
+    model.fix("BLOCK_BOTTOM", "y")
+    for step in fc.solve(model, fc.linear_ramp(2), linear_solver="direct"):
+        contact = step.contact["hertz"]
+        bottom = step.reaction[mesh.points_of("BLOCK_BOTTOM"), 1].sum()
+        top = step.reaction[mesh.points_of("SPHERE_TOP"), 1].sum()
+        assert bottom > 100.0
+        assert bottom + top == pytest.approx(0.0, abs=1e-8 * bottom)
+        assert contact.force[1] == pytest.approx(bottom, rel=1e-8)
+        if formulation == "node_to_segment":
+            assert contact.gap[contact.active] == pytest.approx(0.0, abs=1e-9)
+            assert contact.gap.min() > -1e-9
+            assert contact.pressure.min() >= 0.0
+
+
+def turned(rotation, formulation, **options):
+    mesh = sphere_on_block("hex8", size=25.0, contact_size=3.0, contact_radius=5.0, block_size=(30.0, 30.0))
+    model = fc.Model(mesh.replace(points=mesh.points @ rotation.T), "3d")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model.fix("BLOCK_BOTTOM", "xyz")
+    model.prescribe("SPHERE_TOP", **dict(zip("xyz", rotation @ [0.1, -0.5, 0.05], strict=True)))
+    model.add_contact("pair", secondary="CONT_SPHERE", primary="CONT_BLOCK", formulation=formulation, **options)
+    return fc.solve(model, fc.linear_ramp(1), linear_solver="direct")[-1]
+
+
+@pytest.mark.parametrize(
+    ("formulation", "options"),
+    [
+        ("node_to_segment", {}),
+        ("node_to_segment", {"normals": "facet"}),
+        ("continuous", {}),
+        ("continuous", {"integration": "simpson"}),
+    ],
+)
+def test_turning_the_model_changes_only_rounding(formulation, options):
+    rotation = Rotation.random(random_state=1).as_matrix()
+    one, other = turned(np.eye(3), formulation, **options), turned(rotation, formulation, **options)
+    size = np.abs(one.displacement).max()
+    assert np.abs(one.displacement @ rotation.T - other.displacement).max() < 1e-9 * size
+    assert np.abs(one.von_mises - other.von_mises).max() < 1e-9 * one.von_mises.max()
+    a, b = one.contact["pair"], other.contact["pair"]
+    assert np.array_equal(a.active, b.active)
+    assert np.abs(a.pressure - b.pressure).max() < 1e-9 * a.pressure_max
+    assert a.radius == pytest.approx(b.radius, rel=1e-9)
+    assert a.abscissa == pytest.approx(b.abscissa, abs=1e-9 * 50)
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+def test_direct_and_multigrid_agree(formulation):
+    mesh = sphere_on_block("hex8", size=25.0, contact_size=5.0, contact_radius=5.0, block_size=(30.0, 30.0))
+    model = sphere_model(mesh, formulation)
+    model.fix("BLOCK_BOTTOM", "y")
+    direct, amg = (fc.solve(model, fc.linear_ramp(1), linear_solver=name)[-1] for name in ("direct", "amg"))
+    assert np.abs(direct.displacement - amg.displacement).max() < 1e-6 * np.abs(direct.displacement).max()
+    assert amg.contact["hertz"].pressure_max == pytest.approx(direct.contact["hertz"].pressure_max, rel=1e-6)
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+def test_units_do_not_matter(formulation):
+    mesh = sphere_on_block("hex8", size=25.0, contact_size=5.0, contact_radius=5.0, block_size=(30.0, 30.0))
+    results = []
+    for length, pressure in ((1.0, 1.0), (1e-3, 1e6), (1e6, 1e-9)):
+        model = fc.Model(mesh.replace(points=mesh.points * length), "3d")
+        model.add_material(fc.LinearElastic(E=20_000.0 * pressure, nu=0.3))
+        model.fix("SYMMETRY_X", "x")
+        model.fix("SYMMETRY_Z", "z")
+        model.fix("BLOCK_BOTTOM", "y")
+        model.prescribe("SPHERE_TOP", y=-0.5 * length)
+        model.add_contact("hertz", secondary="CONT_SPHERE", primary="CONT_BLOCK", formulation=formulation)
+        last = fc.solve(model, fc.linear_ramp(1), linear_solver="direct")[-1]
+        results.append((last.stress / pressure, last.iterations["active_set_iterations"]))
+    for stress, iterations in results[1:]:
+        assert np.abs(stress - results[0][0]).max() < 1e-9 * np.abs(results[0][0]).max()
+        assert iterations == results[0][1]
+
+
+def test_results_of_three_dimensions_go_to_a_file_and_back(tmp_path):
+    model = pressed(two_cubes("mixed", "mixed"), "node_to_segment")
+    with fc.ResultWriter(tmp_path / "pair.vtkhdf", model) as out:
+        last = fc.solve(model, fc.linear_ramp(1), on_step=out.write)[-1]
+    read = fc.open_results(tmp_path / "pair.vtkhdf")[-1].contact["pair"]
+    assert np.array_equal(read.force, last.contact["pair"].force)
+    assert np.array_equal(read.pressure, last.contact["pair"].pressure)
+    assert np.array_equal(read.abscissa, last.contact["pair"].abscissa)
