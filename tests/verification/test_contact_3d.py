@@ -85,7 +85,7 @@ def test_a_finer_field_on_a_flat_primary_side_is_exact_too(lower, upper):
 def test_meshes_that_do_not_match_transmit_the_force():
     """Neither formulation passes the patch test there; the resultant is that of the pressure, the error bounded."""
     mesh = two_cubes("hex8", "hex8", ((3, 3, 2), (4, 4, 2)))
-    for formulation, force, pressure in (("node_to_segment", 1e-2, 0.3), ("continuous", 5e-4, 0.1)):
+    for formulation, force, pressure in (("node_to_segment", 1e-2, 0.3), ("continuous", 1e-3, 0.1)):
         contact = fc.solve(pressed(mesh, formulation), fc.linear_ramp(1))[-1].contact["pair"]
         assert -contact.force[2] == pytest.approx(5.0, rel=force)
         assert contact.pressure == pytest.approx(5.0, rel=pressure)
@@ -114,10 +114,9 @@ def sphere_model(mesh, formulation, swap=False, push=0.5, **options):
     return model
 
 
-def on_rigid_plate(element, formulation, contact_size):
-    """The sphere on a plate all of whose nodes are held: half of two equal spheres. All sizes fall together."""
-    sizes = {"size": 8.0 * contact_size, "contact_size": contact_size, "growth": 0.2 * contact_size}
-    sphere = sphere_octant(element, contact_radius=6.0, **sizes)
+def on_rigid_plate(element, formulation, **sizes):
+    """The sphere on a plate all of whose nodes are held: half of two equal spheres."""
+    sphere = sphere_octant(element, **sizes)
     plate = box((30.0, 10.0, 30.0), (1, 1, 1), "hex8", (0.0, -10.0, 0.0), name="PLATE")
     model = sphere_model(union(sphere, renamed(plate, {"YMAX": "CONT_BLOCK"})), formulation)
     model.fix("PLATE", "xyz")
@@ -143,7 +142,11 @@ def measured(contact):
 
 @cache
 def plate_contact(element, formulation, contact_size):
-    model = on_rigid_plate(element, formulation, contact_size)
+    """All sizes of the mesh but the finely meshed radius fall together; quadratic elements do with a coarser one."""
+    sizes = {"size": 8.0 * contact_size, "contact_radius": 6.0, "growth": 0.2 * contact_size}
+    if element != "hex8":
+        sizes = {"size": 25.0, "contact_radius": 5.0}
+    model = on_rigid_plate(element, formulation, contact_size=contact_size, **sizes)
     return fc.solve(model, fc.linear_ramp(1), linear_solver="direct")[-1].contact["hertz"]
 
 
