@@ -375,9 +375,10 @@ class Analysis:
 
     def _cycling(self, state: active_set.State, constraints: Constraints) -> str:
         wrong = np.flatnonzero(state.active != state.wanted)
+        what = f"{len(wrong)} constraints still change (first near {constraints.positions[wrong[0]]})" if len(wrong) else ""
         return (
-            f"the active set did not settle in {state.iterations} iterations: {len(wrong)} constraints still change "
-            f"(first near {constraints.positions[wrong[0]]}). Use more load steps or the direct linear solver"
+            f"the active set did not settle in {state.iterations} iterations: "
+            f"{what or 'sliding constraints still turn'}. Use more load steps or the direct linear solver"
         )
 
     def _balance(self, contact_force: Array, index: int, history: list[dict[str, Any]]) -> Array:
