@@ -375,7 +375,11 @@ class Analysis:
 
     def _cycling(self, state: active_set.State, constraints: Constraints) -> str:
         wrong = np.flatnonzero(state.active != state.wanted)
-        what = f"{len(wrong)} constraints still change (first near {constraints.positions[wrong[0]]})" if len(wrong) else ""
+        what = (
+            f"{len(wrong)} constraints still change (first near {constraints.positions[wrong[0]]})"
+            if len(wrong)
+            else ""
+        )
         return (
             f"the active set did not settle in {state.iterations} iterations: "
             f"{what or 'sliding constraints still turn'}. Use more load steps or the direct linear solver"
