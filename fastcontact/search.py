@@ -124,14 +124,18 @@ def _on_faces(points: Array, corners: Array) -> Closest:
     n = len(points)
     facet, xi, normal, overhang = np.empty(n, np.intp), np.empty((n, 2)), np.empty((n, 3)), np.empty(n)
     position, status = np.empty((n, 3)), np.empty(n, np.int8)
+    # Neighbours one after the other: each finds the facets of the last one in the cache, and a good first guess.
+    order = box_tree.build(points, points)[4] if n else np.empty(0, np.intp)
     search3d.closest_facets(
-        points, terms, corners, bend, nodes, flat_triangles(len(nodes)), sides, low, high,
+        points[order], terms, corners, bend, nodes, flat_triangles(len(nodes)), sides, low, high,
         *box_tree.build(low, high), facet, xi, normal, overhang, position, status,
     )  # fmt: skip
     wrong = np.flatnonzero(status != search3d.CONVERGED)
     if len(wrong):
-        _refuse(points[wrong], facet[wrong], corners)
-    return Closest(facet, xi, normal, overhang, position, np.linalg.norm(points - position, axis=1))
+        _refuse(points[order[wrong]], facet[wrong], corners)
+    distance = np.linalg.norm(points[order] - position, axis=1)
+    back = np.argsort(order)
+    return Closest(facet[back], xi[back], normal[back], overhang[back], position[back], distance[back])
 
 
 def _refuse(points: Array, facet: NDArray[np.intp], corners: Array) -> None:

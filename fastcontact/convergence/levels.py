@@ -37,9 +37,6 @@ def _counts(*names: str) -> Callable[..., tuple[Arguments, tuple[str, ...], tupl
     return rule
 
 
-# Free triangles are made anew up to this level and halved from there on, which takes a thousandth of the time.
-FREE_UP_TO = 3
-
 # By generator: defaults that depend on other arguments, arguments to halve, arguments to double.
 RULES = {
     "half-spheres": _spheres,
@@ -71,11 +68,12 @@ def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
     # Where level 0 is given by shape, it is that of quadratic cells; linear ones stand on the same nodes.
     finer = level + int(shape in settings.arguments and elements.get(element).order == 1)
     given = settings.arguments.get(shape, settings.arguments.get("", {}))
-    made = min(finer, FREE_UP_TO) if shape == "triangles" else finer
+    # Free triangles of other sizes lie in another pattern, and the largest pressure jumps with it: refined, they do not.
+    free = shape == "triangles"
     return {
         "generator": settings.generator,
-        "arguments": _finer(settings, element, given, made),
-        "refinements": finer - made,
+        "arguments": _finer(settings, element, given, 0 if free else finer),
+        "refinements": finer if free else 0,
     }
 
 

@@ -267,14 +267,14 @@ def linearised(mesh: Mesh) -> Mesh:
 def circles(mesh: Mesh) -> list[Circle]:
     """Return the circles on which groups of outer facets lie, one a group, so that `refined` can keep to them.
 
-    A circle through the nodes is found by least squares. It counts if all nodes lie on it to rounding, there are at
-    least four facets, and the line turns gently: four corners of a square lie on a circle, too.
+    A circle through the nodes is found by least squares. It counts if all nodes lie on it to rounding, there are more
+    nodes than make a circle, and the line turns gently: four corners of a square lie on a circle, too.
     """
     found = []
     for group in mesh.cell_groups:
         blocks = mesh.cells_of(group, dim=1)
         solids = any(elements.get(name).dim == 2 for name in mesh.split(mesh.cell_groups[group]))
-        if blocks and not solids and sum(map(len, blocks.values())) >= 4:
+        if blocks and not solids:
             circle = _circle(mesh, group, list(blocks.values()))
             if circle is not None:
                 found.append(circle)
@@ -283,6 +283,8 @@ def circles(mesh: Mesh) -> list[Circle]:
 
 def _circle(mesh: Mesh, group: str, blocks: list[Indices]) -> Circle | None:
     points = mesh.points[np.unique(np.concatenate([block.ravel() for block in blocks]))]
+    if len(points) < 4:
+        return None
     middle, size = points.mean(axis=0), np.ptp(points, axis=0).max()
     x = (points - middle) / size
     # x^2 + y^2 = 2 a x + 2 b y + c is linear in the centre (a, b).

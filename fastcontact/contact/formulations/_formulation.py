@@ -19,6 +19,8 @@ from fastcontact.errors import ContactError, unknown
 
 Array = NDArray[np.float64]
 NORMALS = ("facet", "averaged")
+# Nodes on an axis or plane of symmetry stand out a little beyond facets that lean, in facet lengths.
+ON_SYMMETRY = 0.05
 
 
 @dataclass(eq=False)
@@ -125,6 +127,7 @@ class Formulation(ABC):
         """
         nodes = Candidates(self.secondary.points[:, None], np.ones((len(self.secondary.points), 1)))
         deformed = self.points + displacement
-        pairing = pair(nodes.positions(deformed), self.primary, deformed, self.projection_tolerance, self.normals)
+        tolerance = max(self.projection_tolerance, ON_SYMMETRY)
+        pairing = pair(nodes.positions(deformed), self.primary, deformed, tolerance, self.normals)
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
         return np.where(pairing.paired, gap0 + G @ displacement.ravel(), np.inf), pairing.normal
