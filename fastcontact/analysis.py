@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact import active_set, friction, linear, recovery
+from fastcontact.acceleration import Anderson
 from fastcontact.assembly import rigid_modes, stiffness
 from fastcontact.contact.constraints import Constraints, stacked
 from fastcontact.contact.formulations import Formulation
@@ -36,6 +37,8 @@ Mask = NDArray[np.bool_]
 SMALL = 0.1
 # One active-set iteration per pairing is cheapest near the solution but may cycle; after so many, settle the set first.
 SEMISMOOTH_UPDATES = 8
+# Earlier geometries that are mixed into the next one.
+MIXED = 5
 
 
 @dataclass(frozen=True)
@@ -143,7 +146,8 @@ class Analysis:
         self.forces = model.forces_by_ramp()
         self.K = stiffness(model.mesh, model.kinematics, self.moduli, self.material)
         self.system = System(self.K, supported.ravel(), model.relations)
-        involved = self._involved()
+        self.surface_dofs = self._surface_dofs()
+        involved = self.system.involved(self.surface_dofs)
         R = stacked_rows(model.relations, model.n_dofs)
         motions = free_motions(model.mesh, model.kinematics, supported, R)
         self.floating = Floating(motions, self.system, involved) if len(motions) else None
@@ -162,12 +166,12 @@ class Analysis:
         # Gaps are differences of coordinates and no more accurate than those.
         self.round_off = 8 * np.finfo(float).eps * float(np.abs(model.mesh.points).max())
 
-    def _involved(self) -> NDArray[np.intp]:
-        """Return the unknowns that the contact surfaces depend on."""
+    def _surface_dofs(self) -> NDArray[np.intp]:
+        """Return the displacement components of all points on the contact surfaces."""
         dim = self.model.mesh.dim
         sides = [side.points for pair in self.pairs.values() for side in (pair.secondary, pair.primary)]
         points = np.unique(np.concatenate(sides)) if sides else np.empty(0, np.intp)
-        return self.system.involved((points[:, None].astype(np.intp) * dim + np.arange(dim)).ravel())
+        return (points[:, None].astype(np.intp) * dim + np.arange(dim)).ravel()
 
     def step(self, index: int, instant: float, last: bool = False) -> StepResult:
         """Solve for the loads at `instant` and return the state; see `solve`."""
@@ -224,6 +228,7 @@ class Analysis:
         in_loop = fixed_updates is None and any(pair.geometry_in_loop for pair in self.pairs.values())
         in_loop = in_loop and self.floating is None
         limit = criteria.max_geometry_updates if fixed_updates is None else fixed_updates
+        accelerated, known = Anderson(MIXED, self.surface_dofs), None
         for update in range(limit + 1):
             displacement = self.u.reshape(-1, self.model.mesh.dim)
             parts = {name: pair.constraints(displacement) for name, pair in self.pairs.items()}
@@ -239,7 +244,7 @@ class Analysis:
             change = np.abs(u - self.u).max(initial=0.0)
             # Rigid motions of bodies that only contact holds do not count.
             size = max(np.abs(state.u).max(initial=0.0), np.abs(lift).max(initial=0.0))
-            self.u = u
+            before, self.u = self.u, u
             self._remember(state)
             history.append(
                 {
@@ -255,6 +260,12 @@ class Analysis:
             enough = max(max(criteria.geometry, self.solver.tolerance) * size, self.round_off)
             if fixed_updates is None and state.settled and change <= enough:
                 return constraints, state
+            if fixed_updates is None:
+                same = known is not None and np.array_equal(known, state.active)
+                known = state.active if state.settled else None
+                if not same:
+                    accelerated.restart()
+                self.u = accelerated.mixed(before, u)
         if fixed_updates is None:
             raise ConvergenceError(
                 f"the contact geometry did not settle in {limit} updates: the displacement still changes by "

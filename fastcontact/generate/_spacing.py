@@ -67,7 +67,7 @@ def geometric(length: float, first: float, last: float) -> Array:
     if length <= min(first, last):
         return np.array([0.0, 1.0])
     n = 2
-    if length > max(first, last):
+    if length * (1 - 1e-12) > max(first, last):  # otherwise a segment and a rest of rounding: two do
         # log(last / first) / log(q), without cancellation where the sizes are nearly the same.
         ratios = math.log1p((last - first) / first) / math.log1p((last - first) / (length - last))
         n = 1 + math.ceil(ratios - 1e-9)

@@ -91,3 +91,7 @@ def test_triangles_cover_the_hull_and_stars_close_around_inner_points():
     star = stars_of(triangles, len(points))[5]
     ring = star[star[:, 0] >= 0]
     assert sorted(ring[:, 0]) == sorted(ring[:, 1]) == [0, 1, 2, 3, 4]
+
+
+def test_a_segment_as_long_as_the_line_to_rounding_makes_two():
+    assert len(geometric(1.0, 0.9999999999999999, 0.36741607936191695)) == 3

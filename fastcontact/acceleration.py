@@ -1,0 +1,50 @@
+"""Acceleration of a fixed point iteration by what its last changes tell (Anderson, 1965)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Changes of the residual that point along the same line to more than this tell nothing apart.
+DEPENDENT = 1e-8
+
+
+class Anderson:
+    """Mixing of the last iterates of ``x = G(x)`` so that their residuals ``G(x) - x`` cancel best.
+
+    Near a solution a fixed point iteration whose error shrinks by a factor a time behaves like a linear one; mixing
+    then does what a Krylov method does (Walker and Ni, 2011). Only `where` the iteration depends on x counts in the
+    residual.
+
+    Parameters
+    ----------
+    depth : int
+        Earlier iterates in the mixture.
+    where : ndarray of int
+        Components of x (n,) that G looks at.
+    """
+
+    def __init__(self, depth: int, where: NDArray[np.intp]) -> None:
+        self.depth, self.where = depth, where
+        self._residuals: list[Array] = []
+        self._images: list[Array] = []
+
+    def restart(self) -> None:
+        """Forget earlier iterates, for another G."""
+        self._residuals.clear()
+        self._images.clear()
+
+    def mixed(self, x: Array, image: Array) -> Array:
+        """Return the next iterate (n,) from the last one `x` and its image ``G(x)``, both (n,)."""
+        self._residuals.append((image - x)[self.where])
+        self._images.append(image)
+        del self._residuals[: -self.depth - 1], self._images[: -self.depth - 1]
+        if len(self._residuals) < 2:
+            return image
+        last = self._residuals[-1]
+        differences = np.column_stack([last - earlier for earlier in self._residuals[:-1]])
+        weights = np.linalg.lstsq(differences, last, rcond=DEPENDENT)[0]
+        moves = [weight * (image - earlier) for weight, earlier in zip(weights, self._images[:-1], strict=True)]
+        return image - np.sum(moves, axis=0)
