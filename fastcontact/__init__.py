@@ -13,6 +13,8 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from fastcontact import analytic, generate, obstacles, plot, recovery, topology
     from fastcontact.analysis import Criteria, solve
+    from fastcontact.convergence import convergence_study, parameter_sweep
+    from fastcontact.error_norms import ErrorNorms, error_against
     from fastcontact.errors import (
         CaseError,
         ContactError,
@@ -44,6 +46,7 @@ _HOME = {
     "ContactResult": "results",
     "ConvergenceError": "errors",
     "Criteria": "analysis",
+    "ErrorNorms": "error_norms",
     "FastcontactError": "errors",
     "FastcontactWarning": "errors",
     "FileError": "errors",
@@ -56,10 +59,13 @@ _HOME = {
     "ResultWriter": "io.result_writer",
     "StepResult": "results",
     "contact_table": "io.tables",
+    "convergence_study": "convergence",
+    "error_against": "error_norms",
     "line_table": "io.tables",
     "linear_ramp": "ramp",
     "open_results": "io.result_reader",
     "ordered_line": "topology",
+    "parameter_sweep": "convergence",
     "quality": "mesh_quality",
     "read_med_field": "io.med",
     "read_mesh": "io.mesh_files",
@@ -76,6 +82,7 @@ __all__ = [
     "ContactResult",
     "ConvergenceError",
     "Criteria",
+    "ErrorNorms",
     "FastcontactError",
     "FastcontactWarning",
     "FileError",
@@ -89,12 +96,15 @@ __all__ = [
     "StepResult",
     "analytic",
     "contact_table",
+    "convergence_study",
+    "error_against",
     "generate",
     "line_table",
     "linear_ramp",
     "obstacles",
     "open_results",
     "ordered_line",
+    "parameter_sweep",
     "plot",
     "quality",
     "read_med_field",

@@ -6,5 +6,16 @@ from fastcontact.convergence.execute import Progress
 from fastcontact.convergence.fit import Limit, fit_limit
 from fastcontact.convergence.split import Split, split
 from fastcontact.convergence.study import Study, convergence_study
+from fastcontact.convergence.sweep import Sweep, parameter_sweep
 
-__all__ = ["Limit", "Progress", "Split", "Study", "convergence_study", "fit_limit", "split"]
+__all__ = [
+    "Limit",
+    "Progress",
+    "Split",
+    "Study",
+    "Sweep",
+    "convergence_study",
+    "fit_limit",
+    "parameter_sweep",
+    "split",
+]

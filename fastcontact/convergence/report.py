@@ -33,7 +33,7 @@ def html_report(study: Study) -> str:
     parts = [_said(text) for text in sentences(study.best)]
     if len(study.series) > 1:
         parts += ["<h2>All combinations</h2>", "<p>Limits, and model errors at equal approach.</p>"]
-        parts.append(_table(comparison_rows(study)))
+        parts.append(table_html(comparison_rows(study)))
     parts += ["<h2>Pictures</h2>", *_pictures(study)]
     for series in study.series:
         parts += _of_series(series, study)
@@ -65,7 +65,9 @@ def _failed(text: str) -> str:
     return f"<p class='failed'>{html.escape(text)}</p>"
 
 
-def _table(rows: Sequence[Sequence[str]]) -> str:
+def table_html(rows: Sequence[Sequence[str]]) -> str:
+    """Return rows of texts as a table, the first row a header."""
+
     def row(cells: Sequence[str], tag: str) -> str:
         inside = "".join(f"<{tag}>{html.escape(cell).replace('+-', '&plusmn;')}</{tag}>" for cell in cells)
         return f"<tr>{inside}</tr>"
@@ -96,10 +98,10 @@ def _of_series(series: Series, study: Study) -> list[str]:
     parts = [f"<h2>{html.escape(str(series.combination))}</h2>"]
     main = [name for name in SHOWN if name in series.quantities]
     for start in range(0, len(main), 2):
-        parts.append(_table(level_rows(series, study.units, main[start : start + 2])))
+        parts.append(table_html(level_rows(series, study.units, main[start : start + 2])))
     rows = limit_rows(series, study.units)
     if len(rows) > 1:
-        parts.append(_table(rows))
+        parts.append(table_html(rows))
     parts += [_failed(f"level {number} failed: {text}") for number, text in series.failed.items()]
     warned = sorted({text for level in series.levels for text in level.warnings})
     parts += [f"<p class='say'>Warning: {html.escape(text)}</p>" for text in warned]

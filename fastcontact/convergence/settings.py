@@ -84,15 +84,15 @@ class Settings:
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
 
 
-def settings(case: Case) -> Settings:
-    """Return the settings of a case's studies.
+def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
+    """Return the settings of a case's studies; `data` stand for the parsed case file with some values changed.
 
     Raises
     ------
     CaseError
         If a value of ``[study]`` is wrong.
     """
-    data = tomllib.loads(case.text)
+    data = tomllib.loads(case.text) if data is None else data
     study = data.get("study", {})
     pair = study.get("contact") or next((pair.name for pair in case.model.contact), None)
     if pair is not None and pair not in {p.name for p in case.model.contact}:

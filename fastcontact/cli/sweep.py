@@ -1,0 +1,100 @@
+"""``fastcontact sweep``: a case for many values of its parameters, held against theory."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import Any
+
+from fastcontact.cli import _study
+from fastcontact.errors import CaseError, FastcontactError
+
+HELP = "solve a case for many values of its parameters, held against theory"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    parser.add_argument("case", help="case file (TOML)")
+    parser.add_argument(
+        "--set",
+        action="append",
+        required=True,
+        metavar="NAME=VALUES",
+        help="a path in the case such as material[0].E, or a name of [study.parameters], and its values: 1,2,5 or "
+        "FIRST:LAST:COUNT, in equal ratios with :log behind it; given twice, all combinations are run",
+    )
+    parser.add_argument("--element", metavar="NAME", help="element (default: the last of study.combinations)")
+    parser.add_argument("--formulation", metavar="NAME", help="contact formulation (default: likewise)")
+    parser.add_argument("--level", type=int, metavar="N", help="refinement of the mesh, as in converge")
+    _study.arguments(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the sweep, write what was asked for, print the table."""
+    from fastcontact.cli._pictures import save
+    from fastcontact.convergence import parameter_sweep
+
+    _study.check_targets(options)
+    wanted = dict(_values(text) for text in options.set)
+    progress = _study.Lines(show=sys.stderr.isatty() and not options.quiet)
+    try:
+        with _study.executor(options.executor) as executor:
+            sweep = parameter_sweep(
+                options.case,
+                wanted,
+                element=options.element,
+                formulation=options.formulation.replace("-", "_") if options.formulation else None,
+                level=options.level,
+                executor=executor,
+                workers=options.workers,
+                store=options.store,
+                on_progress=progress,
+            )
+    except KeyboardInterrupt:
+        raise FastcontactError(_study.stopped(options)) from None
+    finally:
+        progress.close()
+    written = _study.write(options, sweep, save)
+    for _, text in sweep.failed:
+        print(f"warning: {text}", file=sys.stderr)
+    if not options.quiet:
+        print("\n".join(sweep.lines()))
+        print(f"wrote {', '.join(written)}" if written else "nothing written: --png FILE makes a picture")
+    return 2 if sweep.failed else 0
+
+
+def _values(text: str) -> tuple[str, list[Any]]:
+    """Return a parameter and its values from ``NAME=VALUES``."""
+    name, equals, values = text.partition("=")
+    if not (name and equals and values):
+        raise CaseError(f"--set '{text}' must be NAME=VALUES, for example approach=0.04,0.4,4")
+    if ":" in values:
+        return name.strip(), _range(text, values.split(":"))
+    return name.strip(), [_value(entry.strip()) for entry in values.split(",") if entry.strip()]
+
+
+def _range(text: str, parts: list[str]) -> list[float]:
+    import numpy as np
+
+    logarithmic = parts[-1] == "log"
+    try:
+        first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
+        if len(parts) != 3 + logarithmic or count < 1 or (logarithmic and first * last <= 0):
+            raise ValueError
+    except (ValueError, IndexError):
+        raise CaseError(
+            f"--set '{text}': a range is FIRST:LAST:COUNT or FIRST:LAST:COUNT:log, for example approach=0.004:4:7:log"
+        ) from None
+    spread = np.geomspace if logarithmic else np.linspace
+    return [float(value) for value in spread(first, last, count)]
+
+
+def _value(text: str) -> Any:
+    if text in ("true", "false"):
+        return text == "true"
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text

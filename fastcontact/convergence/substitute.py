@@ -1,0 +1,90 @@
+"""Setting scalars of a parsed case file by their path, such as ``support[1].y`` or ``theory.hertz.approach``."""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from fastcontact.errors import CaseError, unknown
+
+_PART = re.compile(r"([^.\[\]]+)((?:\[\d+\])*)$")
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_LAW = re.compile(rf"\s*(?:({_NUMBER})\s*\*\s*)?value(?:\s*\^\s*({_NUMBER}))?\s*$")
+
+
+def substituted(data: Mapping[str, Any], parameter: str, value: Any, linked: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a copy of the data with a parameter set.
+
+    Parameters
+    ----------
+    data : mapping
+        A parsed case file.
+    parameter : str
+        A path, or a name of `linked`.
+    value : float, int, str or bool
+    linked : mapping of str to mapping
+        Names that stand for several paths, each set to a law ``"a*value^p"`` of the value: ``[study.parameters]``.
+
+    Raises
+    ------
+    CaseError
+        If there is no such place or name, or a law is wrong.
+    """
+    found: dict[str, Any] = copy.deepcopy(dict(data))
+    if parameter not in linked:
+        _set(found, parameter, value, [*linked, *found])
+        return found
+    for path, law in linked[parameter].items():
+        _set(found, path, _by_law(law, value, f"study.parameters.{parameter}.'{path}'"), found)
+    return found
+
+
+def _by_law(law: Any, value: Any, where: str) -> Any:
+    """Return ``a value^p``."""
+    match = _LAW.match(law) if isinstance(law, str) else None
+    if match is None:
+        raise CaseError(f"{where} = {law!r} must be 'value', 'a*value' or 'a*value^p' with numbers a and p")
+    if match[1] is None and match[2] is None:
+        return value
+    if isinstance(value, str) or (match[2] is not None and value < 0):
+        raise CaseError(f"{where} = '{law}' cannot be taken of {value!r}")
+    return float(match[1] or 1.0) * float(value) ** float(match[2] or 1.0)
+
+
+def _set(data: dict[str, Any], path: str, value: Any, names: Iterable[str]) -> None:
+    keys = _keys(path)
+    if len(keys) == 1:
+        raise CaseError(
+            unknown("parameter", path, [name for name in names if not isinstance(data.get(name), (dict, list))])
+        )
+    place: Any = data
+    for key in keys[:-1]:
+        place = _inside(place, key, path)
+    if isinstance(keys[-1], int) or not isinstance(place, dict):
+        _inside(place, keys[-1], path)
+    if isinstance(place[keys[-1]] if isinstance(place, list) else place.get(keys[-1]), (dict, list)):
+        raise CaseError(f"'{path}' is a table or a list of the case: name a single value in it")
+    place[keys[-1]] = value
+
+
+def _keys(path: str) -> list[str | int]:
+    keys: list[str | int] = []
+    for part in path.split("."):
+        match = _PART.match(part)
+        if match is None:
+            raise CaseError(f"'{path}' is no path into a case file: write for example support[1].y")
+        keys.append(match[1])
+        keys += [int(number) for number in re.findall(r"\d+", match[2])]
+    return keys
+
+
+def _inside(place: Any, key: str | int, path: str) -> Any:
+    if isinstance(key, int):
+        if not isinstance(place, list) or key >= len(place):
+            count = len(place) if isinstance(place, list) else 0
+            raise CaseError(f"'{path}' asks for entry [{key}], counted from [0], and the case has {count} there")
+    elif not isinstance(place, dict) or key not in place:
+        raise CaseError(unknown(f"entry of the case in '{path}'", key, place if isinstance(place, dict) else ()))
+    return place[key]

@@ -1,0 +1,93 @@
+"""Sweeps: right numbers, tables and files, the store, failures that do not end the rest."""
+
+import json
+
+import numpy as np
+import pytest
+
+from fastcontact.cli import main
+from fastcontact.convergence import parameter_sweep
+from fastcontact.errors import CaseError
+
+
+@pytest.fixture(scope="module")
+def case(root):
+    return root / "data/cases/forma04c.toml"
+
+
+@pytest.fixture(scope="module")
+def sweep(case):
+    return parameter_sweep(case, {"approach": (0.004, 0.04, 0.4, 4.0)}, level=2, workers=1)
+
+
+def test_hertz_is_the_limit_of_a_small_approach(sweep):
+    ratios = [point.ratio("pressure_max") for point in sweep.points]
+    assert ratios == sorted(ratios)
+    # 0.09 % of model error at 0.004 mm (a / R = 0.006), and 0.03 % of the mesh.
+    assert ratios[0] == pytest.approx(1.0, abs=2e-3)
+    # The mesh-converged solution, by a method of its own (see the theory finite_half_spheres).
+    for point in sweep.points:
+        assert point.ratio("force", "reference") == pytest.approx(1.0, abs=2e-3)
+        assert point.ratio("pressure_max", "reference") == pytest.approx(1.0, abs=2e-3)
+    assert sweep.points[-1].ratio("pressure_max", "equal_force") == pytest.approx(1.0, abs=2e-3)
+
+
+def test_two_parameters_are_combined_the_last_one_fastest(case):
+    found = parameter_sweep(case, {"material[0].E": (1e4, 2e4), "approach": (0.4, 4.0)}, level=0, workers=1)
+    assert [tuple(point.parameters.values()) for point in found.points] == [(1e4, 0.4), (1e4, 4), (2e4, 0.4), (2e4, 4)]
+    soft, stiff = found.points[1], found.points[3]
+    # Both materials of the case are one entry: the force is proportional to the modulus.
+    assert stiff.values["force"] == pytest.approx(2 * soft.values["force"], rel=1e-9)
+    table = found.table()
+    assert list(table["approach"]) == [0.4, 4.0, 0.4, 4.0]
+    np.testing.assert_allclose(table["force"], [point.values["force"] for point in found.points])
+
+
+def test_the_command_writes_what_it_shows_and_runs_nothing_twice(case, tmp_path, capsys):
+    files = {name: tmp_path / f"sweep.{name}" for name in ("json", "csv", "png", "html")}
+    options = [text for name, path in files.items() for text in (f"--{name}", str(path))]
+    arguments = ["sweep", str(case), "--set", "approach=0.4:4:2:log", "--level", "0", "--workers", "1"]
+    arguments += ["--store", str(tmp_path / "store")]
+    assert main([*arguments, *options]) == 0
+    shown = capsys.readouterr().out
+    points = json.loads(files["json"].read_text())["points"]
+    assert [point["parameters"]["approach"] for point in points] == pytest.approx([0.4, 4.0])
+    assert f"{points[1]['force']:.7g}" in shown
+    assert files["png"].read_bytes()[:4] == b"\x89PNG"
+    assert "data:image/png;base64" in files["html"].read_text()
+    assert files["csv"].read_text().splitlines()[0].lstrip("# ").startswith("approach")
+    kept = sorted(path.stat().st_mtime_ns for path in (tmp_path / "store").iterdir())
+    assert main([*arguments, "--json", str(files["json"]), "-q"]) == 0
+    assert sorted(path.stat().st_mtime_ns for path in (tmp_path / "store").iterdir()) == kept
+    assert json.loads(files["json"].read_text())["points"] == points
+
+
+def test_a_failed_point_is_told_and_the_others_go_on(case, capsys):
+    arguments = ["sweep", str(case), "--set", "material[0].nu=0.3,0.6", "--level", "0", "--workers", "1"]
+    assert main(arguments) == 2
+    shown = capsys.readouterr()
+    assert "material[0].nu = 0.6 failed: " in shown.out
+    assert "0.6" in shown.err
+    assert "0.3" in shown.out
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ({}, "at least one parameter"),
+        ({"approach": ()}, "at least one value"),
+        ({"aproach": (1.0,)}, "'approach'"),
+        ({"material[0].G": (1.0,)}, "material.*'E'|unknown key"),
+    ],
+)
+def test_what_is_wrong_is_told_before_anything_runs(case, parameters, words):
+    with pytest.raises(CaseError, match=words):
+        parameter_sweep(case, parameters, workers=1)
+
+
+@pytest.mark.parametrize(
+    "text", ["approach", "approach=", "=1,2", "approach=1:2", "approach=0:4:3:log", "approach=1:2:x"]
+)
+def test_the_command_says_how_values_are_written(case, text, capsys):
+    assert main(["sweep", str(case), "--set", text]) == 1
+    assert "for example" in capsys.readouterr().err
