@@ -13,7 +13,8 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from fastcontact import analytic, generate, obstacles, plot, recovery, topology
     from fastcontact.analysis import Criteria, solve
-    from fastcontact.convergence import convergence_study, parameter_sweep
+    from fastcontact.convergence import adaptive_study, convergence_study, parameter_sweep
+    from fastcontact.error_estimate import ErrorEstimate, estimate_error
     from fastcontact.error_norms import ErrorNorms, error_against
     from fastcontact.errors import (
         CaseError,
@@ -58,9 +59,11 @@ _HOME = {
     "Ramp": "ramp",
     "ResultWriter": "io.result_writer",
     "StepResult": "results",
+    "adaptive_study": "convergence",
     "contact_table": "io.tables",
     "convergence_study": "convergence",
     "error_against": "error_norms",
+    "estimate_error": "error_estimate",
     "line_table": "io.tables",
     "linear_ramp": "ramp",
     "open_results": "io.result_reader",
@@ -94,10 +97,12 @@ __all__ = [
     "Ramp",
     "ResultWriter",
     "StepResult",
+    "adaptive_study",
     "analytic",
     "contact_table",
     "convergence_study",
     "error_against",
+    "estimate_error",
     "generate",
     "line_table",
     "linear_ramp",

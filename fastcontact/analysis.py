@@ -16,17 +16,19 @@ from fastcontact.acceleration import Anderson
 from fastcontact.assembly import rigid_modes, stiffness
 from fastcontact.contact.constraints import Constraints, stacked
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.result import contact_result
+from fastcontact.contact.result import contact_result, deep
 from fastcontact.contact.rigid import RigidSide
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ConvergenceError, FastcontactWarning, ModelError
+from fastcontact.extrapolation import Extrapolation
 from fastcontact.floating import SLACK, Floating, Settled
+from fastcontact.kernels.multigrid import largest_row_sum
 from fastcontact.model import Model, combined, multiplier
 from fastcontact.overlap import penetration
 from fastcontact.ramp import Ramp, linear_ramp
-from fastcontact.relations import stacked_rows
-from fastcontact.results import StepResult
+from fastcontact.results import ContactResult, StepResult
 from fastcontact.rigid_motions import body_name, free_motions, generalised, resisting, stopped_at
+from fastcontact.springs import ground_force, stiffened
 from fastcontact.system import System
 from fastcontact.topology import bodies
 
@@ -37,6 +39,11 @@ Mask = NDArray[np.bool_]
 SMALL = 0.1
 # One active-set iteration per pairing is cheapest near the solution but may cycle; after so many, settle the set first.
 SEMISMOOTH_UPDATES = 8
+# Pairings after which an iterative solver starts again from the last step instead of the extrapolated state.
+EXTENDED_UPDATES = 25
+# Relative residual of the first solution of a step by an iterative solver, and of later ones in units of the relative
+# change of the displacement and of the last residual: more accuracy than the pairing itself has is lost.
+FIRST_RESIDUAL, RESIDUAL = 1e-2, 0.03
 # Earlier geometries that are mixed into the next one.
 MIXED = 5
 
@@ -57,6 +64,9 @@ class Criteria:
         displacement changes by less than `geometry` of its largest component.
     geometry : float
         See `geometry_updates`.
+    keep_pairing : bool
+        Keep the pairing of the undeformed bodies through all steps, with its normals and projections (REAC_GEOM =
+        'SANS'); for small motions only. Without friction the state then does not depend on the steps that lead to it.
     max_geometry_updates, max_active_set_iterations : int
         Limits per step, and per pairing.
     """
@@ -65,6 +75,7 @@ class Criteria:
     absolute: float | None = None
     geometry_updates: int | None = None
     geometry: float = 1e-11
+    keep_pairing: bool = False
     max_geometry_updates: int = 60
     max_active_set_iterations: int = 200
 
@@ -73,6 +84,10 @@ class Criteria:
             raise ModelError("the convergence criteria `relative` and `geometry` must be positive")
         if self.geometry_updates is not None and self.geometry_updates < 0:
             raise ModelError(f"geometry_updates = {self.geometry_updates} must be None or a whole number >= 0")
+        if self.keep_pairing and self.geometry_updates:
+            raise ModelError(
+                f"keep_pairing leaves no room for geometry_updates = {self.geometry_updates}: give one or the other"
+            )
 
 
 def solve(
@@ -81,6 +96,7 @@ def solve(
     *,
     linear_solver: str = "auto",
     linear_tolerance: float = 1e-10,
+    linear_precision: str | None = None,
     criteria: Criteria | None = None,
     on_step: Callable[[StepResult], None] | None = None,
 ) -> list[StepResult]:
@@ -93,9 +109,11 @@ def solve(
     ramp : Ramp, optional
         By default 20 equal steps.
     linear_solver : str
-        ``"direct"``, ``"amg"`` or ``"auto"``.
+        ``"direct"``, ``"cholmod"``, ``"pardiso"``, ``"amg"`` or ``"auto"``; see `linear.make`.
     linear_tolerance : float
         Relative residual of iterative linear solvers.
+    linear_precision : {"single", "double"}, optional
+        Of the numbers inside the multigrid cycle, single by default; the solution is in double precision always.
     criteria : Criteria, optional
         Convergence criteria and the handling of the geometry.
     on_step : callable, optional
@@ -115,10 +133,11 @@ def solve(
     Warns
     -----
     FastcontactWarning
-        If bodies interpenetrate where no contact is defined, or strains leave the range of linear kinematics.
+        If bodies interpenetrate where no contact is defined, a penalty lets them penetrate by more than 1 % of the
+        largest displacement, or strains leave the range of linear kinematics.
     """
     ramp = ramp or linear_ramp()
-    analysis = Analysis(model, linear_solver, linear_tolerance, criteria or Criteria(), ramp)
+    analysis = Analysis(model, linear_solver, linear_tolerance, criteria or Criteria(), ramp, linear_precision)
     steps = []
     for index, instant in enumerate(ramp.instants, start=1):
         step = analysis.step(index, instant, last=index == len(ramp))
@@ -131,62 +150,86 @@ def solve(
 class Analysis:
     """A prepared model: stiffness, linear solver and contact pairs, solved load by load.
 
-    Parameters are those of `solve`. Attributes `u` (n_points * dim,) and `active` (m,) hold the current state.
+    Parameters are those of `solve`. Attributes `u` (n_dofs,), the displacements of all points and then of the obstacles
+    that forces drive, and `active` (m,) hold the current state.
     """
 
     def __init__(
-        self, model: Model, linear_solver: str, linear_tolerance: float, criteria: Criteria, ramp: Ramp | None = None
-    ) -> None:
+        self, model: Model, linear_solver: str, linear_tolerance: float, criteria: Criteria, ramp: Ramp | None = None,
+        linear_precision: str | None = None,
+    ) -> None:  # fmt: skip
         self.ramp = ramp or linear_ramp()
         model.check(self.ramp)
         self.model, self.criteria = model, criteria
         self.pairs: dict[str, Formulation] = {pair.name: model.bind(pair) for pair in model.contact}
         self.moduli, self.material = model.material_numbers()
-        supported, self.prescribed = model.prescribed_by_ramp()
-        self.forces = model.forces_by_ramp()
-        self.K = stiffness(model.mesh, model.kinematics, self.moduli, self.material)
-        self.system = System(self.K, supported.ravel(), model.relations)
+        self.driven = driven = model.driven
+        supported, prescribed = model.prescribed_by_ramp()
+        for pair in self.pairs.values():
+            pair.supported = supported
+        self.prescribed, self.forces = driven.prescribed(prescribed), driven.forces(model.forces_by_ramp())
+        K = stiffness(model.mesh, model.kinematics, self.moduli, self.material)
+        self.K = driven.stiffness(stiffened(K, model.springs))
+        relations = driven.relations(model.relations)
+        self.system = System(self.K, driven.supported(supported).ravel(), relations, driven.loose)
         self.surface_dofs = self._surface_dofs()
         involved = self.system.involved(self.surface_dofs)
-        R = stacked_rows(model.relations, model.n_dofs)
-        motions = free_motions(model.mesh, model.kinematics, supported, R)
+        motions = driven.motions(free_motions(model.mesh, model.kinematics, supported, model.holding_rows()))
         self.floating = Floating(motions, self.system, involved) if len(motions) else None
         matrix = self.floating.with_springs(self.system.matrix) if self.floating else self.system.matrix
         self.solver = linear.make(
-            linear_solver, dim=model.mesh.dim, n_dofs=model.n_dofs, tolerance=linear_tolerance
+            linear_solver, dim=model.mesh.dim, n_dofs=model.n_dofs, tolerance=linear_tolerance,
+            precision=linear_precision,
         )  # fmt: skip
-        self.solver.prepare(matrix, self.system.unknowns_of(near_nullspace(model)), involved)
-        self.u = np.zeros(model.n_dofs)
-        self.external = np.zeros(model.n_dofs)
+        modes = driven.near_nullspace(near_nullspace(model))
+        self.solver.prepare(matrix, self.system.unknowns_of(modes), involved)
+        self.shape = (driven.n_dofs // model.mesh.dim, model.mesh.dim)
+        self.u = np.zeros(driven.n_dofs)
+        self.external = np.zeros(driven.n_dofs)
         self.active: dict[str, Mask] = {}
+        self.extrapolation = Extrapolation()
         self.pressure: dict[str, Array] = {}
         self.before = self.u  # at the beginning of the step, from where slip counts
         self.largest_force = self.largest_work = 0.0  # of all steps so far
         self.settled: Settled | None = None
+        self.rubbing: friction.FrictionalEquilibrium | None = None  # the last solution of the step
         # Gaps are differences of coordinates and no more accurate than those.
         self.round_off = 8 * np.finfo(float).eps * float(np.abs(model.mesh.points).max())
 
     def _surface_dofs(self) -> NDArray[np.intp]:
-        """Return the displacement components of all points on the contact surfaces."""
+        """Return the displacement components of all points on the contact surfaces, and of driven obstacles."""
         dim = self.model.mesh.dim
         sides = [side.points for pair in self.pairs.values() for side in (pair.secondary, pair.primary)]
         points = np.unique(np.concatenate(sides)) if sides else np.empty(0, np.intp)
-        return (points[:, None].astype(np.intp) * dim + np.arange(dim)).ravel()
+        moved = self.model.mesh.n_points + np.arange(len(self.driven))
+        return (np.concatenate([points, moved])[:, None].astype(np.intp) * dim + np.arange(dim)).ravel()
+
+    @property
+    def displacement(self) -> Array:
+        """Displacements (n_points, dim) of the points of the mesh [length]."""
+        return self.u[: self.model.n_dofs].reshape(-1, self.model.mesh.dim)
 
     def step(self, index: int, instant: float, last: bool = False) -> StepResult:
         """Solve for the loads at `instant` and return the state; see `solve`."""
         lift = self._lift(instant)
-        shape = self.model.mesh.points.shape
-        self.external = combined(self.forces, self.ramp, instant, shape).ravel()
+        self.external = combined(self.forces, self.ramp, instant, self.shape).ravel()
         self.largest_force = max(self.largest_force, np.abs(self.external).max(initial=0.0))
         self.before = self.u
-        self._move_obstacles(instant)
+        for side in self.pairs.values():
+            side.before = self.u.reshape(self.shape)
+        self._move_sides(instant)
         self.settled = None
+        self.rubbing = None
+        self.extrapolation.load(lift, self.external)
         loaded = self.solver.load(self.system.right(self.external, lift))
         before = self.solver.counters.iterations
         self.expected = 0.0  # displacement, for the first step under forces only
         if self.pairs and self.external.any() and not (self.u.any() or lift.any()):
             self.expected = float(np.abs(loaded.displacement(np.zeros(len(lift)))).max())
+        if self.pairs and self.model.springs:
+            # Weak springs alone would let bodies move far; contact takes that back, but not its round-off.
+            alone = float(np.abs(loaded.displacement(np.zeros(len(lift)))).max())
+            self.round_off = max(self.round_off, 16 * np.finfo(float).eps * alone)
         history: list[dict[str, Any]] = []
         if self.pairs:
             constraints, state = self._contact(loaded, lift, history)
@@ -196,6 +239,8 @@ class Analysis:
             v = loaded.solve(csr_array((0, len(lift))), np.empty(0), guess=guess)[0]
             self.u = self.system.displacement(v, lift)
             constraints, state, force = None, None, np.zeros(len(lift))
+        if state is not None:
+            self.extrapolation.converged(self.u, self._contact_states(state))
         reaction = self._balance(force, index, history)
         iterations = {
             "geometry_updates": max(len(history) - 1, 0),
@@ -207,15 +252,27 @@ class Analysis:
             iterations["regularised"] = self.floating.report(self.settled, self.largest_work)
         return self._result(index, instant, reaction, constraints, state, iterations, last)
 
-    def _move_obstacles(self, instant: float) -> None:
+    def _move_sides(self, instant: float) -> None:
         for pair in self.model.contact:
             side = self.pairs[pair.name].primary
             if isinstance(side, RigidSide):
                 side.move(multiplier(pair.ramp, self.ramp, instant))
+            if pair.clearance_ramp is not None:
+                self.pairs[pair.name].terms.factor = multiplier(pair.clearance_ramp, self.ramp, instant)
+
+    def _place_obstacles(self, u: Array) -> dict[str, Array]:
+        """Put the obstacles that forces drive where displacements `u` (n_dofs,) have them; return them by pair."""
+        still = np.zeros(self.model.mesh.dim)
+        positions = dict.fromkeys(self.pairs, still)
+        for number, pair in enumerate(self.driven.pairs):
+            side = self.pairs[pair.name].primary
+            assert isinstance(side, RigidSide)
+            positions[pair.name] = side.now = u[self.driven.dofs(number)]
+        return positions
 
     def _lift(self, instant: float) -> Array:
         """Return what supports and relations prescribe at `instant`; see `System.lift`."""
-        prescribed = combined(self.prescribed, self.ramp, instant, self.model.mesh.points.shape)
+        prescribed = combined(self.prescribed, self.ramp, instant, self.shape)
         factors = [multiplier(relation.ramp, self.ramp, instant) for relation in self.model.relations]
         return self.system.lift(prescribed.ravel(), self.system.values(factors))
 
@@ -224,21 +281,29 @@ class Analysis:
     ) -> tuple[Constraints, active_set.State]:
         """Alternate pairing and active-set solution until both stand still; update `u` and `active`."""
         criteria = self.criteria
-        fixed_updates = criteria.geometry_updates
+        fixed_updates = 0 if criteria.keep_pairing else criteria.geometry_updates
         in_loop = fixed_updates is None and any(pair.geometry_in_loop for pair in self.pairs.values())
         in_loop = in_loop and self.floating is None
         limit = criteria.max_geometry_updates if fixed_updates is None else fixed_updates
         accelerated, known = Anderson(MIXED, self.surface_dofs), None
+        tolerance = self.solver.tolerance
+        start, last_active = self.u, dict(self.active)
+        extended = fixed_updates is None and self.floating is None and self.solver.iterative
+        if extended:
+            self.u = self.extrapolation.displacement(self.u)
+            tolerance = max(tolerance, FIRST_RESIDUAL)
         for update in range(limit + 1):
-            displacement = self.u.reshape(-1, self.model.mesh.dim)
-            parts = {name: pair.constraints(displacement) for name, pair in self.pairs.items()}
+            displacement = self.displacement
+            positions = self._place_obstacles(np.where(self.system.fixed, lift, self.u))
+            paired_at = np.zeros_like(displacement) if criteria.keep_pairing else displacement
+            parts = {name: pair.conditions(paired_at) for name, pair in self.pairs.items()}
             self.parts = parts
-            constraints = stacked(list(parts.values()))
+            constraints = stacked([self.driven.constraints(name, parts[name], positions[name]) for name in parts])
             in_loop = in_loop and update < SEMISMOOTH_UPDATES
-            active = self._initially_active(parts, displacement)
+            active = self._initially_active(parts, displacement, extended and update == 0)
             limit_now = 1 if in_loop else criteria.max_active_set_iterations
             if self.floating is None:
-                state, u = self._inequalities(loaded, constraints, lift, active, limit_now)
+                state, u = self._inequalities(loaded, constraints, lift, active, limit_now, tolerance)
             else:
                 state, u = self._floating(loaded, constraints, lift, active, history)
             change = np.abs(u - self.u).max(initial=0.0)
@@ -258,34 +323,55 @@ class Analysis:
                 raise ConvergenceError(self._cycling(state, constraints), history)
             # Iterative solvers leave a noise of their tolerance; asking for less would never end.
             enough = max(max(criteria.geometry, self.solver.tolerance) * size, self.round_off)
-            if fixed_updates is None and state.settled and change <= enough:
+            finished = tolerance <= self.solver.tolerance or not self.solver.iterative
+            if fixed_updates is None and state.settled and change <= enough and finished:
                 return constraints, state
             if fixed_updates is None:
+                tolerance = max(self.solver.tolerance, RESIDUAL * min(tolerance, change / size if size else 0.0))
                 same = known is not None and np.array_equal(known, state.active)
                 known = state.active if state.settled else None
-                if not same:
+                if not (same and finished):
                     accelerated.restart()
                 self.u = accelerated.mixed(before, u)
+            if extended and update == EXTENDED_UPDATES:
+                # Nodes that flip between facets may do so for ever from one start and not from another.
+                self.u, self.active = start, last_active
+                accelerated.restart()
         if fixed_updates is None:
             raise ConvergenceError(
                 f"the contact geometry did not settle in {limit} updates: the displacement still changes by "
                 f"{history[-1]['displacement_change']:.1e} of its largest component, {history[-1]['active']} "
-                "constraints are active. Use more load steps, a finer mesh on the primary side, or a fixed "
-                "number of updates",
+                f"constraints are active. Use more load steps, a finer mesh on the primary side, {self._smoother()}or a "
+                "fixed number of updates",
                 history,
             )
         return constraints, state
 
-    def _initially_active(self, parts: dict[str, Constraints], displacement: Array) -> Mask:
+    def _smoother(self) -> str:
+        """Return the advice for pairs that may flip between the facets at a node."""
+        faceted = [name for name, pair in self.pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
+        return f'normals="averaged" for contact {faceted[0]!r}, ' if faceted else ""
+
+    def _initially_active(self, parts: dict[str, Constraints], displacement: Array, first: bool) -> Mask:
         """Return the set to start from: that of the last solution, or what the pairs make of its pressures."""
         sets = []
         for name, part in parts.items():
             found = None
-            if name in self.active:
+            if part.held is not None and part.held.all():
+                found = part.held
+            elif name in self.active:
                 found = self.pairs[name].initially_active(part, self.pressure[name], displacement)
-                found = self.active[name] if found is None else found
+                if found is None:
+                    found = self.active[name]
+                    found = self.extrapolation.active(name, found) if first else found
             sets.append(np.zeros(len(part.gap0), bool) if found is None else found)
         return np.concatenate(sets)
+
+    def _contact_states(self, state: active_set.State) -> dict[str, tuple[Array, Array]]:
+        """Return gaps and multipliers by pair."""
+        ends = np.cumsum([len(part.gap0) for part in self.parts.values()])[:-1]
+        both = zip(np.split(state.gap, ends), np.split(state.multiplier, ends), strict=True)
+        return dict(zip(self.parts, both, strict=True))
 
     def _remember(self, state: active_set.State) -> None:
         """Keep, by pair, which constraints the solution wants active, and its nodal pressures."""
@@ -293,14 +379,16 @@ class Analysis:
         for name, part in self.parts.items():
             size = len(part.gap0)
             self.active[name] = state.wanted[first : first + size]
-            self.pressure[name] = self.pairs[name].pressure(state.multiplier[first : first + size])
+            pair = self.pairs[name]
+            self.pressure[name] = pair.pressure(pair.forces(state.multiplier[first : first + size]))
             first += size
 
     def _inequalities(
-        self, loaded: linear.Loaded, constraints: Constraints, lift: Array, active: Mask, limit: int
-    ) -> tuple[active_set.State, Array]:
+        self, loaded: linear.Loaded, constraints: Constraints, lift: Array, active: Mask, limit: int,
+        tolerance: float = 0.0,
+    ) -> tuple[active_set.State, Array]:  # fmt: skip
         """Solve in the unknowns that supports and relations leave; return the state and all displacements."""
-        noise, gap_tolerance = self._noise(lift)
+        noise, gap_tolerance = self._noise(lift, tolerance)
         B, gap0 = self.system.rows(constraints.B, constraints.gap0, lift)
         usable = np.diff(B.indptr) > 0
         state: active_set.State
@@ -311,20 +399,21 @@ class Analysis:
             state = friction.solve(
                 loaded, B, tuple(T for T, _ in pairs), gap0, np.stack([slip for _, slip in pairs]),
                 constraints.friction if constraints.friction is not None else np.zeros(len(gap0)), usable,
-                compliance=constraints.compliance, closed=active,
-                gap_tolerance=gap_tolerance, multiplier_tolerance=noise,
+                compliance=constraints.compliance, directions=constraints.directions, closed=active,
+                held=constraints.held, softness=constraints.softness, loose=constraints.loose, guess=self.rubbing,
             )  # fmt: skip
+            self.rubbing = state
         else:
             state = active_set.solve(
-                loaded, B, gap0, usable, active=active, compliance=constraints.compliance,
+                loaded, B, gap0, usable, active=active, compliance=constraints.normal_compliance, held=constraints.held,
                 gap_tolerance=gap_tolerance, multiplier_tolerance=noise,
-                max_iterations=limit, guess=self.system.unknowns(self.u, lift),
+                max_iterations=limit, guess=self.system.unknowns(self.u, lift), tolerance=tolerance,
             )  # fmt: skip
         return state, self.system.displacement(state.u, lift)
 
-    def _noise(self, lift: Array) -> tuple[float, float]:
+    def _noise(self, lift: Array, tolerance: float) -> tuple[float, float]:
         """Return the relative accuracy of a solution, and the absolute one of its gaps [length]."""
-        noise = 10 * self.solver.tolerance
+        noise = max(10 * self.solver.tolerance, tolerance if self.solver.iterative else 0.0)
         scale = np.abs(lift).max(initial=0.0) + np.abs(self.u).max(initial=0.0)
         return noise, max(noise * (scale or self.expected), self.round_off)
 
@@ -385,6 +474,13 @@ class Analysis:
         )
 
     def _cycling(self, state: active_set.State, constraints: Constraints) -> str:
+        if isinstance(state, friction.FrictionalEquilibrium):
+            assert constraints.friction is not None
+            return (
+                f"contact with friction did not settle in {state.iterations} Newton iterations from several starts: its "
+                f"equations are {state.residual:.1e} of the largest force off. With the coefficient of friction "
+                f"{constraints.friction.max():g} there may be no solution to find: use more load steps or less friction"
+            )
         wrong = np.flatnonzero(state.active != state.wanted)
         what = (
             f"{len(wrong)} constraints still change (first near {constraints.positions[wrong[0]]})"
@@ -401,7 +497,8 @@ class Analysis:
         reaction, residual = self.system.balance(self.K @ self.u - contact_force - self.external)
         force = max(float(np.abs(forces).max(initial=0.0)) for forces in (reaction, contact_force, self.external))
         self.largest_force = max(self.largest_force, force)
-        row_sums = np.asarray(abs(csr_array(self.K)) @ np.abs(self.u)).max(initial=0.0)
+        K = self.K
+        row_sums = largest_row_sum(K.indptr, K.indices, K.data.reshape(-1), self.u, K.blocksize[0])
         round_off = max(1e-13, self.solver.tolerance) * 10 * row_sums
         round_off = max(round_off, SLACK * self.largest_force)
         bound = max(self.criteria.relative * force, self.criteria.absolute or 0.0, round_off)
@@ -413,14 +510,16 @@ class Analysis:
                 f"({self.criteria.relative:g} of the largest force): use the direct solver or a smaller tolerance",
                 history,
             )
-        return reaction
+        n_dofs = self.model.n_dofs
+        return reaction[:n_dofs] + ground_force(self.model.springs, self.u[:n_dofs])
 
     def _result(
         self, index: int, instant: float, reaction: Array, constraints: Constraints | None,
         state: active_set.State | None, iterations: dict[str, Any], last: bool,
     ) -> StepResult:  # fmt: skip
         mesh, kinematics = self.model.mesh, self.model.kinematics
-        u = self.u.reshape(-1, mesh.dim)
+        u = self.displacement
+        self._place_obstacles(self.u)
         at_points = recovery.stress_at_points(mesh, kinematics, self.moduli, self.material, u)
         stress = recovery.nodal_average(mesh, at_points)
         contact, first = {}, 0
@@ -429,17 +528,19 @@ class Analysis:
             assert state is not None
             rows = slice(first, first + len(self.parts[name].gap0))
             contact[name] = contact_result(name, pair, self.parts[name], state, u, rows)
+            pair.end_step(self.parts[name], state.active[rows])
             first = rows.stop
         return StepResult(
             index, instant, u.copy(), stress, recovery.von_mises(stress), recovery.von_mises_signed(stress),
-            reaction.reshape(-1, mesh.dim), contact, iterations, tuple(self._warn(stress, last)),
+            reaction.reshape(-1, mesh.dim), contact, iterations, tuple(self._warn(stress, contact, last)),
         )  # fmt: skip
 
-    def _warn(self, stress: Array, last: bool) -> list[str]:
+    def _warn(self, stress: Array, contact: dict[str, ContactResult], last: bool) -> list[str]:
         """Warn, at the last step, of interpenetration without contact, large strains and springs that still carry."""
         if not last:
             return []
         found = self._interpenetration() + self._large_strain(stress) + self._carrying_springs()
+        found += [text for name, pair in self.pairs.items() for text in deep(pair, contact[name], self.u)]
         for text in found:
             warnings.warn(text, FastcontactWarning, stacklevel=4)
         return found
@@ -454,7 +555,7 @@ class Analysis:
         }
         texts: list[str] = []
         seen: set[frozenset[int]] = set()
-        coordinates = mesh.points + self.u.reshape(-1, mesh.dim)
+        coordinates = mesh.points + self.displacement
         deep = sorted(penetration(mesh, self.model.kinematics, coordinates), key=lambda entry: -entry[2])
         for number, other, depth, where in deep:
             both = frozenset((number, other))

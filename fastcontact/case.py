@@ -11,13 +11,15 @@ from typing import Any
 
 from fastcontact import analytic, generate
 from fastcontact.analysis import Criteria
+from fastcontact.checks import KEYS, Check, read_check
 from fastcontact.errors import CaseError, FastcontactError, unknown
 from fastcontact.io.mesh_files import read_mesh
 from fastcontact.materials import LinearElastic
 from fastcontact.mesh import Mesh
 from fastcontact.model import Model
-from fastcontact.obstacles import SHAPES
+from fastcontact.obstacles import SHAPES, MeshedSurface, Obstacle
 from fastcontact.ramp import Ramp, Table, linear_ramp
+from fastcontact.ready import case_path
 
 _NUMBER = (int, float)
 _UNITS = {"length": str, "force": str, "pressure": str}
@@ -29,11 +31,12 @@ _SOLVE = {
     "absolute": _NUMBER,
     "geometry_updates": int,
     "geometry": _NUMBER,
+    "keep_pairing": bool,
     "max_geometry_updates": int,
     "max_active_set_iterations": int,
 }
 _AXES = {"x": _NUMBER, "y": _NUMBER, "z": _NUMBER}
-# Tables of loads and relations: their keys, the method of the model that takes them, and the keys they need.
+# Tables of loads, relations and springs: their keys, the method of the model that takes them, and the keys they need.
 _LOADS: dict[str, tuple[dict[str, Any], Callable[..., None], tuple[str, ...]]] = {
     "pressure": ({"group": str, "value": _NUMBER, "ramp": list}, Model.add_pressure, ("group", "value")),
     "traction": ({"group": str, **_AXES, "ramp": list}, Model.add_traction, ("group",)),
@@ -41,8 +44,14 @@ _LOADS: dict[str, tuple[dict[str, Any], Callable[..., None], tuple[str, ...]]] =
     "force": ({"group": str, **_AXES, "distribute": bool, "ramp": list}, Model.add_force, ("group",)),
     "couple": ({"group": str, "component": str}, Model.couple, ("group", "component")),
     "relation": ({"terms": list, "value": _NUMBER, "ramp": list}, Model.relate, ("terms",)),
+    "spring": (
+        {"group": (str, int), "to": (str, int), **_AXES, "axial": _NUMBER},
+        Model.add_spring,
+        ("group",),
+    ),
 }
-_CHECK = {"quantity": str, "theory": str, "tolerance": _NUMBER, "name": str}
+# A rigid surface: the facets of a group of a file, or of the mesh of the model.
+_SURFACE = {"file": str, "group": str, "flip": bool, "crease": _NUMBER}
 # What a mesh-convergence study or a sweep of this case needs to know; `fastcontact.convergence` reads it.
 _STUDY = {
     "generator": str,
@@ -77,16 +86,6 @@ _TOP = {
 }
 
 
-@dataclass(frozen=True)
-class Check:
-    """A comparison of a probe with a theory: ``quantity`` is ``"PROBE.stress.yy"`` or ``"PROBE.pressure"``."""
-
-    name: str
-    quantity: str
-    theory: str
-    tolerance: float
-
-
 @dataclass(frozen=True, eq=False)
 class Case:
     """A case file, checked and ready to run.
@@ -104,7 +103,8 @@ class Case:
     probes : dict of str to int
         Point number by probe name.
     theories : dict of str to dict
-        By contact pair: ``"theory"`` and, where given, ``"mesh_converged"``, objects of `fastcontact.analytic`.
+        By contact pair: ``"theory"`` and, where given, ``"mesh_converged"``, objects of `fastcontact.analytic`; and
+        ``"share"``, the part of the theory's contact that the model holds: 0.25 for a quarter of it.
     checks : list of Check
     units : dict of str to str
         Names of the units of length, force and pressure, for labels.
@@ -129,7 +129,7 @@ class Case:
 
 
 def read_case(path: str | Path) -> Case:
-    """Read a case file and build its model.
+    """Read a case file, or a ready case by its name, and build its model.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def read_case(path: str | Path) -> Case:
     FastcontactError
         If its mesh or model is wrong.
     """
-    path = Path(path)
+    path = case_path(path)
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -193,9 +193,13 @@ def build_case(
     theories, approach = _theories(data.get("theory", {}), {**data.get("contact", {}), **data.get("obstacle", {})})
     if mesh is None:
         mesh = _mesh(Path(folder), data["mesh"])
-    model = _model(mesh, data, text)
+    model = _model(mesh, data, text, Path(folder))
     probes = _probes(mesh, data.get("probes", {}))
-    checks = [_check(i, entry, probes, theories) for i, entry in enumerate(_tables("check", data.get("check", [])))]
+    pairs = {**data.get("contact", {}), **data.get("obstacle", {})}
+    checks = []
+    for i, entry in enumerate(_tables("check", data.get("check", []))):
+        _check_keys(f"check[{i}]", entry, KEYS)
+        checks.append(read_check(f"check[{i}]", entry, probes, pairs, theories))
     return Case(
         name=name,
         title=data.get("title", name),
@@ -254,7 +258,7 @@ def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:
     return make(**{key: tuple(v) if isinstance(v, list) else v for key, v in arguments.items()})
 
 
-def _model(mesh: Mesh, data: dict[str, Any], text: str) -> Model:
+def _model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
     model = Model(mesh, data["kinematics"], case_text=text)
     for i, entry in enumerate(_tables("material", data["material"])):
         _check_keys(f"material[{i}]", entry, {"E": _NUMBER, "nu": _NUMBER, "groups": (list, str)})
@@ -276,30 +280,44 @@ def _model(mesh: Mesh, data: dict[str, Any], text: str) -> Model:
                 raise CaseError(f"contact.{name} needs '{key}', the name of a group of facets")
         model.add_contact(name, **entry)
     for name, entry in data.get("obstacle", {}).items():
-        _add_obstacle(model, name, entry)
+        _add_obstacle(model, name, entry, folder)
     return model
 
 
-def _add_obstacle(model: Model, name: str, entry: Any) -> None:
+def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
     """Give the model a rigid obstacle: its shape by kind and arguments, the rest as for `Model.add_obstacle`."""
     where = f"obstacle.{name}"
     if not isinstance(entry, dict) or not isinstance(entry.get("secondary"), str):
         raise CaseError(f"{where} needs 'secondary', the name of a group of facets")
-    shape = entry.get("shape")
-    if not isinstance(shape, dict) or shape.get("kind") not in SHAPES:
-        kind = shape.get("kind", "") if isinstance(shape, dict) else ""
-        raise CaseError(unknown(f"{where}.shape.kind", str(kind), SHAPES))
-    factory = SHAPES[shape["kind"]]
-    arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in shape.items() if key != "kind"}
-    _check_keys(f"{where}.shape", arguments, dict.fromkeys(_parameters(factory)))
-    try:
-        obstacle = factory(**arguments)
-    except (TypeError, ValueError) as error:
-        raise CaseError(f"'{where}.shape': {error}") from error
     rest = {key: value for key, value in entry.items() if key != "shape"}
-    if "motion" in rest:
-        _check_keys(f"{where}.motion", rest["motion"], _AXES)
+    shape = entry.get("shape")
+    if shape == "mesh":  # its few arguments may stand beside it
+        shape = {"kind": "mesh", **{key: rest.pop(key) for key in _SURFACE if key in rest}}
+    obstacle = _obstacle(f"{where}.shape", shape, model.mesh, folder)
+    for key in ("motion", "force"):
+        if key in rest:
+            _check_keys(f"{where}.{key}", rest[key], _AXES)
     model.add_obstacle(name, obstacle=obstacle, **_arguments(where, rest))
+
+
+def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
+    """Return the rigid shape that a table with its kind and arguments describes; `mesh` is that of the model."""
+    kind = shape.get("kind", "") if isinstance(shape, dict) else shape if isinstance(shape, str) else ""
+    if not isinstance(shape, dict) or kind not in (*SHAPES, "mesh"):
+        raise CaseError(unknown(f"{where}.kind", str(kind), (*SHAPES, "mesh")))
+    arguments: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in shape.items() if k != "kind"}
+    if kind == "mesh":
+        _check_keys(where, arguments, _SURFACE)
+        if "group" not in arguments:
+            raise CaseError(f"'{where}' needs 'group', the facets of the rigid surface")
+        file = arguments.pop("file", None)
+        return MeshedSurface(mesh if file is None else read_mesh(folder / file), **arguments)
+    factory = SHAPES[kind]
+    _check_keys(where, arguments, dict.fromkeys(_parameters(factory)))
+    try:
+        return factory(**arguments)
+    except (TypeError, ValueError) as error:
+        raise CaseError(f"'{where}': {error}") from error
 
 
 def _add_loads(model: Model, data: dict[str, Any]) -> None:
@@ -359,13 +377,24 @@ def _theories(data: dict[str, Any], pairs: Mapping[str, Any]) -> tuple[dict[str,
     for pair, entry in data.items():
         if pair not in pairs:
             raise CaseError(unknown("contact pair in 'theory'", pair, pairs))
-        own = {key: value for key, value in entry.items() if key != "mesh_converged"}
-        theories[pair] = {"theory": _theory(f"theory.{pair}", own)}
+        own = {key: value for key, value in entry.items() if key not in ("mesh_converged", "share")}
+        theories[pair] = {"theory": _theory(f"theory.{pair}", own), "share": _share(f"theory.{pair}", entry)}
         if "mesh_converged" in entry:
             theories[pair]["mesh_converged"] = _theory(f"theory.{pair}.mesh_converged", entry["mesh_converged"])
         if "approach" in own:
             approach[pair] = float(own["approach"])
     return theories, approach
+
+
+def _share(where: str, data: dict[str, Any]) -> float:
+    """Return the part of the theory's contact that the model holds, 1 by default."""
+    _check_keys(where, {"share": data.get("share", 1.0)}, {"share": _NUMBER})
+    share = float(data.get("share", 1.0))
+    if not 0.0 < share <= 1.0:
+        raise CaseError(
+            f"{where}.share = {share:g} must be more than 0 and at most 1: 0.25 for a quarter of the contact"
+        )
+    return share
 
 
 def _theory(where: str, data: dict[str, Any]) -> Any:
@@ -383,7 +412,7 @@ def _theory(where: str, data: dict[str, Any]) -> Any:
 
 
 def described(data: dict[str, Any]) -> dict[str, Any]:
-    """Return what pictures need of a case: ``title``, ``units``, ``theories`` and ``approach`` by contact pair.
+    """Return what pictures need of a case: ``title``, ``units``; ``theories``, ``shares``, ``approach`` by contact pair.
 
     `data` is the parsed text kept in a result file; it may be empty.
     """
@@ -392,23 +421,6 @@ def described(data: dict[str, Any]) -> dict[str, Any]:
         "title": data.get("title", ""),
         "units": {"length": "-", "force": "-", "pressure": "-", **data.get("units", {})},
         "theories": {pair: entry["theory"] for pair, entry in theories.items()},
+        "shares": {pair: entry["share"] for pair, entry in theories.items()},
         "approach": approach,
     }
-
-
-def _check(index: int, entry: dict[str, Any], probes: dict[str, int], theories: Mapping[str, Any]) -> Check:
-    where = f"check[{index}]"
-    _check_keys(where, entry, _CHECK)
-    for key in ("quantity", "theory", "tolerance"):
-        if key not in entry:
-            raise CaseError(f"{where} needs '{key}'")
-    probe, _, what = entry["quantity"].partition(".")
-    if probe not in probes:
-        raise CaseError(unknown(f"probe in {where}.quantity", probe, probes))
-    allowed = ["pressure", *(f"stress.{component}" for component in ("xx", "yy", "zz", "xy"))]
-    if what not in allowed:
-        raise CaseError(unknown(f"quantity in {where}", what, allowed))
-    if entry["theory"] not in theories:
-        raise CaseError(unknown(f"theory in {where}", entry["theory"], theories))
-    name = entry.get("name", entry["quantity"])
-    return Check(name, entry["quantity"], entry["theory"], float(entry["tolerance"]))

@@ -82,12 +82,18 @@ class Floating:
 
     def __init__(self, motions: FreeMotions, system: System, avoid: NDArray[np.intp]) -> None:
         diagonal = system.matrix.diagonal()
+        weightless = diagonal == 0
+        typical = float(np.median(diagonal[system.free & (diagonal > 0)]))
+        diagonal = np.where(diagonal > 0, diagonal, typical)  # rigid obstacles have no stiffness of their own
         self._dim = system.matrix.blocksize[0]
         self.names = motions.names()
         self.dofs = _sturdy(system.unknowns_of(motions.displacement), diagonal, avoid)
+        self._places = [
+            f"{'xyz'[dof % self._dim]} of {self._owner(motions, dof, weightless)}" for dof in self.dofs.tolist()
+        ]
         self._at_springs = motions.displacement[self.dofs]
         self.motions = motions.combined(np.asarray(np.linalg.inv(self._at_springs), np.float64))
-        self.stiffness = float(np.median(diagonal[system.free]))
+        self.stiffness = typical
 
     def with_springs(self, matrix: bsr_array) -> bsr_array:
         """Return the matrix with the springs added."""
@@ -113,12 +119,19 @@ class Floating:
         left = np.abs(settled.left)
         return {
             "motions": self.names,
-            "springs": [f"{'xyz'[dof % self._dim]} of point {dof // self._dim}" for dof in self.dofs.tolist()],
+            "springs": self._places,
             "spring_stiffness": self.stiffness,
             "force_left": left.tolist(),
             "relative_to_load": float(left.max() / load) if load else 0.0,
             "positions": settled.positions,
         }
+
+    def _owner(self, motions: FreeMotions, dof: int, weightless: NDArray[np.bool_]) -> str:
+        """Return what a spring hangs on: a point of a body, or an obstacle that has no point in the mesh."""
+        if not weightless[dof]:
+            return f"point {dof // self._dim}"
+        column = int(np.argmax(np.abs(motions.displacement[dof])))
+        return motions.labels[int(np.argmax(np.abs(motions.parts[:, column])))][0]
 
     def unheld(self, settled: Settled) -> list[str]:
         """Return the names of the free motions that the springs still hold most."""

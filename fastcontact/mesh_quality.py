@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fastcontact import elements
 from fastcontact.errors import MeshError
+from fastcontact.kernels import jacobians
 from fastcontact.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -164,23 +165,11 @@ class _Verdict:
 
 def _verdict(mesh: Mesh, name: str) -> _Verdict:
     """Judge the cells of a solid element by their Jacobians at the default quadrature points."""
-    corners = mesh.points[mesh.cells[name]]
-    _, gradients, weights = elements.get(name).tables
-    low, high = np.full(len(corners), np.inf), np.full(len(corners), -np.inf)
-    measure = np.zeros(len(corners))
-    # One quadrature point at a time keeps the memory at a few arrays of n_cells.
-    for gradient, weight in zip(gradients, weights, strict=True):
-        jacobian = _determinant(np.tensordot(corners, gradient, axes=(1, 0)))
-        np.minimum(low, jacobian, out=low)
-        np.maximum(high, jacobian, out=high)
-        measure += weight * jacobian
-    rounding = _FLAT * _edge_lengths(mesh, name).max(axis=1) ** mesh.dim
+    element = elements.get(name)
+    _, gradients, weights = element.tables
+    low, high, measure, longest = np.empty((4, len(mesh.cells[name])))
+    edges = np.array(element.edges, np.intp)
+    jacobians.extremes(mesh.points, mesh.cells[name], gradients, weights, edges, low, high, measure, longest)
+    rounding = _FLAT * longest**mesh.dim
     flat = np.maximum(np.abs(low), np.abs(high)) <= rounding
     return _Verdict(measure, flat, (low <= rounding) & ~flat)
-
-
-def _determinant(J: Array) -> Array:
-    """Determinants (n,) of matrices (n, 2, 2) or (n, 3, 3), written out: far faster than one factorisation each."""
-    if J.shape[1] == 2:
-        return J[:, 0, 0] * J[:, 1, 1] - J[:, 0, 1] * J[:, 1, 0]
-    return (J[:, 0] * np.cross(J[:, 1], J[:, 2])).sum(axis=1)

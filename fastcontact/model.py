@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
+import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, vstack
 
 from fastcontact import elements
+from fastcontact.contact.default import default_formulation
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
 from fastcontact.contact.rigid import RigidSide
 from fastcontact.contact.surface import Surface, surface
+from fastcontact.driven import Driven, Driving
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.loads import (
     BodyForce,
@@ -32,14 +35,17 @@ from fastcontact.loads import (
 from fastcontact.materials import KINEMATICS, LinearElastic
 from fastcontact.mesh import Mesh
 from fastcontact.mesh_quality import check_cells
-from fastcontact.obstacles import Obstacle
+from fastcontact.obstacles import MeshedSurface, Obstacle
+from fastcontact.pair_terms import TERMS, clearance_ramp, terms_of
 from fastcontact.ramp import Ramp, Table, checked_table, table_value
 from fastcontact.relations import Relation, stacked_rows
 from fastcontact.rigid_motions import free_motions, generalised, resisting, unstopped
+from fastcontact.springs import Springs, between, check_stiffness, grounded, stacked
 from fastcontact.system import ConstrainedMotion
 from fastcontact.validation import check_forces, check_motions, check_overlap, check_ramps
 
 Array = NDArray[np.float64]
+log = logging.getLogger("fastcontact")
 # Formulations that need no facets on the primary side.
 AGAINST_OBSTACLES = ("node_to_segment", "continuous")
 # A history of a single load: a ramp, whose table counts, or pairs (instant, multiplier).
@@ -69,7 +75,7 @@ class ContactPair:
     """Two groups of facets that may touch, or one and a rigid obstacle, with a formulation and its options.
 
     With an `obstacle`, `primary` is empty; `motion` is the obstacle's displacement at multiplier 1 [length], and `ramp`
-    a history of its own or None.
+    a history of its own or None. Components of `force` that are not None drive the obstacle at multiplier 1 [force].
     """
 
     name: str
@@ -80,6 +86,12 @@ class ContactPair:
     obstacle: Obstacle | None = None
     motion: tuple[float, ...] = ()
     ramp: Table | None = None
+    force: Driving = ()
+
+    @property
+    def clearance_ramp(self) -> Table | None:
+        """History of the clearance; None where it does not change."""
+        return clearance_ramp(self.name, self.options)
 
     @property
     def opposite(self) -> str:
@@ -139,6 +151,7 @@ class Model:
         self.supports: list[Support] = []
         self.loads: list[Load] = []
         self.relations: list[Relation] = []
+        self.springs: list[Springs] = []
         self.contact: list[ContactPair] = []
 
     def __repr__(self) -> str:
@@ -332,6 +345,59 @@ class Model:
         rows = csr_array((values, dofs, np.array([0, len(dofs)])), shape=(1, self.n_dofs))
         self.relations.append(Relation(name, rows, float(value), _table(ramp, name)))
 
+    def add_spring(
+        self,
+        group: str | int,
+        to: str | int | None = None,
+        *,
+        x: float | None = None,
+        y: float | None = None,
+        z: float | None = None,
+        axial: float | None = None,
+    ) -> None:
+        """Hang every node of a group on the ground by springs, or join two nodes by them.
+
+        Parameters
+        ----------
+        group : str or int
+            Group or point number.
+        to : str or int, optional
+            Group of one node or point number: the springs then lie between the single node of `group` and this one.
+        x, y, z : float
+            Stiffness along the axes [force / length]; in axisymmetry over the full circle.
+        axial : float
+            Stiffness along the line between the two nodes [force / length], which keeps its reference direction.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If a group is unknown or has not the right number of nodes, or a stiffness is not a positive number.
+        """
+        name = f"the spring on '{group}'" if to is None else f"the spring between '{group}' and '{to}'"
+        given = {"x": x, "y": y, "z": z}
+        if axial is not None and to is None:
+            raise ModelError(f"{name} has an axial stiffness but no second node: name it by `to`, or give x, y or z")
+        axes = {} if axial is not None and set(given.values()) == {None} else axes_of(name, given, self.mesh.dim)
+        values = [*axes.values(), *([] if axial is None else [axial])]
+        for value in values:
+            check_number(f"the stiffness of {name}", value)
+        check_stiffness(name, values)
+        nodes = self._nodes(group)
+        if not len(nodes):
+            raise ModelError(f"group '{group}' is empty: no spring can be there")
+        if to is None:
+            self.springs.append(grounded(name, nodes, axes, self.n_dofs, self.mesh.dim))
+            return
+        ends = [*nodes, *self._nodes(to)]
+        if len(ends) != 2:
+            raise ModelError(f"{name} needs one node at each end, but finds {len(nodes)} and {len(ends) - len(nodes)}")
+        self.springs.append(between(name, self.mesh.points, int(ends[0]), int(ends[1]), axes, axial))
+
+    def holding_rows(self) -> csr_array:
+        """Return rows (m, n_dofs) that relations and springs want to vanish: motions in which they do are not held."""
+        relations = stacked_rows(self.relations, self.n_dofs)
+        return csr_array(vstack([relations, stacked(self.springs, self.n_dofs)], format="csr"))
+
     def _nodes(self, place: str | int) -> NDArray[Any]:
         if isinstance(place, str):
             return self.mesh.points_of(place)
@@ -340,7 +406,7 @@ class Model:
         return np.array([place])
 
     def add_contact(
-        self, name: str, *, secondary: str, primary: str, formulation: str = "node_to_segment", **options: Any
+        self, name: str, *, secondary: str, primary: str, formulation: str | None = None, **options: Any
     ) -> None:
         """Let the facets of group `secondary` come into contact with those of group `primary`.
 
@@ -351,16 +417,41 @@ class Model:
         secondary, primary : str
             The side whose nodes or integration points are projected and carry the constraints, and the side
             projected upon. Facets are oriented from the solid behind them.
-        formulation : str
-            ``"node_to_segment"`` or ``"continuous"``.
+        formulation : str, optional
+            ``"node_to_segment"``, ``"continuous"`` or ``"mortar"``. By default mortar where facets are quadratic or the
+            nodes of the two sides do not lie opposite to each other, else node-to-segment; ``repr(model)`` and the log
+            tell which.
         **options
-            Fields of the formulation, e.g. ``integration="simpson"``.
+            What every formulation takes, in addition to the fields of the formulation itself:
+
+            - ``friction``: coefficient of Coulomb friction.
+            - ``kind``: ``"unilateral"`` (default) contact closes and opens. ``"bilateral"`` closes every gap that faces
+              the other side from the beginning and never opens, but slides without friction. In
+              ``"bilateral_once_closed"`` what is closed at the end of a load step never opens again. ``"tied"`` neither
+              opens nor slides: the two sides are paired once, as they lie, and their relative displacement stays zero,
+              also across initial gaps, which are kept (a rotation then strains by its angle times the gap).
+            - ``clearance``: added to the gap, a number or a function from reference positions (n, dim) on the secondary
+              side to lengths (n,); positive opens the gap, negative is an interference, as of a press fit [length].
+              ``clearance_primary``: the same on the primary side, at the positions faced. ``clearance_ramp``: their
+              history, as pairs (instant, multiplier); without one they are there from the beginning.
+            - ``excluded``: groups whose nodes carry no contact. Where the formulation has integration points, those
+              nearer to such a node than to any other take no part. ``frictionless``: groups whose nodes carry no
+              friction, likewise.
+            - ``penalty``: pressure by penetration [pressure / length], instead of none at all; results tell the
+              penetration. It does not soften friction.
+            - ``normals``: ``"facet"`` or ``"averaged"`` between the facets at a node, which curved sides that fit closely
+              need; ``projection_tolerance``: how far points may stand out beyond the end of the primary side, in facet
+              lengths.
 
         Raises
         ------
-        ContactError
-            If a side is wrong, an option unknown, or the name taken.
+        ContactError, ModelError
+            If a side is wrong, an option unknown or wrong, or the name taken.
         """
+        if formulation is None:
+            sides = surface(self.mesh, secondary), surface(self.mesh, primary)
+            formulation, reason = default_formulation(*sides, self.mesh.points)
+            log.info("contact '%s': formulation %s, since %s", name, formulation, reason)
         self._add_pair(ContactPair(name, secondary, primary, formulation, options))
 
     def add_obstacle(
@@ -370,6 +461,7 @@ class Model:
         secondary: str,
         obstacle: Obstacle,
         motion: Mapping[str, float] | None = None,
+        force: Mapping[str, float] | None = None,
         ramp: History = None,
         formulation: str = "continuous",
         **options: Any,
@@ -384,8 +476,12 @@ class Model:
             A shape of `fastcontact.obstacles`, or any object with their ``distance`` method.
         motion : mapping of str to float, optional
             Its displacement at multiplier 1, e.g. ``{"y": -0.1}`` [length]; it stands still without.
+        force : mapping of str to float, optional
+            The force on it at multiplier 1, e.g. ``{"y": -100.0}`` [force], in axisymmetry over the full circle. In
+            these components the obstacle is a rigid body that moves freely until contact holds it; in the others it
+            follows `motion`. Results tell where it is.
         ramp : Ramp or iterable of (float, float), optional
-            A history of its own for the motion; by default that of the analysis.
+            A history of its own for motion and force; by default that of the analysis.
         formulation : str
             ``"node_to_segment"`` (then: node against obstacle) or ``"continuous"``.
         **options
@@ -394,15 +490,41 @@ class Model:
         Raises
         ------
         ContactError, ModelError
-            If the group, an option or the motion is wrong, or the name taken.
+            If the group, an option, the motion or the force is wrong, or the name taken.
         """
         moves = axes_of(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
         displacement = tuple(float(moves.get(axis, 0.0)) for axis in range(self.mesh.dim))  # type: ignore[arg-type]
         if not np.isfinite(displacement).all():
             raise ModelError(f"the motion {motion} of obstacle '{name}' must be finite numbers")
+        if isinstance(obstacle, MeshedSurface):
+            obstacle.check_apart(self.mesh)
         obstacle.distance(self.mesh.points[:1])  # what does not fit this dimension shows at once
         history = _table(ramp, f"the motion of obstacle '{name}'")
-        self._add_pair(ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history))
+        driving = self._driving(name, moves, force)
+        self._add_pair(ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving))
+
+    def _driving(self, name: str, moves: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
+        """Return the force on obstacle `name` by component, None for prescribed ones; empty without any."""
+        if not force:
+            return ()
+        forces = axes_of(f"the force on obstacle '{name}'", dict(force), self.mesh.dim)
+        for axis, value in forces.items():
+            check_number(f"the force {'xyz'[axis]} on obstacle '{name}'", value)
+            if axis in moves:
+                raise ModelError(
+                    f"obstacle '{name}' is both moved and pushed along {'xyz'[axis]}: name this component either in its "
+                    "motion or in its force"
+                )
+            if axis == 0 and self.kinematics == "axisymmetric":
+                raise ModelError(
+                    f"a force cannot move obstacle '{name}' along x, the radius: in axisymmetry give y only"
+                )
+        return tuple(float(forces[k]) if k in forces else None for k in range(self.mesh.dim))  # type: ignore[arg-type]
+
+    @property
+    def driven(self) -> Driven:
+        """The rigid obstacles that forces drive."""
+        return Driven([pair for pair in self.contact if pair.force], (self.mesh.n_points, self.mesh.dim))
 
     def _add_pair(self, pair: ContactPair) -> None:
         if pair.name in {other.name for other in self.contact}:
@@ -414,9 +536,9 @@ class Model:
         """Return the formulation of a contact pair on this mesh; see `add_contact` for the errors."""
         if pair.formulation not in FORMULATIONS:
             raise ContactError(unknown("contact formulation", pair.formulation, FORMULATIONS))
-        kind = FORMULATIONS[pair.formulation].in_dimension(self.mesh.dim)
-        given = ("secondary", "primary", "points", "axisymmetric", "modulus")
-        known = [f.name for f in dataclasses.fields(kind) if f.init and f.name not in given]
+        kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
+        given = ("secondary", "primary", "points", "axisymmetric", "modulus", "terms")
+        known = [*TERMS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in given)]
         for option in pair.options:
             if option not in known:
                 raise ContactError(unknown(f"option of {pair.formulation}", option, known))
@@ -432,7 +554,10 @@ class Model:
             primary = surface(self.mesh, pair.primary)
             _check_sides(self.mesh, pair, secondary, primary)
         modulus = min((m.E / (1 - m.nu**2) for m, _ in self.materials), default=1.0)
-        return kind(secondary, primary, self.mesh.points, self.kinematics == "axisymmetric", modulus, **pair.options)
+        terms = terms_of(pair.name, pair.options, self.mesh, secondary, against_obstacle=pair.obstacle is not None)
+        own = {key: value for key, value in pair.options.items() if key not in TERMS}
+        axisymmetric = self.kinematics == "axisymmetric"
+        return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, terms=terms, **own)
 
     def material_numbers(self) -> tuple[Array, dict[str, NDArray[np.int32]]]:
         """Return moduli (n_materials, 4, 4), in 3D (n_materials, 6, 6), and by element every solid cell's material.
@@ -512,7 +637,7 @@ class Model:
             If a load is a function that fails, or acts on points that nothing holds.
         """
         related = np.zeros(self.mesh.n_points, bool)
-        related[stacked_rows(self.relations, self.n_dofs).indices // self.mesh.dim] = True
+        related[self.holding_rows().indices // self.mesh.dim] = True
         by_ramp: dict[Table | None, Array] = {}
         for load in self.loads:
             forces = load.vector(self.mesh, self.kinematics)
@@ -535,12 +660,13 @@ class Model:
             items: list[Support | Load | Relation] = [*self.supports, *self.loads, *self.relations]
             named = [(item.name, item.ramp) for item in items]
             named += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]
+            named += [(f"the clearance of contact '{p.name}'", p.clearance_ramp) for p in self.contact]
             check_ramps(named, ramp.instants)
         self._check_relations(fixed, prescribed, ramp or Ramp((1.0,)))
         check_overlap(
             self.mesh, self.kinematics, [(p.secondary, p.primary) for p in self.contact if p.obstacle is None]
         )
-        self._check_motions(fixed, list(forces.values()))
+        self._check_motions(fixed, list(self.driven.forces(forces).values()))
 
     def _check_relations(self, fixed: NDArray[np.bool_], prescribed: Mapping[Table | None, Array], ramp: Ramp) -> None:
         if not self.relations:
@@ -551,13 +677,14 @@ class Model:
             motion.lift(lift.ravel(), motion.values([multiplier(r.ramp, ramp, instant) for r in self.relations]))
 
     def _check_motions(self, fixed: NDArray[np.bool_], forces: Sequence[Array]) -> None:
-        """Refuse motions without deformation that neither supports nor relations nor loads against a contact stop."""
-        R = stacked_rows(self.relations, self.n_dofs)
-        motions = free_motions(self.mesh, self.kinematics, fixed, R)
+        """Refuse motions without deformation that no supports, relations, springs or loads against a contact stop."""
+        driven = self.driven
+        motions = driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.holding_rows()))
         if not len(motions):
             return
-        at_rest = np.zeros(self.mesh.points.shape)
-        rows = [resisting(self.bind(pair).constraints(at_rest))[0] @ motions.displacement for pair in self.contact]
+        at_rest, still = np.zeros(self.mesh.points.shape), np.zeros(self.mesh.dim)
+        parts = [driven.constraints(pair.name, self.bind(pair).conditions(at_rest), still) for pair in self.contact]
+        rows = [resisting(part)[0] @ motions.displacement for part in parts]
         works = [generalised(motions, force.ravel()) for force in forces]
         k = len(motions)
         check_motions(

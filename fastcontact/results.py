@@ -28,9 +28,10 @@ class ContactResult:
         line through the secondary node with the smallest gap before any load (of equally close ones that nearest to the
         origin) along the normal faced there [length].
     gap : ndarray (m,)
-        Open positive, closed zero [length].
+        Open positive, closed zero, clearance included; negative by what a penalty lets penetrate [length].
     pressure : ndarray (m,)
-        Contact pressure, >= 0 in compression, per reference area [pressure].
+        Contact pressure, >= 0 in compression, per reference area; negative only where tied or bilateral contact pulls
+        [pressure].
     multiplier : ndarray (m,)
         What the formulation solves for: nodal contact force (node-to-segment) [force], or nodal value of the
         pressure field (continuous) [pressure].
@@ -47,11 +48,13 @@ class ContactResult:
         first contact, of the outermost closed constraint and of the first open one beyond it [length]; NaN without
         contact.
     shear : ndarray (m, dim)
-        Tangential traction on the secondary side, zero without friction [pressure].
+        Tangential traction on the secondary side, zero without friction or tie [pressure].
     sticking : ndarray of bool (m,)
         Closed nodes that do not slide; all closed ones without friction.
     dissipation : float
         Work of friction in this step [energy].
+    obstacle_displacement : ndarray (dim,), optional
+        How far a rigid obstacle stands from its place at rest [length]; None for contact between bodies.
     """
 
     name: str
@@ -70,6 +73,7 @@ class ContactResult:
     shear: Array = None  # type: ignore[assignment]
     sticking: NDArray[np.bool_] = None  # type: ignore[assignment]
     dissipation: float = 0.0
+    obstacle_displacement: Array | None = None
 
     def __post_init__(self) -> None:
         if self.shear is None:
@@ -78,9 +82,27 @@ class ContactResult:
             object.__setattr__(self, "sticking", self.active.copy())
 
     @property
+    def stick_radius(self) -> tuple[float, float]:
+        """Bracket of the stick zone, as `radius`: the outermost node that sticks, and the next one; NaN if none does."""
+        place = np.abs(self.coordinates[:, 0]) if self.coordinates.shape[1] == 2 else self.abscissa
+        held = self.active & self.sticking
+        if not held.any():
+            return float("nan"), float("nan")
+        inside = place[held].max()
+        return float(inside), float(place[place > inside].min(initial=np.inf))
+
+    @property
     def pressure_max(self) -> float:
         """Largest nodal pressure [pressure]."""
         return float(self.pressure.max(initial=0.0))
+
+    @property
+    def penetration(self) -> float:
+        """How far closed nodes lie inside the other side at most [length].
+
+        Pressure over stiffness with a penalty; else what a weighted gap leaves between the nodes of both sides.
+        """
+        return float(-self.gap[self.active].min(initial=0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +123,8 @@ class StepResult:
     von_mises, von_mises_signed : ndarray (n_points,)
         Equivalent stress of `stress`; the same with the sign of its trace [pressure].
     reaction : ndarray (n_points, dim)
-        Forces of supports and linear relations, zero elsewhere; axisymmetric: over the full circle [force].
+        Forces of supports, linear relations and springs to the ground, zero elsewhere; axisymmetric: over the full
+        circle [force].
     contact : dict of str to ContactResult
         By contact pair.
     iterations : dict
@@ -109,6 +132,8 @@ class StepResult:
         alone holds bodies, ``regularised``: what was made regular, and by how much; see `floating.Floating.report`.
     warnings : tuple of str
         What the step warned of.
+    cell_fields : dict of str to ndarray (n_solids,)
+        Further numbers of every solid cell, in the order of ``mesh.solids``, e.g. an estimated error.
     """
 
     index: int
@@ -121,3 +146,4 @@ class StepResult:
     contact: dict[str, ContactResult] = field(default_factory=dict)
     iterations: dict[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    cell_fields: dict[str, Array] = field(default_factory=dict)

@@ -59,7 +59,7 @@ class FreeMotions:
 
     def names(self) -> list[str]:
         """Return a description of each motion: bodies and elementary motions that it mixes."""
-        return ["; ".join(f"body {body}: {motion}" for body, motion in self._mixed(column)) for column in self.parts.T]
+        return ["; ".join(f"{body}: {motion}" for body, motion in self._mixed(column)) for column in self.parts.T]
 
     def by_body(self) -> dict[str, list[str]]:
         """Return the names of the motions of each body."""
@@ -106,7 +106,7 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
             own[members] = (modes / np.abs(modes).max(axis=0) @ loose).reshape(len(members), mesh.dim, -1)
             columns.append(own.reshape(dofs, -1))
             parts.append(loose)
-            labels += [(body_name(mesh, body, number), name) for name in MODE_NAMES[kinematics]]
+            labels += [(f"body {body_name(mesh, body, number)}", name) for name in MODE_NAMES[kinematics]]
     if relations is not None:
         for dof in np.unique(relations.indices[(body[relations.indices // mesh.dim] < 0)]):
             if not fixed.ravel()[dof]:
@@ -147,8 +147,18 @@ def resisting(constraints: Constraints) -> tuple[csr_array, Array]:
     """Return rows and gaps at u = 0 that must stay >= 0 if nothing slides: gaps, and edges of the friction cone.
 
     A contact force lies in the cone of the rows: normal, and with friction ``n + mu t`` and ``n - mu t`` for each
-    tangent t.
+    tangent t. What is held for good resists both ways.
     """
+    rows, gap0 = _edges(constraints)
+    if constraints.held is None:
+        return rows, gap0
+    backwards = np.flatnonzero(np.tile(constraints.held, len(gap0) // len(constraints.held)))
+    both = csr_array(vstack([rows, -rows[backwards]], format="csr"))
+    return both, np.concatenate([gap0, -gap0[backwards]])
+
+
+def _edges(constraints: Constraints) -> tuple[csr_array, Array]:
+    """Return the rows and gaps of contact that may open."""
     if not constraints.tangents or constraints.friction is None:
         return constraints.B, constraints.gap0
     edges = [

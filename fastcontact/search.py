@@ -117,6 +117,9 @@ def _on_lines(points: Array, corners: Array) -> Closest:
 
 def _on_faces(points: Array, corners: Array) -> Closest:
     nodes, sides, to_terms, to_hull, to_bend = _tables(corners.shape[1])
+    # Seen from their midst: far from the origin, rounding would be coarser than the steps of a converged projection.
+    midst = 0.5 * (corners.min(axis=(0, 1)) + corners.max(axis=(0, 1)))
+    points, corners = points - midst, corners - midst
     terms, hull = to_terms @ corners, to_hull @ corners
     low, high = hull.min(axis=1), hull.max(axis=1)
     bend = np.linalg.norm(terms, axis=2) @ to_bend
@@ -132,10 +135,10 @@ def _on_faces(points: Array, corners: Array) -> Closest:
     )  # fmt: skip
     wrong = np.flatnonzero(status != search3d.CONVERGED)
     if len(wrong):
-        _refuse(points[order[wrong]], facet[wrong], corners)
+        _refuse(points[order[wrong]] + midst, facet[wrong], corners + midst)
     distance = np.linalg.norm(points[order] - position, axis=1)
     back = np.argsort(order)
-    return Closest(facet[back], xi[back], normal[back], overhang[back], position[back], distance[back])
+    return Closest(facet[back], xi[back], normal[back], overhang[back], position[back] + midst, distance[back])
 
 
 def _refuse(points: Array, facet: NDArray[np.intp], corners: Array) -> None:

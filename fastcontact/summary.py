@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 
 import fastcontact
-from fastcontact.case import Case, Check
+from fastcontact.case import Case
+from fastcontact.checks import at_point, evaluated
 from fastcontact.results import ContactResult, StepResult
 
-_STRESS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3}
+# Numbers that a theory must have to be compared as a whole.
+COMPARED = ("force", "pressure_max", "radius")
 
 
 def versions() -> dict[str, str]:
@@ -29,6 +31,7 @@ def summarise(
     """Return the summary of a run, with the state of its last step; plain numbers, strings, lists and dictionaries."""
     mesh, last = case.mesh, steps[-1]
     top = int(np.argmax(last.von_mises))
+    penalties = {pair.name: pair.options.get("penalty") for pair in case.model.contact}
     return {
         "case": case.name,
         "title": case.title,
@@ -36,16 +39,16 @@ def summarise(
         "mesh": {"n_points": mesh.n_points, "n_cells": mesh.n_cells},
         "n_dofs": case.model.n_dofs,
         "steps": [_step(step) for step in steps],
-        "contact": {name: _contact(contact) for name, contact in last.contact.items()},
+        "contact": {name: _contact(contact, penalties.get(name)) for name, contact in last.contact.items()},
         "probes": {name: _probe(last, point) for name, point in case.probes.items()},
         "von_mises_max": {"value": float(last.von_mises[top]), "at": mesh.points[top].tolist()},
         "theory": {
-            pair: _against_theory(last.contact[pair], **theories)
+            pair: _against_theory(last.contact[pair], case.approach.get(pair), **theories)
             for pair, theories in case.theories.items()
-            if pair in last.contact
+            if pair in last.contact and all(hasattr(theories["theory"], name) for name in COMPARED)
         },
         "regularised": last.iterations.get("regularised"),
-        "checks": [_checked(case, check, last) for check in case.checks],
+        "checks": [evaluated(check, last, case.probes, case.theories) for check in case.checks],
         "timings": dict(timings),
         "versions": versions(),
         "warnings": list(warnings),
@@ -57,7 +60,7 @@ def _step(step: StepResult) -> dict[str, Any]:
     return {"load_factor": step.load_factor, **{name: step.iterations[name] for name in counts}}
 
 
-def _contact(contact: ContactResult) -> dict[str, Any]:
+def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
     return {
         "formulation": contact.formulation,
         "force": float(np.linalg.norm(contact.force)),
@@ -65,6 +68,11 @@ def _contact(contact: ContactResult) -> dict[str, Any]:
         "radius": [_finite(value) for value in contact.radius],
         "pressure_max": contact.pressure_max,
         "closed_nodes": int(contact.active.sum()),
+        "obstacle_displacement": None
+        if contact.obstacle_displacement is None
+        else contact.obstacle_displacement.tolist(),
+        "penetration": contact.penetration,
+        "penalty": penalty,
     }
 
 
@@ -73,11 +81,8 @@ def _finite(value: float) -> float | None:
 
 
 def _probe(step: StepResult, point: int) -> dict[str, Any]:
-    pressure = None
-    for contact in step.contact.values():
-        at = np.flatnonzero(contact.points == point)
-        if len(at):
-            pressure = float(contact.pressure[at[0]])
+    found = at_point(step, point)
+    pressure = None if found is None else float(found[0].pressure[found[1]])
     return {
         "stress": step.stress[point].tolist(),
         "displacement": step.displacement[point].tolist(),
@@ -86,12 +91,14 @@ def _probe(step: StepResult, point: int) -> dict[str, Any]:
     }
 
 
-def _against_theory(contact: ContactResult, theory: Any, mesh_converged: Any = None) -> dict[str, Any]:
-    """Compare a contact with its theory at the theory's own load and at the computed force."""
-    force = float(np.linalg.norm(contact.force))
+def _against_theory(
+    contact: ContactResult, approach: float | None, theory: Any, mesh_converged: Any = None, share: float = 1.0
+) -> dict[str, Any]:
+    """Compare a contact, a `share` of the theory's, with it at its own load and at the computed force."""
+    force = float(np.linalg.norm(contact.force)) / share
     computed = {"force": force, "pressure_max": contact.pressure_max, "radius": list(contact.radius)}
-    compared = {"equal_approach": _deviations(computed, theory)}
-    if force > 0:
+    compared = {"equal_approach": {"approach": approach, **_deviations(computed, theory)}}
+    if force > 0 and hasattr(theory, "at_force"):
         compared["equal_force"] = _deviations(computed, theory.at_force(force))
     if mesh_converged is not None:
         compared["mesh_converged"] = _deviations(computed, mesh_converged)
@@ -114,28 +121,6 @@ def _deviations(computed: Mapping[str, Any], theory: Any) -> dict[str, Any]:
     }
 
 
-def _checked(case: Case, check: Check, last: StepResult) -> dict[str, Any]:
-    """Compare one probe with the theory's greatest pressure, and with that of the mesh-converged solution."""
-    probe, _, what = check.quantity.partition(".")
-    values = _probe(last, case.probes[probe])
-    compression = values["pressure"] if what == "pressure" else -values["stress"][_STRESS[what.partition(".")[2]]]
-    theories = case.theories[check.theory]
-    target = theories["theory"].pressure_max
-    value = float("nan") if compression is None else compression
-    converged = theories.get("mesh_converged")
-    return {
-        "name": check.name,
-        "quantity": check.quantity,
-        "value": value if what == "pressure" else -value,
-        "target": target if what == "pressure" else -target,
-        "deviation": value / target - 1.0,
-        "tolerance": check.tolerance,
-        "passed": bool(abs(value / target - 1.0) <= check.tolerance),
-        "distance_to_mesh_converged": value / converged.pressure_max - 1.0 if converged is not None else None,
-        "mesh_converged_deviation": converged.pressure_max / target - 1.0 if converged is not None else None,
-    }
-
-
 def lines(summary: Mapping[str, Any]) -> list[str]:
     """Return the summary as lines for a person: contact, maximum of von Mises, theory, checks."""
     unit = summary["units"]
@@ -148,11 +133,19 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     ]
     for name, contact in summary["contact"].items():
         inside, outside = contact["radius"]
-        edge = f"radius {inside:.4g} to {outside:.4g} {unit['length']}" if inside and outside else "open"
+        edge = _edge(inside, outside, unit["length"])
         found.append(
             f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force {contact['force']:.6g} "
             f"{unit['force']}, largest pressure {contact['pressure_max']:.6g} {unit['pressure']}, {edge}"
         )
+        if any(contact["obstacle_displacement"] or ()):
+            moved = ", ".join(f"{value:.6g}" for value in contact["obstacle_displacement"])
+            found.append(f"  obstacle '{name}' stands ({moved}) {unit['length']} from its place at rest")
+        if contact["penalty"] is not None:
+            found.append(
+                f"  contact '{name}' penetrates by up to {contact['penetration']:.4g} {unit['length']}, with a penalty of "
+                f"{contact['penalty']:.4g} {unit['pressure']}/{unit['length']}"
+            )
     top = summary["von_mises_max"]
     where = ", ".join(f"{x:.4g}" for x in top["at"])
     found.append(f"  largest von Mises stress {top['value']:.6g} {unit['pressure']} at ({where}) {unit['length']}")
@@ -161,8 +154,17 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     for name, theory in summary["theory"].items():
         found.extend(_theory_lines(name, theory))
     for check in summary["checks"]:
-        found.append(_check_line(check, unit["pressure"]))
+        found.append(_check_line(check, unit[check["unit"]]))
     return found
+
+
+def _edge(inside: float | None, outside: float | None, unit: str) -> str:
+    """Return where the contact ends; `outside` is None where it reaches to the end of the surface."""
+    if inside is None:
+        return "open"
+    return (
+        f"radius {inside:.4g} {unit}, to its end" if outside is None else f"radius {inside:.4g} to {outside:.4g} {unit}"
+    )
 
 
 def _regularised_line(told: Mapping[str, Any], unit: Mapping[str, str]) -> str:
@@ -179,6 +181,8 @@ def _theory_lines(pair: str, theory: Mapping[str, Any]) -> list[str]:
         "equal_force": "theory at equal force",
         "mesh_converged": "mesh-converged solution",
     }
+    if theory["equal_approach"]["approach"] is None:
+        titles["equal_approach"] = "the theory given"
     return [
         f"  contact '{pair}' against {titles[key]}: force {values['deviation']['force']:+.3%}, "
         f"largest pressure {values['deviation']['pressure_max']:+.3%}"
@@ -189,8 +193,9 @@ def _theory_lines(pair: str, theory: Mapping[str, Any]) -> list[str]:
 
 def _check_line(check: Mapping[str, Any], unit: str) -> str:
     verdict = "within" if check["passed"] else "NOT within"
+    owner = "the theory's" if check["of"] else "the documented"
     text = (
-        f"  check {check['name']}: {check['value']:.6g} {unit} is {abs(check['deviation']):.3%} from the theory's "
+        f"  check {check['name']}: {check['value']:.6g} {unit} is {abs(check['deviation']):.3%} from {owner} "
         f"{check['target']:.6g}, {verdict} {check['tolerance']:.3g}"
     )
     if check["distance_to_mesh_converged"] is not None:

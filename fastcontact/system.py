@@ -32,6 +32,8 @@ class System:
     supported : ndarray of bool (n,)
         Displacement components that are prescribed.
     relations : sequence of Relation
+    loose : ndarray of bool (n,), optional
+        Components without stiffness that are free all the same, since something else holds them: none by default.
 
     Attributes
     ----------
@@ -45,12 +47,15 @@ class System:
         Components that a support or a relation may exert a force on.
     """
 
-    def __init__(self, K: bsr_array, supported: Mask, relations: Sequence[Relation] = ()) -> None:
+    def __init__(
+        self, K: bsr_array, supported: Mask, relations: Sequence[Relation] = (), loose: Mask | None = None
+    ) -> None:
         self.K = K
         R = stacked_rows(relations, K.shape[0])
         related = np.zeros(K.shape[0], bool)
         related[R.indices] = True
-        self.fixed: Mask = supported | (np.asarray(K.diagonal() == 0.0) & ~related)
+        loose = np.zeros(K.shape[0], bool) if loose is None else loose
+        self.fixed: Mask = supported | (np.asarray(K.diagonal() == 0.0) & ~related & ~loose)
         self.held: Mask = self.fixed | related
         self._constraints = ConstrainedMotion(self.fixed, relations)
         self.T = self._constraints.T if relations else None
@@ -60,7 +65,7 @@ class System:
         else:
             condensed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
             condensed.sort_indices()
-            self.free &= condensed.diagonal() > 0  # points that relations tie to nothing but each other
+            self.free &= (condensed.diagonal() > 0) | loose  # not points that relations tie to nothing but each other
             self.matrix = with_supports(condensed, ~self.free)
 
     def lift(self, prescribed: Array, values: Array) -> Array:

@@ -22,7 +22,7 @@ def check_motions(motions: FreeMotions) -> None:
     if not len(motions):
         return
     total = len(motions)
-    listing = "; ".join(f"body {name}: {', '.join(found)}" for name, found in motions.by_body().items())
+    listing = "; ".join(f"{name}: {', '.join(found)}" for name, found in motions.by_body().items())
     raise ModelError(
         f"{total} rigid-body motion{'s are' if total > 1 else ' is'} not supported: {listing}. "
         "Fix or prescribe a displacement component that stops each, or let a load press the body against a contact"

@@ -91,11 +91,22 @@ class CattaneoMindlinLine(_PartialSlip):
     def slip(self, x: ArrayLike) -> Array:
         """Return how far the surfaces have slipped on each other, in the direction of the force [length].
 
-        The integral of f p0/a (2/E*) sqrt(x^2 - c^2) from the edge c of the stick zone outward, for c <= |x|
-        <= a; zero within the stick zone and outside the contact (from Johnson 1985, eq. 2.25 and section
+        The integral of f p0/a (2/E*) sqrt(x^2 - c^2) from the edge c of the stick zone outward, for ``c <= |x|
+        <= a``; zero within the stick zone and outside the contact (from Johnson 1985, eq. 2.25 and section
         7.2a).
         """
         return self._slip(self._zone(self.tangential_force_peak), x) - 2.0 * self._slip(self._zone(self._reversal), x)
+
+    @property
+    def slip_displacement(self) -> float:
+        """Tangential displacement of distant points beyond that of a contact that sticks throughout [length].
+
+        While loading, f F/(pi E*) [(1 - t) ln(1 - t) + t] with t = T/(f F): the compliance of a strip that sticks
+        over ``|x| < c`` is -2/(pi E*) ln c and a constant of the far bodies (from Johnson 1985, eq. 2.25), integrated
+        over the force with c = a sqrt(1 - t). The elastic part, proportional to the force, depends on how the far
+        bodies are held, as ever in the plane.
+        """
+        return self._beyond(self.tangential_force_peak) - 2.0 * self._beyond(self._reversal)
 
     def unloaded_to(self, tangential_force: float) -> CattaneoMindlinLine:
         """Return the contact after the tangential force went down to a value not below the opposite peak.
@@ -109,6 +120,12 @@ class CattaneoMindlinLine(_PartialSlip):
 
     def _zone(self, load: float) -> float:
         return _stick(self.normal.radius, load, self.friction * self.normal.force, 0.5)
+
+    def _beyond(self, load: float) -> float:
+        limit = self.friction * self.normal.force
+        rest = max(1.0 - load / limit, 0.0)
+        logarithm = rest * math.log(rest) if rest > 0.0 else 0.0
+        return limit / (math.pi * self.normal.E_star) * (logarithm + 1.0 - rest)
 
     def _slip(self, c: float, x: ArrayLike) -> Array:
         a = self.normal.radius

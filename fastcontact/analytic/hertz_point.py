@@ -110,7 +110,7 @@ class HertzPoint:
     def von_mises_maximum(self, nu: float | None = None) -> VonMisesMaximum:
         """Return the largest equivalent stress on the axis and its depth.
 
-        The stationary point of |rr - zz| of Johnson (1985), eq. 3.45, found to rounding. For nu >= -0.3 it is
+        The stationary point of ``|rr - zz|`` of Johnson (1985), eq. 3.45, found to rounding. For nu >= -0.3 it is
         the largest anywhere in the body; with a Poisson ratio below that the edge of the contact is stressed
         more.
         """

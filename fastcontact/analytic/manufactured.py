@@ -19,7 +19,7 @@ from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
 from fastcontact.errors import ModelError
 
 Array = NDArray[np.float64]
-KINEMATICS = ("plane_strain", "plane_stress", "axisymmetric")
+KINEMATICS = ("plane_strain", "plane_stress", "axisymmetric", "3d")
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,10 @@ class HertzBox:
     """Exact solution of a linear contact problem on the box 0 <= x <= width, -height <= y <= 0.
 
     The problem: u_y <= obstacle(x) at the top, without friction, on the reference geometry; `displacement`
-    prescribed on the side x = width and at the bottom; u_x = 0 on x = 0 (in the full box |x| <= width:
-    prescribed on both sides). Choose a contact radius that no mesh node hits, or results superconverge by
+    prescribed on the side x = width and at the bottom; u_x = 0 on x = 0 (in the full box ``|x| <= width``:
+    prescribed on both sides). In three dimensions z stands for y, and y is a second coordinate like x, up to the
+    same width. The box is the rigid obstacle over its own top, too (see `distance`), for a model with
+    ``Criteria(geometry_updates=0)``. Choose a contact radius that no mesh node hits, or results superconverge by
     chance.
 
     Attributes
@@ -36,7 +38,7 @@ class HertzBox:
     hertz : HertzLine or HertzPoint
         The contact whose field this is.
     kinematics : str
-        "plane_strain", "plane_stress" or "axisymmetric" (x is the distance from the axis).
+        "plane_strain", "plane_stress", "axisymmetric" (x is the distance from the axis) or "3d".
     E, nu : float
         Material of the box [pressure], [-].
     width, height : float
@@ -69,47 +71,80 @@ class HertzBox:
     def force(self) -> float:
         """Exact contact force of the whole contact; half of it acts on a plane model of x >= 0 only.
 
-        Full circle [force] in axisymmetry, per unit length [force/length] in the plane.
+        Full circle [force] in axisymmetry and three dimensions, per unit length [force/length] in the plane.
         """
         return self.hertz.force
 
-    def obstacle(self, x: ArrayLike) -> Array:
-        """Return the height x^2/(2 R) of the rigid parabola over the top (n,) [length]."""
-        return np.asarray(x, dtype=np.float64) ** 2 / (2.0 * self.R)
+    @property
+    def dim(self) -> int:
+        """Number of coordinates, 2 or 3."""
+        return 3 if self.kinematics == "3d" else 2
 
-    def pressure(self, x: ArrayLike) -> Array:
-        """Return the exact contact pressure at positions `x` of the top [pressure]."""
-        return self.hertz.pressure(x)
+    def obstacle(self, x: ArrayLike, y: ArrayLike = 0.0) -> Array:
+        """Return the height (x^2 + y^2)/(2 R) of the rigid parabola over the top (n,) [length].
+
+        `y` only in three dimensions.
+        """
+        return (np.asarray(x, dtype=np.float64) ** 2 + np.asarray(y, dtype=np.float64) ** 2) / (2.0 * self.R)
+
+    def distance(self, points: Array) -> tuple[Array, Array]:
+        """Return the vertical gap (n,) under the parabola and its downward normals (n, dim): a rigid obstacle.
+
+        The problem is linear, so the gap is measured along the axis, not at right angles to the parabola.
+        """
+        normal = np.zeros_like(points)
+        normal[:, -1] = -1.0
+        return self.obstacle(*points[:, :-1].T) - points[:, -1], normal
+
+    def pressure(self, x: ArrayLike, y: ArrayLike = 0.0) -> Array:
+        """Return the exact contact pressure at positions of the top, `y` only in three dimensions [pressure]."""
+        return self.hertz.pressure(np.hypot(x, y))
 
     def displacement(self, points: ArrayLike) -> Array:
-        """Return the exact displacements (..., 2) at `points` (..., 2), zero at the point (0, 0) [length].
+        """Return the exact displacements (..., dim) at `points` (..., dim), zero at the origin [length].
 
         Raises
         ------
         ModelError
-            If the points are not of shape (..., 2) or one lies above y = 0.
+            If the points are not of shape (..., dim) or one lies above the top.
         """
-        x, y = self._coordinates(points)
-        return self.hertz.displacement(x, y) - self.hertz.displacement(0.0, 0.0)
+        place, direction = self._in_plane(points)
+        u = self.hertz.displacement(*place) - self.hertz.displacement(0.0, 0.0)
+        along = np.where(place[0] == 0.0, 0.0, u[..., 0])  # the symmetry is exact
+        return np.stack([*(along * cosine for cosine in direction), u[..., 1]], axis=-1)
 
     def stress(self, points: ArrayLike) -> Array:
         """Return the exact stresses (..., 4) at `points` (..., 2) [pressure].
 
-        The order is xx, yy, zz, xy; in axisymmetry rr, yy, hoop, ry.
+        The order is xx, yy, zz, xy; in axisymmetry rr, yy, hoop, ry; in three dimensions (..., 6) at `points` (..., 3),
+        xx, yy, zz, xy, yz, xz.
 
         Raises
         ------
         ModelError
-            If the points are not of shape (..., 2) or one lies above y = 0.
+            If the points are not of shape (..., dim) or one lies above the top.
         """
-        return self.hertz.stress(*self._coordinates(points))
+        place, direction = self._in_plane(points)
+        stress = self.hertz.stress(*place)
+        if self.dim == 2:
+            return stress
+        radial, vertical, hoop, shear = np.moveaxis(stress, -1, 0)
+        cosine, sine = direction
+        xx, yy = radial * cosine**2 + hoop * sine**2, radial * sine**2 + hoop * cosine**2
+        xy = (radial - hoop) * sine * cosine
+        return np.stack([xx, yy, vertical, xy, shear * sine, shear * cosine], axis=-1)
 
-    @staticmethod
-    def _coordinates(points: ArrayLike) -> tuple[Array, Array]:
+    def _in_plane(self, points: ArrayLike) -> tuple[tuple[Array, Array], tuple[Array, ...]]:
+        """Return (distance from the axis, height), and the direction that leads there in the coordinates of the top."""
         array = np.asarray(points, dtype=np.float64)
-        if array.ndim == 0 or array.shape[-1] != 2:
-            raise ModelError(f"points has shape {array.shape}: it must be (..., 2)")
-        return array[..., 0], array[..., 1]
+        if array.ndim == 0 or array.shape[-1] != self.dim:
+            raise ModelError(f"points has shape {array.shape}: it must be (..., {self.dim})")
+        if self.dim == 2:
+            return (array[..., 0], array[..., 1]), (np.ones(array.shape[:-1]),)
+        r = np.hypot(array[..., 0], array[..., 1])
+        along_x = np.divide(array[..., 0], r, out=np.ones_like(r), where=r > 0)
+        along_y = np.divide(array[..., 1], r, out=np.zeros_like(r), where=r > 0)
+        return (r, array[..., 2]), (along_x, along_y)
 
 
 def hertz_box(
@@ -130,7 +165,7 @@ def hertz_box(
     Parameters
     ----------
     kinematics : str
-        "plane_strain", "plane_stress" or "axisymmetric".
+        "plane_strain", "plane_stress", "axisymmetric" or "3d" (the axis is z).
     E, nu : float
         Material of the box [pressure], [-].
     radius : float
@@ -157,7 +192,7 @@ def hertz_box(
     if a >= width:
         raise ModelError(f"radius is {a:g}: the contact must be narrower than the box, width {width:g}")
     hertz: HertzLine | HertzPoint
-    if kinematics == "axisymmetric":
+    if kinematics in ("axisymmetric", "3d"):
         hertz = hertz_point(E1=E, nu1=nu, R1=2.0 * a * E / ((1.0 - nu**2) * math.pi * p0), radius=a)
     else:
         E_star = E / (1.0 - nu**2) if kinematics == "plane_strain" else E

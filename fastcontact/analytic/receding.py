@@ -29,7 +29,7 @@ class RecedingLayer:
     thickness : float
         Of the layer [length].
     load_half_width : float
-        The force is spread evenly over |x| <= load_half_width on the top [length].
+        The force is spread evenly over ``|x| <= load_half_width`` on the top [length].
     force : float
         Force per unit length [force/length].
     radius : float
@@ -143,7 +143,7 @@ def receding_layer(
     force : float
         Force per unit length [force/length].
     load_half_width : float
-        The force is spread evenly over |x| <= load_half_width, at most ten thicknesses; 0 is a line force
+        The force is spread evenly over ``|x| <= load_half_width``, at most ten thicknesses; 0 is a line force
         [length].
     kinematics : str
         "plane_strain" or "plane_stress".

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact.cli._results import curve
 from fastcontact.errors import FastcontactError, FileError
-from fastcontact.results import StepResult
+from fastcontact.results import ContactResult, StepResult
 
 
 def save(axes: Any, path: str) -> None:
@@ -34,15 +35,24 @@ def profile_picture(case: Any, step: StepResult, path: str, pair: str | None = N
     contact = step.contact[name]
     theories = case.theories.get(name, {})
     theory, others = theories.get("theory"), {}
-    force = float(np.linalg.norm(contact.force))
-    if theory is not None and force > 0:
+    if not curve(theory):
+        theory = None
+    force = float(np.linalg.norm(contact.force)) / theories.get("share", 1.0)
+    if hasattr(theory, "at_force") and force > 0:
         others["Hertz, equal force"] = theory.at_force(force)
     axes = plot.pressure_profile(
         contact,
         theory,
         other_theories=others,
-        stress=step.stress[contact.points, 1],
+        stress=step.stress[contact.points, 1] if contact.normal.shape[1] == 2 else _normal_stress(contact, step),
         title=f"{case.title}\nload factor {step.load_factor:g}",
         units=case.units,
     )
     save(axes, path)
+
+
+def _normal_stress(contact: ContactResult, step: StepResult) -> Any:
+    """Return the stress (m,) at the contact nodes along the normals that they face [pressure]."""
+    xx, yy, zz, xy, yz, xz = step.stress[contact.points].T
+    x, y, z = contact.normal.T
+    return x * x * xx + y * y * yy + z * z * zz + 2.0 * (x * y * xy + y * z * yz + x * z * xz)

@@ -57,3 +57,15 @@ def case_data(results: Any) -> dict[str, Any]:
     except tomllib.TOMLDecodeError:
         data = {}
     return described(data)
+
+
+def curve(theory: Any) -> bool:
+    """Return whether a theory has a pressure that can be drawn over the contact; that of a punch is infinite."""
+    return all(hasattr(theory, name) for name in ("pressure", "pressure_max", "radius"))
+
+
+def law(case: dict[str, Any], pair: str) -> Any:
+    """Return what gives force and radius of a contact pair by its approach, from none on; None where nothing does."""
+    theory = case["theories"].get(pair)
+    theory = getattr(theory, "hertz", theory)
+    return theory if hasattr(theory, "at_approach") and case["shares"][pair] == 1.0 else None

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import sys
+from typing import Any
 
 from fastcontact.cli import _study
-from fastcontact.errors import FastcontactError
+from fastcontact.errors import CaseError, FastcontactError
 
 HELP = "mesh-convergence study: orders, limits with error bars, model error told from mesh error"
 
@@ -18,6 +20,16 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--elements", metavar="NAMES", help="elements to compare, e.g. quad4,quad8, or all")
     parser.add_argument("--formulations", metavar="NAMES", help="e.g. node_to_segment,continuous, or all")
     parser.add_argument("--quantities", metavar="NAMES", help="further quantities, e.g. C1.stress.yy,C1.displacement.y")
+    adaptive = parser.add_argument_group("adaptive meshes (2D)")
+    adaptive.add_argument(
+        "--adaptive", nargs="?", const="pressure_max", metavar="QUANTITY",
+        help="refine where the error is large until this quantity is accurate (default pressure_max)",
+    )  # fmt: skip
+    adaptive.add_argument("--tolerance", type=float, default=1e-3, metavar="T", help="relative error (default 0.001)")
+    adaptive.add_argument("--max-dofs", type=int, default=400_000, metavar="N", help="where to stop (default 400000)")
+    adaptive.add_argument(
+        "-o", "--output", metavar="FILE", help="result file of the last mesh, with the error of cells"
+    )
     _study.arguments(parser)
 
 
@@ -27,6 +39,8 @@ def run(options: argparse.Namespace) -> int:
     from fastcontact.convergence import convergence_study
 
     _study.check_targets(options)
+    if options.adaptive:
+        return _adaptive(options)
     progress = _study.Lines(show=sys.stderr.isatty() and not options.quiet)
     try:
         with _study.executor(options.executor) as executor:
@@ -53,3 +67,44 @@ def run(options: argparse.Namespace) -> int:
         print("\n".join(study.lines()))
         print(f"wrote {', '.join(written)}" if written else "nothing written: --html FILE makes a report to send on")
     return 2 if failures else 0
+
+
+def _adaptive(options: argparse.Namespace) -> int:
+    """Refine until the quantity is accurate, write what was asked for, print the table; 2 if it is not."""
+    from fastcontact.cli._pictures import save
+    from fastcontact.convergence import adaptive_study
+
+    element, formulation = (
+        _only(text, name) for text, name in ((options.elements, "element"), (options.formulations, "formulation"))
+    )
+    show = sys.stderr.isatty() and not options.quiet
+
+    def told(found: Any) -> None:
+        if show:
+            sys.stderr.write(f"\r{found.n_dofs} degrees of freedom, estimated error {found.estimate:.1e}".ljust(80))
+            sys.stderr.flush()
+
+    study = adaptive_study(
+        options.case, options.adaptive, options.tolerance, element=element, formulation=formulation,
+        max_dofs=options.max_dofs, on_round=told,
+    )  # fmt: skip
+    if show:
+        sys.stderr.write("\r" + " " * 80 + "\r")
+    written = _study.write(options, study, save)
+    if options.output:
+        from fastcontact.io.result_writer import ResultWriter
+
+        with ResultWriter(options.output, study.case.model, case_text=study.text, cell_fields=("error",)) as out:
+            out.write(dataclasses.replace(study.last, cell_fields={"error": study.error.cells}))
+        written.append(options.output)
+    if not options.quiet:
+        print("\n".join(study.lines()))
+        print(f"wrote {', '.join(written)}" if written else "nothing written: --html FILE makes a report to send on")
+    return 0 if study.reached else 2
+
+
+def _only(text: str | None, what: str) -> str | None:
+    found = _study.names(text) or []
+    if len(found) > 1:
+        raise CaseError(f"adaptive meshes take one {what}, not {len(found)}: {text}")
+    return found[0] if found else None

@@ -31,7 +31,7 @@ def run(options: argparse.Namespace) -> int:
             axes = plot.history(
                 list(results),
                 name,
-                law=case["theories"].get(name),
+                law=_results.law(case, name),
                 approach=case["approach"].get(name),
                 title=case["title"],
                 units=case["units"],

@@ -50,11 +50,11 @@ def run(options: argparse.Namespace) -> int:
 
 def _theories(case: dict[str, Any], name: str, contact: Any) -> dict[str, Any]:
     theory = case["theories"].get(name)
-    if theory is None:
+    if not _results.curve(theory):
         return {}
-    force = float(np.linalg.norm(contact.force))
+    force = float(np.linalg.norm(contact.force)) / case["shares"][name]
     found = {"Hertz equal approach": theory}
-    if force > 0:
+    if force > 0 and hasattr(theory, "at_force"):
         found["Hertz equal force"] = theory.at_force(force)
     return found
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 import os
 import sys
@@ -15,15 +16,18 @@ from fastcontact.cli._progress import Progress
 from fastcontact.errors import FastcontactWarning, FileError
 
 HELP = "solve a case file and write the results of all steps"
+# Cell field of the estimated error.
+ERROR = "error"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
-    parser.add_argument("case", help="case file (TOML)")
+    parser.add_argument("case", help="case file (TOML), or the name of a ready case: see 'fastcontact cases'")
     parser.add_argument("-o", "--output", help="result file (default: the case's name with .vtkhdf, here)")
     parser.add_argument("--json", metavar="FILE", help="write a summary of the last step and the iterations")
     parser.add_argument("--plot", metavar="PNG", help="plot the contact pressure of the last step against theory")
     parser.add_argument("--linear", metavar="SOLVER", help="linear solver: auto, direct or amg (default: the case's)")
+    parser.add_argument("--estimate-error", action="store_true", help="estimate the error of every cell, into the file")
     parser.add_argument("--threads", type=int, metavar="N", help="threads of parallel kernels")
 
 
@@ -44,10 +48,11 @@ def run(options: argparse.Namespace) -> int:
     progress = Progress(len(case.ramp), show=sys.stderr.isatty() and not options.quiet)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FastcontactWarning)
-        with ResultWriter(output, case.model, case_text=case.text) as writer:
+        fields = (ERROR,) if options.estimate_error else ()
+        with ResultWriter(output, case.model, case_text=case.text, cell_fields=fields) as writer:
 
             def on_step(step: Any) -> None:
-                writer.write(step)
+                writer.write(_estimated(case.model, step) if fields else step)
                 progress.step(step)
 
             try:
@@ -77,6 +82,12 @@ def run(options: argparse.Namespace) -> int:
         print("\n".join(summary.lines(numbers)))
         print(f"  wrote {output}" + "".join(f", {path}" for path in (options.json, options.plot) if path))
     return 0
+
+
+def _estimated(model: Any, step: Any) -> Any:
+    from fastcontact.error_estimate import estimate_error
+
+    return dataclasses.replace(step, cell_fields={ERROR: estimate_error(model, step).cells})
 
 
 def _set_threads(count: int) -> None:

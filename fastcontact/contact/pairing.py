@@ -10,12 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
+from fastcontact.contact.line_projection import along_line_normals
 from fastcontact.contact.projection import along_normals, interpolated, nodal_normals, places
 from fastcontact.contact.rigid import RigidSide
 from fastcontact.contact.surface import Surface
-from fastcontact.search import closest_of_kinds
+from fastcontact.search import Closest, closest_of_kinds
 
 Array = NDArray[np.float64]
+# In facet lengths: how far beyond both facets at a node a point may lie and still face it.
+FOLDED = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +39,19 @@ class Candidates:
     def positions(self, coordinates: Array) -> Array:
         """Return the positions (n, dim) for nodal `coordinates` (n_points, dim)."""
         return np.einsum("nk,nkd->nd", self.shape, coordinates[self.nodes])
+
+    @property
+    def nearest(self) -> NDArray[np.int32]:
+        """The node (n,) of the largest weight of each; of equal ones the first."""
+        largest = np.argmax(self.shape, axis=1)
+        found: NDArray[np.int32] = self.nodes[np.arange(len(largest)), largest]
+        return found
+
+    def belonging_to(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return which candidates (n,) lie nearer to nodes of `mask` (n_points,) than to all others."""
+        inside = mask[self.nodes]
+        largest = np.where(inside, self.shape, -np.inf).max(axis=1)
+        return largest > np.where(inside, -np.inf, self.shape).max(axis=1) + 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +90,7 @@ def pair(
 
     A candidate farther out than `projection_tolerance` facet lengths beyond the end of its facet is not paired
     (TOLE_PROJ_EXT of code_aster). With `normals` ``"averaged"``, the normal is interpolated between nodal means of
-    the facets' normals, so that it does not jump where facets meet; in 3D the candidates are then projected along it.
+    the facets' normals, so that it does not jump where facets meet, and the candidates are projected along it.
 
     Raises
     ------
@@ -87,13 +103,28 @@ def pair(
         return Pairing(nowhere, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)
     found = closest_of_kinds(candidates, primary.corners(coordinates))
     if normals == "facet":
-        return Pairing(found.facet, found.xi, found.normal, found.overhang <= projection_tolerance)
+        allowed = _allowed(primary, found, projection_tolerance)
+        return Pairing(found.facet, found.xi, found.normal, found.overhang <= allowed)
     at_nodes = nodal_normals(primary, coordinates)
     facet, xi, overhang = found.facet, found.xi, found.overhang
-    if coordinates.shape[1] == 3:
-        facet, xi, overhang = along_normals(candidates, primary, coordinates, at_nodes, found)
+    project = along_normals if coordinates.shape[1] == 3 else along_line_normals
+    facet, xi, overhang = project(candidates, primary, coordinates, at_nodes, found)
     normal = interpolated(at_nodes, places(primary, facet, xi))
     return Pairing(facet, xi, normal, overhang <= projection_tolerance)
+
+
+def _allowed(primary: Surface, found: Closest, projection_tolerance: float) -> Array | float:
+    """Return how far (n,) candidates may stand out beyond the facets they are closest to.
+
+    On lines that fold inward, points at a distance lie beyond the ends of both facets at a node, but not beyond the end
+    of the surface.
+    """
+    if found.position.shape[1] == 3:
+        return projection_tolerance
+    ends = places(primary, found.facet, found.xi).local[:, :2]
+    count = np.bincount(np.concatenate([block.local[:, :2].ravel() for block in primary.blocks]))
+    end = np.where(found.xi[:, 0] > 0.0, ends[:, 1], ends[:, 0])
+    return np.where(count[end] > 1, max(projection_tolerance, FOLDED), projection_tolerance)
 
 
 def filled_up(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
@@ -122,13 +153,45 @@ def gap_rows(
 
 
 def tangents(normal: Array) -> list[Array]:
-    """Return unit tangents (n, dim) that complete `normal` (n, dim): one in 2D, two in 3D."""
+    """Return unit tangents (n, dim) that complete `normal` (n, dim): one in 2D, two in 3D.
+
+    In 3D one pair of axes at right angles to the mean normal is turned to every point by the smallest rotation. Tangents
+    then change no faster than normals, so that components of tractions along them can be taken for fields, and the choice
+    of the first axis makes no difference.
+    """
     if normal.shape[1] == 2:
         return [np.column_stack([normal[:, 1], -normal[:, 0]])]
+    mean = normal[np.isfinite(normal).all(axis=1)].sum(axis=0)
+    length = np.linalg.norm(mean)
+    mean = mean / length if length > 1e-9 * len(normal) else np.array([0.0, 0.0, 1.0])
+    axis = np.cross(np.eye(3)[np.argmin(np.abs(mean))], mean)
+    axis /= np.linalg.norm(axis)
+    # What a rotation of the mean normal to the normal does to the axis; where they are opposite, a half turn about it.
+    both = 1.0 + normal @ mean
+    slope = np.divide(normal @ axis, both, out=np.zeros(len(normal)), where=both > 1e-9)
+    first = axis - slope[:, None] * (mean + normal)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return [first, np.cross(normal, first)]
+
+
+def tangents_by_axes(normal: Array) -> list[Array]:
+    """Return tangents as `tangents` does, but in 3D for each point by itself, along coordinate axes where these allow it.
+
+    In planes and on lines of symmetry, one of them is what supports hold. From point to point they may jump.
+    """
+    if normal.shape[1] == 2:
+        return tangents(normal)
     smallest = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
     first = np.cross(smallest, normal)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return [first, np.cross(normal, first)]
+
+
+def normals(directions: Sequence[Array]) -> Array:
+    """Return the unit normals (n, dim) that `tangents` complete."""
+    if len(directions) == 1:
+        return np.column_stack([-directions[0][:, 1], directions[0][:, 0]])
+    return np.cross(directions[0], directions[1])
 
 
 def rows_along(

@@ -129,7 +129,10 @@ def along_normals(
         How far the projection lies beyond the end of its facet, in facet lengths.
     """
     facet, xi, overhang = start.facet.copy(), start.xi.copy(), start.overhang.copy()
+    # Seen from the midst of the surface: far from the origin, rounding would be coarser than a converged step.
+    midst = 0.5 * (coordinates[side.points].min(axis=0) + coordinates[side.points].max(axis=0))
     height = np.einsum("nd,nd->n", points - start.position, start.normal)
+    points, coordinates = points - midst, coordinates - midst
     found, good = _newton(points, side, coordinates, normals, facet, xi, height)
     beyond = _beyond(side, facet, found)
     good &= beyond <= BEYOND

@@ -8,11 +8,14 @@ from numpy.typing import NDArray
 from fastcontact.active_set import State
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.pairing import tangents
+from fastcontact.contact.pairing import normals
+from fastcontact.contact.rigid import RigidSide
 from fastcontact.friction import FrictionalEquilibrium
 from fastcontact.results import ContactResult
 
 Array = NDArray[np.float64]
+# Penetration under a penalty that is worth a warning, relative to the largest displacement.
+DEEP = 0.01
 
 
 def contact_result(
@@ -21,17 +24,22 @@ def contact_result(
     """Return the state of one pair, whose constraints `part` are the `rows` of the solution."""
     points, dim = pair.secondary.points, pair.points.shape[1]
     multiplier, active = state.multiplier[rows], state.active[rows]
-    field = pair.pressure(multiplier)
+    excluded = pair.terms.excluded_nodes(pair.secondary)
+    own = pair.forces(multiplier)
+    field = np.where(excluded, 0.0, pair.pressure(own))
     gap, normal = pair.nodal_gap(displacement)
-    closed = pair.closed_nodes(active, gap, field)
+    closed = _closed_nodes(pair, part, active, gap, field) & ~excluded
     forces = part.B.T @ multiplier
     shear, sticking, dissipation = np.zeros((len(points), dim)), closed.copy(), 0.0
+    if pair.tie is not None:
+        normal = pair.nodal_gap(np.zeros_like(displacement))[1]  # the equations are those of the bodies at rest
+        shear = _nodal_shear(pair, pair.tie.directions, pair.tie.forces(multiplier)[1], normal)
     if isinstance(state, FrictionalEquilibrium) and part.tangents:
         tangential, slip = state.tangential[rows], state.slip[rows]
         for rows_along, along in zip(part.tangents, tangential.T, strict=True):
             forces = forces + rows_along.T @ along
         dissipation = float(-(tangential * slip).sum())
-        shear = _nodal_shear(pair, part, tangential, normal)
+        shear = _nodal_shear(pair, part.directions, tangential, normal, own)
         sticking = closed & _mostly_sticking(pair, state.sticking[rows], multiplier, field)
     forces = forces.reshape(-1, dim)[points]
     total = forces.sum(axis=0)
@@ -44,7 +52,7 @@ def contact_result(
         coordinates=pair.points[points],
         abscissa=pair.secondary.abscissa if dim == 2 else _distance(pair, pair.points[points]),
         gap=gap,
-        pressure=np.where(closed, np.maximum(field, 0.0), 0.0),
+        pressure=np.where(closed, field if part.held is not None else np.maximum(field, 0.0), 0.0),
         multiplier=field,
         force_vectors=forces,
         normal=normal,
@@ -54,18 +62,50 @@ def contact_result(
         shear=np.where(closed[:, None], shear, 0.0),
         sticking=sticking,
         dissipation=dissipation,
+        obstacle_displacement=pair.primary.now.copy() if isinstance(pair.primary, RigidSide) else None,
     )
 
 
-def _nodal_shear(pair: Formulation, part: Constraints, tangential: Array, normal: Array) -> Array:
-    """Return the tangential traction on the secondary nodes (n_nodes, dim) [pressure]."""
-    at_nodes = tangents(normal)
-    if normal.shape[1] == 2:
-        return pair.pressure(tangential[:, 0])[:, None] * at_nodes[0]
-    # In three dimensions the tangents turn from point to point: take the Cartesian components of the forces.
-    directions = np.stack(part.directions, axis=2)
-    cartesian = np.einsum("nk,ndk->nd", tangential, directions)
-    return np.column_stack([pair.pressure(component) for component in cartesian.T])
+def deep(pair: Formulation, contact: ContactResult, displacement: Array) -> list[str]:
+    """Return a warning where a penalty lets the sides penetrate by much of the largest displacement."""
+    size = float(np.abs(displacement).max(initial=0.0))
+    penalty, depth = pair.terms.penalty, contact.penetration
+    if penalty is None or depth <= DEEP * size:
+        return []
+    return [
+        f"contact '{contact.name}' penetrates by {depth:.4g}, which is {depth / size:.1%} of the largest displacement: "
+        f"raise its penalty from {penalty:.4g} to about {penalty * depth / (DEEP * size):.2g}, or leave it out"
+    ]
+
+
+def _closed_nodes(
+    pair: Formulation, part: Constraints, active: NDArray[np.bool_], gap: Array, field: Array
+) -> NDArray[np.bool_]:
+    """Return which secondary nodes are in contact: by their pressure, or because they never open again."""
+    if pair.terms.always_closed:
+        return np.isfinite(gap)
+    closed = pair.closed_nodes(active, gap, field)
+    for_good = pair.closed_for_good(pair.points[pair.secondary.points])
+    return closed if for_good is None else closed | for_good
+
+
+def _nodal_shear(
+    pair: Formulation,
+    directions: tuple[Array, ...],
+    tangential: Array,
+    normal: Array,
+    along_normal: Array | None = None,
+) -> Array:
+    """Return the tangential traction on the secondary nodes (n_nodes, dim) [pressure].
+
+    Frames turn from point to point: the traction is that of the Cartesian components of the forces, and its part along
+    the nodal normals is no shear.
+    """
+    forces = np.einsum("nk,ndk->nd", tangential, np.stack(directions, axis=2))
+    if along_normal is not None:
+        forces += along_normal[:, None] * normals(directions)
+    traction = np.column_stack([pair.pressure(component) for component in forces.T])
+    return traction - np.einsum("nd,nd->n", traction, normal)[:, None] * normal
 
 
 def _mostly_sticking(

@@ -23,6 +23,7 @@ from fastcontact.convergence.levels import Recipe, make_mesh
 from fastcontact.convergence.settings import Combination, Settings
 from fastcontact.errors import FastcontactError, FastcontactWarning
 from fastcontact.mesh import Mesh
+from fastcontact.pair_terms import TERMS
 
 # Changes when the measured numbers or the stored form change.
 SCHEMA = 1
@@ -96,11 +97,11 @@ def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
     for entry in data.get("contact", {}).values():
         if combination.formulation is None:
             break
-        own = entry.get("formulation", "node_to_segment")
+        own = entry.get("formulation")
         entry["formulation"] = combination.formulation
         if combination.formulation != own:
             known = {f.name for f in dataclasses.fields(FORMULATIONS[combination.formulation])}
-            known |= {"secondary", "primary", "formulation", "friction"}
+            known |= {"secondary", "primary", "formulation", "friction", *TERMS}
             for key in [key for key in entry if key not in known]:
                 del entry[key]
         entry.update(settings.options.get(combination.formulation, {}))

@@ -23,6 +23,16 @@ MARKERS = "osD^v<>ph*"
 BARS_UP_TO = 3
 
 
+def plain_log_axis(ax: Axes) -> None:
+    """Make the x axis logarithmic with plain numbers, few enough not to run into each other."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    ax.set_xscale("log")
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.xaxis.set_minor_formatter(NullFormatter())
+
+
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure [inches] that needs no display.
 
@@ -111,7 +121,7 @@ def errors(study: Study, quantity: str, ax: Axes) -> Axes:
         fitted = _fitted(h, off, limit.order)
         if fitted is not None:
             ax.plot(h, fitted, ":", color=line.get_color(), lw=1.0)
-    ax.set_xscale("log")
+    plain_log_axis(ax)
     ax.set_yscale("log")
     _slope_triangle(ax, quantity, [series for _, series in known])
     ax.set_xlabel(f"facet length at the contact h [{_length(study)}]")
@@ -214,7 +224,7 @@ def from_theory(study: Study, quantity: str, ax: Axes) -> Axes:
         label = f"model error at equal force {100 * same.model:+.3f} %"
         ax.axhline(100 * same.model, color="tab:green", lw=1.2, ls="--", label=label)
     ax.axhline(0.0, color="black", lw=1.0, label="theory")
-    ax.set_xscale("log")
+    plain_log_axis(ax)
     ax.set_xlabel(f"facet length at the contact h [{_length(study)}]")
     ax.set_ylabel("difference from theory at equal approach [%]")
     ax.set_title(f"Model and mesh error of the {title(quantity)}")

@@ -182,6 +182,22 @@ def combinations(
     return tuple(_checked(element, formulation) for element in chosen for formulation in how)
 
 
+def one_combination(settings: Settings, element: str | None, formulation: str | None) -> Combination:
+    """Return the last combination of ``[study]`` with this element and formulation, where given; else make one of them.
+
+    Raises
+    ------
+    CaseError
+        If the element or the formulation is unknown.
+    """
+    formulation = formulation.replace("-", "_") if formulation else None
+    for known in reversed(settings.combinations):
+        if element in (None, known.element) and formulation in (None, known.formulation):
+            return known
+    last = settings.combinations[-1]
+    return _checked(element or last.element, formulation or last.formulation)
+
+
 def makeable(settings: Settings, element: str) -> bool:
     """Whether meshes of this element can be made for the case."""
     if settings.generator is None:

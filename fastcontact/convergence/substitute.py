@@ -62,11 +62,12 @@ def _set(data: dict[str, Any], path: str, value: Any, names: Iterable[str]) -> N
     place: Any = data
     for key in keys[:-1]:
         place = _inside(place, key, path)
-    if isinstance(keys[-1], int) or not isinstance(place, dict):
-        _inside(place, keys[-1], path)
-    if isinstance(place[keys[-1]] if isinstance(place, list) else place.get(keys[-1]), (dict, list)):
+    last: Any = keys[-1]
+    if isinstance(last, int) or not isinstance(place, dict):
+        _inside(place, last, path)
+    if isinstance(place[last] if isinstance(place, list) else place.get(last), (dict, list)):
         raise CaseError(f"'{path}' is a table or a list of the case: name a single value in it")
-    place[keys[-1]] = value
+    place[last] = value
 
 
 def _keys(path: str) -> list[str | int]:

@@ -17,7 +17,7 @@ from fastcontact.case import Case, build_case, read_case
 from fastcontact.convergence.execute import Progress, run_all
 from fastcontact.convergence.job import Job, case_data
 from fastcontact.convergence.levels import recipe
-from fastcontact.convergence.settings import combinations, settings
+from fastcontact.convergence.settings import one_combination, settings
 from fastcontact.convergence.store import Store
 from fastcontact.convergence.substitute import substituted
 from fastcontact.errors import CaseError
@@ -192,8 +192,7 @@ def _job(case: Case, choice: dict[str, Value], element: str | None, formulation:
     for parameter, value in choice.items():
         data = substituted(data, parameter, value, linked)
     chosen = settings(case, data)
-    asked = [element] if element else None, [formulation] if formulation else None
-    member = combinations(chosen, *asked)[-1]
+    member = one_combination(chosen, element, formulation)
     by_shape = chosen.generator is not None and "" not in chosen.arguments
     finer = (LEVEL if by_shape else 0) if level is None else level
     return Job(

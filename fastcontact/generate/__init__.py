@@ -10,9 +10,14 @@ from collections.abc import Callable
 
 from fastcontact.generate.blocks import block, block_on_block, cylinder_on_block
 from fastcontact.generate.box import box
+from fastcontact.generate.crowned_blocks import crowned_blocks
+from fastcontact.generate.forest import Forest
+from fastcontact.generate.graded_block import graded_block
 from fastcontact.generate.half_spheres import half_spheres, quarter_disc
+from fastcontact.generate.punched_block import punched_block
 from fastcontact.generate.quadratic import Circle, to_quadratic
 from fastcontact.generate.refine import circles, linearised, refined
+from fastcontact.generate.rings import rings
 from fastcontact.generate.sphere import sphere_octant, sphere_on_block
 from fastcontact.generate.transform import merge_points, mirrored, renamed, transformed, union
 from fastcontact.mesh import Mesh
@@ -23,24 +28,34 @@ GENERATORS: dict[str, Callable[..., Mesh]] = {
     "block-on-block": block_on_block,
     "cylinder-on-block": cylinder_on_block,
     "box": box,
+    "graded-block": graded_block,
     "sphere-on-block": sphere_on_block,
+    "sphere-octant": sphere_octant,
+    "punched-block": punched_block,
+    "crowned-blocks": crowned_blocks,
+    "rings": rings,
 }
 
 __all__ = [
     "GENERATORS",
     "Circle",
+    "Forest",
     "block",
     "block_on_block",
     "box",
     "circles",
+    "crowned_blocks",
     "cylinder_on_block",
+    "graded_block",
     "half_spheres",
     "linearised",
     "merge_points",
     "mirrored",
+    "punched_block",
     "quarter_disc",
     "refined",
     "renamed",
+    "rings",
     "sphere_octant",
     "sphere_on_block",
     "to_quadratic",

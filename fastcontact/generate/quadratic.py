@@ -152,19 +152,31 @@ def _ends(keys: Indices, n_points: int) -> Indices:
     return np.column_stack([keys // n_points, keys % n_points])
 
 
-def _rows_on(mesh: Mesh, curve: Curve, edges: Indices) -> Indices:
-    """Rows of `edges` that belong to the curve's facets and have both ends on it."""
+def edges_on(mesh: Mesh, curve: Curve) -> Indices:
+    """Return the edges of the curve's facets that have both ends on it, each as ``least end << 32 | greatest end``.
+
+    Raises
+    ------
+    MeshError
+        If there is none.
+    """
     facets = outer_facets(mesh) if curve.group is None else mesh.cells_of(curve.group, dim=mesh.dim - 1)
-    keys = _edges(facets, mesh.n_points)
-    ends = mesh.points[_ends(keys, mesh.n_points)]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    flat = ends.reshape(-1, mesh.dim)
+    ends = _ends(_edges(facets, mesh.n_points), mesh.n_points)
+    places = mesh.points[ends]
+    length = np.linalg.norm(places[:, 1] - places[:, 0], axis=1)
+    flat = places.reshape(-1, mesh.dim)
     off = np.linalg.norm(curve.project(flat) - flat, axis=1).reshape(-1, 2).max(axis=1)
     on = off <= _ON_CURVE * length
     if not on.any():
         where = "outer facets" if curve.group is None else f"group '{curve.group}'"
         raise MeshError(f"no edge of {where} has both ends on {curve}: check its centre and radius")
-    return np.searchsorted(edges, keys[on])
+    return ends[on, 0] << 32 | ends[on, 1]
+
+
+def _rows_on(mesh: Mesh, curve: Curve, edges: Indices) -> Indices:
+    """Rows of `edges` that belong to the curve's facets and have both ends on it."""
+    found = edges_on(mesh, curve)
+    return np.searchsorted(edges, (found >> 32) * mesh.n_points + (found & 0xFFFFFFFF))
 
 
 def _centres(corners: Array, middles: Array) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import sys
+from collections.abc import Sequence
 from importlib import metadata
 from typing import Any
 
@@ -18,8 +19,8 @@ from fastcontact.mesh import Mesh
 ROWS, BYTES = 64, 4096
 
 
-def write_geometry(file: Any, mesh: Mesh) -> None:
-    """Write /VTKHDF with the solid cells, the static arrays, and room for the steps."""
+def write_geometry(file: Any, mesh: Mesh, growing: Sequence[str] = ()) -> None:
+    """Write /VTKHDF with the solid cells, the static arrays, and room for the steps and their `growing` cell fields."""
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array([2, 0], np.int64)
     root.attrs["Type"] = np.bytes_("UnstructuredGrid")  # readers want a fixed-length ASCII string
@@ -39,10 +40,12 @@ def write_geometry(file: Any, mesh: Mesh) -> None:
         _packed(point_data, name, values)
     for name, values in cell_fields.items():
         _packed(cell_data, name, values)
-    _write_steps_group(root, list(point_flags), list(cell_fields))
+    for name in growing:
+        _growing_field(cell_data, name, len(cells.types), 1)
+    _write_steps_group(root, list(point_flags), list(cell_fields), growing)
 
 
-def _write_steps_group(root: Any, static_point: list[str], static_cell: list[str]) -> None:
+def _write_steps_group(root: Any, static_point: list[str], static_cell: list[str], growing: Sequence[str]) -> None:
     """Write the empty step tables; equal ones are one data set under several names."""
     steps = root.create_group("Steps")
     steps.attrs["NSteps"] = np.int64(0)
@@ -63,6 +66,8 @@ def _write_steps_group(root: Any, static_point: list[str], static_cell: list[str
         point_offsets[name] = zeros
     for name in static_cell:
         cell_offsets[name] = zeros
+    for name in growing:
+        growing_table(cell_offsets, name, np.int64)
 
 
 def write_own(file: Any, mesh: Mesh, kinematics: str, case_text: str) -> None:
@@ -116,13 +121,13 @@ def _packed(parent: Any, name: str, values: NDArray[Any]) -> None:
         parent.create_dataset(name, data=values)
 
 
-def _growing_field(parent: Any, name: str, n_points: int, width: int) -> None:
+def _growing_field(parent: Any, name: str, length: int, width: int) -> None:
     tail = () if width == 1 else (width,)
     parent.create_dataset(
         name,
         shape=(0, *tail),
         maxshape=(None, *tail),
-        chunks=(max(n_points, 1), *tail),
+        chunks=(max(length, 1), *tail),
         dtype=np.float64,
         compression="gzip",
         compression_opts=1,

@@ -28,8 +28,12 @@ POINT_FIELDS = {
     "contact_pressure": 1,
 }
 
-# Element codes of the XDMF format by VTK cell type, for cells whose nodes stand in the same order in both.
-XDMF_TYPES = {5: 0x4, 9: 0x5, 10: 0x6, 12: 0x9, 22: 0x24, 23: 0x25, 24: 0x26, 28: 0x23}
+# Element codes of the XDMF format by VTK cell type. Its readers take the nodes of all of them in VTK's order.
+XDMF_TYPES = {
+    **{5: 0x4, 9: 0x5, 22: 0x24, 23: 0x25, 28: 0x23},  # triangles and quadrangles
+    **{10: 0x6, 14: 0x7, 13: 0x8, 12: 0x9},  # tet4, pyramid5, wedge6, hex8
+    **{24: 0x26, 27: 0x27, 26: 0x28, 32: 0x29, 25: 0x30, 29: 0x32},  # tet10, pyramid13, wedge15, wedge18, hex20, hex27
+}
 
 STEP_ROW = np.dtype([("index", "<i8"), ("load_factor", "<f8"), ("notes_first", "<i8"), ("notes_count", "<i8")])
 
@@ -42,8 +46,9 @@ def contact_row(dim: int) -> np.dtype[Any]:
 
 
 def contact_step(dim: int) -> np.dtype[Any]:
-    """Return the type of the row that a contact pair has for each step: its rows, resultant, radius, work."""
+    """Return the type of the row that a contact pair has for each step: its rows, resultant, radius, work, obstacle."""
     sums = [("force", "<f8", (dim,)), ("radius", "<f8", (2,)), ("dissipation", "<f8")]
+    sums.append(("obstacle_displacement", "<f8", (dim,)))  # NaN between bodies
     return np.dtype([("first", "<i8"), ("count", "<i8"), *sums])
 
 

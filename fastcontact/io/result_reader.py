@@ -167,7 +167,7 @@ class Results(Sequence[StepResult]):
         grid = pyvista.UnstructuredGrid(flat, cells.types, layout.padded(self.mesh.points, 3))
         for name, values in (layout.point_fields(self.mesh, step) | layout.point_flags(self.mesh)).items():
             grid.point_data[name] = values
-        for name, values in layout.cell_fields(self.mesh).items():
+        for name, values in (layout.cell_fields(self.mesh) | step.cell_fields).items():
             grid.cell_data[name] = values
         return grid
 
@@ -192,7 +192,14 @@ class Results(Sequence[StepResult]):
                 contact=self._contact(number, dict(notes["contact"])),
                 iterations=notes["iterations"],
                 warnings=tuple(notes["warnings"]),
+                cell_fields=self._cell_fields(number),
             )
+
+    def _cell_fields(self, number: int) -> dict[str, NDArray[np.float64]]:
+        """Return the cell fields that change from step to step."""
+        data, static = self._file["VTKHDF/CellData"], layout.cell_fields(self.mesh)
+        n = len(self._file["VTKHDF/Types"])
+        return {name: data[name][number * n : (number + 1) * n] for name in data if name not in static}
 
     def _field(self, name: str, number: int, width: int | None = None) -> NDArray[np.float64]:
         n = self.mesh.n_points
@@ -273,11 +280,14 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
     for mask in ("active", "sticking"):
         columns[mask] = columns[mask].astype(bool)
     inner, outer = step["radius"].tolist()
+    # Absent from files of version 0.1.
+    moved = step["obstacle_displacement"].copy() if "obstacle_displacement" in step.dtype.names else np.array([np.nan])
     return ContactResult(
         name=name,
         formulation=formulation,
         force=step["force"].copy(),
         radius=(inner, outer),
         dissipation=float(step["dissipation"]),
+        obstacle_displacement=moved if np.isfinite(moved).all() else None,
         **columns,
     )

@@ -46,6 +46,8 @@ class ResultWriter:
         The case file, kept as it is.
     overwrite : bool
         Whether an existing result file may be replaced.
+    cell_fields : iterable of str
+        Names of the `StepResult.cell_fields` that every step brings; viewers show them, the XDMF sidecar does not.
 
     Attributes
     ----------
@@ -76,6 +78,7 @@ class ResultWriter:
         kinematics: str = "axisymmetric",
         case_text: str = "",
         overwrite: bool = True,
+        cell_fields: Iterable[str] = (),
     ) -> None:
         if not isinstance(mesh, Mesh):
             if not isinstance(getattr(mesh, "mesh", None), Mesh) or not hasattr(mesh, "kinematics"):
@@ -85,6 +88,7 @@ class ResultWriter:
             mesh = mesh.mesh
         self.path = checked_target(path)
         self.n_steps = 0
+        self._cell_fields = _checked_fields(cell_fields, mesh)
         self._mesh: Mesh = mesh
         self._pairs: dict[str, Any] = {}
         self._file: Any = None
@@ -120,6 +124,7 @@ class ResultWriter:
         if self._file is None:
             raise FileError(f"'{self.path}' is closed: write steps before close, or inside the with block")
         _check_shapes(self._mesh, step)
+        _check_cell_fields(self._mesh, step, self._cell_fields)
         with self._explained(f"written at step {step.index}"):
             self._reserve(_step_size(self._mesh, step))
             self._append_fields(step)
@@ -188,7 +193,7 @@ class ResultWriter:
                 size = _header_size(self._mesh) + len(case_text) + MARGIN
                 reserve(probe.fileno(), temporary.parent, 0, size)
             with h5py.File(temporary, "w", locking=False) as file:
-                write_geometry(file, self._mesh)
+                write_geometry(file, self._mesh, self._cell_fields)
                 write_own(file, self._mesh, kinematics, case_text)
             os.replace(temporary, self.path)
         finally:
@@ -203,6 +208,8 @@ class ResultWriter:
         for name, values in layout.point_fields(self._mesh, step).items():
             data[name].resize(first + len(values), axis=0)
             data[name][first:] = values
+        for name in self._cell_fields:
+            _extend(self._file["VTKHDF/CellData"][name], step.cell_fields[name])
 
     def _append_tables(self, step: StepResult) -> None:
         own = self._file["fastcontact"]
@@ -228,6 +235,9 @@ class ResultWriter:
         _set_row(steps["PartOffsets"], self.n_steps, 0)
         _set_row(steps["CellOffsets"], self.n_steps, 0)
         _set_row(steps["PointDataOffsets/displacement"], self.n_steps, self.n_steps * self._mesh.n_points)
+        for name in self._cell_fields:
+            first = self.n_steps * len(self._file["VTKHDF/Types"])
+            _set_row(steps["CellDataOffsets"][name], self.n_steps, first)
         steps.attrs.modify("NSteps", np.int64(self.n_steps + 1))
 
 
@@ -260,6 +270,7 @@ def _step_size(mesh: Mesh, step: StepResult) -> int:
     """Return an upper bound for what a step takes in the file [bytes]."""
     fields = 8 * sum(layout.POINT_FIELDS.values()) * mesh.n_points
     row = layout.contact_row(mesh.dim).itemsize
+    fields += 8 * sum(map(np.size, step.cell_fields.values()))
     contact = sum((len(pair.points) + 2 * ROWS) * row + BYTES for pair in step.contact.values())
     return int(1.01 * fields) + contact + len(as_json([step.iterations, step.warnings]))
 
@@ -280,6 +291,28 @@ def _check_shapes(mesh: Mesh, step: StepResult) -> None:
             raise FileError(f"step {step.index}: {name} has shape {found}, but the mesh of the file needs {shape}")
     for name, contact in step.contact.items():
         _check_contact(f"step {step.index}, contact '{name}'", contact, mesh)
+
+
+def _checked_fields(names: Iterable[str], mesh: Mesh) -> tuple[str, ...]:
+    """Return names of cell fields that neither stand in a file already nor cannot be written."""
+    found = tuple(names)
+    for name in found:
+        if name in layout.cell_fields(mesh) or not name.isidentifier():
+            raise FileError(
+                f"'{name}' cannot be the name of a cell field: it is taken or no plain word; choose another"
+            )
+    return found
+
+
+def _check_cell_fields(mesh: Mesh, step: StepResult, names: Iterable[str]) -> None:
+    count = sum(map(len, mesh.solids.values()))
+    for name in names:
+        found = np.shape(step.cell_fields.get(name, ()))
+        if found != (count,):
+            raise FileError(
+                f"step {step.index}: the cell field '{name}' that was announced has shape {found}, but ({count},) is "
+                "needed, a number for each solid cell"
+            )
 
 
 def _check_contact(where: str, contact: ContactResult, mesh: Mesh) -> None:
@@ -311,6 +344,9 @@ def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> No
         row["first"], row["count"] = len(pair["rows"]), len(table)
         row["force"], row["radius"] = contact.force, contact.radius
         row["dissipation"] = contact.dissipation
+        row["obstacle_displacement"] = (
+            np.nan if contact.obstacle_displacement is None else contact.obstacle_displacement
+        )
         _extend(pair["rows"], table)
     _set_row(pair["steps"], number, row)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import logging
 import pkgutil
 
@@ -10,41 +11,56 @@ from fastcontact.errors import ModelError, unknown
 from fastcontact.linear._solver import Counters, LinearSolver, Loaded
 
 log = logging.getLogger("fastcontact")
-SOLVERS = tuple(name for _, name, _ in pkgutil.iter_modules(__path__) if not name.startswith("_"))
+# Solvers that need a package which is not among the dependencies, and the extra that brings it.
+OPTIONAL = {"cholmod": ("kvxopt", "cholmod"), "pardiso": ("pypardiso", "mkl")}
+KNOWN = tuple(name for _, name, _ in pkgutil.iter_modules(__path__) if not name.startswith("_"))
+SOLVERS = tuple(name for name in KNOWN if name not in OPTIONAL or importlib.util.find_spec(OPTIONAL[name][0]))
 # Above these sizes a multigrid solution is cheaper than a factorisation (measured, see bench/README.md).
 DIRECT_UP_TO = {2: 500_000, 3: 15_000}
 
 
-def make(name: str, *, dim: int, n_dofs: int, tolerance: float = 1e-10) -> LinearSolver:
+def make(
+    name: str, *, dim: int, n_dofs: int, tolerance: float = 1e-10, precision: str | None = None
+) -> LinearSolver:  # fmt: skip
     """Return a linear solver by name.
 
     Parameters
     ----------
     name : str
-        ``"direct"``, ``"amg"`` or ``"auto"``: direct for 2D and small 3D problems, multigrid beyond.
+        ``"direct"`` (SuperLU, always there), ``"cholmod"`` or ``"pardiso"`` (direct too, where their packages are
+        installed), ``"amg"`` or ``"auto"``: direct for 2D and small 3D problems, multigrid beyond. Multigrid needs
+        more iterations where parts are thin or materials nearly incompressible.
     dim, n_dofs : int
         Dimension and number of unknowns, for ``"auto"``.
     tolerance : float
         Relative residual of iterative solvers.
+    precision : {"single", "double"}, optional
+        Of the multigrid cycle, single by default; direct solvers work in double precision always.
 
     Raises
     ------
     ModelError
-        If there is no such solver.
+        If there is no such solver, or a package that it needs is missing.
     """
     if name == "auto":
-        name = "direct" if n_dofs <= DIRECT_UP_TO[dim] else "amg"
-        log.info(
-            "linear solver: %s, for %d unknowns in %dD (direct up to %d)",
-            name,
-            n_dofs,
-            dim,
-            DIRECT_UP_TO[dim],
-        )
+        name, reason = chosen(dim, n_dofs)
+        log.info("linear solver: %s, %s", name, reason)
+    if name in OPTIONAL and name not in SOLVERS:
+        package, extra = OPTIONAL[name]
+        raise ModelError(f"linear solver '{name}' needs the package {package}: pip install 'fastcontact[{extra}]'")
     if name not in SOLVERS:
         raise ModelError(unknown("linear solver", name, [*SOLVERS, "auto"]))
-    solver: LinearSolver = importlib.import_module(f"{__name__}.{name}").SOLVER(tolerance)
+    options = {} if precision is None or name != "amg" else {"precision": precision}
+    solver: LinearSolver = importlib.import_module(f"{__name__}.{name}").SOLVER(tolerance, **options)
     return solver
+
+
+def chosen(dim: int, n_dofs: int) -> tuple[str, str]:
+    """Return the solver that ``"auto"`` stands for, and why."""
+    limit = DIRECT_UP_TO[dim]
+    if n_dofs <= limit:
+        return "direct", f"for {n_dofs} unknowns in {dim}D a factorisation is cheapest (up to {limit})"
+    return "amg", f"for {n_dofs} unknowns in {dim}D a factorisation is dearer than multigrid (beyond {limit})"
 
 
 __all__ = ["SOLVERS", "Counters", "LinearSolver", "Loaded", "make"]

@@ -1,4 +1,4 @@
-"""Elimination of linear equations ``B u = c``: ``u = T v + t``, one unknown removed per equation."""
+"""Elimination of linear equations ``B u = c``: one unknown of each is tied to others, ``u[pivots] = tie u + t``."""
 
 from __future__ import annotations
 
@@ -6,58 +6,131 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, diags_array
-from scipy.sparse.csgraph import min_weight_full_bipartite_matching
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.linalg import qr
+from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse.csgraph import connected_components, min_weight_full_bipartite_matching
+
+from fastcontact.kernels import multigrid
+from fastcontact.linear._peeling import peeled
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+# An unknown of its own is taken as pivot where its entry is at least this part of the largest one of the equation.
+SMALLEST = 0.25
+# Beyond so many equations without unknowns of their own a dense factorisation costs more than it gains.
+DENSE_UP_TO = 400
 
 
 @dataclass(frozen=True, eq=False)
 class Elimination:
-    """``u = T v + t``; v has zeros at the eliminated unknowns.
+    """``u[pivots] = tie u + t``.
 
     Attributes
     ----------
     pivots : ndarray of int (m,)
         The eliminated unknown of each equation.
-    T : csr_array (n, n)
-        Identity but for the rows of the pivots; the columns of the pivots are empty.
-    t : ndarray (n,)
+    tie : csr_array (m, n)
+        What the pivots follow; no pivot is among it.
+    t : ndarray (m,)
     """
 
-    pivots: NDArray[np.intp]
-    T: csr_array
+    pivots: Indices
+    tie: csr_array
     t: Array
-    _lu: SuperLU
+    _inverse: csr_array  # of the pivots' columns of B
 
-    def multiplier(self, residual: Array) -> Array:
-        """Return the multiplier (m,) with ``B.T multiplier = residual`` at the pivots; residual = K u - f (n,)."""
-        return self._lu.solve(np.ascontiguousarray(residual[self.pivots]), trans="T")
+    def multiplier(self, forces: Array) -> Array:
+        """Return the multiplier (m,) with ``B.T multiplier = forces`` at the pivots; forces = (K u - f)[pivots]."""
+        return np.asarray(self._inverse.T @ forces)
+
+    def complete(self, x: Array, t: Array | None = None) -> None:
+        """Set the pivots of `x` (n,) to what they follow, plus `t`."""
+        multigrid.complete(self.pivots, self.tie.indptr, self.tie.indices, self.tie.data, x)
+        if t is not None:
+            x[self.pivots] += t
+
+    def condense(self, r: Array) -> None:
+        """Move the forces `r` (n,) at the pivots to what they follow."""
+        multigrid.condense(self.pivots, self.tie.indptr, self.tie.indices, self.tie.data, r)
+
+    def release(self, r: Array, forces: Array) -> None:
+        """Undo `condense`, given the `forces` (m,) that were at the pivots."""
+        multigrid.release(self.pivots, self.tie.indptr, self.tie.indices, self.tie.data, forces, r)
 
 
 def eliminate(B: csr_array, c: Array) -> Elimination:
     """Choose the unknowns to eliminate from ``B u = c`` and express them by the others.
 
-    The pivots are the assignment of unknowns to equations with the largest product of entries (Duff and Koster, 2001),
-    so that the matrix to invert is as well conditioned as a permutation allows; where every equation has an unknown of
-    its own, as for node-to-segment contact, that matrix is diagonal.
+    Where every equation has unknowns of its own, as for node-to-segment contact and dual multipliers, its largest one
+    is taken, and nothing is inverted; where equations fall away layer by layer, see `_peeling`. Otherwise the pivots
+    are the assignment of unknowns to equations with the largest product of entries (Duff and Koster, 2001), so that the
+    matrix to invert is as well conditioned as a permutation allows; groups of equations that share pivots are inverted
+    group by group.
     """
-    B = csr_array(B)
+    B = csr_array(B, copy=True)
+    if not B.has_canonical_format:
+        B.sum_duplicates()
     B.eliminate_zeros()
+    m = B.shape[0]
+    entries = _own(B)
+    if entries is not None:
+        pivots = B.indices[entries].astype(np.intp)
+        inverse = csr_array(diags_array(1.0 / B.data[entries], format="csr")) if m else csr_array((0, 0))
+    elif (layered := peeled(B, SMALLEST)) is not None:
+        pivots, inverse = layered
+    else:
+        pivots = _matched(B)
+        inverse = _block_inverse(csr_array(B[:, pivots]))
+    is_pivot = np.zeros(B.shape[1], bool)
+    is_pivot[pivots] = True
+    rest = csr_array((np.where(is_pivot[B.indices], 0.0, -B.data), B.indices, B.indptr), shape=B.shape, copy=True)
+    rest.eliminate_zeros()
+    tie = csr_array(inverse @ rest)
+    tie.sort_indices()
+    return Elimination(pivots, tie, np.asarray(inverse @ c, float), inverse)
+
+
+def _own(B: csr_array) -> Indices | None:
+    """Return, for each row, the entry of its largest unknown that no other row has; None where a row has none."""
+    m = B.shape[0]
+    if not m:
+        return np.empty(0, np.intp)
+    if not np.diff(B.indptr).all():
+        return None
+    size = np.abs(B.data)
+    count = np.bincount(B.indices, minlength=B.shape[1])
+    row = np.repeat(np.arange(m), np.diff(B.indptr))
+    own = np.where(count[B.indices] == 1, size, 0.0)
+    order = np.lexsort((-np.arange(len(own)), own, row))
+    best = order[B.indptr[1:] - 1]
+    largest = np.maximum.reduceat(size, B.indptr[:-1])
+    return best if (own[best] >= SMALLEST * largest).all() else None
+
+
+def _matched(B: csr_array) -> Indices:
+    """Return the unknown assigned to each row."""
+    if B.shape[0] <= DENSE_UP_TO:
+        columns = np.unique(B.indices)
+        *_, order = qr(B[:, columns].toarray(), mode="r", pivoting=True)
+        return np.asarray(columns[order[: B.shape[0]]], np.intp)
     largest = np.abs(B.data).max()
     cost = csr_array((1.0 + np.log(largest) - np.log(np.abs(B.data)), B.indices, B.indptr), shape=B.shape)
     row, pivots = min_weight_full_bipartite_matching(cost)
-    pivots = pivots[np.argsort(row)].astype(np.intp)
-    lu = splu(B[:, pivots].tocsc())
-    keep = np.ones(B.shape[1])
-    keep[pivots] = 0.0
-    columns = np.flatnonzero((np.abs(B).sum(axis=0) > 0) & (keep > 0))
-    tie = -lu.solve(B[:, columns].toarray())
-    n, m = B.shape[1], len(pivots)
-    entries = np.flatnonzero(tie.ravel())
-    rows, cols = pivots[entries // max(len(columns), 1)], columns[entries % max(len(columns), 1)]
-    T = diags_array(keep).tocsr() + csr_array((tie.ravel()[entries], (rows, cols)), shape=(n, n))
-    t = np.zeros(n)
-    t[pivots] = lu.solve(c) if m else 0.0
-    return Elimination(pivots, csr_array(T), t, lu)
+    return np.asarray(pivots[np.argsort(row)], np.intp)
+
+
+def _block_inverse(A: csr_array) -> csr_array:
+    """Return the inverse of a sparse matrix that falls into small independent blocks, one block after the other."""
+    count, label = connected_components(A, directed=False)
+    order = np.argsort(label, kind="stable")
+    ends = np.cumsum(np.bincount(label, minlength=count))
+    columns = csc_array(A)
+    rows, cols, values = [], [], []
+    for first, end in zip(np.r_[0, ends[:-1]], ends, strict=True):
+        members = order[first:end]
+        inverse = np.linalg.inv(columns[:, members].tocsr()[members].toarray())
+        rows.append(np.repeat(members, len(members)))
+        cols.append(np.tile(members, len(members)))
+        values.append(inverse.ravel())
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(cols)))
+    return csr_array(entries, shape=A.shape)

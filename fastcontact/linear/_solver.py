@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
 Array = NDArray[np.float64]
+# Looks at an unfinished solution (u, multiplier, relative residual); True ends it there.
+Monitor = Callable[[Array, Array, float], bool]
 
 
 @dataclass
@@ -23,10 +26,15 @@ class Counters:
 class Loaded(Protocol):
     """A prepared matrix with a right-hand side."""
 
-    def solve(self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None) -> tuple[Array, Array]:
+    def solve(
+        self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None,
+    ) -> tuple[Array, Array]:  # fmt: skip
         """Return (u, multiplier) with ``K u = f + B.T multiplier`` and ``B u + C multiplier = c``.
 
-        B (m, n) has full row rank where C (m, m), symmetric and positive semidefinite, is None or singular.
+        B (m, n) has full row rank where C (m, m), symmetric and positive semidefinite, is None or singular. Solvers that
+        iterate show the state to `monitor` from time to time and return it, unfinished, where that says True; they stop
+        at a relative residual of `tolerance` where that is given and above their own.
         """
         ...
 
@@ -46,10 +54,13 @@ class LinearSolver(Protocol):
     ----------
     tolerance : float
         Relative accuracy of the solutions.
+    iterative : bool
+        Whether less accurate solutions cost less.
     counters : Counters
     """
 
     tolerance: float
+    iterative: bool
     counters: Counters
 
     def prepare(self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None) -> None:

@@ -1,28 +1,37 @@
-"""Conjugate gradients preconditioned by smoothed aggregation (pyamg), with the rigid-body modes as near-nullspace.
+"""Conjugate gradients preconditioned by multigrid, with the rigid-body modes as near-nullspace.
 
-The aggregates and prolongators are those of K and serve the whole analysis. Equations ``B u = c`` are eliminated;
-for the eliminated matrix the rows of the finest prolongator that belong to eliminated unknowns are dropped and the
-Galerkin products renewed. Equations with a compliance of their own cannot be eliminated: they go through the
-compliance of their degrees of freedom, one solution each, kept for the whole analysis.
+Aggregates and prolongators are those of K and serve the whole analysis. Equations ``B u = c`` are eliminated: the
+iterates obey them, forces at the eliminated unknowns are moved to what these follow, and the hierarchy is changed
+where it is near them. Equations with a compliance of their own cannot be eliminated: they go through the compliance of
+their degrees of freedom, one solution each, kept for the whole analysis.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import logging
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, bsr_matrix, csr_array, csr_matrix, diags_array
-from scipy.sparse.linalg import cg
+from scipy.sparse import bsr_array, csr_array
 
-from fastcontact.errors import ConvergenceError
+from fastcontact.errors import ConvergenceError, ModelError
+from fastcontact.kernels import krylov, ties
 from fastcontact.linear._compliance import ComplianceCache, multipliers, reduced
-from fastcontact.linear._elimination import eliminate
-from fastcontact.linear._solver import Counters
+from fastcontact.linear._elimination import Elimination, eliminate
+from fastcontact.linear._hierarchy import Hierarchy, Matrix
+from fastcontact.linear._pcg import ConjugateGradients
+from fastcontact.linear._solver import Counters, Monitor
+from fastcontact.linear._ties import Ties
 
+log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
-SMOOTHER = ("block_gauss_seidel", {"sweep": "symmetric"})
 MAX_ITERATIONS = 1000
+# Iterations between two looks of a monitor.
+WATCH_EVERY = 2
+# Weights of ties that differ by less than this share a hierarchy.
+ALIKE = 0.02
+# Where the smoother is found to amplify something, its bound of the spectrum is raised by this factor, so many times.
+RAISE, RAISES = 1.3, 4
 
 
 class Amg:
@@ -32,145 +41,231 @@ class Amg:
     ----------
     tolerance : float
         The residual is reduced below this fraction of the right-hand side (2-norms).
+    precision : {"single", "double"}
+        Of the numbers inside the multigrid cycle; the iteration around it is in double precision.
+
+    Raises
+    ------
+    ModelError
+        If there is no such precision.
     """
 
     name = "amg"
+    iterative = True
 
-    def __init__(self, tolerance: float = 1e-10) -> None:
-        self.tolerance = tolerance
+    def __init__(self, tolerance: float = 1e-10, precision: str = "single") -> None:
+        if precision not in ("single", "double"):
+            raise ModelError(f"the precision of the multigrid cycle is 'single' or 'double', not '{precision}'")
+        self.tolerance, self.precision = tolerance, precision
         self.counters = Counters()
 
     def __repr__(self) -> str:
-        if not hasattr(self, "_hierarchy"):
+        if not hasattr(self, "hierarchy"):
             return "Amg(not prepared)"
-        sizes = " -> ".join(str(level.A.shape[0]) for level in self._hierarchy.levels)
-        complexity = self._hierarchy.operator_complexity()
-        return f"Amg({len(self._hierarchy.levels)} levels, unknowns {sizes}, operator complexity {complexity:.2f})"
+        return f"Amg({self.hierarchy}, {self.nbytes / 1e6:.1f} MB, {self.precision} precision)"
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the hierarchy and the work space, without K [bytes]."""
+        return self.hierarchy.nbytes + self._cg.nbytes
 
     def prepare(self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None) -> None:
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
-        import pyamg
-
-        self.K = K
-        self._block = K.blocksize
-        self._hierarchy = pyamg.smoothed_aggregation_solver(
-            bsr_matrix(K), B=rigid_modes, strength=("symmetric", {"theta": 0.0}), smooth="energy",
-            max_coarse=50, coarse_solver="splu", presmoother=SMOOTHER, postsmoother=SMOOTHER,
-        )  # fmt: skip
-        self.counters.setups += 1
+        size = K.blocksize[0]
+        self._given = K, rigid_modes
+        self.K = Matrix(K.indptr, K.indices, K.data.reshape(-1), (0,) * size, (0,) * size)
+        self._cg = ConjugateGradients(K.shape[0])
+        self._solved: Array | None = None  # the right-hand side that iterate and residual belong to
+        self._build()
         self.compliance = ComplianceCache(K.shape[0], self._solve_many)
 
+    def _build(self) -> None:
+        K, rigid_modes = self._given
+        for old in ("_ties", "hierarchy"):  # two hierarchies at a time need not be remembered
+            self.__dict__.pop(old, None)
+        self.hierarchy = Hierarchy(K, rigid_modes, self.precision)
+        self._ties = Ties(self.hierarchy, self.K)
+        self._tied: Elimination | None = None  # the equations that hold, and those that the hierarchy was tied for
+        self._tied_as: Elimination | None = None
+        self.counters.setups += 1
+
     def _solve_many(self, F: Array) -> Array:
-        K = bsr_matrix(self.K)
-        return np.column_stack([self.conjugate_gradients(K, f, self._hierarchy, None) for f in F.T])
+        return np.column_stack([self.solution(np.ascontiguousarray(f), None, None) for f in F.T])
 
     def load(self, f: Array) -> _Loaded:
         """Return the prepared matrix with right-hand side `f`."""
         return _Loaded(self, f)
 
-    def conjugate_gradients(self, A: Any, f: Array, hierarchy: Any, guess: Array | None) -> Array:
-        """Solve ``A u = f`` to the solver's tolerance.
+    def tie(self, elimination: Elimination | None) -> None:
+        """Change the hierarchy to that of the eliminated matrix.
+
+        A hierarchy for the same pivots that follow others with nearly the same weights is kept: it preconditions as
+        well, since only the unknowns beside the pivots count.
+        """
+        if elimination is not self._tied:
+            if not _alike(elimination, self._tied_as):
+                self._ties.tie(elimination)
+                self._tied_as = elimination
+            self._tied = elimination
+
+    def solution(
+        self, f: Array, elimination: Elimination | None, guess: Array | None, monitor: Monitor | None = None,
+        tolerance: float | None = None,
+    ) -> Array:  # fmt: skip
+        """Solve ``K u = f`` under the equations of `elimination` to the solver's tolerance, or a larger one.
 
         Raises
         ------
         ConvergenceError
             If the residual does not fall below the tolerance.
         """
-        scale = np.linalg.norm(f)
-        if scale == 0.0:
-            return np.zeros(len(f))
-
-        def count(_: Array) -> None:
-            self.counters.iterations += 1
-
-        u, failed = cg(
-            A,
-            f,
-            x0=guess,
-            rtol=self.tolerance,
-            maxiter=MAX_ITERATIONS,
-            M=hierarchy.aspreconditioner(),
-            callback=count,
-        )
-        if failed:
-            left = np.linalg.norm(f - A @ u) / scale
-            raise ConvergenceError(
-                f"conjugate gradients stand at a relative residual of {left:.1e} after {MAX_ITERATIONS} iterations, "
-                f"above {self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
-            )
-        return u
-
-    def eliminated_hierarchy(self, A: bsr_array, pivots: NDArray[np.intp]) -> Any:
-        """Return the hierarchy of the eliminated matrix `A` with the prolongators of K."""
-        from pyamg.multilevel import MultilevelSolver
-        from pyamg.relaxation.smoothing import change_smoothers
-
-        keep = np.ones(A.shape[0])
-        keep[pivots] = 0.0
-        levels = []
-        operator: Any = bsr_matrix(A)
-        for number, old in enumerate(self._hierarchy.levels):
-            level = MultilevelSolver.Level()
-            level.A = operator
-            levels.append(level)
-            if not hasattr(old, "P"):
+        cg, old = self._cg, self._tied
+        goes_on = guess is not None and f is self._solved and np.array_equal(guess, cg.x)
+        self.tie(elimination)
+        if goes_on:
+            self._go_on(f, old, elimination)
+        else:
+            cg.x[:] = 0.0 if guess is None else guess
+            self._begin(f, elimination)
+        self._solved = f
+        scale = self._scale(f, elimination)
+        enough = max(self.tolerance, tolerance or 0.0) * scale
+        made = raised = 0
+        while cg.norm > enough:
+            if made >= MAX_ITERATIONS or raised > RAISES:
+                raise ConvergenceError(self._stuck(cg.norm / scale, made))
+            if (
+                made
+                and monitor is not None
+                and made % WATCH_EVERY == 0
+                and self._stopped(monitor, f, elimination, cg.norm / scale)
+            ):
                 break
-            P = csr_matrix(diags_array(keep) @ csr_matrix(old.P)).tobsr(old.P.blocksize) if number == 0 else old.P
-            level.P, level.R = P, P.T.tobsr(P.blocksize[::-1])
-            operator = bsr_matrix(level.R @ operator @ P).tobsr((P.blocksize[1], P.blocksize[1]))
-        solver = MultilevelSolver(levels, coarse_solver="splu")
-        change_smoothers(solver, SMOOTHER, SMOOTHER)
-        return solver
+            if cg.step(self._multiply, self._precondition):
+                made += 1
+                self.counters.iterations += 1
+            else:
+                raised += 1
+                self._strengthen(raised)
+                self._begin(f, elimination)
+        return cg.x.copy()
+
+    def _strengthen(self, times: int) -> None:
+        """Make the preconditioner positive definite again: with higher bounds, at last in double precision."""
+        if times < RAISES or self.precision == "double":
+            self.hierarchy.raise_bounds(RAISE)
+            return
+        log.info("multigrid: single precision is not enough for this matrix, the cycle goes on in double precision")
+        self.precision, tied = "double", self._tied
+        self._build()
+        self.tie(tied)
+
+    def _stuck(self, left: float, made: int) -> str:
+        return (
+            f"conjugate gradients stand at a relative residual of {left:.1e} after {made} iterations, above "
+            f"{self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
+        )
+
+    def _begin(self, f: Array, elimination: Elimination | None) -> None:
+        """Make the iterate obey the equations and compute its residual."""
+        cg = self._cg
+        if elimination is not None:
+            elimination.complete(cg.x, elimination.t)
+        self.K.combine(-1.0, cg.x, 1.0, f, cg.r)
+        if elimination is not None:
+            elimination.condense(cg.r)
+        cg.start()
+
+    def _go_on(self, f: Array, old: Elimination | None, new: Elimination | None) -> None:
+        """Let the iterate obey other equations: its residual changes near the pivots only."""
+        cg, K = self._cg, self.K
+        if old is not None:
+            old.release(cg.r, -self._forces(old, cg.x, f))
+        if new is not None:
+            before = cg.x[new.pivots]
+            new.complete(cg.x, new.t)
+            moved = before - cg.x[new.pivots]
+            ties.forces_of(new.pivots, moved, K.indptr, K.indices, K.data, len(K.rows), cg.r)
+            new.condense(cg.r)
+        cg.start()
+
+    def _forces(self, elimination: Elimination, u: Array, f: Array) -> Array:
+        """Return ``(K u - f)[pivots]``."""
+        K = self.K
+        out = np.empty(len(elimination.pivots))
+        ties.forces_at(elimination.pivots, K.indptr, K.indices, K.data, len(K.rows), u, f, out)
+        return out
+
+    def _scale(self, f: Array, elimination: Elimination | None) -> float:
+        """Return the size of the right-hand side, forces that impose the equations included."""
+        square = self._cg.dot(f, f)
+        if elimination is not None and elimination.t.any():
+            forces = np.zeros(len(f))
+            K = self.K
+            ties.forces_of(elimination.pivots, elimination.t, K.indptr, K.indices, K.data, len(K.rows), forces)
+            square += self._cg.dot(forces, forces)
+        return float(np.sqrt(square))
+
+    def _multiply(self, p: Array, q: Array) -> None:
+        self.K.multiply(p, q)
+        if self._tied is not None:
+            self._tied.condense(q)
+
+    def _precondition(self, r: Array, norm: float, z: Array) -> None:
+        top = self.hierarchy.levels[0]
+        krylov.scaled(1.0 / norm, r, top.b)
+        self.hierarchy.cycle()
+        krylov.scaled(norm * self.hierarchy.unit, top.x, z)
+        if self._tied is not None:
+            self._tied.complete(z)
+
+    def _stopped(self, monitor: Monitor, f: Array, elimination: Elimination | None, error: float) -> bool:
+        return monitor(self._cg.x, self.multiplier(elimination, self._cg.x, f), error)
+
+    def multiplier(self, elimination: Elimination | None, u: Array, f: Array) -> Array:
+        """Return the multipliers (m,) of the equations at `u`."""
+        if elimination is None:
+            return np.empty(0)
+        return elimination.multiplier(self._forces(elimination, u, f))
+
+
+def _alike(new: Elimination | None, old: Elimination | None) -> bool:
+    """Return whether two eliminations have the same pivots and nearly the same weights."""
+    if new is None or old is None or not np.array_equal(new.pivots, old.pivots):
+        return new is old
+    return bool(np.abs((new.tie - old.tie).data).max(initial=0.0) <= ALIKE)
 
 
 class _Loaded:
     """See `linear._solver.Loaded`."""
 
     def __init__(self, solver: Amg, f: Array) -> None:
-        self._solver, self._f = solver, f
+        self._solver, self._f = solver, np.ascontiguousarray(f, float)
         self._free: Array | None = None
 
-    def solve(self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None) -> tuple[Array, Array]:
-        if B.shape[0] == 0:
-            return self._unconstrained(self._f, guess), np.empty(0)
-        if C is None:
-            return self._eliminated(B, c, guess)
-        multiplier = multipliers(self._solver.compliance, B, c - B @ self._unloaded(), C)
-        return self._unconstrained(self._f + B.T @ multiplier, guess), multiplier
+    def solve(
+        self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        solver = self._solver
+        if C is None or not B.shape[0]:
+            elimination = eliminate(B, c) if B.shape[0] else None
+            u = solver.solution(self._f, elimination, guess, monitor, tolerance)
+            return u, solver.multiplier(elimination, u, self._f)
+        multiplier = multipliers(solver.compliance, B, c - B @ self._unloaded(), C)
+        return solver.solution(self._f + B.T @ multiplier, None, guess), multiplier
 
     def reduce(self, R: csr_array) -> tuple[Array, Array]:
         return R @ self._unloaded(), reduced(self._solver.compliance, R)
 
     def displacement(self, force: Array) -> Array:
-        return self._unconstrained(self._f + force, None)
+        return self._solver.solution(self._f + force, None, None)
 
     def _unloaded(self) -> Array:
         """Return the displacement without contact forces."""
         if self._free is None:
-            self._free = self._unconstrained(self._f, None)
+            self._free = self._solver.solution(self._f, None, None)
         return self._free
-
-    def _unconstrained(self, f: Array, guess: Array | None) -> Array:
-        solver = self._solver
-        return solver.conjugate_gradients(bsr_matrix(solver.K), f, solver._hierarchy, guess)
-
-    def _eliminated(self, B: csr_array, c: Array, guess: Array | None) -> tuple[Array, Array]:
-        solver = self._solver
-        K = csr_array(solver.K)
-        tie = eliminate(B, c)
-        diagonal = np.zeros(K.shape[0])
-        diagonal[tie.pivots] = K.diagonal()[tie.pivots]
-        A = bsr_array((tie.T.T @ K @ tie.T + diags_array(diagonal)).tobsr(solver._block))
-        right = tie.T.T @ (self._f - K @ tie.t)
-        start = None
-        if guess is not None:
-            start = guess.copy()
-            start[tie.pivots] = 0.0
-        v = solver.conjugate_gradients(
-            bsr_matrix(A), right, solver.eliminated_hierarchy(A, tie.pivots), start
-        )  # fmt: skip
-        u = tie.T @ v + tie.t
-        return u, tie.multiplier(K @ u - self._f)
 
 
 SOLVER = Amg

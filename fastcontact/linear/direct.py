@@ -10,26 +10,22 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.sparse import bsr_array, csc_array, csr_array
+from scipy.sparse import bsr_array, csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from fastcontact.errors import ModelError
-from fastcontact.linear._compliance import ComplianceCache, multipliers, reduced
-from fastcontact.linear._solver import Counters
+from fastcontact.linear._compliance import ComplianceCache
+from fastcontact.linear._factor import FactorSolver, singular
 
 Array = NDArray[np.float64]
 # Beyond this many unknowns last, their dense block costs more than the solutions it saves.
 LAST_UP_TO = 4000
 
 
-class Direct:
+class Direct(FactorSolver):
     """SuperLU in symmetric mode, minimum-degree ordering of A + A.T."""
 
     name = "direct"
-
-    def __init__(self, tolerance: float = 1e-14) -> None:
-        self.tolerance = 1e-14  # round-off, whatever was asked
-        self.counters = Counters()
 
     def __repr__(self) -> str:
         if not hasattr(self, "_lu"):
@@ -45,6 +41,7 @@ class Direct:
             If K is singular.
         """
         matrix = K.tocsc()
+        self.n = K.shape[0]
         self._lu = self._factorised(matrix, "MMD_AT_PLUS_A")
         self._order: NDArray[np.intp] | None = None
         self.compliance = ComplianceCache(K.shape[0], self._solve)
@@ -60,9 +57,7 @@ class Direct:
         try:
             lu = splu(matrix, permc_spec=order, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         except RuntimeError as error:
-            raise ModelError(
-                "the stiffness matrix is singular: support the rigid-body motions of every body"
-            ) from error
+            raise singular() from error
         self.counters.setups += 1
         return lu
 
@@ -91,35 +86,6 @@ class Direct:
         U = np.empty_like(F)
         U[self._order] = self._lu.solve(np.ascontiguousarray(F[self._order]))
         return U
-
-    def load(self, f: Array) -> _Loaded:
-        """Return the prepared matrix with right-hand side `f`."""
-        return _Loaded(self, f)
-
-    def back_substitute(self, f: Array) -> Array:
-        """Return ``K^-1 f``."""
-        self.counters.iterations += 1
-        return self._solve(f)
-
-
-class _Loaded:
-    """See `linear._solver.Loaded`."""
-
-    def __init__(self, solver: Direct, f: Array) -> None:
-        self._solver, self._f = solver, f
-        self._free = solver.back_substitute(f)
-
-    def solve(self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None) -> tuple[Array, Array]:
-        if B.shape[0] == 0:
-            return self._free, np.empty(0)
-        multiplier = multipliers(self._solver.compliance, B, c - B @ self._free, C)
-        return self._solver.back_substitute(self._f + B.T @ multiplier), multiplier
-
-    def reduce(self, R: csr_array) -> tuple[Array, Array]:
-        return R @ self._free, reduced(self._solver.compliance, R)
-
-    def displacement(self, force: Array) -> Array:
-        return self._solver.back_substitute(self._f + force)
 
 
 SOLVER = Direct

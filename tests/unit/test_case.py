@@ -1,5 +1,6 @@
 """Case files are checked whole; every mistake is one line that names the key."""
 
+import numpy as np
 import pytest
 
 import fastcontact as fc
@@ -249,3 +250,45 @@ def test_mistakes_in_an_obstacle_name_the_key(write, old, new, message):
     assert old in OBSTACLE
     with pytest.raises(fc.CaseError, match=message):
         read_case(write(OBSTACLE.replace(old, new, 1)))
+
+
+SURFACE = OBSTACLE.replace(
+    'shape = { kind = "half_space", point = [0.0, 0.0], normal = [0.0, -1.0] }',
+                           'shape = "mesh"\nfile = "tool.med"\ngroup = "TOOL"')  # fmt: skip
+
+
+@pytest.fixture
+def tool(tmp_path):
+    """A plane of three lines, facing down."""
+    points = [[x, 0.0] for x in (0.0, 20.0, 45.0, 60.0)]
+    mesh = fc.Mesh(points, {"line2": [[0, 1], [1, 2], [2, 3]]}, cell_groups={"TOOL": [0, 1, 2]})
+    fc.write_mesh(tmp_path / "tool.med", mesh)
+    return mesh
+
+
+def test_a_rigid_surface_is_read_from_its_own_file(write, tool):
+    for shape in ("", "flip = true\n", 'shape = { kind = "mesh", file = "tool.med", group = "TOOL", crease = 10 }\n'):
+        text = SURFACE.replace('group = "TOOL"\n', f'group = "TOOL"\n{shape}')
+        if shape.startswith("shape"):
+            text = text.replace('shape = "mesh"\nfile = "tool.med"\ngroup = "TOOL"\n', "")
+        surface = read_case(write(text)).model.contact[0].obstacle
+        sign = -1 if shape.startswith("flip") else 1
+        distance, normal = surface.distance(np.array([[30.0, -1.0]]))
+        assert (distance[0], normal[0].tolist()) == (sign * 1.0, [0.0, -sign * 1.0])
+        assert surface.crease == (10 if shape.startswith("shape") else 30)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('group = "TOOL"\n', "", r"'obstacle.plane.shape' needs 'group'"),
+        ('"TOOL"', '"TOOLS"', r"unknown group of cells 'TOOLS': did you mean 'TOOL'"),
+        ('"mesh"', '"mash"', r"unknown obstacle.plane.shape.kind 'mash': did you mean 'mesh'"),
+        ('file = "tool.med"\n', "", r"unknown group of cells 'TOOL'"),
+        ('"tool.med"', '"tol.med"', r"tol.med"),
+    ],
+)
+def test_mistakes_in_a_rigid_surface_are_told(write, tool, old, new, message):
+    assert old in SURFACE
+    with pytest.raises(fc.FastcontactError, match=message):
+        read_case(write(SURFACE.replace(old, new, 1)))

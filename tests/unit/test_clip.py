@@ -1,28 +1,52 @@
-"""Facets cut by facets in 3D: areas add up, whatever the position in space."""
+"""Facets cut by facets in 3D: areas add up, whatever the position in space; products are integrated exactly."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fastcontact.kernels import clip3d
+from fastcontact import elements, quadrature
+from fastcontact.contact.formulations._cut_faces import terms_of
+from fastcontact.kernels import box_tree, clip3d
 
 
-def cut(secondary, primary, facing=-0.1):
-    def packed(polygons):
-        room = np.zeros((len(polygons), 4, 3))
-        for row, polygon in zip(room, polygons, strict=True):
-            row[: len(polygon)] = polygon
-        return room, np.array([len(polygon) for polygon in polygons])
-
-    pairs = np.array([(i, j) for i in range(len(secondary)) for j in range(len(primary))])
-    owner, triangles = np.empty(1000, np.intp), np.empty((1000, 3, 3))
-    count = clip3d.facing_triangles(*packed(secondary), *packed(primary), pairs, facing, owner, triangles)
-    return owner[:count], triangles[:count]
+def planes(corners):
+    n, count = corners.shape[:2]
+    origin, axes = np.empty((n, 3)), np.empty((n, 3, 3))
+    clip3d.planes(corners, count, origin, axes)
+    return origin, axes
 
 
-def areas(triangles):
-    return 0.5 * np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
+def facing(secondary, primary, room=1000, reach=2.0):
+    """Pairs of polygons (n, n_corners, 3) that face each other."""
+    (origin, axes), (_, other_axes) = planes(secondary), planes(primary)
+    radius = np.linalg.norm(secondary - origin[:, None], axis=2).max(axis=1)
+    low, high = primary.min(axis=1), primary.max(axis=1)
+    pairs = np.empty((room, 2), np.intp)
+    count = clip3d.facing_pairs(
+        secondary, secondary.shape[1], origin, axes, radius, np.full(len(secondary), reach),
+        primary, primary.shape[1], np.ascontiguousarray(other_axes[:, 2]), low, high, *box_tree.build(low, high),
+        -0.1, pairs,
+    )  # fmt: skip
+    return pairs[: min(count, room)], count
+
+
+def integrated(secondary, primary, kinds, reference=None):
+    """Pairs, mass and coupling of facets given by their nodes, with the rule of degree 8."""
+    one, other = (elements.get(kind) for kind in kinds)
+    corners, opposite = secondary[:, : one.n_corners].copy(), primary[:, : other.n_corners].copy()
+    pairs, _ = facing(corners, opposite)
+    origin, axes = planes(corners)
+    reference = secondary if reference is None else reference
+    mass = np.empty((len(secondary), one.n_nodes, one.n_nodes))
+    coupling = np.empty((len(pairs), one.n_nodes, other.n_nodes))
+    wrong = clip3d.integrate(
+        corners, one.n_corners, origin, axes, terms_of(one) @ secondary, terms_of(one) @ reference, terms_of(one),
+        one.nodes[: one.n_corners].mean(axis=0), opposite, other.n_corners, terms_of(other) @ primary,
+        terms_of(other), other.nodes[: other.n_corners].mean(axis=0), pairs, *quadrature.triangle(8), mass, coupling,
+    )  # fmt: skip
+    assert wrong == -1
+    return pairs, mass, coupling
 
 
 def rotation(seed):
@@ -30,51 +54,103 @@ def rotation(seed):
     return q * np.sign(np.linalg.det(q))
 
 
-def grid(nx, ny, height, up):
-    """Quadrangles over the unit square at a height, looking up or down."""
-    x, y = np.linspace(0, 1, nx + 1), np.linspace(0, 1, ny + 1)
+def lines(n):
+    return np.linspace(0, 1, n + 1)
+
+
+def grid(nx, ny, height, up, kind="quad4"):
+    """Quadrangles (n, n_nodes, 3) over the unit square at a height, looking up or down."""
+    element = elements.get(kind)
+    x, y = lines(nx), lines(ny)
+    order = np.arange(element.n_nodes) if up else np.array(element.reversed)
     found = []
     for i in range(nx):
         for j in range(ny):
-            corners = [(x[i], y[j]), (x[i + 1], y[j]), (x[i + 1], y[j + 1]), (x[i], y[j + 1])]
-            polygon = np.array([(a, b, height) for a, b in corners])
-            found.append(polygon if up else polygon[::-1])
-    return found
+            s, t = 0.5 * (1 + element.nodes[order].T)
+            flat = x[i] + s * (x[i + 1] - x[i]), y[j] + t * (y[j + 1] - y[j])
+            found.append(np.column_stack([*flat, np.full(element.n_nodes, height)]))
+    return np.array(found)
 
 
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 1000), nx=st.integers(1, 4), ny=st.integers(1, 4), gap=st.floats(-0.3, 0.3))
 def test_pieces_of_one_square_cover_the_other(seed, nx, ny, gap):
     Q = rotation(seed)
-    lower = [polygon @ Q.T for polygon in grid(nx, ny, 0.0, True)]
-    upper = [polygon @ Q.T for polygon in grid(3, 2, gap, False)]
-    owner, triangles = cut(lower, upper)
-    assert areas(triangles).sum() == pytest.approx(1.0, abs=1e-12)
-    per_facet = np.bincount(owner, weights=areas(triangles), minlength=nx * ny)
+    lower, upper = grid(nx, ny, 0.0, True) @ Q.T, grid(3, 2, gap, False) @ Q.T
+    pairs, mass, coupling = integrated(lower, upper, ("quad4", "quad4"))
+    assert mass.sum(axis=(1, 2)) == pytest.approx(1.0 / (nx * ny), abs=1e-12)
+    per_facet = np.bincount(pairs[:, 0], weights=coupling.sum(axis=(1, 2)), minlength=nx * ny)
     assert per_facet == pytest.approx(1.0 / (nx * ny), abs=1e-12)
 
 
+def overlap_of_intervals(a, b):
+    return max(a[0], b[0]), min(a[1], b[1])
+
+
+@pytest.mark.parametrize("kinds", [("quad4", "quad4"), ("quad8", "quad4"), ("quad4", "quad9"), ("quad9", "quad8")])
+def test_products_agree_with_a_rule_on_rectangles(kinds):
+    """Facets along the axes overlap in rectangles, which the product rule of Gauss integrates exactly.
+
+    The reference surface is stretched threefold in x, and areas are those of the reference.
+    """
+    lower, upper = grid(2, 3, 0.0, True, kinds[0]), grid(3, 2, 0.2, False, kinds[1])
+    stretched = lower * np.array([3.0, 1.0, 1.0])
+    pairs, mass, coupling = integrated(lower, upper, kinds, stretched)
+    (one, other), points = (elements.get(kind) for kind in kinds), quadrature.gauss_square(4)
+    expected_mass = np.zeros_like(mass)
+    seen = 0
+    for (s, p), found in zip(pairs, coupling, strict=True):
+        boxes = [
+            (nodes[:, d].min(), nodes[:, d].max()) for nodes in (lower[s], upper[p]) for d in range(2)
+        ]  # x and y of the one, x and y of the other
+        (x0, x1), (y0, y1) = (overlap_of_intervals(boxes[d], boxes[2 + d]) for d in range(2))
+        assert x1 > x0
+        assert y1 > y0
+        x = x0 + 0.5 * (1 + points[0][:, 0]) * (x1 - x0)
+        y = y0 + 0.5 * (1 + points[0][:, 1]) * (y1 - y0)
+        weights = points[1] * 0.25 * (x1 - x0) * (y1 - y0) * 3.0
+        shapes = []
+        for element, nodes, box in ((one, lower[s], boxes[:2]), (other, upper[p], boxes[2:])):
+            xi = np.column_stack([2 * (v - a) / (b - a) - 1 for v, (a, b) in zip((x, y), box, strict=True)])
+            shapes.append(element.shape(xi[:, ::-1] if shapes else xi))  # what looks down has s and t swapped
+            assert shapes[-1] @ nodes[:, :2] == pytest.approx(np.column_stack([x, y]), abs=1e-12)
+        assert found == pytest.approx(np.einsum("q,qa,qb->ab", weights, *shapes), abs=1e-13)
+        expected_mass[s] += np.einsum("q,qa,qb->ab", weights, shapes[0], shapes[0])
+        seen += 1
+    assert seen == 16  # pieces in 4 columns and 4 rows
+    assert mass == pytest.approx(expected_mass, abs=1e-13)
+
+
 def test_a_triangle_and_a_quadrangle_share_their_common_part():
-    triangle = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0]])
-    square = np.array([[0.0, 0, 1], [0, 1.5, 1], [1.5, 1.5, 1], [1.5, 0, 1]])
-    _, triangles = cut([triangle], [square])
-    assert areas(triangles).sum() == pytest.approx(2.0 - 2 * 0.5 * 0.25, abs=1e-14)
-    assert np.abs(triangles[:, :, 2]).max() < 1e-15
+    triangle = np.array([[[0.0, 0, 0], [2, 0, 0], [0, 2, 0]]])
+    square = np.array([[[0.0, 0, 1], [0, 1.5, 1], [1.5, 1.5, 1], [1.5, 0, 1]]])
+    _, mass, _ = integrated(triangle, square, ("tri3", "quad4"))
+    assert mass.sum() == pytest.approx(2.0 - 2 * 0.5 * 0.25, abs=1e-14)
 
 
 def test_facets_that_look_the_same_way_or_lie_apart_share_nothing():
-    square = grid(1, 1, 0.0, True)
-    assert len(cut(square, grid(1, 1, 0.1, True))[0]) == 0
-    apart = [polygon + np.array([5.0, 0, 0]) for polygon in grid(1, 1, 0.1, False)]
-    assert len(cut(square, apart)[0]) == 0
-    touching = [polygon + np.array([1.0, 0, 0]) for polygon in grid(1, 1, 0.1, False)]
-    assert len(cut(square, touching)[0]) == 0
+    square, opposite = grid(1, 1, 0.0, True), grid(1, 1, 0.1, False)
+    assert facing(square, grid(1, 1, 0.1, True))[1] == 0
+    assert facing(square, opposite + np.array([5.0, 0, 0]))[1] == 0
+    assert facing(square, opposite + np.array([1.0, 0, 0]))[1] == 0
+    assert facing(square, opposite)[1] == 1
+    assert facing(square, grid(1, 1, 1.0, False), reach=0.2)[1] == 0
+
+
+def test_all_pairs_of_large_grids_are_found():
+    """The tree against the counting of overlapping intervals."""
+    lower, upper = grid(13, 9, 0.0, True), grid(7, 11, 0.1, False)
+    overlaps = [
+        sum(min(a[i + 1], b[j + 1]) - max(a[i], b[j]) > 1e-9 for i in range(len(a) - 1) for j in range(len(b) - 1))
+        for a, b in ((lines(13), lines(7)), (lines(9), lines(11)))
+    ]
+    pairs, count = facing(lower, upper)
+    assert count == overlaps[0] * overlaps[1]
+    assert len(np.unique(pairs, axis=0)) == count
+    assert (np.diff(pairs[:, 0]) >= 0).all()
 
 
 def test_too_little_room_is_told():
-    lower, upper = np.zeros((1, 4, 3)), np.zeros((1, 4, 3))
-    lower[0], upper[0] = grid(1, 1, 0.0, True)[0], grid(1, 1, 0.1, False)[0]
-    count = clip3d.facing_triangles(
-        lower, np.array([4]), upper, np.array([4]), np.array([[0, 0]]), -0.1, np.empty(1, np.intp), np.empty((1, 3, 3))
-    )
-    assert count > 1
+    pairs, count = facing(grid(2, 2, 0.0, True), grid(3, 3, 0.1, False), room=1)
+    assert count == 16
+    assert len(pairs) == 1

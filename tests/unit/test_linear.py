@@ -1,8 +1,11 @@
 """Every linear solver under one test of the protocol."""
 
+import importlib.util
+import logging
+
 import numpy as np
 import pytest
-from scipy.sparse import csr_array
+from scipy.sparse import bsr_array, csr_array
 
 import fastcontact as fc
 from fastcontact import linear
@@ -70,3 +73,34 @@ def test_auto_chooses_by_dimension_and_size():
 def test_an_unknown_solver_is_refused():
     with pytest.raises(ModelError, match=r"'amgg'.*'amg'"):
         linear.make("amgg", dim=2, n_dofs=10)
+
+
+def test_auto_says_why(caplog):
+    with caplog.at_level(logging.INFO, logger="fastcontact"):
+        linear.make("auto", dim=3, n_dofs=60_000)
+    assert "linear solver: amg, for 60000 unknowns in 3D a factorisation is dearer than multigrid" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("name", "package", "extra"), [("cholmod", "kvxopt", "cholmod"), ("pardiso", "pypardiso", "mkl")]
+)
+def test_optional_direct_solvers_agree_or_say_what_they_need(name, package, extra, problem):
+    if importlib.util.find_spec(package) is None:
+        assert name not in linear.SOLVERS
+        with pytest.raises(
+            ModelError, match=rf"'{name}' needs the package {package}: pip install 'fastcontact\[{extra}\]'"
+        ):
+            linear.make(name, dim=2, n_dofs=10)
+        pytest.skip(f"{package} is not installed: only the message was checked")
+    analysis, f, B, c = problem
+    u, multiplier = prepared(name, analysis).load(f).solve(B, c)
+    v, expected = prepared("direct", analysis).load(f).solve(B, c)
+    assert np.abs(u - v).max() < 1e-11 * np.abs(v).max()
+    assert np.abs(multiplier - expected).max() < 1e-10 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("name", [name for name in linear.SOLVERS if name != "amg"])
+def test_a_singular_matrix_is_refused(name):
+    solver = linear.make(name, dim=2, n_dofs=4)
+    with pytest.raises(ModelError, match="singular: support the rigid-body motions"):
+        solver.prepare(bsr_array(np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(2)), blocksize=(2, 2)), np.ones((4, 1)))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from aster_loads import Support, constant
-from aster_mesh import Entry, MissingError, nodes_of
+from aster_mesh import Entry, MissingError, listed, nodes_of
 
 import fastcontact as fc
 from fastcontact.obstacles import HalfSpace
@@ -27,7 +27,9 @@ IGNORED_ZONE = {
     "PENE_MAXI", "GLIS_MAXI", "RESOLUTION", "SANS_GROUP_NO_FR", "SANS_NOEUD_FR", "GLISSIERE", "TOLE_INTERP",
 }  # fmt: skip
 INTEGRATION = {"AUTO": "node", "GAUSS": "gauss", "SIMPSON": "simpson"}
-OFFSETS = ("DIST_ESCL", "DIST_MAIT", "DIST_POUTRE", "DIST_COQUE")
+# Material added on a side, where we count what is added to the gap.
+OFFSETS = {"DIST_ESCL": "clearance", "DIST_MAIT": "clearance_primary"}
+NO_OFFSETS = ("DIST_POUTRE", "DIST_COQUE")
 EXCLUSIONS = ("SANS_GROUP_NO", "SANS_NOEUD", "SANS_GROUP_MA", "SANS_MAILLE")
 
 
@@ -40,18 +42,22 @@ def add_zone(model: fc.Model, name: str, contact: Entry, zone: Entry, supports: 
     exact method, is replaced by it.
     """
     mesh = model.mesh
-    _check_frictionless_nodes(zone, mesh, supports)
     options: dict[str, Any] = {}
     if contact.get("LISSAGE") == "OUI":
         options["normals"] = "averaged"
     if contact.get("FROTTEMENT", "SANS") == "COULOMB":
         options["friction"] = constant(zone.get("COULOMB", 0.0), "COULOMB of a contact zone")
+        options |= _frictionless_nodes(zone, mesh, supports)
+    if zone.get("GLISSIERE") == "OUI":
+        # Contact that starts closed, as by default, stays so.
+        options["kind"] = "bilateral_once_closed" if zone.get("CONTACT_INIT") == "NON" else "bilateral"
+    options |= {ours: -constant(zone[key], f"{key} of a contact zone") for key, ours in OFFSETS.items() if key in zone}
     solid = np.unique(np.concatenate([block.ravel() for block in mesh.solids.values()]))
     behind, backed = (np.isin(nodes_of(mesh, {"GROUP_MA": zone[side]}), solid).all() for side in ("slave", "master"))
     if not behind:
         raise MissingError(f"needs a rigid meshed surface without solid as the secondary side ({zone['slave']})")
     options |= _formulation(contact, zone, mesh, against_obstacle=not backed)
-    _check_excluded_nodes(zone, mesh, supports, options, against_obstacle=not backed)
+    options |= _excluded_nodes(zone, mesh, supports, options, against_obstacle=not backed)
     if backed:
         model.add_contact(name, secondary=zone["slave"], primary=zone["master"], **options)
     else:
@@ -85,27 +91,29 @@ def missing_in_contact(contact: Entry) -> Iterator[str]:
         yield f"the friction law {contact['FROTTEMENT']}"
     yield from (f"{key} of DEFI_CONTACT" for key in contact if key not in IGNORED_CONTACT)
     for zone in contact.get("zones", ()):
-        yield from (f"gap offsets {key}" for key in OFFSETS if zone.get(key, "NON") != "NON")
-        yield from (f"{key} of a contact zone" for key in zone if key not in {*IGNORED_ZONE, *OFFSETS, *EXCLUSIONS})
-        if zone.get("GLISSIERE") == "OUI":
-            yield "bilateral contact GLISSIERE"
+        yield from (f"gap offsets {key}" for key in NO_OFFSETS if zone.get(key, "NON") != "NON")
+        known = {*IGNORED_ZONE, *OFFSETS, *NO_OFFSETS, *EXCLUSIONS}
+        yield from (f"{key} of a contact zone" for key in zone if key not in known)
         if zone.get("RESOLUTION", "OUI") != "OUI":
             yield "contact that is only checked, RESOLUTION = NON"
 
 
-def _check_frictionless_nodes(zone: Entry, mesh: fc.Mesh, supports: Sequence[Support]) -> None:
-    """Accept nodes without friction where a support already holds them, as on an axis: no force is left to friction."""
+def _frictionless_nodes(zone: Entry, mesh: fc.Mesh, supports: Sequence[Support]) -> dict[str, Any]:
+    """Name nodes without friction, but for those that a support holds, as on an axis: friction has no force there."""
     place = {"GROUP_NO": zone.get("SANS_GROUP_NO_FR", ()), "NOEUD": zone.get("SANS_NOEUD_FR", ())}
     nodes = nodes_of(mesh, {key: value for key, value in place.items() if value})
     held = mesh.dim == 2 and all(any(node in support.nodes for support in supports) for node in nodes)
-    if len(nodes) and not held:
-        raise MissingError("needs nodes without friction SANS_GROUP_NO_FR")
+    if not len(nodes) or held:
+        return {}
+    if zone.get("SANS_NOEUD_FR"):
+        raise MissingError("needs nodes without friction by their number, SANS_NOEUD_FR")
+    return {"frictionless": listed(zone["SANS_GROUP_NO_FR"])}
 
 
-def _check_excluded_nodes(
+def _excluded_nodes(
     zone: Entry, mesh: fc.Mesh, supports: Sequence[Support], options: Entry, *, against_obstacle: bool
-) -> None:
-    """Accept excluded nodes that could not carry a force: held, each with its own gap to what stands still."""
+) -> dict[str, Any]:
+    """Name excluded nodes, but for those that could not carry a force: held, each opposite to what stands still."""
     place = {key.removeprefix("SANS_"): zone[key] for key in EXCLUSIONS if key in zone}
     excluded = np.intersect1d(nodes_of(mesh, place), nodes_of(mesh, {"GROUP_MA": zone["slave"]}))
     nodal = options["formulation"] == "node_to_segment" or options.get("integration") == "node"
@@ -114,8 +122,12 @@ def _check_excluded_nodes(
         for node in excluded
         for axis in "xyz"[: mesh.dim]
     )
-    if len(excluded) and not (nodal and against_obstacle and held):
-        raise MissingError(f"needs nodes excluded from contact ({', '.join(key for key in EXCLUSIONS if key in zone)})")
+    if not len(excluded) or (nodal and against_obstacle and held):
+        return {}
+    if {"SANS_NOEUD", "SANS_MAILLE"} & set(zone):
+        raise MissingError("needs nodes excluded from contact by their number")
+    groups = [name for key in ("SANS_GROUP_NO", "SANS_GROUP_MA") for name in listed(zone.get(key, ()))]
+    return {"excluded": [name for name in groups if np.isin(mesh.points_of(name), excluded).any()]}
 
 
 def _obstacle(mesh: fc.Mesh, zone: Entry, supports: Sequence[Support]) -> HalfSpace:
@@ -139,7 +151,7 @@ def criteria_of(contact: Entry) -> fc.Criteria:
     """Return how often to pair: fixed numbers where code_aster's user asks for one, otherwise until it stands still."""
     updates = str(contact.get("REAC_GEOM", "AUTOMATIQUE")).split()[0]
     if updates == "SANS":
-        return fc.Criteria(geometry_updates=0)
+        return fc.Criteria(keep_pairing=True)
     if updates == "CONTROLE":
         return fc.Criteria(geometry_updates=int(contact.get("NB_ITER_GEOM", 2)))
     return fc.Criteria()

@@ -1,6 +1,6 @@
 """A validation spec of code_aster (JSON, with a MED mesh) as a model of fastcontact.
 
-`problem` translates one run of a spec: mesh, groups, materials, loads with their histories, contact. What cannot be
+`problem` translates one run of a spec: mesh, groups, materials, loads with their histories, springs, contact. What cannot be
 translated raises `MissingError` with the reason; nothing is left out in silence.
 """
 
@@ -15,6 +15,7 @@ from pathlib import Path
 from aster_contact import add_zone, criteria_of, missing_in_contact
 from aster_loads import add_loads, supports_of
 from aster_mesh import Entry, MissingError, listed, mesh_of
+from aster_springs import add_springs, missing_in_springs
 
 import fastcontact as fc
 
@@ -92,6 +93,7 @@ def problem(path: Path, number: int) -> Problem:
         model.prescribe(support.group, ramp=support.history, **{support.component: support.value})
     for load in run["loads"]:
         add_loads(model, spec, load, times)
+    add_springs(model, run)
     for index, zone in enumerate(run["contact"]["zones"]):
         add_zone(model, f"zone {index}", run["contact"], zone, supports)
     ramp = fc.Ramp(tuple(times[1:]), ((times[0], 1.0), (times[-1], 1.0)))
@@ -99,18 +101,8 @@ def problem(path: Path, number: int) -> Problem:
 
 
 def solve(problem: Problem) -> list[fc.StepResult]:
-    """Return the states at all instants of a run.
-
-    Where the geometry is frozen (REAC_GEOM = 'SANS') code_aster keeps the first pairing through all steps, while ours
-    begins each with a new one: without friction, which remembers, every instant is then solved on its own.
-    """
-    instants = problem.ramp.instants
-    if problem.criteria.geometry_updates != 0 or len(instants) == 1:
-        return fc.solve(problem.model, problem.ramp, criteria=problem.criteria)
-    if any(pair.options.get("friction") for pair in problem.model.contact):
-        raise MissingError("needs one pairing for several steps (REAC_GEOM = 'SANS') with friction")
-    ramps = [fc.Ramp((instant,), problem.ramp.table) for instant in instants]
-    return [fc.solve(problem.model, ramp, criteria=problem.criteria)[0] for ramp in ramps]
+    """Return the states at all instants of a run."""
+    return fc.solve(problem.model, problem.ramp, criteria=problem.criteria)
 
 
 def _missing_in_run(spec: Entry, run: Entry) -> Iterator[str]:
@@ -120,8 +112,7 @@ def _missing_in_run(spec: Entry, run: Entry) -> Iterator[str]:
     for behaviour in listed(run.get("behaviour") or []):
         if behaviour.get("RELATION", "ELAS") != "ELAS":
             yield f"the behaviour {behaviour['RELATION']}"
-    for entry in run.get("elementary_characteristics", {}).get("DISCRET", ()):
-        yield f"springs {entry['CARA']}"
+    yield from missing_in_springs(run)
     for operation in spec.get("mesh_operations") or ():
         for keyword in operation["kw"]:
             if keyword not in MESH_OPERATIONS:

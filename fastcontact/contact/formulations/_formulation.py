@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.active_set import Compliance
 from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.formulations._held_nodes import held_nodes
 from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair, rows_along, tangents
+from fastcontact.contact.projection import interpolated, nodal_normals, places
 from fastcontact.contact.rigid import RigidSide
 from fastcontact.contact.surface import Surface
+from fastcontact.contact.terms import Terms
+from fastcontact.contact.tie import Tie, tie
 from fastcontact.errors import ContactError, unknown
 
 Array = NDArray[np.float64]
@@ -46,6 +51,15 @@ class Formulation(ABC):
     normals : str, optional
         ``"facet"``: of the primary facet at the projection; ``"averaged"``: interpolated between nodal means. By default
         the former in 2D and the latter in 3D, where a point opposite an edge between facets often flips for ever.
+    terms : Terms
+        What the pair is asked to do whatever its formulation, e.g. its clearance.
+
+    Attributes
+    ----------
+    supported : ndarray of bool (n_points, dim), optional
+        Components that supports prescribe, where they are known.
+    before : ndarray (n_points, dim), optional
+        Displacement at the beginning of the step [length]; None stands for zero.
     """
 
     secondary: Surface
@@ -57,6 +71,10 @@ class Formulation(ABC):
     friction: float = 0.0
     projection_tolerance: float = 0.5
     normals: str | None = None
+    terms: Terms = field(default_factory=Terms, repr=False)
+    supported: NDArray[np.bool_] | None = field(default=None, init=False, repr=False)
+    before: Array | None = field(default=None, init=False, repr=False)
+    _closed: tuple[Array, NDArray[np.bool_]] | None = field(default=None, init=False, repr=False)
 
     name: ClassVar[str]
     # Re-pair after every active-set iteration (True), or after the active set has settled (False).
@@ -73,13 +91,56 @@ class Formulation(ABC):
             raise ContactError(f"projection_tolerance = {self.projection_tolerance} must not be negative")
 
     @classmethod
-    def in_dimension(cls, dim: int) -> type[Formulation]:
-        """Return the class that does this formulation in 2 or 3 dimensions."""
+    def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:
+        """Return the class that does this formulation in 2 or 3 dimensions with the options of a user."""
         return cls
 
     @abstractmethod
     def constraints(self, displacement: Array) -> Constraints:
         """Pair on the configuration displaced by `displacement` (n_points, dim) and return the constraints."""
+
+    def areas(self) -> Array:
+        """Return the area (m,) that each constraint of the last pairing stands for; infinite where it does nothing.
+
+        Raises
+        ------
+        ContactError
+            If constraints of this formulation stand for no areas.
+        """
+        raise ContactError(f"formulation '{self.name}' knows no penalty: leave out the option")
+
+    def conditions(self, displacement: Array) -> Constraints:
+        """Return the constraints as the terms of the pair have them: penalised, held for good, or tied."""
+        if self.tie is not None:
+            return self.tie.constraints()
+        part = self.constraints(displacement)
+        softness = None if self.terms.penalty is None else 1.0 / (self.terms.penalty * self.areas())
+        return replace(part, held=self.closed_for_good(part.positions), softness=softness)
+
+    @cached_property
+    def tie(self) -> Tie | None:
+        """The equations of a tied pair, on the bodies as they lie before any load."""
+        return tie(self.constraints(np.zeros_like(self.points))) if self.terms.tied else None
+
+    def closed_for_good(self, positions: Array) -> NDArray[np.bool_] | None:
+        """Return which places (m,) at reference `positions` (m, dim) never open again; None if all may."""
+        if self.terms.always_closed:
+            return np.ones(len(positions), bool)
+        if self._closed is None:
+            return None
+        from scipy.spatial import cKDTree
+
+        at, closed = self._closed
+        return np.asarray(closed[cKDTree(at).query(positions)[1]])
+
+    def end_step(self, part: Constraints, active: NDArray[np.bool_]) -> None:
+        """Take note of the constraints `part` that are closed at the end of a load step."""
+        if self.terms.kind == "bilateral_once_closed":
+            self._closed = part.positions, active.copy()
+
+    def forces(self, multiplier: Array) -> Array:
+        """Return the normal forces (m,) of the formulation's own constraints from the multipliers of `conditions`."""
+        return multiplier if self.tie is None else self.tie.forces(multiplier)[0]
 
     def initially_active(
         self, constraints: Constraints, pressure: Array, displacement: Array
@@ -95,18 +156,70 @@ class Formulation(ABC):
     def closed_nodes(self, active: NDArray[np.bool_], gap: Array, pressure: Array) -> NDArray[np.bool_]:
         """Return which secondary nodes are in contact, from the active constraints and the nodal gap and pressure."""
 
-    def assembled(self, candidates: Candidates, pairing: Pairing, compliance: Compliance | None) -> Constraints:
-        """Return the constraints of paired candidates, with tangential rows where there is friction."""
+    def assembled(
+        self, candidates: Candidates, pairing: Pairing, compliance: Compliance | None, deformed: Array
+    ) -> Constraints:
+        """Return the constraints of candidates paired at `deformed`, with tangential rows where there is friction."""
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
+        gap0 += self.terms.added_gap(candidates, pairing, self.primary, self.points)
         positions = candidates.positions(self.points)
-        if not self.friction:
+        if not (self.friction or self.terms.tied):
             return Constraints(B, gap0, positions, compliance)
         directions = tuple(tangents(pairing.normal))
         along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
-        drift = None
         if isinstance(self.primary, RigidSide):
             drift = -np.stack([t @ (self.primary.now - self.primary.before) for t in directions])
-        return Constraints(B, gap0, positions, compliance, along, directions, np.full(len(gap0), self.friction), drift)
+        else:
+            drift = self._approach(candidates, pairing, directions, deformed)
+        friction = self.terms.coefficients(self.friction, candidates)
+        loose = self._loose(candidates, pairing, directions) if self.friction else None
+        return Constraints(B, gap0, positions, compliance, along, directions, friction, drift, loose=loose)
+
+    def _loose(self, candidates: Candidates, pairing: Pairing, directions: tuple[Array, ...]) -> Array | None:
+        """Return what supports leave undetermined of tangential forces, see `Constraints.loose`."""
+        return None
+
+    def held_along(self, axis: int, candidates: Candidates, pairing: Pairing) -> NDArray[np.bool_]:
+        """Return which secondary nodes (m,) supports keep from slipping along an axis; see `_held_nodes`."""
+        m = len(self.secondary.points)
+        if self.supported is None or not self.supported[self.secondary.points, axis].any():
+            return np.zeros(m, bool)
+        supported = self.supported[:, axis]
+        opposite = np.ones(m, bool)
+        if isinstance(self.primary, Surface):
+            rows = np.flatnonzero(pairing.paired)
+            facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
+            rows = rows[supported[facing.nodes].any(axis=1)]
+            opposite = np.isin(self.secondary.points, candidates.nodes[rows][candidates.shape[rows] != 0.0])
+        return held_nodes(self.secondary, supported[self.secondary.points], opposite)
+
+    def _approach(
+        self, candidates: Candidates, pairing: Pairing, directions: tuple[Array, ...], deformed: Array
+    ) -> Array:
+        """Return the slip (k, n) to add so that closing a gap is none, though the normal leans.
+
+        Where the surface bends, at the edge of the contact above all, the normal of one side leans against the direction
+        in which the gap closes, and a part of that would count as slip. Along the mean of both sides' normals mirrored
+        bodies close their gaps without any.
+        """
+        assert isinstance(self.primary, Surface)
+        drift = np.zeros((len(directions), len(pairing.paired)))
+        rows = np.flatnonzero(pairing.paired)
+        facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
+        local = np.zeros(len(deformed), np.intp)
+        local[self.secondary.points] = np.arange(len(self.secondary.points))
+        nodes, shape = candidates.nodes[rows], candidates.shape[rows]
+        ours = np.einsum("nk,nkd->nd", shape, nodal_normals(self.secondary, deformed)[local[nodes]])
+        theirs = interpolated(nodal_normals(self.primary, deformed), facing)
+        mean = theirs - ours / np.linalg.norm(ours, axis=1, keepdims=True)
+        mean /= np.linalg.norm(mean, axis=1, keepdims=True)
+        start = self.points if self.before is None else self.points + self.before
+        apart = np.einsum("nk,nkd->nd", shape, start[nodes])
+        apart -= np.einsum("nk,nkd->nd", facing.shape, start[facing.nodes])
+        opening = np.einsum("nd,nd->n", mean, apart)
+        for k, along in enumerate(directions):
+            drift[k, rows] = np.einsum("nd,nd->n", along[rows], mean) * opening
+        return drift
 
     @cached_property
     def first_contact(self) -> tuple[Array, Array]:
@@ -130,4 +243,5 @@ class Formulation(ABC):
         tolerance = max(self.projection_tolerance, ON_SYMMETRY)
         pairing = pair(nodes.positions(deformed), self.primary, deformed, tolerance, self.normals)
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
+        gap0 += self.terms.added_gap(nodes, pairing, self.primary, self.points)
         return np.where(pairing.paired, gap0 + G @ displacement.ravel(), np.inf), pairing.normal

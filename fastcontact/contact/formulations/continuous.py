@@ -32,10 +32,12 @@ from scipy.sparse.linalg import splu
 from fastcontact import elements, quadrature
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._formulation import Formulation
+from fastcontact.contact.formulations._held_nodes import compliant
 from fastcontact.contact.formulations._projection import Projection
 from fastcontact.contact.integration import facet_measure, fine_rule, gauss_rule
-from fastcontact.contact.pairing import Candidates, filled_up, pair
+from fastcontact.contact.pairing import Candidates, Pairing, filled_up, normals, pair
 from fastcontact.contact.surface import FacetBlock
+from fastcontact.contact.terms import spread
 from fastcontact.errors import ContactError, unknown
 
 Array = NDArray[np.float64]
@@ -73,6 +75,7 @@ class Continuous(Formulation):
     _local: NDArray[np.intp] = field(init=False, repr=False)
     _projection: Projection = field(init=False, repr=False)
     _field: csr_array = field(init=False, repr=False)
+    _own: NDArray[np.intp] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -90,7 +93,7 @@ class Continuous(Formulation):
         self._candidates = Candidates(filled_up(nodes), filled_up(shapes))
         self._local = filled_up(local)
         rho = self.augmentation * self.modulus / shortest
-        self._project(np.concatenate(areas), float(rho))
+        self._project(np.where(self.terms.out(self._candidates), 0.0, np.concatenate(areas)), float(rho))
 
     def _project(self, areas: Array, rho: float) -> None:
         """Set up the multiplier field and its compliance."""
@@ -149,16 +152,18 @@ class Continuous(Formulation):
         """
         size = P.shape[1]
         seen = np.asarray((P.T @ diags_array(areas) @ P).diagonal())
-        blind = np.flatnonzero(seen == 0.0)
+        excluded = self.terms.excluded_nodes(self.secondary)
+        blind = np.flatnonzero((seen == 0.0) | excluded)
         values = eye_array(size, format="lil")
         lines = [block.local for block in self.secondary.blocks if block.element == "line3"]
         for facet in np.concatenate(lines) if len(blind) and lines else ():
             for end, other in ((0, 1), (1, 0)):
-                if facet[end] in blind:
+                if facet[end] in blind and not excluded[facet[end]]:
                     values[facet[end], facet[end]] = 0.0
                     values[facet[end], facet[2]] = 4.0 / 3.0
                     values[facet[end], facet[other]] = -1.0 / 3.0
-        return csr_array(values.tocsr()[:, np.setdiff1d(np.arange(size), blind)])
+        self._own = kept = np.setdiff1d(np.arange(size), blind)
+        return csr_array((values.tocsr() @ spread(self.secondary, excluded, kept))[:, kept])
 
     def constraints(self, displacement: Array) -> Constraints:
         """Pair the integration points on the displaced configuration and return their gaps."""
@@ -167,7 +172,21 @@ class Continuous(Formulation):
         pairing = pair(positions, self.primary, deformed, self.projection_tolerance, self.normals)
         usable = self._projection.areas > 1e-12 * self._projection.areas.max()
         pairing.paired[~usable] = False
-        return self.assembled(self._candidates, pairing, self._projection)
+        return self.assembled(self._candidates, pairing, self._projection, deformed)
+
+    def _loose(self, candidates: Candidates, pairing: Pairing, directions: tuple[Array, ...]) -> Array | None:
+        """Return the compliance of fields that do no work on any slip, where supports hold nodes."""
+        factors = []
+        for axis in range(directions[0].shape[1]):
+            columns = np.flatnonzero(self.held_along(axis, candidates, pairing)[self._own])
+            if len(columns):
+                Z = compliant(self._projection, columns)
+                factors.append(np.stack([along[:, axis, None] * Z for along in (normals(directions), *directions)]))
+        return np.concatenate(factors, axis=2) if factors else None
+
+    def areas(self) -> Array:
+        """Return the areas of the integration points."""
+        return np.where(self._projection.areas > 0, self._projection.areas, np.inf)
 
     def pressure(self, multiplier: Array) -> Array:
         """Return the multiplier field at the nodes; it may be slightly negative beyond the edge of the contact."""

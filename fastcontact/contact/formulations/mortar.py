@@ -11,28 +11,29 @@ The pressure at a point and the complementarity are those of the continuous form
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
-from fastcontact import elements, quadrature
+from fastcontact import quadrature
 from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.formulations._cut_lines import line_points
 from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.formulations._mortar_faces import MortarFaces
+from fastcontact.contact.formulations._held_nodes import compliant
 from fastcontact.contact.formulations._projection import Projection
+from fastcontact.contact.formulations._weighted import WeightedMortar
 from fastcontact.contact.integration import facet_measure
-from fastcontact.contact.pairing import Candidates, Pairing, pair
+from fastcontact.contact.pairing import Candidates, Pairing, normals, pair
 from fastcontact.contact.surface import Surface
+from fastcontact.contact.terms import spread
 from fastcontact.errors import ContactError
-from fastcontact.search import closest
 
 Array = NDArray[np.float64]
-# Parts of a facet shorter than this, in its own length, are rounding errors of the cut.
-SLIVER = 1e-10
 # A facet that faces less than this part of its length takes no part: its multipliers would have next to no equation.
 COVERED = 1e-3
 
@@ -47,18 +48,22 @@ class Mortar(Formulation):
         Gauss points per piece; by default 3 on linear and 4 on quadratic facets.
     augmentation : float
         rho times the length of the shortest facet over the modulus of the bodies [1].
+    multipliers : str
+        ``"standard"``, this class; ``"dual"``, see `WeightedMortar`.
     """
 
     projection_tolerance: float = 1e-6
     normals: str = "averaged"
     n_gauss: int | None = None
     augmentation: float = 1.0
+    multipliers: str = "standard"
 
     name: ClassVar[str] = "mortar"
     geometry_in_loop: ClassVar[bool] = True
     _projection: Projection = field(init=False, repr=False)
     _field: csr_array = field(init=False, repr=False)
     _facet: NDArray[np.intp] = field(init=False, repr=False)
+    _own: NDArray[np.intp] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -72,56 +77,27 @@ class Mortar(Formulation):
         self._rho = self.augmentation * self.modulus / float(lengths.min())
 
     @classmethod
-    def in_dimension(cls, dim: int) -> type[Formulation]:
-        """Faces are cut differently from lines."""
-        return MortarFaces if dim == 3 else cls
-
-    def _cuts(self, deformed: Array) -> tuple[NDArray[np.intp], Array, Array]:
-        """Return (facet, begin, end) of the pieces of the secondary facets, in their reference coordinate."""
-        assert isinstance(self.primary, Surface)
-        ends = np.unique(self.primary.facets[:, :2])
-        opposite = closest(deformed[ends], deformed[self.secondary.facets])
-        along = opposite.xi[:, 0]
-        inside = (opposite.overhang == 0.0) & (np.abs(along) < 1.0 - SLIVER)
-        n = len(self.secondary.facets)
-        facet = np.concatenate([np.arange(n), np.arange(n), opposite.facet[inside]])
-        xi = np.concatenate([np.full(n, -1.0), np.full(n, 1.0), along[inside]])
-        order = np.lexsort((xi, facet))
-        facet, xi = facet[order], xi[order]
-        piece = (facet[1:] == facet[:-1]) & (np.diff(xi) > SLIVER)
-        return facet[:-1][piece], xi[:-1][piece], xi[1:][piece]
-
-    def _points(self, deformed: Array) -> tuple[NDArray[np.intp], Array, Array]:
-        """Return (facet, xi, area) of the integration points of all pieces."""
-        facet, begin, end = self._cuts(deformed)
-        n_nodes = self.secondary.facets.shape[1]
-        s, w = quadrature.gauss_line(n_nodes + 1 if self.n_gauss is None else self.n_gauss)
-        xi = (0.5 * (begin + end)[:, None] + 0.5 * (end - begin)[:, None] * s[:, 0]).ravel()
-        weight = (0.5 * (end - begin)[:, None] * w).ravel()
-        facet = np.repeat(facet, len(w))
-        element = elements.get(self.secondary.element)
-        corners = self.points[self.secondary.facets[facet]]
-        tangent = np.einsum("nk,nkd->nd", element.gradient(xi[:, None])[:, :, 0], corners)
-        area = np.linalg.norm(tangent, axis=1) * weight
-        if self.axisymmetric:
-            radius = np.einsum("nk,nk->n", element.shape(xi[:, None]), corners[:, :, 0])
-            area *= 2 * np.pi * np.maximum(radius, 0.0)
-        return facet, xi, area
+    def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:
+        """Between faces, and with dual multipliers, gaps are weighted means."""
+        return WeightedMortar if dim == 3 or options.get("multipliers", "standard") != "standard" else cls
 
     def constraints(self, displacement: Array) -> Constraints:
         """Cut and pair on the displaced configuration and return the gaps of the integration points."""
         deformed = self.points + displacement
-        facet, xi, area = self._points(deformed)
-        shape = elements.get(self.secondary.element).shape(xi[:, None])
+        assert isinstance(self.primary, Surface)
+        block, borders = self.secondary.blocks[0], self.terms.borders(self.secondary)
+        n_gauss = block.facets.shape[1] + 1 if self.n_gauss is None else self.n_gauss
+        points = line_points(block, self.primary, self.points, deformed, self.axisymmetric, n_gauss, borders)
+        facet, shape, area = points.facet, points.shape, points.area
         candidates = Candidates(self.secondary.facets[facet], shape)
         found = pair(candidates.positions(deformed), self.primary, deformed, self.projection_tolerance, self.normals)
         total = np.bincount(facet, weights=area)
         covered = np.bincount(facet, weights=np.where(found.paired, area, 0.0))
-        kept = found.paired & (covered > COVERED * total)[facet] & (area > 0)
+        kept = found.paired & (covered > COVERED * total)[facet] & (area > 0) & ~self.terms.out(candidates)
         pairing = Pairing(found.facet, found.xi, found.normal, kept)
         self._facet = facet
         self._project(facet, shape, np.where(kept, area, 0.0))
-        return self.assembled(candidates, pairing, self._projection)
+        return self.assembled(candidates, pairing, self._projection, deformed)
 
     def _project(self, facet: NDArray[np.intp], shape: Array, area: Array) -> None:
         """Set up the multiplier field on the nodes of facets that take part."""
@@ -131,17 +107,32 @@ class Mortar(Formulation):
         P = coo_array((shape.ravel(), (row.ravel(), column.ravel())), shape=size).tocsr()
         seen = np.zeros(size[1], bool)
         seen[column[area > 0]] = True
-        keep = np.flatnonzero(seen)
-        self._field = csr_array((np.ones(len(keep)), (keep, np.arange(len(keep)))), shape=(size[1], len(keep)))
-        P = csr_array(P[:, keep])
+        excluded = self.terms.excluded_nodes(self.secondary)
+        self._own = keep = np.flatnonzero(seen & ~excluded)
+        self._field = csr_array(spread(self.secondary, excluded, keep)[:, keep])
+        P = csr_array(P @ self._field)
         mass = splu((P.T @ diags_array(area) @ P).tocsc()) if len(keep) else None
         self._projection = Projection(P, area, self._rho, mass)
 
     def initially_active(self, constraints: Constraints, pressure: Array, displacement: Array) -> NDArray[np.bool_]:
         """Return the points where the field of nodal `pressure` exceeds rho times the gap; they have no other past."""
-        nodal = self._field.T @ pressure
+        nodal = pressure[self._own]
         gap = constraints.gap0 + constraints.B @ displacement.ravel()
         return (self._projection.areas > 0) & (self._projection.P @ nodal - self._rho * gap > 0)
+
+    def _loose(self, candidates: Candidates, pairing: Pairing, directions: tuple[Array, ...]) -> Array | None:
+        """Return the compliance of fields that do no work on any slip, where supports hold nodes."""
+        factors = []
+        for axis in range(directions[0].shape[1]):
+            columns = np.flatnonzero(self.held_along(axis, candidates, pairing)[self._own])
+            if len(columns):
+                Z = compliant(self._projection, columns)
+                factors.append(np.stack([along[:, axis, None] * Z for along in (normals(directions), *directions)]))
+        return np.concatenate(factors, axis=2) if factors else None
+
+    def areas(self) -> Array:
+        """Return the areas of the integration points."""
+        return np.where(self._projection.areas > 0, self._projection.areas, np.inf)
 
     def pressure(self, multiplier: Array) -> Array:
         """Return the multiplier field at the nodes, zero on facets that face nothing."""

@@ -56,7 +56,13 @@ class NodeToSegment(Formulation):
         deformed = self.points + displacement
         positions = self._candidates.positions(deformed)
         pairing = pair(positions, self.primary, deformed, self.projection_tolerance, self.normals)
-        return self.assembled(self._candidates, pairing, None)
+        pairing.paired[self.terms.out(self._candidates)] = False
+        return self.assembled(self._candidates, pairing, None, deformed)
+
+    def areas(self) -> Array:
+        """Return the integrals of the nodes' shape functions."""
+        areas = nodal_areas(self.secondary, self.points, self.axisymmetric)
+        return np.where(areas > 1e-12 * areas.max(), areas, np.inf)
 
     def pressure(self, multiplier: Array) -> Array:
         """Return nodal forces over nodal areas; on quadratic facets, solve with the surface mass matrix instead.

@@ -102,6 +102,24 @@ def test_line_sticks_in_the_middle_and_slips_as_the_half_plane_says():
     assert contact.slip(1.01 * a) == 0.0
 
 
+@pytest.mark.parametrize("down", [0.6, 0.2, -0.5])
+def test_displacement_by_slip_is_what_the_slip_does_to_a_strip_that_sticks(down):
+    """By reciprocity: the mean of the slip, weighted by the tractions under a strip that sticks throughout."""
+    contact = line(0.6).unloaded_to(down * 0.4 * 500.0)
+    a = contact.normal.radius
+    kinks = [math.asin(0.4**0.5), math.asin(contact.stick_radius / a)]
+    weighted = quad(
+        lambda angle: float(contact.slip(a * math.sin(angle))) / math.pi, 0.0, math.pi / 2, points=kinks, epsabs=1e-16
+    )[0]
+    assert contact.slip_displacement == pytest.approx(2.0 * weighted, rel=1e-8)
+
+
+def test_displacement_by_slip_without_force_and_at_sliding():
+    assert line(0.0).slip_displacement == 0.0
+    n = line(1.0).normal
+    assert line(1.0).slip_displacement == pytest.approx(0.4 * n.force / (math.pi * n.E_star), rel=1e-14)
+
+
 def test_slip_of_full_sliding_starts_at_the_centre():
     contact = line(1.0)
     assert contact.stick_radius == 0.0

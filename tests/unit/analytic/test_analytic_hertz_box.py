@@ -82,6 +82,52 @@ def test_stress_follows_from_displacement(kinematics):
     np.testing.assert_allclose(d_x[:, 1] + d_y[:, 0], 2.0 * (1.0 + box.nu) / box.E * xy, atol=1e-8)
 
 
+def test_the_box_in_three_dimensions_is_the_axisymmetric_one_turned():
+    box, round_box = hertz_box(kinematics="3d", nu=0.2), hertz_box(kinematics="axisymmetric", nu=0.2)
+    r, z = np.array([0.0, 0.2, 0.6, 0.9]), np.array([-0.3, 0.0, -0.1, -1.0])
+    u, s = round_box.displacement(np.column_stack([r, z])), round_box.stress(np.column_stack([r, z]))
+    for angle in (0.0, 0.3, 2.0, -1.0):
+        cosine, sine = math.cos(angle), math.sin(angle)
+        turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+        points = np.column_stack([r * cosine, r * sine, z])
+        expected = np.column_stack([u[:, 0], 0 * r, u[:, 1]]) @ turn.T
+        np.testing.assert_allclose(box.displacement(points), expected, atol=1e-15)
+        tensor = np.zeros((4, 3, 3))
+        tensor[:, 0, 0], tensor[:, 1, 1], tensor[:, 2, 2] = s[:, 0], s[:, 2], s[:, 1]
+        tensor[:, 0, 2] = tensor[:, 2, 0] = s[:, 3]
+        turned = turn @ tensor @ turn.T
+        rows, columns = (0, 1, 2, 0, 1, 0), (0, 1, 2, 1, 2, 2)
+        np.testing.assert_allclose(box.stress(points), turned[:, rows, columns], atol=1e-12)
+        np.testing.assert_allclose(box.pressure(points[:, 0], points[:, 1]), round_box.pressure(r), rtol=1e-13)
+        np.testing.assert_allclose(box.obstacle(points[:, 0], points[:, 1]), round_box.obstacle(r), rtol=1e-13)
+    assert box.force == round_box.force
+    assert (box.dim, round_box.dim) == (3, 2)
+
+
+@pytest.mark.parametrize("kinematics", [*KINEMATICS, "3d"])
+def test_symmetry_planes_stay_plane_to_the_last_bit(kinematics):
+    box = hertz_box(kinematics=kinematics)
+    points = np.random.default_rng(1).uniform(0.0, 1.0, (50, box.dim))
+    points[:, -1] *= -1.0
+    for axis in range(box.dim - 1):
+        on = points.copy()
+        on[:, axis] = 0.0
+        assert not box.displacement(on)[:, axis].any()
+
+
+@pytest.mark.parametrize("kinematics", ["plane_strain", "3d"])
+def test_the_box_is_its_own_obstacle(kinematics):
+    """Its gap is the one between the exact deformed top and the parabola."""
+    box = hertz_box(kinematics=kinematics)
+    top = np.zeros((20, box.dim))
+    top[:, 0] = np.linspace(0.0, 1.0, 20)
+    gap, normal = box.distance(top)
+    assert (normal == [*[0.0] * (box.dim - 1), -1.0]).all()
+    left = gap + (normal * box.displacement(top)).sum(axis=1)
+    np.testing.assert_allclose(left[top[:, 0] < box.radius], 0.0, atol=1e-15)
+    assert (left[top[:, 0] > box.radius] > 0.0).all()
+
+
 def test_rounded_mesh_coordinates_are_forgiven():
     box = hertz_box()
     np.testing.assert_array_equal(box.stress([[0.2, 1e-16]]), box.stress([[0.2, 0.0]]))

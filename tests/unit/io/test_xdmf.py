@@ -9,12 +9,14 @@ from xml.etree import ElementTree
 import h5py
 import numpy as np
 import pytest
+from test_node_order import SOLIDS, row_of
 from test_result_files import CELL_DATA, MESH, ResultWriter, expected_point_data, step_result, write
 
 from fastcontact import elements
 from fastcontact.errors import FileError
 from fastcontact.io.xdmf import write_xdmf
 from fastcontact.mesh import Mesh
+from fastcontact.results import StepResult
 
 N_STEPS = 3
 
@@ -139,3 +141,65 @@ def test_what_cannot_be_exported(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"with no solid cells: open the .vtkhdf file itself"):
         write_xdmf(tmp_path / "lines.vtkhdf", tmp_path / "a.xdmf")
     assert not (tmp_path / "a.xdmf").exists()
+
+
+def solid_step(mesh: Mesh) -> StepResult:
+    """Displacements that tell the points apart."""
+    u, zero = np.arange(mesh.points.size, dtype=float).reshape(-1, 3), np.zeros(mesh.n_points)
+    return StepResult(1, 1.0, u, np.zeros((mesh.n_points, 6)), zero, zero, np.zeros_like(u))
+
+
+def test_vtk_reads_every_solid_through_it(tmp_path: Path) -> None:
+    """Cell types, nodes, and where VTK sees the middles of edges and the inside of the cells."""
+    xdmf = pytest.importorskip("vtkmodules.vtkIOXdmf2", reason="this VTK has no XDMF reader")
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    mesh = row_of(list(SOLIDS))
+    with ResultWriter(tmp_path / "r.vtkhdf", mesh, kinematics="3d") as out:
+        out.write(solid_step(mesh))
+    write_xdmf(tmp_path / "r.vtkhdf", tmp_path / "r.xdmf")
+    reader = xdmf.vtkXdmfReader()
+    reader.SetFileName(str(tmp_path / "r.xdmf"))
+    reader.Update()
+    grid = reader.GetOutputDataObject(0)
+    assert grid.GetNumberOfCells() == mesh.n_cells
+    np.testing.assert_array_equal(
+        vtk_to_numpy(grid.GetPointData().GetArray("displacement")), solid_step(mesh).displacement
+    )
+    number = 0
+    for name, block in mesh.solids.items():
+        for nodes in block.tolist():
+            cell = grid.GetCell(number)
+            assert cell.GetCellType() == elements.get(name).vtk
+            assert [cell.GetPointId(i) for i in range(len(nodes))] == nodes
+            for edge in map(cell.GetEdge, range(cell.GetNumberOfEdges())):
+                ends = [mesh.points[edge.GetPointId(i)] for i in range(edge.GetNumberOfPoints())]
+                if len(ends) == 3:
+                    np.testing.assert_allclose(ends[2], 0.5 * (ends[0] + ends[1]), atol=1e-14)
+            centre, found = [0.0] * 3, [0.0] * 3
+            weights = [0.0] * len(nodes)
+            cell.GetParametricCenter(centre)
+            cell.EvaluateLocation(_reference(0), centre, found, weights)
+            np.testing.assert_allclose(np.array(weights) @ mesh.points[nodes], found, atol=1e-12)
+            number += 1
+
+
+def _reference(value: int) -> object:
+    from vtkmodules.vtkCommonCore import reference
+
+    return reference(value)
+
+
+@pytest.mark.parametrize("name", list(SOLIDS))
+def test_every_solid_has_its_code(tmp_path: Path, name: str) -> None:
+    """Names and codes as the XDMF library lists them."""
+    codes = {"tet4": 0x6, "pyramid5": 0x7, "wedge6": 0x8, "hex8": 0x9, "tet10": 0x26, "pyramid13": 0x27,
+             "wedge15": 0x28, "wedge18": 0x29, "hex20": 0x30, "hex27": 0x32}  # fmt: skip
+    mesh = row_of([name])
+    with ResultWriter(tmp_path / "r.vtkhdf", mesh, kinematics="3d") as out:
+        out.write(solid_step(mesh))
+    write_xdmf(tmp_path / "r.vtkhdf", tmp_path / "r.xdmf")
+    item = ElementTree.parse(tmp_path / "r.xdmf").getroot().find(".//Topology/DataItem")
+    sequence = values_of(item, tmp_path).reshape(2, -1)
+    assert sequence[:, 0].tolist() == [codes[name]] * 2
+    np.testing.assert_array_equal(sequence[:, 1:], mesh.cells[name])

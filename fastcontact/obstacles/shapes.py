@@ -1,20 +1,10 @@
-"""Rigid obstacles: shapes that a body may touch but not enter.
-
-An obstacle answers one question, in its own frame: how far from it is a point, and where is outside? Distances are
-signed, positive outside. Where only a height is given (paraboloid, cone, a function of position), the distance is the
-vertical one, times the cosine of the slope: exact in sign and on the surface, and to first order next to it, which is
-all that contact asks, since the pairing is renewed until the points lie on the surface.
-
-Coordinates are (x, y) in two dimensions (x the radius in axisymmetry) and (x, y, z) in three; the axis of a shape is
-the last coordinate.
-"""
+"""The simple shapes: half-space, ball, cylinder, heights over the other coordinates, flat punch."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,14 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from fastcontact.errors import ContactError
 
 Array = NDArray[np.float64]
-
-
-class Obstacle(Protocol):
-    """A rigid shape."""
-
-    def distance(self, points: Array) -> tuple[Array, Array]:
-        """Return the signed distance (n,) of `points` (n, dim) and the unit outward normals (n, dim) there [length]."""
-        ...
 
 
 def _positive(**values: float) -> None:
@@ -227,13 +209,3 @@ class FlatPunch:
         gap = sign * (points[:, -1] - self.height)
         beside = np.linalg.norm(points[:, :-1], axis=1) > self.radius * (1 + 1e-12)
         return np.where(beside, np.inf, gap), normal
-
-
-SHAPES: dict[str, Callable[..., Obstacle]] = {
-    "half_space": HalfSpace,
-    "sphere": Sphere,
-    "cylinder": Cylinder,
-    "paraboloid": paraboloid,
-    "cone": cone,
-    "flat_punch": FlatPunch,
-}

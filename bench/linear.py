@@ -1,0 +1,228 @@
+"""Multigrid and contact on top of it: what a linear solution costs, and a contact analysis in units of it.
+
+Usage: python bench/linear.py [--problem box|blocks|sphere] [--dofs N ...] [--steps 20] [--pyamg] [--json FILE]
+
+``box``: a cube of hex8 held at its base, pressed at its top: set-up, linear solution, bandwidth. ``blocks``: two cubes
+with meshes that do not match, tied where they touch. ``sphere``: a quarter of a half-sphere on a block, a cold step to
+the full load and 20 steps, geometry converged.
+
+CPU seconds are those of the process. L is one linear solution of the same mesh to the same tolerance without set-up,
+measured in the same run; ``triad`` is the memory bandwidth of a core then. A small problem runs first and compiles the kernels.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import time
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+from scipy.sparse import csr_array
+
+import fastcontact as fc
+from fastcontact.analysis import Analysis, Criteria, near_nullspace
+from fastcontact.extrapolation import Extrapolation
+from fastcontact.kernels import krylov
+from fastcontact.linear import _hierarchy
+from fastcontact.linear.amg import Amg
+
+
+def timed(work: Any) -> tuple[Any, float, float]:
+    """Return the result, CPU and wall seconds of a call."""
+    cpu, wall = time.process_time(), time.perf_counter()
+    result = work()
+    return result, time.process_time() - cpu, time.perf_counter() - wall
+
+
+def triad() -> float:
+    """Return the bandwidth of a core [GB per CPU second], ``p = z + beta p`` on long vectors, median of nine."""
+    z, p = np.ones(20_000_000), np.ones(20_000_000)
+    krylov.turn(0.5, z, p)
+    return float(np.median([24e-9 * len(z) / timed(lambda: krylov.turn(0.5, z, p))[1] for _ in range(9)]))
+
+
+def material(model: fc.Model) -> fc.Model:
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    return model
+
+
+def box(dofs: int) -> fc.Model:
+    n = round((dofs / 3) ** (1 / 3)) - 1
+    model = material(fc.Model(fc.generate.box((1.0, 1.0, 1.0), (n, n, n)), kinematics="3d"))
+    model.fix("ZMIN", "xyz")
+    model.prescribe("ZMAX", x=0.0, y=0.0, z=-0.01)
+    return model
+
+
+def blocks(dofs: int) -> fc.Model:
+    n = round((dofs / 3 / 1.35) ** (1 / 3)) - 1
+    m = max(2, round(0.7 * n))
+    low = fc.generate.box((1.0, 1.0, 1.0), (n, n, n), name="LOW")
+    high = fc.generate.box((1.0, 1.0, 1.0), (m, m, m), origin=(0.0, 0.0, 1.0), name="HIGH")
+    named = [fc.generate.renamed(mesh, {k: f"{k}_{name}" for k in mesh.cell_groups}) for mesh, name in
+             ((low, "LOW"), (high, "HIGH"))]  # fmt: skip
+    model = material(fc.Model(fc.generate.union(*named), kinematics="3d"))
+    model.fix("ZMIN_LOW", "xyz")
+    model.prescribe("ZMAX_HIGH", x=0.0, y=0.0, z=-0.01)
+    model.add_contact("c", secondary="ZMIN_HIGH", primary="ZMAX_LOW", formulation="node_to_segment")
+    return model
+
+
+def sphere(dofs: int) -> fc.Model:
+    h = 0.06 * (114_036 / dofs) ** (1 / 3)
+    mesh = fc.generate.sphere_on_block("hex8", R=1.0, size=h, contact_size=h / 3, contact_radius=0.2)
+    model = material(fc.Model(mesh, kinematics="3d"))
+    model.fix("SYMMETRY_X", "x")
+    model.fix("SYMMETRY_Z", "z")
+    model.fix("BLOCK_BOTTOM", "y")
+    model.prescribe("SPHERE_TOP", y=-0.02)
+    model.add_contact("c", secondary="CONT_SPHERE", primary="CONT_BLOCK", formulation="node_to_segment")
+    return model
+
+
+def bytes_per_iteration(solver: Amg) -> int:
+    """Return what one iteration must read of matrices at least: K once, levels and prolongators as the cycle does."""
+    own = 2 * _hierarchy.DEGREE * sum(level.A.nbytes + level.inverse.nbytes for level in solver.hierarchy.levels[:-1])
+    across = sum(A.nbytes for level in solver.hierarchy.levels for A in (level.P, level.R) if A is not None)
+    return solver.K.nbytes + own + across
+
+
+def linear_solution(analysis: Analysis, tolerance: float) -> dict[str, Any]:
+    """Solve for the full loads without contact; the second of two runs counts."""
+    solver = analysis.solver
+    solver.tolerance = tolerance
+    lift = analysis._lift(1.0)
+    loaded = solver.load(analysis.system.right(np.zeros_like(lift), lift))
+    none = csr_array((0, len(lift))), np.empty(0)
+    for _ in range(2):
+        before = solver.counters.iterations
+        _, cpu, wall = timed(lambda: loaded.solve(*none))
+    return {"cpu_s": cpu, "wall_s": wall, "iterations": solver.counters.iterations - before}
+
+
+def restart(analysis: Analysis, tolerance: float, ramp: fc.Ramp) -> None:
+    """Bring an analysis back to the beginning, with its matrices and hierarchy."""
+    analysis.solver.tolerance = tolerance
+    analysis.criteria, analysis.ramp = Criteria(geometry=tolerance), ramp
+    analysis.u = np.zeros_like(analysis.u)
+    analysis.active, analysis.pressure, analysis.extrapolation = {}, {}, Extrapolation()
+
+
+def steps(analysis: Analysis, count: int, tolerance: float, contact: dict[str, Any]) -> None:
+    """Run an analysis on a prepared hierarchy and add its work to `contact`."""
+    solver, ramp = analysis.solver, fc.linear_ramp(count)
+    assert isinstance(solver, Amg)
+    restart(analysis, tolerance, ramp)
+    cpu, before = 0.0, solver.counters.iterations
+    inside = [0.0]
+    solution = solver.solution
+
+    def measured(*arguments: Any) -> Any:
+        result, seconds, _ = timed(lambda: solution(*arguments))
+        inside[0] += seconds
+        return result
+
+    solver.solution = measured
+    updates = 0
+    for index, instant in enumerate(ramp.instants, start=1):
+        result, seconds, _ = timed(lambda index=index, instant=instant: analysis.step(index, instant))
+        cpu += seconds
+        updates += result.iterations["geometry_updates"] + 1
+    solver.solution = solution
+    contact |= {"cpu_s": cpu, "solver_cpu_s": inside[0], "iterations": solver.counters.iterations - before,
+                "pairings": updates, "active": int(analysis.active["c"].sum()), "setups": solver.counters.setups}  # fmt: skip
+
+
+def prepared(problem: str, dofs: int) -> tuple[Analysis, float]:
+    """Return an analysis with its hierarchy, and the CPU seconds that took."""
+    model = {"box": box, "blocks": blocks, "sphere": sphere}[problem](dofs)
+    seconds: list[float] = []
+    prepare = Amg.prepare
+    Amg.prepare = lambda *arguments: seconds.append(timed(lambda: prepare(*arguments))[1])  # type: ignore[method-assign]
+    try:
+        analysis = Analysis(model, "amg", 1e-8, Criteria())
+        return analysis, seconds[-1]
+    finally:
+        Amg.prepare = prepare  # type: ignore[method-assign]
+
+
+def measure(problem: str, dofs: int, count: int, with_pyamg: bool) -> dict[str, Any]:
+    bandwidth = triad()
+    analysis, setup = prepared(problem, 5_000)  # compiles
+    analysis, setup = prepared(problem, dofs)
+    solver, model = analysis.solver, analysis.model
+    assert isinstance(solver, Amg)
+    n = model.n_dofs
+    found: dict[str, Any] = {"problem": problem, "n_dofs": n, "threads": numba.get_num_threads()}
+    found |= {"triad_GB_per_cpu_s": bandwidth, "setup_cpu_s": setup}
+    if with_pyamg:
+        import pyamg
+        from scipy.sparse import bsr_matrix
+
+        options = {"strength": ("symmetric", {"theta": 0.0}), "smooth": "energy", "max_coarse": 50}
+        K, modes = bsr_matrix(analysis.system.matrix), analysis.system.unknowns_of(near_nullspace(model))
+        _, found["pyamg_setup_cpu_s"], _ = timed(lambda: pyamg.smoothed_aggregation_solver(K, B=modes, **options))
+    L = linear_solution(analysis, 1e-8)
+    per = 1e9 / (n * L["iterations"])
+    L |= {"ns_per_dof_iteration_cpu": L["cpu_s"] * per, "ns_per_dof_iteration_wall": L["wall_s"] * per}
+    L["GB_per_cpu_s"] = 1e-9 * bytes_per_iteration(solver) * L["iterations"] / L["cpu_s"]
+    L["part_of_triad"] = L["GB_per_cpu_s"] / bandwidth
+    found |= {"linear": L, "hierarchy": repr(solver)}
+    if problem == "blocks":
+        rows = analysis.pairs["c"].constraints(np.zeros(model.mesh.points.shape))
+        lift = analysis._lift(1.0)
+        B, gap0 = analysis.system.rows(rows.B, rows.gap0, lift)
+        use = np.flatnonzero(np.diff(B.indptr) > 0)
+        loaded = solver.load(analysis.system.right(np.zeros_like(lift), lift))
+        for _ in range(2):
+            before = solver.counters.iterations
+            _, cpu, _ = timed(lambda: loaded.solve(B[use], -gap0[use]))
+        found["tied"] = {"cpu_s": cpu, "iterations": solver.counters.iterations - before, "equations": len(use)}
+    if problem == "sphere":
+        steps(analysis, 1, 1e-2, {})  # compiles
+        found["linear_1e-4"] = linear_solution(analysis, 1e-4)
+        for name, number, tolerance in (("cold", 1, 1e-8), ("steps", count, 1e-8), ("steps_1e-4", count, 1e-4)):
+            found[name] = {}
+            steps(analysis, number, tolerance, found[name])
+            unit = found["linear_1e-4" if tolerance > 1e-6 else "linear"]
+            found[name] |= {
+                "iterations_in_L": found[name]["iterations"] / unit["iterations"],
+                "solver_cpu_in_L": found[name]["solver_cpu_s"] / unit["cpu_s"],
+                "cpu_in_L": found[name]["cpu_s"] / unit["cpu_s"],
+            }
+    found["peak_kB_per_dof"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / n
+    return found
+
+
+def told(found: dict[str, Any]) -> str:
+    """Return the figures as indented lines."""
+    lines = [f"{found['problem']}, {found['n_dofs']} unknowns, {found['threads']} threads: {found['hierarchy']}"]
+    for key, value in found.items():
+        if isinstance(value, dict):
+            value = ", ".join(f"{k} {v:.4g}" for k, v in value.items())
+        lines.append(f"  {key:<20} {value:.4g}" if isinstance(value, float) else f"  {key:<20} {value}")
+    return "\n".join(lines[:1] + [line for line in lines[1:] if "hierarchy" not in line])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--problem", choices=("box", "blocks", "sphere"), default="sphere")
+    parser.add_argument("--dofs", type=int, nargs="+", default=[30_000, 100_000])
+    parser.add_argument("--steps", type=int, default=20)
+    parser.add_argument("--pyamg", action="store_true", help="also time pyamg's set-up")
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    results = []
+    for dofs in options.dofs:
+        results.append(measure(options.problem, dofs, options.steps, options.pyamg))
+        print(told(results[-1]), flush=True)
+    if options.json:
+        options.json.write_text(json.dumps(results, indent=1))
+
+
+if __name__ == "__main__":
+    main()

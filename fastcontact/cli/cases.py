@@ -1,0 +1,76 @@
+"""``fastcontact cases``: the ready cases, listed, printed or copied."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from fastcontact.errors import FileError
+
+HELP = "list the ready cases; print one, or copy it to change it"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    parser.add_argument("name", nargs="?", help="print this case file instead of the list")
+    parser.add_argument("--copy", metavar="NAME", help="copy this case file, and the mesh file it reads")
+    parser.add_argument("-o", "--output", metavar="FILE", help="copy to this file (default: NAME.toml, here)")
+
+
+def run(options: argparse.Namespace) -> int:
+    """List, print or copy."""
+    from fastcontact.errors import FastcontactError
+    from fastcontact.ready import ready_case, ready_cases
+
+    if options.copy and options.name:
+        raise FastcontactError("give either a name to print or --copy NAME, not both")
+    if options.output and not options.copy:
+        raise FastcontactError("-o says where to copy to: give --copy NAME with it")
+    if options.copy:
+        written = _copy(ready_case(options.copy), Path(options.output or f"{options.copy}.toml"))
+        if not options.quiet:
+            print(f"wrote {', '.join(map(str, written))}")
+    elif options.name:
+        print(ready_case(options.name).read_text(encoding="utf-8"), end="")
+    elif not options.quiet:
+        print("\n".join(line for path in ready_cases().values() for line in _lines(path)))
+        print("solve one with: fastcontact run NAME")
+    return 0
+
+
+def _lines(path: Path) -> list[str]:
+    """Return what one case is and what it checks."""
+    from fastcontact.case import read_case
+
+    case = read_case(path)
+    solid = sum(map(len, case.mesh.solids.values()))
+    kinematics = case.model.kinematics.replace("_", " ")
+    kinds = ", ".join(case.mesh.solids)
+    return [
+        f"{case.name}: {case.title}",
+        f"    {kinematics}, {solid} {kinds}, {len(case.ramp)} load steps",
+        *(f"    checks {check.described()}" for check in case.checks),
+    ]
+
+
+def _copy(case: Path, target: Path) -> list[Path]:
+    """Copy a case file, and beside it the mesh file it reads, if any; refuse to overwrite."""
+    import tomllib
+
+    text = case.read_text(encoding="utf-8")
+    mesh: dict[str, Any] = tomllib.loads(text).get("mesh", {})
+    files = {target: text.encode()}
+    if "file" in mesh:
+        source = case.parent / mesh["file"]
+        files = {target: text.replace(f'"{mesh["file"]}"', f'"{source.name}"').encode()}
+        files[target.parent / source.name] = source.read_bytes()
+    for path in files:
+        if path.exists():
+            raise FileError(f"'{path}' exists already: name another file with -o, or remove it first")
+    for path, content in files.items():
+        try:
+            path.write_bytes(content)
+        except OSError as error:
+            raise FileError(f"cannot write '{path}': {error.strerror}") from error
+    return list(files)

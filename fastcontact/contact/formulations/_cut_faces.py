@@ -1,0 +1,132 @@
+"""Faces cut by the faces opposite in their own plane, and integrated piece by piece (Puso, 2004).
+
+Both sides are followed along the normal of the secondary facet, so that each piece has one facet on either side.
+Curved facets are cut by their corner polygons, an error of second order in the facet's length over its radius.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact import elements, quadrature
+from fastcontact.contact.formulations._overlap import Coupling, Overlap
+from fastcontact.contact.surface import FacetBlock, Surface
+from fastcontact.errors import ContactError
+from fastcontact.kernels import box_tree, clip3d
+from fastcontact.search import closest_of_kinds
+
+Array = NDArray[np.float64]
+# Facets face each other if their normals enclose more than about 95 degrees.
+FACING = -0.1
+# How far off what faces a facet may be: in distances of the closest primary facet, and radii of the facet itself.
+DISTANCES, RADII = 2.0, 3.0
+# Powers of s and t of the terms of a facet's polynomial, in the order of `kernels.clip3d`.
+POWERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1], [2, 0], [0, 2], [2, 1], [1, 2], [2, 2]])
+# Highest degree in s and t together of what the mapped shape functions of a facet contain.
+DEGREE = {3: 1, 4: 2, 6: 2, 8: 3, 9: 4}
+
+
+def face_overlap(secondary: Surface, primary: Surface, reference: Array, deformed: Array) -> Overlap:
+    """Cut and integrate the secondary facets on the deformed configuration; areas are those of the reference.
+
+    Parameters
+    ----------
+    secondary, primary : Surface
+    reference, deformed : ndarray (n_points, 3)
+        Coordinates of all points [length].
+
+    Raises
+    ------
+    ContactError
+        If a facet is too distorted to be followed.
+    """
+    ours = [_Polygons.of(block, deformed) for block in secondary.blocks]
+    theirs = [_Polygons.of(block, deformed) for block in primary.blocks]
+    centres = np.concatenate([polygons.origin for polygons in ours])
+    away = closest_of_kinds(centres, primary.corners(deformed)).distance
+    masses, couplings, first = [], [], 0
+    for mine in ours:
+        size, nodes = mine.block.facets.shape
+        reach = DISTANCES * away[first : first + size] + RADII * mine.radius
+        mass = np.zeros((size, nodes, nodes))
+        for other in theirs:
+            coupling, part = _integrated(mine, other, _facing(mine, other, reach), reference)
+            couplings.append(coupling)
+            mass += part
+        masses.append(mass)
+        first += size
+    return Overlap(masses, couplings)
+
+
+@dataclass(frozen=True, eq=False)
+class _Polygons:
+    """Facets of one kind: nodes (n, k, 3), the planes of their corners, radii around the centres (n,), boxes."""
+
+    block: FacetBlock
+    nodes: Array
+    count: int
+    origin: Array
+    axes: Array
+    radius: Array
+    low: Array
+    high: Array
+
+    @classmethod
+    def of(cls, block: FacetBlock, deformed: Array) -> _Polygons:
+        """Return the facets of a block where they are."""
+        nodes, count = deformed[block.facets], elements.get(block.element).n_corners
+        origin, axes = np.empty((len(nodes), 3)), np.empty((len(nodes), 3, 3))
+        clip3d.planes(nodes, count, origin, axes)
+        corners = nodes[:, :count]
+        radius = np.linalg.norm(corners - origin[:, None], axis=2).max(axis=1)
+        return cls(block, nodes, count, origin, axes, radius, corners.min(axis=1), corners.max(axis=1))
+
+
+def _facing(ours: _Polygons, theirs: _Polygons, reach: Array) -> NDArray[np.intp]:
+    """Return the pairs of facets (n, 2) that face each other with a part."""
+    tree = box_tree.build(theirs.low, theirs.high)
+    room = 8 * (len(ours.nodes) + len(theirs.nodes))
+    while True:
+        pairs = np.empty((room, 2), np.intp)
+        count = clip3d.facing_pairs(
+            ours.nodes, ours.count, ours.origin, ours.axes, ours.radius, reach, theirs.nodes, theirs.count,
+            np.ascontiguousarray(theirs.axes[:, 2]), theirs.low, theirs.high, *tree, FACING, pairs,
+        )  # fmt: skip
+        if count <= room:
+            return pairs[:count]
+        room = count
+
+
+def _integrated(
+    ours: _Polygons, theirs: _Polygons, pairs: NDArray[np.intp], reference: Array
+) -> tuple[Coupling, Array]:
+    """Return the coupling of pairs of facets, and the mass of the secondary ones over what they face there."""
+    one, other = elements.get(ours.block.element), elements.get(theirs.block.element)
+    to_terms, other_to_terms = terms_of(one), terms_of(other)
+    n, k = ours.block.facets.shape
+    mass, integrals = np.empty((n, k, k)), np.empty((len(pairs), k, other.n_nodes))
+    degree = DEGREE[one.n_nodes] + max(DEGREE[one.n_nodes], DEGREE[other.n_nodes])
+    wrong = clip3d.integrate(
+        ours.nodes, ours.count, ours.origin, ours.axes,
+        to_terms @ ours.nodes, to_terms @ reference[ours.block.facets], to_terms, _middle(one),
+        theirs.nodes, theirs.count, other_to_terms @ theirs.nodes, other_to_terms, _middle(other),
+        pairs, *quadrature.triangle(min(degree + degree % 2, 8)), mass, integrals,
+    )  # fmt: skip
+    if wrong >= 0:
+        first, second = (side.origin[row] for side, row in zip((ours, theirs), pairs[wrong], strict=True))
+        raise ContactError(f"the facets near {first} and {second} are too distorted to be cut: improve the mesh there")
+    return Coupling(ours.block, theirs.block, pairs, integrals), mass
+
+
+def terms_of(element: elements.Element) -> Array:
+    """Return the matrix (n_nodes, n_nodes) from nodal values of a facet to the terms of its polynomial."""
+    powers = POWERS[: element.n_nodes]
+    inverse: Array = np.linalg.inv(np.prod(element.nodes[:, None] ** powers[None], axis=2))
+    return np.ascontiguousarray(inverse)
+
+
+def _middle(element: elements.Element) -> Array:
+    return np.ascontiguousarray(element.nodes[: element.n_corners].mean(axis=0))

@@ -1,0 +1,146 @@
+r"""Shape functions of pressure that are biorthogonal to those of displacement, facet by facet.
+
+For positive shape functions :math:`\tilde N` of a facet that sum to one, the dual functions
+
+.. math:: \psi = \mathrm{diag}(w) M^{-1} \tilde N, \quad w = \int \tilde N, \quad M = \int \tilde N \tilde N^T
+
+obey :math:`\int \psi_j \tilde N_k = w_j \delta_{jk}` and sum to one (Wohlmuth, 2000). The integrals run over that part
+of the facet which faces the other side, so both hold there (Cichosz and Bischoff, 2011; Popp, Seitz, Gee and Wall,
+2013). Where a function has next to no part in it, M is next to singular: that function is left out, and the others
+sum to one without it.
+
+The corner functions of quadratic facets are not positive. They get shares of those of the mid nodes (Popp, Wohlmuth,
+Gee and Wall, 2012), here as large as it takes to be positive everywhere, so that no part of a facet, however cut,
+weighs less than nothing: on lines, triangles and nine-node quadrangles these are the polynomials of Bernstein. The
+displacement that goes with a corner function is that of the corner; the one of a mid node adds those of its edge's ends.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact import elements
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+# Share of a mid node's function that either end of its edge gets: 1/4 makes parabolas Bernstein polynomials; without a
+# centre node, 3/8 is the least that leaves no negative part, that of (a + b) / 4 + 1 / 2 for a, b in [-1, 1].
+SHARE, SHARE_WITHOUT_CENTRE = 0.25, 0.375
+# A function of which less than this fraction of its weight faces the other side takes no part of its own.
+COVERED = 0.02
+# Dual functions of whole facets have root mean squares up to 2.4 (nine nodes); beyond this multiple of one, and where
+# their integral falls below this fraction of their weight, they extrapolate more than they test.
+MOST, LEAST = 20.0, 0.2
+ROUNDING = 1e-9
+
+
+@cache
+def positive(name: str) -> Array:
+    r"""Return T (n_nodes, n_nodes) with :math:`\tilde N = T N`, positive on the facet, summing to one."""
+    element = elements.get(name)
+    T = np.eye(element.n_nodes)
+    if element.order == 1:
+        return T
+    if element.n_nodes == 9:
+        return _bernstein_square(element)
+    share = SHARE_WITHOUT_CENTRE if element.n_nodes == 8 else SHARE
+    for k, ends in enumerate(_edges(element)):
+        middle = element.n_corners + k
+        T[list(ends), middle] = share
+        T[middle, middle] = 1.0 - 2.0 * share
+    return T
+
+
+def _edges(element: elements.Element) -> tuple[tuple[int, int], ...]:
+    """Return the ends of what each mid node halves."""
+    return ((0, 1),) if element.dim == 1 else element.edges
+
+
+def _bernstein_square(element: elements.Element) -> Array:
+    """Return T of nine-node quadrangles: the product of two lines."""
+    line = elements.get("line3")
+    place = {-1.0: 0, 1.0: 1, 0.0: 2}
+    at = np.array([[place[float(c)] for c in node] for node in element.nodes])
+    T = positive(line.name)
+    return T[np.ix_(at[:, 0], at[:, 0])] * T[np.ix_(at[:, 1], at[:, 1])]
+
+
+def dual_functions(mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Array]:
+    r"""Return the dual functions of facets of which any part may face the other side.
+
+    Parameters
+    ----------
+    mass : ndarray (n_facets, k, k)
+        Integrals of products of positive shape functions that sum to one, over that part [area].
+    kept : ndarray of bool (n_facets, k)
+        Functions that may take part.
+    fraction : ndarray (n_facets, k)
+        Weight of each function over that part, in terms of its weight over the whole facet.
+
+    Returns
+    -------
+    dual, D
+        As by `biorthogonal`, for all functions kept where that makes sense. On a narrow strip those with next to no
+        share are left out, and if that does not help all but the one with the largest.
+    """
+    part = kept & (fraction > 0.0)
+    dual, D = biorthogonal(mass, part)
+    largest = np.argmax(np.where(part, fraction, -1.0), axis=1)[:, None] == np.arange(part.shape[1])
+    for fewer in (part & (fraction > COVERED), part & largest):
+        wild = np.flatnonzero(~_tame(dual, mass, part))
+        if not len(wild):
+            break
+        part[wild] = np.where(np.any(fewer[wild], axis=1, keepdims=True), fewer[wild], part[wild])
+        dual[wild], D[wild] = biorthogonal(mass[wild], part[wild])
+    return dual, D
+
+
+def _tame(dual: Array, mass: Array, part: Mask) -> Mask:
+    """Return for which facets (n_facets,) the dual functions are moderate and positive on average."""
+    area = np.maximum(mass.sum(axis=(1, 2)), 1e-300)
+    weight = mass.sum(axis=2)
+    with np.errstate(invalid="ignore", over="ignore"):
+        size = np.sqrt(np.einsum("fab,fbc,fac->fa", dual, mass, dual) / area[:, None]).max(axis=1)
+        off = np.abs(dual.sum(axis=1) - 1.0).max(axis=1)  # the shape functions sum to one with no other coefficients
+        share = np.where(part, np.einsum("fab,fb->fa", dual, weight) - LEAST * weight, 0.0).min(axis=1)
+    return ((size <= MOST) & (off <= ROUNDING) & (share >= 0.0)) | ~part.any(axis=1)
+
+
+def biorthogonal(mass: Array, part: Mask) -> tuple[Array, Array]:
+    r"""Return the dual functions of facets, and their integrals with the positive shape functions.
+
+    Parameters
+    ----------
+    mass : ndarray (n_facets, k, k)
+        Integrals of products of positive shape functions that sum to one [area].
+    part : ndarray of bool (n_facets, k)
+        Functions that take part; the dual functions of the others are zero.
+
+    Returns
+    -------
+    dual : ndarray (n_facets, k, k)
+        Coefficients, :math:`\psi_j = \sum_k dual_{jk} \tilde N_k`; the sum over those that take part is one.
+    D : ndarray (n_facets, k, k)
+        :math:`\int \psi_j \tilde N_k` [area]; diagonal among those that take part.
+
+    Where the functions are linearly dependent to the last digit, both are NaN.
+    """
+    k = mass.shape[1]
+    rest = part.sum(axis=1)[:, None, None]
+    # Those that take part share the others evenly, so that they still sum to one.
+    spanning = np.eye(k) * part[:, :, None] + part[:, :, None] * ~part[:, None, :] / np.maximum(rest, 1)
+    G = np.where(part[:, :, None] & part[:, None, :], spanning @ mass, np.eye(k))
+    weight = np.where(part, mass.sum(axis=2), 0.0)
+    # Rows and columns are scaled before the inversion: weights of cut facets may differ by orders.
+    scale = 1.0 / np.sqrt(np.einsum("fkk->fk", G))
+    scaled = G * scale[:, :, None] * scale[:, None, :]
+    regular: Mask = np.not_equal(np.linalg.det(scaled), 0.0)
+    scaled[~regular] = np.eye(k)
+    inverse = np.linalg.inv(scaled) * scale[:, :, None] * scale[:, None, :]
+    inverse[~regular] = np.nan
+    dual = weight[:, :, None] * inverse @ spanning
+    D = np.where(part[:, None, :], weight[:, :, None] * np.eye(k), dual @ mass)
+    return dual, D * part[:, :, None]

@@ -1,0 +1,59 @@
+"""What faces what: integrals of products of shape functions over the parts where two surfaces face each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact import elements
+from fastcontact.contact.surface import FacetBlock
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Coupling:
+    """Pairs of a secondary and a primary facet that face each other, each of one kind.
+
+    Attributes
+    ----------
+    secondary, primary : FacetBlock
+    pairs : ndarray of int (n, 2)
+        Rows of the facets in their blocks.
+    integrals : ndarray (n, n_nodes, n_primary_nodes)
+        Of secondary times primary shape functions over the common part [area].
+    """
+
+    secondary: FacetBlock
+    primary: FacetBlock
+    pairs: NDArray[np.intp]
+    integrals: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Overlap:
+    """All parts where two surfaces face each other.
+
+    Attributes
+    ----------
+    mass : list of ndarray (n_facets, n_nodes, n_nodes)
+        For each block of the secondary side, integrals of products of two of its shape functions over the part that
+        faces the primary side [area].
+    couplings : list of Coupling
+    """
+
+    mass: list[Array]
+    couplings: list[Coupling]
+
+
+def normals_of(block: FacetBlock, coordinates: Array) -> Array:
+    """Return the unit normals (n_facets, n_nodes, dim) of facets at their own nodes."""
+    element = elements.get(block.element)
+    tangent = np.einsum("akj,fkd->fadj", element.gradient(element.nodes), coordinates[block.facets])
+    if element.dim == 1:
+        normal = np.stack([tangent[..., 1, 0], -tangent[..., 0, 0]], axis=2)
+    else:
+        normal = np.cross(tangent[..., 0], tangent[..., 1])
+    return normal / np.linalg.norm(normal, axis=2, keepdims=True)

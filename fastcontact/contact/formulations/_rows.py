@@ -1,0 +1,50 @@
+"""Sparse matrices of mortar contact: put together facet by facet, scaled by rows, turned into rows of displacements."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
+
+Array = NDArray[np.float64]
+
+
+class Entries:
+    """Entries of a sparse matrix, collected facet by facet."""
+
+    def __init__(self) -> None:
+        self._rows: list[NDArray[np.int32]] = []
+        self._columns: list[NDArray[np.int32]] = []
+        self._values: list[Array] = []
+
+    def add(self, rows: NDArray[np.integer], columns: NDArray[np.integer], values: Array) -> None:
+        """Add blocks (n, k, l) at rows (n, k) and columns (n, l); zeros are left out."""
+        kept = np.flatnonzero(values)
+        self._rows.append(np.broadcast_to(rows[:, :, None].astype(np.int32), values.shape).ravel()[kept])
+        self._columns.append(np.broadcast_to(columns[:, None, :].astype(np.int32), values.shape).ravel()[kept])
+        self._values.append(values.ravel()[kept])
+
+    def matrix(self, size: tuple[int, int]) -> csr_array:
+        """Return the sum of all entries."""
+        place = np.concatenate(self._rows), np.concatenate(self._columns)
+        return csr_array(coo_array((np.concatenate(self._values), place), shape=size))
+
+
+def scaled(matrix: csr_array, factor: Array) -> csr_array:
+    """Return the matrix with its rows times `factor`; rows times zero are empty."""
+    values = matrix.data * np.repeat(factor, np.diff(matrix.indptr))
+    result = csr_array((values, matrix.indices, matrix.indptr), shape=matrix.shape)
+    result.eliminate_zeros()
+    return result
+
+
+def rows_of(mean: csr_array, direction: Array) -> csr_array:
+    """Return rows (m, n_dofs): the relative motion (m, n_points) of nodes along their directions (m, dim)."""
+    dim = direction.shape[1]
+    row = np.repeat(np.arange(mean.shape[0]), np.diff(mean.indptr))
+    values = mean.data[:, None] * direction[row]
+    columns = mean.indices[:, None] * dim + np.arange(dim)
+    size = (mean.shape[0], mean.shape[1] * dim)
+    rows = csr_array((values.ravel(), columns.ravel(), mean.indptr * dim), shape=size)
+    rows.eliminate_zeros()
+    return rows

@@ -1,0 +1,257 @@
+r"""Mortar contact with one weighted gap per node: :math:`\int \psi_j\, (x_s - x_p) \cdot n_j \ge 0`.
+
+The integrals run over the pieces into which the two sides cut each other (Puso, 2004; Popp, Gitterle, Gee and Wall,
+2010). A gap is divided by the weight of its :math:`\psi_j`, so that it is a length, and its multiplier is the force
+of the node's share of the pressure; the normal is the mean of those of the primary side around the node.
+
+``"dual"`` functions are biorthogonal to the displacement of the secondary side, see `_dual_basis`: a gap involves one
+node of that side, on quadratic facets also the ends of the edge in the middle of which it lies. So constraints are
+eliminated one by one, the corners first, and the matrix stays sparse and positive definite. ``"standard"`` functions are
+linear between the corners, also on quadratic facets; only corners have gaps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from fastcontact import elements
+from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.formulations._cut_faces import face_overlap
+from fastcontact.contact.formulations._cut_lines import line_overlap
+from fastcontact.contact.formulations._dual_basis import COVERED, dual_functions, positive
+from fastcontact.contact.formulations._formulation import Formulation
+from fastcontact.contact.formulations._overlap import Overlap, normals_of
+from fastcontact.contact.formulations._rows import Entries, rows_of, scaled
+from fastcontact.contact.integration import facet_measure, fine_rule
+from fastcontact.contact.pairing import Candidates, tangents_by_axes
+from fastcontact.contact.projection import nodal_normals
+from fastcontact.contact.surface import Surface
+from fastcontact.errors import ContactError, unknown
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+MULTIPLIERS = ("standard", "dual")
+# What faces the other side with less than this fraction of its area is left out.
+LEAST = 1e-3
+# A direction in which less than this part of a motion is free is held by supports.
+FREE = 0.1
+
+
+@dataclass(eq=False)
+class WeightedMortar(Formulation):
+    """Mortar contact with weighted gaps at nodes; further parameters as in `Formulation`.
+
+    Parameters
+    ----------
+    normals : str
+        What the normal of a node is the mean of: ``"facet"``, those of the primary facets that it faces;
+        ``"averaged"``, nodal means of them.
+    multipliers : str
+        ``"dual"`` or, between faces, ``"standard"``.
+    """
+
+    projection_tolerance: float = 1e-6
+    normals: str = "averaged"
+    multipliers: str = "standard"
+
+    name: ClassVar[str] = "mortar"
+    geometry_in_loop: ClassVar[bool] = True
+    _whole: list[Array] = field(init=False, repr=False)
+    _weight: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.multipliers not in MULTIPLIERS:
+            raise ContactError(unknown("kind of multipliers", self.multipliers, MULTIPLIERS))
+        self._test = [self._test_functions(block.element) for block in self.secondary.blocks]
+        self._whole = []
+        for block, T in zip(self.secondary.blocks, self._test, strict=True):
+            xi, weights = fine_rule(block.element)
+            dA = facet_measure(block.facets, block.element, self.points, xi, self.axisymmetric) * weights
+            self._whole.append(dA @ elements.get(block.element).shape(xi) @ T.T)
+
+    def _test_functions(self, name: str) -> Array:
+        """Return the non-negative functions of a facet that sum to one, by its shape functions (n_nodes, n_nodes)."""
+        if self.multipliers == "dual":
+            return positive(name)
+        element = elements.get(name)
+        linear = elements.get(element.linear).shape(element.nodes)
+        return np.vstack([linear.T, np.zeros((element.n_nodes - element.n_corners, element.n_nodes))])
+
+    def _overlap(self, deformed: Array) -> Overlap:
+        assert isinstance(self.primary, Surface)
+        if deformed.shape[1] == 3:
+            return face_overlap(self.secondary, self.primary, self.points, deformed)
+        return line_overlap(
+            self.secondary, self.primary, self.points, deformed, self.axisymmetric, self.projection_tolerance
+        )
+
+    def constraints(self, displacement: Array) -> Constraints:
+        """Cut and pair on the displaced configuration and return one mean gap per node."""
+        deformed = self.points + displacement
+        overlap = self._overlap(deformed)
+        covered = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
+        kept = self._taking_part(covered)
+        own, across = self._weighted(overlap, covered, kept)
+        weight = np.asarray(own.sum(axis=1)).ravel()
+        self._weight = np.where(weight > 0.0, weight, np.inf)
+        mean = scaled(csr_array(own - across), 1.0 / self._weight)
+        normal = self._mean_normals(overlap, deformed)
+        B = rows_of(mean, normal)
+        gap0 = B @ self.points.ravel() + self._clearance(own, across)
+        positions = self.points[self.secondary.points]
+        if not (self.friction or self.terms.tied):
+            return Constraints(B, gap0, positions)
+        directions = tuple(tangents_by_axes(normal))
+        sliding = self._sliding(overlap, covered, kept, mean)
+        along = tuple(self._along(direction, sliding) for direction in directions)
+        nodes = Candidates(self.secondary.points[:, None], np.ones((len(positions), 1)))
+        friction = self.terms.coefficients(self.friction, nodes)
+        drift = self._approach_of_nodes(sliding, normal, directions, deformed)
+        return Constraints(B, gap0, positions, None, along, directions, friction, drift)
+
+    def _approach_of_nodes(
+        self, sliding: list[csr_array], normal: Array, directions: tuple[Array, ...], deformed: Array
+    ) -> Array:
+        """Return the slip (k, m) to add so that closing a gap is none, though the normal leans.
+
+        As in `Formulation`, for mean gaps.
+        """
+        between = normal - nodal_normals(self.secondary, deformed)
+        between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), 1e-300)  # zero where nothing is faced
+        start = self.points if self.before is None else self.points + self.before
+        apart = np.stack([motion @ start[:, axis] for axis, motion in enumerate(sliding)], axis=1)
+        closing = np.einsum("nd,nd->n", between, apart)
+        return np.stack([closing * np.einsum("nd,nd->n", along, between) for along in directions])
+
+    def _sliding(self, overlap: Overlap, covered: list[Array], kept: Mask, mean: csr_array) -> list[csr_array]:
+        """Return the relative motions (m, n_points) of nodes that count as slip along each axis; mostly the mean one.
+
+        Where supports hold a node along the axis, its slip is that of the other side alone, of which its neighbours
+        leave next to nothing: those take over its friction. Where all nodes of a facet are held each keeps its own.
+        """
+        motions = []
+        for axis in range(self.points.shape[1]):
+            held = self._held(axis)
+            if not (held & kept).any():
+                motions.append(mean)
+                continue
+            own, across = self._weighted(overlap, covered, kept & ~held)
+            motions.append(scaled(csr_array(own - across), 1.0 / self._weight))
+        return motions
+
+    def _held(self, axis: int) -> Mask:
+        """Return the nodes (m,) that supports hold along an axis, without those of facets that they hold whole."""
+        if self.supported is None:
+            return np.zeros(len(self.secondary.points), bool)
+        held: Mask = self.supported[self.secondary.points, axis].copy()
+        alone = [block.local[held[block.local].all(axis=1)].ravel() for block in self.secondary.blocks]
+        held[np.concatenate(alone)] = False
+        return held
+
+    def _along(self, direction: Array, sliding: list[csr_array]) -> csr_array:
+        """Return rows (m, n_dofs) of the slip along a tangent (m, dim); none where supports hold most of it."""
+        held = np.stack([self._held(axis) for axis in range(direction.shape[1])], axis=1)
+        free = np.einsum("md,md->m", direction**2, ~held) >= FREE
+        rows: csr_array | None = None
+        for axis, motion in enumerate(sliding):
+            component = np.zeros_like(direction)
+            component[free, axis] = direction[free, axis]
+            part = rows_of(motion, component)
+            rows = part if rows is None else csr_array(rows + part)
+        assert rows is not None
+        return rows
+
+    def _weighted(self, overlap: Overlap, covered: list[Array], kept: Mask) -> tuple[csr_array, csr_array]:
+        """Return the integrals of psi with secondary and with primary shape functions, both (m, n_points) [area].
+
+        `covered` are the weights (n_facets, k) of the functions of each block, `kept` (m,) the nodes with gaps.
+        """
+        size = (len(self.secondary.points), len(self.points))
+        own, across, functions = Entries(), Entries(), {}
+        for number, (block, mass) in enumerate(zip(self.secondary.blocks, overlap.mass, strict=True)):
+            whole = self._whole[number]
+            fraction = np.where(whole > 0.0, covered[number] / np.where(whole > 0.0, whole, 1.0), 0.0)
+            psi, products = self._functions(self._test[number], mass, kept[block.local], fraction)
+            own.add(block.local, block.facets, products)
+            functions[block.element] = psi
+        for coupling in overlap.couplings:
+            ours, theirs = coupling.pairs.T
+            values = functions[coupling.secondary.element][ours] @ coupling.integrals
+            across.add(coupling.secondary.local[ours], coupling.primary.facets[theirs], values)
+        return own.matrix(size), across.matrix(size)
+
+    def _functions(self, T: Array, mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Array]:
+        """Return psi of facets by their shape functions, and its integrals with those, both (n_facets, k, k)."""
+        if self.multipliers == "standard":
+            psi = np.where(kept[:, :, None], T, 0.0)
+            return psi, psi @ mass
+        psi, D = dual_functions(T @ mass @ T.T, kept, fraction)
+        return psi @ T, D @ np.linalg.inv(T).T
+
+    def _taking_part(self, covered: list[Array]) -> Mask:
+        """Return which nodes (m,) have gaps, given the weights (n_facets, k) of all functions."""
+        m = len(self.secondary.points)
+        total, whole, rescued = np.zeros(m), np.zeros(m), np.zeros(m, bool)
+        for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
+            np.add.at(total, block.local, weights)
+            np.add.at(whole, block.local, full)
+        enough = total > (COVERED if self.multipliers == "dual" else LEAST) * whole
+        for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
+            # What a facet faces is not lost: where no node has enough, the one with most takes it.
+            lost = ~enough[block.local].any(axis=1) & (weights.sum(axis=1) > LEAST * full.sum(axis=1))
+            most = np.argmax(total[block.local[lost]], axis=1)
+            rescued[block.local[lost][np.arange(len(most)), most]] = True
+        return (enough | rescued) & (whole > 0.0) & ~self.terms.excluded_nodes(self.secondary)
+
+    def _mean_normals(self, overlap: Overlap, deformed: Array) -> Array:
+        """Return unit means (m, dim) of the primary normals that the nodes face; the last axis for nodes without."""
+        assert isinstance(self.primary, Surface)
+        mean = np.zeros((len(self.secondary.points), deformed.shape[1]))
+        averaged = nodal_normals(self.primary, deformed)
+        tests = dict(zip((block.element for block in self.secondary.blocks), self._test, strict=True))
+        for coupling in overlap.couplings:
+            ours, theirs = coupling.pairs.T
+            if self.normals == "averaged":
+                normals = averaged[coupling.primary.local[theirs]]
+            else:
+                normals = normals_of(coupling.primary, deformed)[theirs]
+            faced = coupling.integrals @ normals
+            np.add.at(mean, coupling.secondary.local[ours], tests[coupling.secondary.element] @ faced)
+        length = np.linalg.norm(mean, axis=1, keepdims=True)
+        return np.where(length > 0, mean / np.where(length > 0, length, 1.0), np.eye(mean.shape[1])[-1])
+
+    def _clearance(self, own: csr_array, across: csr_array) -> Array:
+        """Return what clearances add to the mean gaps (m,), interpolated between the nodes of both sides [length]."""
+        added = np.zeros(own.shape[0])
+        for matrix, side, clearance in (
+            (own, self.secondary, self.terms.clearance), (across, self.primary, self.terms.clearance_primary)
+        ):  # fmt: skip
+            if clearance is not None:
+                values = np.zeros(len(self.points))
+                values[side.points] = clearance(self.points[side.points])
+                added += matrix @ values / self._weight
+        return self.terms.factor * added
+
+    def areas(self) -> Array:
+        """Return the weights of the gaps."""
+        return self._weight
+
+    def pressure(self, multiplier: Array) -> Array:
+        """Return forces over the areas they stand for; at mid nodes without a multiplier, the mean of their corners."""
+        pressure = multiplier / self._weight
+        if self.multipliers == "standard":
+            for block in self.secondary.blocks:
+                element = elements.get(block.element)
+                linear = elements.get(element.linear).shape(element.nodes)[element.n_corners :]
+                pressure[block.local[:, element.n_corners :]] = pressure[block.local[:, : element.n_corners]] @ linear.T
+        return pressure
+
+    def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
+        """Return the active nodes, and mid nodes without a multiplier that have a pressure."""
+        return active | (pressure > 0)

@@ -1,0 +1,42 @@
+"""Projection on lines along averaged normals: the counterpart of `projection` in the plane."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.contact.surface import Surface
+from fastcontact.kernels import along2d
+from fastcontact.search import Closest
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+def along_line_normals(
+    points: Array, side: Surface, coordinates: Array, normals: Array, start: Closest
+) -> tuple[Indices, Array, Array]:
+    """Project points (n, 2) on a line along its interpolated normals; see `projection.along_normals`."""
+    n_facets = side.n_facets
+    corners, at_nodes = np.zeros((n_facets, 3, 2)), np.zeros((n_facets, 3, 2))
+    counts, ends = np.empty(n_facets, np.intp), np.empty((n_facets, 2), np.intp)
+    first = 0
+    for block in side.blocks:
+        rows, k = slice(first, first + len(block.facets)), block.facets.shape[1]
+        corners[rows, :k], at_nodes[rows, :k] = coordinates[block.facets], normals[block.local]
+        counts[rows], ends[rows] = k, block.local[:, :2]
+        first = rows.stop
+    facet, xi, overhang = start.facet.astype(np.intp), start.xi[:, 0].copy(), start.overhang.copy()
+    work = np.empty(3), np.empty(3)
+    neighbour = _neighbours(ends, len(side.points))
+    along2d.along_normals(
+        np.ascontiguousarray(points), corners, at_nodes, counts, neighbour, facet, xi, overhang, *work
+    )
+    return facet, xi[:, None], overhang
+
+
+def _neighbours(ends: Indices, n_points: int) -> Indices:
+    """Return the facets (n_facets, 2) beyond both ends; facets are oriented alike, so ends meet beginnings."""
+    begins, finishes = np.full(n_points, -1, np.intp), np.full(n_points, -1, np.intp)
+    begins[ends[:, 0]] = finishes[ends[:, 1]] = np.arange(len(ends))
+    return np.column_stack([finishes[ends[:, 0]], begins[ends[:, 1]]])

@@ -1,0 +1,80 @@
+"""Tied contact: no opening and no slip, as linear equations that hold from the beginning.
+
+The sides are paired once, as they lie before any load; the relative displacement of what faces each other there stays
+zero in every direction. What the equations are tested with are the formulation's own multipliers: one set of equations
+a node where forces are nodal; moments with the functions of the multiplier field where they act at integration points,
+which is the mortar method (Bernardi, Maday and Patera, 1994), so that complementarity parameters play no part.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array, eye_array, vstack
+
+from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.formulations._projection import Projection
+
+Array = NDArray[np.float64]
+# Entries of a row below this fraction of the largest are rounding errors of a projection that ends at a node.
+ZERO = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Tie:
+    """The equations of a tied pair.
+
+    Attributes
+    ----------
+    moments : csr_array (q, m)
+        From the gaps at the m places of the formulation to the q gaps that vanish.
+    rows : tuple of csr_array (q, n_dofs)
+        Relative displacement along the normal and each tangent.
+    directions : tuple of ndarray (m, dim)
+        The tangents.
+    positions : ndarray (q, dim)
+        Where the equations hold, about, on the reference surface [length].
+    """
+
+    moments: csr_array
+    rows: tuple[csr_array, ...]
+    directions: tuple[Array, ...]
+    positions: Array
+
+    def constraints(self) -> Constraints:
+        """Return the equations."""
+        B = csr_array(vstack(self.rows, format="csr"))
+        positions = np.tile(self.positions, (len(self.rows), 1))
+        return Constraints(B, np.zeros(B.shape[0]), positions, held=np.ones(B.shape[0], bool))
+
+    def forces(self, multiplier: Array) -> tuple[Array, Array]:
+        """Return normal (m,) and tangential (m, k) forces at the places of the formulation."""
+        parts = [self.moments.T @ part for part in multiplier.reshape(len(self.rows), -1)]
+        return parts[0], np.column_stack(parts[1:])
+
+
+def tie(part: Constraints) -> Tie:
+    """Return the equations that tie what the constraints `part`, with tangents, pair."""
+    moments = _moments(part)
+    size = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), 1e-300)
+    positions = abs(moments) @ part.positions / size[:, None]
+    rows = tuple(_cleaned(csr_array(moments @ along)) for along in (part.B, *part.tangents))
+    return Tie(moments, rows, part.directions, positions)
+
+
+def _moments(part: Constraints) -> csr_array:
+    """Return the matrix (q, m) whose rows are the functions that the multipliers are combinations of."""
+    if not isinstance(part.compliance, Projection):
+        return csr_array(eye_array(len(part.gap0), format="csr"))
+    P, areas = part.compliance.P, part.compliance.areas
+    weighted = csr_array(P.T @ diags_array(areas))
+    scale = np.asarray(abs(weighted).sum(axis=1)).ravel()
+    return csr_array(diags_array(1.0 / np.maximum(scale, 1e-300)) @ weighted)
+
+
+def _cleaned(rows: csr_array) -> csr_array:
+    rows.data[np.abs(rows.data) < ZERO * np.abs(rows.data).max(initial=0.0)] = 0.0
+    rows.eliminate_zeros()
+    return rows

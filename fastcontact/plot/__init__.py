@@ -1,0 +1,13 @@
+"""Pictures: pressure against theory, the deformed shape with its stresses, history over the load.
+
+Every function takes an optional ``ax`` and returns the axes it drew on; save with ``ax.figure.savefig``.
+"""
+
+from __future__ import annotations
+
+from fastcontact.plot._axes import UNITS
+from fastcontact.plot.history import history
+from fastcontact.plot.profile import pressure_profile
+from fastcontact.plot.shape import deformed_shape
+
+__all__ = ["UNITS", "deformed_shape", "history", "pressure_profile"]

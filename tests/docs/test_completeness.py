@@ -1,0 +1,75 @@
+"""The documentation names everything that there is, and nothing that there is not."""
+
+import inspect
+import re
+
+import pages
+import pytest
+
+import fastcontact as fc
+from fastcontact import analytic, case, convergence, generate, linear, obstacles, pair_terms, plot
+from fastcontact.cli._main import parser
+from fastcontact.contact.formulations import FORMULATIONS
+
+PATH = re.compile(r"`((?:fastcontact|tests|bench|data|docs)/[\w./-]+)`")
+MADE = ("docs/_build",)
+
+
+def text(*names):
+    return "\n".join((pages.DOCS / name).read_text(encoding="utf-8") for name in names)
+
+
+def quoted(name, where):
+    """Whether a name stands in back or double quotes, or as a word of code."""
+    return re.search(rf"[`\"\[.( ]{re.escape(name)}[`\"\]=(,: ]", where) is not None
+
+
+@pytest.mark.parametrize("page", pages.pages(), ids=lambda page: str(page.relative_to(pages.ROOT)))
+def test_files_that_a_page_names_are_there(page):
+    for path in PATH.findall(page.read_text(encoding="utf-8")):
+        assert "NAME" in path or path in MADE or (pages.ROOT / path).exists(), path
+
+
+def test_every_public_name_is_in_the_reference():
+    reference = "\n".join(path.read_text(encoding="utf-8") for path in (pages.DOCS / "reference").glob("*.md"))
+    errors = {name for name, value in vars(fc.errors).items() if inspect.isclass(value)}
+    for name in set(fc.__all__) - errors - set(convergence.__all__):
+        assert re.search(rf"auto(class|function|module):: (fastcontact\.)?{name}$", reference, re.MULTILINE), name
+    for module in (analytic, convergence, generate, obstacles, plot, fc.errors):
+        assert f"automodule:: {module.__name__}\n" in reference
+
+
+def test_every_command_is_listed():
+    commands = next(action.choices for action in parser()._actions if action.dest == "command")
+    for name in commands:
+        assert f"| `{name}" in text("reference/commands.md"), name
+
+
+def test_every_key_of_case_files_is_listed():
+    page = text("reference/case-files.md")
+    for key in {**case._TOP, **case._STUDY}:
+        assert re.search(rf"[`\[]{key}[`\].]", page), key
+
+
+def test_every_option_of_contact_pairs_is_listed():
+    page = text("howto/contact-options.md")
+    for option in (*pair_terms.TERMS, "formulation", "friction", "normals", "projection_tolerance"):
+        assert f"| `{option}` |" in page, option
+
+
+def test_every_formulation_solver_shape_and_theory_is_named():
+    for name in FORMULATIONS:
+        assert f"`{name}`" in text("howto/formulation.md"), name
+    for name in linear.KNOWN:
+        assert f'(`"{name}"`)' in text("theory/linear-algebra.md"), name
+    for name in obstacles.SHAPES:
+        assert f"| `{name}`" in text("howto/rigid-indenter.md"), name
+    for name in analytic.THEORIES:
+        assert f"`{name}`" in text("theory/analytic.md"), name
+
+
+def test_every_method_that_builds_a_model_is_named_in_a_how_to_page():
+    how_to = "\n".join(path.read_text(encoding="utf-8") for path in (pages.DOCS / "howto").glob("*.md"))
+    for name, method in vars(fc.Model).items():
+        if inspect.isfunction(method) and (name.startswith("add_") or name in ("fix", "prescribe", "couple", "relate")):
+            assert quoted(name, how_to), name

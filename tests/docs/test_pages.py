@@ -1,0 +1,64 @@
+"""Every code block of the README and the documentation runs, and every picture shown is one that its page made."""
+
+import re
+import warnings
+
+import pages
+import pytest
+
+PAGES = pages.pages()
+LINK = re.compile(r"\]\((?P<target>[^)#\s]+)(#[^)\s]*)?\)")
+
+
+def name(page):
+    return str(page.relative_to(pages.ROOT))
+
+
+@pytest.mark.filterwarnings("default::pytest.PytestWarning")
+@pytest.mark.parametrize("page", [page for page in PAGES if any(map(pages.runnable, pages.blocks(page)))], ids=name)
+def test_all_blocks_of_a_page_run(page, tmp_path):
+    for block in pages.run_page(page, tmp_path):
+        text = f"{name(page)}:{block.line} was not run: it needs {', '.join(block.missing)}"
+        warnings.warn(pytest.PytestWarning(text), stacklevel=1)
+    for picture in pages.pictures(page):
+        assert picture.is_file(), f"{name(page)} shows {picture.name}, which is not there"
+        if page.parts[-2:] != (pages.ROOT.name, "README.md"):
+            assert (tmp_path / picture.name).is_file(), f"no command of {name(page)} made {picture.name}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_links_between_pages_lead_somewhere(page):
+    for match in LINK.finditer(page.read_text(encoding="utf-8")):
+        target = match["target"]
+        if "://" not in target:
+            assert (page.parent / target).exists(), f"{name(page)} links to {target}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_a_block_that_needs_something_is_told_so_in_the_text(page):
+    """The comment that keeps a block from running is invisible: the sentences around it must say the same."""
+    text = page.read_text(encoding="utf-8").casefold()
+    for block in pages.blocks(page):
+        for word in block.needs:
+            assert text.count(word.casefold()) > text.count(f"needs: {word}".casefold()), f"{name(page)}: {word}"
+
+
+def test_blocks_are_found_with_their_files_and_needs(tmp_path):
+    """The finder itself."""
+    page = tmp_path / "page.md"
+    page.write_text(
+        "<!-- needs: network -->\n<!-- remark -->\n```sh\nmake\n```\n\n```python\nx = 1\n```\n"
+        "1. nested\n\n   ```text\n   out\n   ```\n\n```{code-block} toml\n:caption: case.toml\n\na = 1\n```\n"
+        "<!-- needs: no-such-program -->\nwords end what is needed\n```sh\nfastcontact a \\\n  b\nfastcontact c\n```\n"
+    )
+    found = pages.blocks(page)
+    assert [(b.language, b.needs, b.file) for b in found] == [
+        ("sh", ("network",), ""), ("python", (), ""), ("text", (), ""), ("toml", (), "case.toml"), ("sh", (), ""),
+    ]  # fmt: skip
+    assert found[0].missing == ["network"]
+    assert found[3].text == "a = 1\n"
+    assert [command.split() for command in pages.commands(found[4])] == [
+        ["fastcontact", "a", "b"],
+        ["fastcontact", "c"],
+    ]
+    assert [pages.runnable(block) for block in found] == [True, True, False, True, True]

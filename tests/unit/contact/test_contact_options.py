@@ -1,0 +1,124 @@
+"""Options of contact pairs: from Python and from case files alike, and what is said when they are wrong."""
+
+import copy
+import tomllib
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.case import build_case, read_case
+from fastcontact.summary import lines, summarise
+
+CASE = """
+kinematics = "plane_strain"
+[mesh]
+generator = "block-on-block"
+element = "quad4"
+divisions_lower = [3, 2]
+divisions_upper = [3, 2]
+[[material]]
+E = 1000.0
+nu = 0.3
+[[support]]
+group = "LOWER_LEFT"
+x = 0.0
+[[support]]
+group = "UPPER_LEFT"
+x = 0.0
+[[support]]
+group = "LOWER_BOTTOM"
+y = 0.0
+[[support]]
+group = "UPPER_TOP"
+y = -0.02
+[ramp]
+steps = 2
+[contact.pair]
+secondary = "CONT_UPPER"
+primary = "CONT_LOWER"
+"""
+
+
+def case_with(options):
+    return build_case(tomllib.loads(CASE + options), name="case", text=CASE + options)
+
+
+def solved(case):
+    return fc.solve(case.model, case.ramp)[-1]
+
+
+@pytest.mark.parametrize(("text", "options"), [
+    ("clearance = 0.005", {"clearance": 0.005}),
+    ("clearance = -0.01\\nclearance_ramp = [[0, 0], [1, 1]]", {"clearance": -0.01, "clearance_ramp": fc.linear_ramp(2)}),
+    ("clearance_primary = 1e-3", {"clearance_primary": 1e-3}),
+    ('excluded = "UPPER_LEFT"\\nnormals = "averaged"', {"excluded": ["UPPER_LEFT"], "normals": "averaged"}),
+    ('friction = 0.2\\nfrictionless = ["UPPER_LEFT"]', {"friction": 0.2, "frictionless": "UPPER_LEFT"}),
+    ('kind = "tied"', {"kind": "tied"}),
+    ('kind = "bilateral"\\nformulation = "mortar"', {"kind": "bilateral", "formulation": "mortar"}),
+    ("penalty = 1e5", {"penalty": 1e5}),
+])  # fmt: skip
+def test_case_files_take_what_python_takes(text, options):
+    case = case_with(text.replace("\\n", "\n"))
+    model = copy.copy(case.model)
+    model.contact = []
+    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
+    one, other = solved(case), fc.solve(model, case.ramp)[-1]
+    assert np.array_equal(one.displacement, other.displacement)
+    assert one.contact["pair"].formulation == options.get("formulation", "node_to_segment")
+
+
+def test_an_obstacle_takes_them_from_a_case_file():
+    text = CASE.split("[contact.pair]")[0] + (
+        '[obstacle.plate]\nsecondary = "LOWER_BOTTOM"\nclearance = 0.003\npenalty = 1e5\nkind = "bilateral"\n'
+        'shape = { kind = "half_space", point = [0.0, -6.0], normal = [0.0, 1.0] }\n'
+    )
+    pair = build_case(tomllib.loads(text), name="case").model.contact[0]
+    assert pair.options == {"clearance": 0.003, "penalty": 1e5, "kind": "bilateral"}
+
+
+@pytest.mark.parametrize(("options", "words"), [
+    ("clearence = 0.1", "'clearence'.*'clearance'"),
+    ('clearance = "0.1 * x"', "the clearance of contact 'pair' is '0.1 \\* x', which is not a finite number"),
+    ("clearance = [1.0]", "the clearance of contact 'pair' is \\[1.0\\], which is not a finite number"),
+    ("clearance = nan", "the clearance of contact 'pair' is nan"),
+    ("clearance_ramp = [[0, 0], [1, 1]]", "has a clearance_ramp, but no clearance"),
+    ("clearance = 0.1\nclearance_ramp = [[1, 0], [1, 1]]", "clearance_ramp of contact 'pair'.* ascending"),
+    ('excluded = "NOWHERE"', "NOWHERE"),
+    ('excluded = "LOWER_BOTTOM"', "has no nodes on the secondary side 'CONT_UPPER'"),
+    ("penalty = 0", "penalty = 0 of contact 'pair' must be positive"),
+    ('penalty = "stiff"', "the penalty of contact 'pair' is 'stiff'"),
+    ('kind = "glue"', "kind of contact 'pair' 'glue'.*bilateral.*tied"),
+])  # fmt: skip
+def test_wrong_options_are_named(options, words):
+    with pytest.raises(fc.FastcontactError, match=words):
+        case_with(options)
+
+
+def test_a_ramp_must_cover_the_analysis():
+    case = case_with("clearance = 0.1\nclearance_ramp = [[0, 0], [0.5, 1]]")
+    with pytest.raises(fc.ModelError, match="clearance of contact 'pair' covers 0 to 0.5, but .* instant 1"):
+        fc.solve(case.model, case.ramp)
+
+
+def test_a_clearance_that_fails_is_named():
+    case = case_with("")
+    case.model.contact.clear()
+    case.model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", clearance=lambda x: x[:3, 0])
+    with pytest.raises(fc.ModelError, match="clearance of contact 'pair' is a function that returned"):
+        solved(case)
+
+
+def test_the_summary_tells_the_penetration(tmp_path):
+    path = tmp_path / "soft.toml"
+    path.write_text(CASE + "penalty = 1e5\n")
+    case = read_case(path)
+    steps = fc.solve(case.model, case.ramp)
+    summary = summarise(case, steps, {}, [])
+    pressure = 0.02 / (10 * 0.91e-3 + 1e-5)
+    assert summary["contact"]["pair"]["penetration"] == pytest.approx(pressure / 1e5, rel=1e-8)
+    assert summary["contact"]["pair"]["penalty"] == 1e5
+    assert any(f"penetrates by up to {pressure / 1e5:.4g}" in line for line in lines(summary))
+    stiff = summarise(case_with(""), fc.solve(case_with("").model, case.ramp), {}, [])
+    assert stiff["contact"]["pair"]["penetration"] < 1e-15
+    assert stiff["contact"]["pair"]["penalty"] is None

@@ -1,0 +1,149 @@
+"""Checks of case files: what may be compared with what, and what comes out."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.case import described
+from fastcontact.checks import Check, evaluated, measured, read_check
+from fastcontact.errors import CaseError
+from fastcontact.results import ContactResult, StepResult
+
+HERTZ = fc.analytic.hertz_point(E1=1000.0, nu1=0.3, R1=10.0, force=4.0)
+SLIP = fc.analytic.cattaneo_mindlin_line(
+    E1=1e3, nu1=0.3, R1=9.0, E2=1e3, nu2=0.3, R2=9.0, force=2.0, friction=0.5, tangential_force=0.5
+)
+THEORIES = {"hertz": {"theory": HERTZ, "share": 0.25}, "slip": {"theory": SLIP, "share": 1.0}}
+PROBES = {"pole": 0, "far": 3}
+PAIRS = {"hertz": {}, "slip": {}}
+
+
+def step():
+    """Four points on the secondary side: two stick, one slips, one is open."""
+    m = 4
+    contact = ContactResult(
+        name="hertz", formulation="continuous", points=np.arange(m), coordinates=np.outer(np.arange(m), [1.0, 0.0]),
+        abscissa=np.arange(m, dtype=float), gap=np.zeros(m), pressure=np.array([5.0, 4.0, 2.0, 0.0]),
+        multiplier=np.zeros(m), force_vectors=np.zeros((m, 2)), normal=np.zeros((m, 2)),
+        active=np.array([True, True, True, False]), force=np.array([0.0, 1.1]), radius=(2.0, 3.0),
+        shear=np.array([[0.3, 0.4], [0, 0], [0, 0], [0, 0]]), sticking=np.array([True, True, False, False]),
+    )  # fmt: skip
+    stress = np.tile([-1.0, -2.0, -3.0, 0.5], (m + 1, 1))
+    displacement = np.tile([0.1, -0.2], (m + 1, 1))
+    return StepResult(
+        1,
+        1.0,
+        displacement,
+        stress,
+        np.full(m + 1, 7.0),
+        np.full(m + 1, -7.0),
+        np.zeros((m + 1, 2)),
+        {"hertz": contact},
+    )
+
+
+def check(**entry):
+    return read_check("check[0]", {"tolerance": 0.1, **entry}, {**PROBES, "inside": 4}, PAIRS, THEORIES)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "value", "unit"),
+    [
+        ("pole.pressure", 5.0, "pressure"),
+        ("pole.shear", 0.5, "pressure"),
+        ("far.von_mises", 7.0, "pressure"),
+        ("far.stress.yy", -2.0, "pressure"),
+        ("far.displacement.y", -0.2, "length"),
+        ("hertz.force", 1.1, "force"),
+        ("hertz.pressure_max", 5.0, "pressure"),
+        ("hertz.radius", 2.5, "length"),
+        ("hertz.stick_radius", 1.5, "length"),
+    ],
+)
+def test_every_quantity_is_measured_in_its_unit(quantity, value, unit):
+    found = check(quantity=quantity, value=1.0)
+    assert measured(found, step(), PROBES) == pytest.approx(value, rel=1e-15)
+    assert found.unit == unit
+
+
+def test_targets_come_from_the_theory_or_are_documented():
+    assert check(quantity="pole.pressure", theory="hertz").target(HERTZ) == HERTZ.pressure_max
+    assert check(quantity="pole.stress.yy", theory="hertz").target(HERTZ) == -HERTZ.pressure_max
+    assert check(quantity="hertz.radius", theory="hertz").target(HERTZ) == HERTZ.radius
+    assert check(quantity="hertz.stick_radius", theory="slip").target(SLIP) == SLIP.stick_radius
+    assert (
+        check(quantity="pole.shear", theory="slip", of="normal.pressure_max").target(SLIP) == SLIP.normal.pressure_max
+    )
+    assert check(quantity="pole.pressure", value=3.0).target(None) == 3.0
+
+
+def test_the_force_of_a_quarter_counts_four_times():
+    found = evaluated(check(quantity="hertz.force", theory="hertz"), step(), PROBES, THEORIES)
+    assert found["value"] == pytest.approx(4.4)
+    assert found["target"] == 4.0
+    assert found["deviation"] == pytest.approx(0.1)
+    assert check(quantity="hertz.force", theory="hertz", factor=2.0).factor == 2.0
+    assert check(quantity="hertz.radius", theory="hertz").factor == 1.0
+
+
+def test_a_check_passes_within_its_tolerance_only():
+    for tolerance, passed in ((0.11, True), (0.09, False)):
+        entry = {"quantity": "hertz.force", "theory": "hertz", "tolerance": tolerance}
+        assert evaluated(check(**entry), step(), PROBES, THEORIES)["passed"] is passed
+    inside = check(quantity="inside.pressure", value=1.0)  # a point that is in no contact
+    result = evaluated(inside, step(), {**PROBES, "inside": 4}, THEORIES)
+    assert np.isnan(result["value"])
+    assert result["passed"] is False
+
+
+def test_the_distance_to_the_mesh_converged_solution_is_told():
+    better = fc.analytic.hertz_point(E1=1000.0, nu1=0.3, R1=10.0, force=4.2)
+    theories = {"hertz": {**THEORIES["hertz"], "mesh_converged": better}}
+    found = evaluated(check(quantity="hertz.force", theory="hertz"), step(), PROBES, theories)
+    assert found["distance_to_mesh_converged"] == pytest.approx(4.4 / 4.2 - 1)
+    assert found["mesh_converged_deviation"] == pytest.approx(0.05)
+
+
+def test_it_says_what_is_compared():
+    assert check(quantity="pole.pressure", theory="hertz").described() == (
+        "pole.pressure against the theory's pressure_max within 0.1"
+    )
+    found = Check("c", "pole.pressure", 0.1, value=2.5, source="a book")
+    assert found.described() == "pole.pressure against 2.5 (a book) within 0.1"
+
+
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        ({}, r"check\[0\] needs 'quantity'"),
+        ({"quantity": "pole.pressure"}, "either 'theory'.* or 'value'"),
+        ({"quantity": "pole.pressure", "value": 1.0, "theory": "hertz"}, "either 'theory'.* or 'value'"),
+        ({"quantity": "poll.pressure", "value": 1.0}, "'poll': did you mean 'pole'"),
+        ({"quantity": "pole.presure", "value": 1.0}, "did you mean 'pressure'"),
+        ({"quantity": "hertz.stickradius", "value": 1.0}, "did you mean 'stick_radius'"),
+        ({"quantity": "pole.pressure", "theory": "hert"}, "did you mean 'hertz'"),
+        ({"quantity": "pole.pressure", "theory": "hertz", "of": "pressure_mx"}, "did you mean 'pressure_max'"),
+        ({"quantity": "pole.pressure", "theory": "hertz", "of": "pressure"}, r"number of the theory in check\[0\].of"),
+        ({"quantity": "pole.pressure", "theory": "slip"}, r"number of the theory in check\[0\].of 'pressure_max'"),
+    ],
+)
+def test_wrong_checks_are_named(entry, words):
+    with pytest.raises(CaseError, match=words):
+        check(**entry)
+
+
+def test_no_contact_has_no_stick_zone():
+    contact = step().contact["hertz"]
+    assert contact.stick_radius == (1.0, 2.0)
+    object.__setattr__(contact, "sticking", np.zeros(4, bool))
+    assert np.isnan(contact.stick_radius).all()
+
+
+def test_the_share_of_a_contact_lies_between_nothing_and_all_of_it():
+    theory = {"kind": "hertz_point", "E1": 1.0, "nu1": 0.3, "R1": 1.0, "force": 1.0}
+    for share in (0.0, 1.5):
+        with pytest.raises(CaseError, match=r"theory.a.share = .* 0.25 for a quarter"):
+            described({"contact": {"a": {}}, "theory": {"a": {**theory, "share": share}}})
+    with pytest.raises(CaseError, match="share"):
+        described({"contact": {"a": {}}, "theory": {"a": {**theory, "share": "half"}}})
+    assert described({"contact": {"a": {}}, "theory": {"a": {**theory, "share": 0.5}}})["theories"]["a"].force == 1.0

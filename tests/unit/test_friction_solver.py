@@ -1,0 +1,120 @@
+"""Friction on a compliance that couples forces in turning frames, and what supports leave undetermined."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array, diags_array
+from scipy.sparse.linalg import splu
+
+import fastcontact as fc
+from fastcontact import coulomb, friction
+from fastcontact.contact.formulations._held_nodes import compliant
+from fastcontact.contact.formulations._projection import Projection
+from fastcontact.contact.pairing import normals, tangents
+
+
+def unit_vectors(rng, n, dim):
+    found = rng.normal(size=(n, dim))
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_tangents_complete_normals(dim):
+    normal = unit_vectors(np.random.default_rng(0), 20, dim)
+    np.testing.assert_allclose(normals(tangents(normal)), normal, atol=1e-15)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_compliance_of_components_is_that_of_the_vectors(dim):
+    rng = np.random.default_rng(dim)
+    m = 6
+    A = rng.normal(size=(m, m))
+    C, normal = A @ A.T, unit_vectors(rng, m, dim)
+    along = np.stack(tangents(normal))
+    components = rng.normal(size=(dim, m))
+    vectors = components[0][:, None] * normal + np.einsum("km,kmd->md", components[1:], along)
+    given = C @ vectors  # (m, dim)
+    wanted = np.concatenate([[np.einsum("md,md->m", given, normal)], np.einsum("md,kmd->km", given, along)])
+    found = friction._turned(C, along) @ components.ravel()
+    np.testing.assert_allclose(found, wanted.ravel(), atol=1e-12)
+
+
+def test_constraints_without_friction_keep_their_own_compliance():
+    C = np.array([[2.0, 1.0], [1.0, 3.0]])
+    found = friction._turned(C, np.zeros((1, 2, 2)))
+    np.testing.assert_array_equal(found[:2, :2], C)
+    assert not found[2:].any()
+
+
+def test_dropping_a_column_of_the_field_adds_what_it_represented():
+    rng = np.random.default_rng(4)
+    P, areas, rho = np.abs(rng.normal(size=(9, 4))), rng.uniform(0.5, 1.5, 9), 3.0
+
+    def projection(columns):
+        part = csr_array(P[:, columns])
+        return Projection(part, areas, rho, splu((part.T @ diags_array(areas) @ part).tocsc()))
+
+    everything = np.arange(9)
+    Z = compliant(projection([0, 1, 2, 3]), np.array([1, 3]))
+    wanted = projection([0, 2]).block(everything) - projection([0, 1, 2, 3]).block(everything)
+    np.testing.assert_allclose(Z @ Z.T, wanted, atol=1e-13)
+
+
+def test_what_does_not_settle_is_told_with_its_numbers(monkeypatch):
+    monkeypatch.setattr(coulomb, "PATIENCE", 0)
+    monkeypatch.setattr(coulomb, "SWEPT", ())
+    monkeypatch.setattr(coulomb, "LARGEST", 0)
+    mesh = fc.generate.block_on_block(divisions_lower=(6, 2), divisions_upper=(3, 3))
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("LOWER_BOTTOM", "xy")
+    model.prescribe("UPPER_TOP", x=1e-3, y=-1e-4)
+    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.3)
+    with pytest.raises(
+        fc.ConvergenceError, match=r"contact with friction did not settle .* of the largest force off.*0\.3"
+    ):
+        fc.solve(model, fc.linear_ramp(1))
+
+
+def spheres(friction=0.0):
+    model = fc.Model(fc.generate.half_spheres("tri3", size=8.0), "axisymmetric")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model.fix("A1A2", "x")
+    model.prescribe("A2B2", y=-2.0)
+    model.prescribe("A1B1", y=2.0)
+    model.add_contact("pair", secondary="CONT1", primary="CONT2", formulation="node_to_segment", friction=friction)
+    return model
+
+
+def pressed(criteria, steps):
+    return fc.solve(spheres(), fc.linear_ramp(steps), criteria=criteria)
+
+
+def test_a_kept_pairing_forgets_the_steps_and_a_new_one_does_not():
+    kept = [pressed(fc.Criteria(keep_pairing=True), steps)[-1].displacement for steps in (1, 5)]
+    renewed = [pressed(fc.Criteria(geometry_updates=0), steps)[-1].displacement for steps in (1, 5)]
+    size = np.abs(kept[0]).max()
+    assert np.abs(kept[0] - kept[1]).max() < 1e-12 * size
+    assert np.abs(kept[0] - renewed[0]).max() < 1e-12 * size  # the first pairing is that of the undeformed bodies
+    assert np.abs(renewed[0] - renewed[1]).max() > 1e-6 * size
+
+
+def test_a_kept_pairing_serves_friction_through_steps():
+    model = spheres(friction=0.02)
+    (along,) = model.bind(model.contact[0]).constraints(np.zeros_like(model.mesh.points)).directions
+    normal, slid = normals([along]), 0
+    for step in fc.solve(model, fc.linear_ramp(5), criteria=fc.Criteria(keep_pairing=True)):
+        contact = step.contact["pair"]
+        assert step.iterations["geometry_updates"] == 0
+        n, t = (np.einsum("nd,nd->n", contact.force_vectors, frame) for frame in (normal, along))
+        size = 1e-12 * n.max()
+        assert n.min() >= -size
+        assert (np.abs(t) <= 0.02 * n + size).all()
+        sliding = contact.active & ~contact.sticking
+        np.testing.assert_allclose(np.abs(t[sliding]), 0.02 * n[sliding], rtol=1e-9)
+        slid += sliding.sum()
+    assert slid  # the frames of the undeformed bodies lean
+
+
+def test_keeping_a_pairing_and_renewing_it_exclude_each_other():
+    with pytest.raises(fc.ModelError, match="keep_pairing leaves no room for geometry_updates = 2"):
+        fc.Criteria(keep_pairing=True, geometry_updates=2)

@@ -1,0 +1,384 @@
+"""Multigrid against NumPy and SciPy: kernels, set-up, ties; bits, bytes and allocations."""
+
+import logging
+import tracemalloc
+
+import numba
+import numpy as np
+import pytest
+from scipy.sparse import bsr_array, csr_array, diags_array
+
+import fastcontact as fc
+from fastcontact.assembly import rigid_modes, stiffness
+from fastcontact.errors import ModelError
+from fastcontact.kernels import galerkin, krylov, multigrid
+from fastcontact.linear._coarse import Coarse
+from fastcontact.linear._elimination import eliminate
+from fastcontact.linear._hierarchy import Hierarchy, Matrix, chebyshev, largest_eigenvalue, product
+from fastcontact.linear._pcg import ConjugateGradients
+from fastcontact.linear._ties import Ties
+from fastcontact.linear.amg import Amg
+from fastcontact.system import with_supports
+
+
+def problem(divisions=(7, 6, 5)):
+    """Return stiffness, rigid modes and a load of a box held at one side."""
+    mesh = fc.generate.box((1.0, 1.1, 0.9), divisions)
+    moduli = np.asarray([fc.LinearElastic(E=1000.0, nu=0.3).moduli("3d")])
+    K = stiffness(mesh, "3d", moduli, {"hex8": np.zeros(len(mesh.cells["hex8"]), np.int64)})
+    fixed = np.repeat(mesh.points[:, 1] == 0, 3)
+    modes = np.where(fixed[:, None], 0.0, rigid_modes(mesh.points, "3d"))
+    f = np.where(fixed, 0.0, np.random.default_rng(0).normal(size=len(fixed)))
+    return with_supports(K, fixed), modes, f, fixed
+
+
+def matrix_of(K):
+    size = K.blocksize
+    return Matrix(K.indptr, K.indices, K.data.reshape(-1), (0,) * size[0], (0,) * size[1])
+
+
+def scipy_of(A):
+    m, n = len(A.rows), len(A.cols)
+    width = n * (int(A.indices.max(initial=-1)) + 1)
+    return bsr_array((A.data.reshape(-1, m, n), A.indices, A.indptr), shape=(m * (len(A.indptr) - 1), width))
+
+
+def random_blocks(m, n, rows=40, columns=30, dtype=float, seed=0):
+    rng = np.random.default_rng(seed)
+    pattern = csr_array((rng.random((rows, columns)) < 0.2).astype(float))
+    data = rng.normal(size=(len(pattern.indices), m, n)).astype(dtype)
+    indices, indptr = pattern.indices.astype(np.int32), pattern.indptr.astype(np.int32)
+    return bsr_array((data, indices, indptr), shape=(rows * m, columns * n)), rng
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize(("m", "n"), [(3, 3), (2, 2), (6, 6), (3, 6), (6, 3), (2, 3), (1, 1), (2, 1)])
+def test_products_are_those_of_scipy(m, n, dtype):
+    A, rng = random_blocks(m, n, dtype=dtype)
+    x, z = rng.normal(size=A.shape[1]).astype(dtype), rng.normal(size=A.shape[0]).astype(dtype)
+    y = np.full(A.shape[0], np.nan, dtype)
+    own = matrix_of(A)
+    own.multiply(x, y)
+    close = 50 * np.finfo(dtype).eps * np.abs(A @ x).max()
+    assert np.abs(y - A @ x).max() < close
+    own.combine(-1.0, x, 1.0, z, z)
+    assert np.abs(z + y).max() != 0.0
+    again = z + y
+    own.combine(1.0, x, 1.0, z, z)
+    assert np.abs(z - again).max() < close
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 6])
+def test_a_chebyshev_step_is_block_jacobi_with_memory(size):
+    rng = np.random.default_rng(1)
+    n = 1500
+    blocks = rng.normal(size=(n, size, size))
+    blocks = blocks @ blocks.transpose(0, 2, 1) + np.eye(size)
+    inverse = np.empty(blocks.size)
+    multigrid.invert_blocks(blocks.ravel(), size, inverse)
+    expected = np.linalg.inv(blocks)
+    assert np.abs(inverse.reshape(expected.shape) - expected).max() < 1e-10 * np.abs(expected).max()
+    r, d, x = (rng.normal(size=n * size) for _ in range(3))
+    step = np.einsum("nij,nj->ni", expected, r.reshape(n, size)).ravel()
+    d1, x1 = d.copy(), x.copy()
+    multigrid.relax(inverse, r, 0.3, 0.7, d1, x1, (0,) * size, False)
+    assert d1 == pytest.approx(0.3 * d + 0.7 * step, abs=1e-9)
+    assert x1 == pytest.approx(x + d1, abs=1e-9)
+    d2, x2 = np.full_like(d, np.nan), np.full_like(x, np.nan)
+    multigrid.relax(inverse, r, 0.0, 0.7, d2, x2, (0,) * size, True)
+    assert x2 == pytest.approx(0.7 * step, abs=1e-9)
+    assert np.array_equal(d2, x2)
+
+
+def test_blocks_are_inverted_past_unknowns_without_stiffness():
+    block = np.diag([2.0, 0.0, 4.0])
+    out = np.empty(9)
+    multigrid.invert_blocks(block.ravel(), 3, out)
+    assert out.reshape(3, 3) == pytest.approx(np.diag([0.5, 0.0, 0.25]))
+
+
+@pytest.mark.parametrize("n", [7, 1600])
+def test_the_coarsest_level_is_solved_and_idle_unknowns_stay_at_zero(n):
+    rng = np.random.default_rng(2)
+    off = rng.random(n - 1)
+    A = diags_array([3.0 + rng.random(n), off, off], offsets=[0, 1, -1]).tolil()
+    A[4, :] = 0.0
+    A[:, 4] = 0.0
+    A = A.tocsc()
+    b, x = rng.normal(size=n), np.empty(n)
+    b[4] = 0.0
+    coarse = Coarse(A)
+    coarse.solve(b, x)
+    assert np.abs(A @ x - b).max() < 1e-12
+    assert x[4] == 0.0
+    change = diags_array(np.r_[1.0, np.zeros(n - 1)]).tocsc()
+    coarse.set(change)
+    coarse.solve(b, x)
+    assert np.abs((A + change) @ x - b).max() < 1e-12
+    coarse.set(None)
+    coarse.solve(b, x)
+    assert np.abs(A @ x - b).max() < 1e-12
+
+
+def test_vector_kernels_are_those_of_numpy():
+    rng = np.random.default_rng(3)
+    for n in (5, 4096, 40_003):
+        p, q, x, r = rng.normal(size=(4, n))
+        sums = np.empty(-(-n // krylov.CHUNK))
+        assert krylov.dot(p, q, sums) == pytest.approx(p @ q, rel=1e-10, abs=1e-10 * n)
+        x1, r1, p1, single = x.copy(), r.copy(), p.copy(), np.empty(n, np.float32)
+        assert krylov.advance(0.3, p, q, x1, r1, sums) == pytest.approx((r - 0.3 * q) @ (r - 0.3 * q))
+        krylov.turn(0.2, q, p1)
+        krylov.scaled(2.0, p, single)
+        assert np.allclose(x1, x + 0.3 * p, rtol=0, atol=1e-14)
+        assert np.allclose(p1, q + 0.2 * p, rtol=0, atol=1e-14)
+        assert np.array_equal(single, (2.0 * p).astype(np.float32))
+
+
+def test_galerkin_products_and_prolongators_are_those_of_scipy():
+    K, modes, _, _ = problem((9, 8, 8))
+    hierarchy = Hierarchy(K, modes, "double")
+    assert len(hierarchy.levels) >= 2
+    top, below = hierarchy.levels[:2]
+    P = scipy_of(top.P)
+    expected = (P.T @ K @ P).toarray()
+    assert np.abs(scipy_of(below.A).toarray() - expected).max() < 1e-12 * np.abs(expected).max()
+    assert np.abs((scipy_of(top.R) - P.T).toarray()).max() == 0.0
+
+
+def test_rigid_motions_of_a_free_body_are_interpolated_without_error():
+    mesh = fc.generate.box((1.0, 1.1, 0.9), (8, 7, 7))
+    moduli = np.asarray([fc.LinearElastic(E=1000.0, nu=0.3).moduli("3d")])
+    K = stiffness(mesh, "3d", moduli, {"hex8": np.zeros(len(mesh.cells["hex8"]), np.int64)})
+    modes = rigid_modes(mesh.points, "3d")
+    P = scipy_of(Hierarchy(K, modes, "double").levels[0].P)
+    coarse = np.linalg.lstsq(P.toarray(), modes, rcond=None)[0]
+    assert np.abs(P @ coarse - modes).max() < 1e-10
+
+
+def test_a_galerkin_product_of_other_blocks():
+    A, _ = random_blocks(2, 2, 40, 40)
+    A = bsr_array((A + A.T).tobsr((2, 2)))
+    A.sort_indices()
+    P, _ = random_blocks(2, 3, 40, 12, seed=5)
+    own = matrix_of(P)
+    result = product(matrix_of(A), own, galerkin.transposed(own.indptr, own.indices, 12))
+    expected = (P.T @ A @ P).toarray()
+    assert np.abs(scipy_of(result).toarray() - expected).max() < 1e-12 * np.abs(expected).max()
+
+
+def test_the_spectrum_is_bounded_and_chebyshev_stays_small_on_its_upper_part():
+    K, modes, _, _ = problem()
+    level = Hierarchy(K, modes, "double").levels[0]
+    inverse = bsr_array((level.inverse.reshape(-1, 3, 3), np.arange(level.n // 3), np.arange(level.n // 3 + 1)))
+    exact = np.linalg.eigvals((inverse @ K).toarray()).real.max()
+    assert largest_eigenvalue(level) <= exact * (1 + 1e-10)
+    assert exact <= level.bound
+    for degree in (1, 2, 3):
+        values = np.linspace(level.bound / 24, level.bound, 50)
+        error, step = np.ones_like(values), np.zeros_like(values)
+        for first, second in chebyshev(level.bound, degree):
+            step = first * step + second * values * error
+            error = error - step
+        assert np.abs(error).max() < 1.0
+        assert np.abs(error).max() == pytest.approx(np.abs(error[-1]), rel=1e-6)
+
+
+def tied(B, n):
+    """Return T of an elimination as a matrix."""
+    elimination = eliminate(B, np.zeros(B.shape[0]))
+    keep = np.ones(n)
+    keep[elimination.pivots] = 0.0
+    spread = csr_array(
+        (np.ones(B.shape[0]), (elimination.pivots, np.arange(B.shape[0]))), shape=(n, B.shape[0])
+    )  # fmt: skip
+    return elimination, diags_array(keep).tocsr() + spread @ elimination.tie
+
+
+def contact_rows(fixed, count=6):
+    """Return rows that tie single unknowns to four others, like those of nodes facing quadrangles."""
+    rng = np.random.default_rng(4)
+    free = rng.permutation(np.flatnonzero(~fixed))
+    B = np.zeros((count, len(fixed)))
+    for row in range(count):
+        own, others = free[row], free[count + 3 * row : count + 3 * row + 4]
+        B[row, own], B[row, others] = 1.0, -rng.random(4) / 2
+    return csr_array(B)
+
+
+def test_ties_change_the_levels_to_those_of_the_eliminated_matrix_and_back():
+    K, modes, _, fixed = problem((9, 8, 8))
+    hierarchy = Hierarchy(K, modes, "double")
+    ties = Ties(hierarchy, matrix_of(K))
+    elimination, T = tied(contact_rows(fixed), len(fixed))
+    before = [level.inverse.copy() for level in hierarchy.levels]
+    bounds = [level.bound for level in hierarchy.levels]
+    ties.tie(elimination)
+    A, top = (T.T @ K @ T).tocsr(), hierarchy.levels[0]
+    blocks = np.stack([A[3 * i : 3 * i + 3, 3 * i : 3 * i + 3].toarray() for i in range(len(fixed) // 3)])
+    expected = np.linalg.pinv(blocks, rcond=1e-10, hermitian=True)
+    assert np.abs(top.inverse.reshape(-1, 3, 3) - expected).max() < 1e-9 * np.abs(expected).max()
+    keep = np.ones(len(fixed))
+    keep[elimination.pivots] = 0.0
+    W = diags_array(keep) @ scipy_of(top.P)
+    for level in hierarchy.levels[1:]:
+        A = W.T @ A @ W
+        x = np.random.default_rng(6).normal(size=level.n)
+        if level.P is None:
+            b, found = A @ x, np.empty(level.n)
+            hierarchy.coarse.solve(b, found)
+            assert np.abs(A @ found - b).max() < 1e-9 * np.abs(b).max()
+        else:
+            r = np.empty(level.n)
+            level.subtract_product(x, np.zeros(level.n), r)
+            assert np.abs(r + A @ x).max() < 1e-11 * np.abs(A @ x).max()
+            W = scipy_of(level.P)
+    ties.tie(None)
+    assert all(np.array_equal(level.inverse, old) for level, old in zip(hierarchy.levels, before, strict=True))
+    assert [level.bound for level in hierarchy.levels] == bounds
+
+
+@pytest.mark.parametrize("coupled", [False, True])
+def test_eliminated_equations_hold_for_any_unknowns(coupled):
+    rng = np.random.default_rng(7)
+    B = rng.normal(size=(5, 20)) * (rng.random((5, 20)) < 0.6)
+    if not coupled:
+        B[:, :5] = np.diag([2.0, -3.0, 4.0, 5.0, -6.0])
+    c, kept = rng.normal(size=5), csr_array(B)
+    elimination = eliminate(kept, c)
+    assert np.array_equal(kept.toarray(), B)  # untouched
+    u = rng.normal(size=20)
+    elimination.complete(u, elimination.t)
+    assert B @ u == pytest.approx(c, abs=1e-12)
+    multiplier = rng.normal(size=5)
+    assert elimination.multiplier((B.T @ multiplier)[elimination.pivots]) == pytest.approx(multiplier)
+    # Forces at the pivots are moved so that they do the same work.
+    force, motion = rng.normal(size=20), rng.normal(size=20)
+    elimination.complete(motion)
+    work = force @ motion
+    elimination.condense(force)
+    assert force @ motion == pytest.approx(work)
+    assert not force[elimination.pivots].any()
+    assert not np.isin(elimination.pivots, elimination.tie.indices).any()
+    if not coupled:
+        assert elimination.pivots.tolist() == [0, 1, 2, 3, 4]
+
+
+def test_many_coupled_equations_are_assigned_unknowns():
+    rng = np.random.default_rng(8)
+    B = csr_array((rng.random((450, 900)) < 0.01) * rng.normal(size=(450, 900)) + np.eye(450, 900, 3))
+    elimination = eliminate(B, np.ones(450))
+    u = rng.normal(size=900)
+    elimination.complete(u, elimination.t)
+    assert np.abs(B @ u - 1.0).max() < 1e-8 * np.abs(u).max()
+
+
+def prepared(precision="single", scale=1.0, divisions=(12, 11, 10)):
+    K, modes, f, fixed = problem(divisions)
+    solver = Amg(1e-10, precision)
+    solver.prepare(bsr_array((scale * K.data, K.indices, K.indptr), shape=K.shape), modes)
+    return solver, scale * f, fixed
+
+
+def test_bits_do_not_depend_on_the_number_of_threads():
+    found = []
+    before = numba.get_num_threads()
+    for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
+        numba.set_num_threads(threads)
+        solver, f, fixed = prepared()
+        u, multiplier = solver.load(f).solve(contact_rows(fixed), np.full(6, 1e-3))
+        found.append((u.tobytes(), multiplier.tobytes(), solver.counters.iterations))
+    numba.set_num_threads(before)
+    assert found[0] == found[1]
+
+
+def test_going_on_under_other_equations_is_starting_there():
+    solver, f, fixed = prepared()
+    loaded, K = solver.load(f), problem((12, 11, 10))[0]
+    first, second = contact_rows(fixed), contact_rows(fixed, 9)
+    u, _ = loaded.solve(first, np.full(6, 1e-3))
+    made = solver.counters.iterations
+    for B, c in ((second, np.full(9, 2e-3)), (second[:4], np.zeros(4)), (second[:0], np.zeros(0))):
+        u, multiplier = loaded.solve(B, c, guess=u)
+        residual = K @ u - f - B.T @ multiplier
+        assert np.abs(residual).max() < 1e-8 * np.abs(f).max()
+        assert np.abs(B @ u - c).max(initial=0.0) < 1e-12
+    again, _ = solver.load(f).solve(second[:0], np.zeros(0), guess=u)
+    assert np.abs(again - u).max() < 1e-8 * np.abs(u).max()
+    assert solver.counters.iterations > made
+
+
+def test_units_do_not_change_the_iterations():
+    counts, solutions = [], []
+    for scale in (1.0, 1e-25, 1e30):
+        solver, f, _ = prepared(scale=scale)
+        solutions.append(solver.load(f).displacement(np.zeros(len(f))))
+        counts.append(solver.counters.iterations)
+    assert counts[0] == counts[1] == counts[2]
+    assert solutions[1] == pytest.approx(solutions[0], rel=1e-6, abs=1e-9 * np.abs(solutions[0]).max())
+
+
+def test_both_precisions_agree_and_single_takes_half_the_memory():
+    (single, f, _), (double, _, _) = prepared(), prepared("double")
+    zero = np.zeros(len(f))
+    u, v = single.load(f).displacement(zero), double.load(f).displacement(zero)
+    assert np.abs(u - v).max() < 1e-8 * np.abs(v).max()
+    assert abs(single.counters.iterations - double.counters.iterations) <= 1
+    assert single.hierarchy.nbytes < 0.62 * double.hierarchy.nbytes
+    assert "single precision" in repr(single)
+    assert "levels, unknowns 5148 -> " in repr(single)
+    assert "operator complexity 1." in repr(single)
+    assert "MB" in repr(single)
+    with pytest.raises(ModelError, match="'single' or 'double', not 'half'"):
+        Amg(precision="half")
+
+
+def test_the_loop_allocates_nothing_that_grows_with_the_problem():
+    solver, f, fixed = prepared()
+    elimination = eliminate(contact_rows(fixed), np.full(6, 1e-3))
+    solver.solution(f, elimination, None)  # compiles
+    solver._begin(f, elimination)
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+    tracemalloc.reset_peak()
+    for _ in range(5):
+        assert solver._cg.step(solver._multiply, solver._precondition)
+    peak = tracemalloc.get_traced_memory()[1] - before
+    tracemalloc.stop()
+    assert peak < len(f)  # bytes: less than an eighth of one vector
+
+
+def test_memory_is_what_the_levels_hold():
+    solver, f, _ = prepared()
+    top = solver.hierarchy.levels[0]
+    blocks = len(top.A.indices)
+    assert top.A.nbytes == 4 * (9 * blocks + blocks + len(f) // 3 + 1)
+    assert solver.hierarchy.nbytes < 3.0 * top.A.nbytes  # small problems pay relatively more for prolongators
+    assert solver.nbytes == pytest.approx(solver.hierarchy.nbytes + 5 * 8 * len(f), rel=1e-3)
+
+
+def test_a_bound_that_is_too_low_is_noticed_and_raised(caplog):
+    solver, f, _ = prepared()
+    for level in solver.hierarchy.levels:
+        level.bound *= 0.3
+    solver.hierarchy._free_bounds = [level.bound for level in solver.hierarchy.levels]
+    solver.hierarchy.set_bounds()
+    with caplog.at_level(logging.INFO, logger="fastcontact"):
+        u = solver.load(f).displacement(np.zeros(len(f)))
+    K = problem((12, 11, 10))[0]
+    assert np.abs(K @ u - f).max() < 1e-8 * np.abs(f).max()
+
+
+def test_conjugate_gradients_finish_on_a_small_matrix():
+    rng = np.random.default_rng(9)
+    half = rng.normal(size=(8, 8))
+    A = half @ half.T + np.eye(8)
+    b = rng.normal(size=8)
+    cg = ConjugateGradients(8)
+    cg.r[:] = b
+    cg.start()
+    diagonal = np.diag(A)
+    for _ in range(8):
+        assert cg.step(lambda p, q: np.matmul(A, p, out=q), lambda r, norm, z: np.divide(r, diagonal, out=z))
+    assert A @ cg.x == pytest.approx(b, abs=1e-8)
+    assert cg.norm < 1e-8

@@ -1,0 +1,101 @@
+"""Pictures: what is drawn of a solid, and where; looked at through the artists and through the pixels."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.generate import block, box, union
+from fastcontact.results import StepResult
+
+pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+
+
+def step_of(mesh, von_mises, displacement=None):
+    n, dim = mesh.points.shape
+    u = np.zeros((n, dim)) if displacement is None else displacement
+    stress = np.zeros((n, 4 if dim == 2 else 6))
+    return StepResult(1, 1.0, u, stress, von_mises, von_mises, np.zeros((n, dim)))
+
+
+@pytest.fixture
+def polygons(monkeypatch):
+    """The polygons that were given to matplotlib in this test."""
+    from mpl_toolkits.mplot3d import art3d
+
+    given = []
+
+    class Recorded(art3d.Poly3DCollection):
+        def __init__(self, verts, **options):
+            given.extend(np.asarray(polygon) for polygon in verts)
+            super().__init__(verts, **options)
+
+    monkeypatch.setattr(art3d, "Poly3DCollection", Recorded)
+    return given
+
+
+@pytest.mark.parametrize("element", ["hex8", "hex20", "tet4", "tet10", "wedge6", "pyramid5"])
+def test_the_three_sides_of_a_box_that_face_the_eye_are_drawn(element, polygons):
+    mesh = box((1.0, 2.0, 3.0), (2, 2, 2), element)
+    ax = fc.plot.deformed_shape(mesh, step_of(mesh, mesh.points[:, 2]), edges=False)
+    assert ax.name == "3d"
+    points = np.concatenate(polygons)
+    # The eye stands at x > 0, y < 0, z > 0: the sides there, and no others.
+    on = [np.isclose(points[:, 0], 1.0), np.isclose(points[:, 1], 0.0), np.isclose(points[:, 2], 3.0)]
+    assert np.any(on, axis=0).all()
+    area = sum(np.linalg.norm(np.cross(b - a, c - a)) / 2 for a, b, c in polygons)
+    assert area == pytest.approx(1 * 2 + 1 * 3 + 2 * 3)
+    assert ax.get_xlim() == pytest.approx((0.0, 1.0), abs=0.1)
+    assert ax.get_zlim() == pytest.approx((0.0, 3.0), abs=0.2)
+    assert ax.get_zlabel() == "z [mm]"
+
+
+def test_the_deformation_is_drawn_and_the_maximum_is_marked():
+    mesh = box((1.0, 1.0, 1.0), (2, 2, 2), "hex8")
+    values = np.linalg.norm(mesh.points, axis=1)
+    ax = fc.plot.deformed_shape(mesh, step_of(mesh, values, 0.1 * mesh.points), scale=5.0)
+    (mark,) = ax.lines
+    assert [float(v[0]) for v in mark.get_data_3d()] == pytest.approx([1.5, 1.5, 1.5])
+    assert mark.get_label() == "maximum 1.7 at (1.00, 1.00, 1.00)"
+    assert ax.get_xlim()[1] == pytest.approx(1.5, rel=0.05)
+
+
+def test_colours_follow_the_stress_and_edges_are_seen():
+    """A box whose stress is high below: its picture is yellow below and dark above."""
+    mesh = union(box((1.0, 1.0, 0.5), (3, 3, 2), "hex8"), box((1.0, 1.0, 0.5), (3, 3, 2), "tet10", (0, 0, 0.5)))
+    step = step_of(mesh, np.where(mesh.points[:, 2] < 0.4, 100.0, 0.0))
+
+    def pixels(edges):
+        ax = fc.plot.deformed_shape(mesh, step, edges=edges)
+        ax.set_axis_off()
+        ax.figure.axes[1].remove()  # the colour bar
+        ax.figure.canvas.draw()
+        return np.asarray(ax.figure.canvas.buffer_rgba())[..., :3].astype(int)
+
+    plain, lined = pixels(False), pixels(True)
+    yellow, dark = [np.abs(plain - colour).sum(axis=2) < 60 for colour in ([253, 231, 36], [68, 1, 84])]
+    rows = np.arange(len(plain))[:, None]
+    assert yellow.mean() > 0.03
+    assert dark.mean() > 0.05
+    assert (rows * yellow).sum() / yellow.sum() > (rows * dark).sum() / dark.sum() + 50  # rows count from the top
+    assert (np.abs(plain - lined).sum(axis=2) > 30).mean() > 0.005
+
+
+def test_a_plane_mesh_is_still_drawn_in_the_plane():
+    mesh = block((1.0, 1.0), (3, 3), "quad8")
+    ax = fc.plot.deformed_shape(mesh, step_of(mesh, mesh.points[:, 0]))
+    assert ax.name == "rectilinear"
+    assert ax.get_legend().get_texts()[0].get_text().startswith("maximum 1.0 at (1.00, ")
+
+
+def test_a_pressure_profile_in_space_is_over_the_distance_from_first_contact():
+    model = fc.Model(box((1.0, 1.0, 0.5), (5, 5, 2), "hex8", (-0.5, -0.5, -0.5)), "3d")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("ZMIN", "xyz")
+    ball = fc.obstacles.Sphere((0.0, 0.0, 2.0), 2.0)
+    model.add_obstacle("ball", secondary="ZMAX", obstacle=ball, motion={"z": -0.02})
+    contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["ball"]
+    ax = fc.plot.pressure_profile(contact, stress=-contact.pressure)
+    distance = ax.lines[0].get_xdata()
+    assert np.isin(distance, contact.abscissa).all()
+    assert distance.max() > 0.1
+    assert [text.get_text() for text in ax.get_legend().get_texts()][1] == r"$-\sigma_{nn}$ at the nodes"

@@ -1,0 +1,202 @@
+"""Springs at nodes and between them: exact solutions, held motions, reactions, messages."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.case import build_case
+
+E, WIDTH, HEIGHT, PRESSURE = 1000.0, 2.0, 3.0, 10.0
+
+
+def block_on_springs(stiffness=50.0, kinematics="plane_strain", element="quad4"):
+    """One element wide, so that equal springs at both bottom corners bear a uniform pressure uniformly."""
+    model = fc.Model(fc.generate.block((WIDTH, HEIGHT), (1, 3), element), kinematics)
+    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model.add_pressure("TOP", PRESSURE)
+    model.add_spring("BOTTOM_LEFT", y=stiffness)
+    model.add_spring("BOTTOM_RIGHT", y=stiffness)
+    return model
+
+
+def last(model, **options):
+    return fc.solve(model, fc.linear_ramp(1), **options)[-1]
+
+
+def test_a_block_on_springs_settles_by_load_over_stiffness():
+    model = block_on_springs()
+    model.fix("LEFT", "x")
+    step = last(model)
+    bottom, top = (model.mesh.points_of(group) for group in ("BOTTOM", "TOP"))
+    settled = PRESSURE * WIDTH / 100.0
+    np.testing.assert_allclose(step.displacement[bottom, 1], -settled, rtol=1e-13)
+    np.testing.assert_allclose(step.displacement[top, 1], -settled - PRESSURE * HEIGHT / E, rtol=1e-13)
+    np.testing.assert_allclose(step.stress[:, 1], -PRESSURE, rtol=1e-12)
+
+
+def test_reactions_hold_the_springs_of_the_ground():
+    model = block_on_springs()
+    model.fix("LEFT", "x")
+    step = last(model)
+    np.testing.assert_allclose(step.reaction.sum(axis=0), [0.0, PRESSURE * WIDTH], atol=1e-11)
+    np.testing.assert_allclose(step.reaction[model.mesh.points_of("BOTTOM"), 1], 0.5 * PRESSURE * WIDTH, rtol=1e-12)
+    np.testing.assert_allclose([s.tension(step.displacement) for s in model.springs], -0.5 * PRESSURE * WIDTH)
+
+
+def test_a_support_beside_a_spring_bears_the_rest():
+    model = block_on_springs()
+    model.fix("LEFT", "x")
+    model.prescribe("BOTTOM_LEFT", y=-0.1)
+    model.prescribe("BOTTOM_RIGHT", y=-0.1)
+    step = last(model)
+    np.testing.assert_allclose(step.reaction[:, 1].sum(), PRESSURE * WIDTH, rtol=1e-12)  # of which springs bear 10
+
+
+def test_multigrid_agrees():
+    model = block_on_springs()
+    model.fix("LEFT", "x")
+    one, other = last(model), last(model, linear_solver="amg", linear_tolerance=1e-12)
+    assert np.abs(one.displacement - other.displacement).max() < 1e-10 * np.abs(one.displacement).max()
+
+
+def test_springs_alone_hold_a_body():
+    model = block_on_springs()
+    model.add_spring("BOTTOM_LEFT", x=1.0)
+    step = last(model)
+    np.testing.assert_allclose(step.displacement[model.mesh.points_of("BOTTOM"), 1], -0.2, rtol=1e-12)
+    assert np.abs(step.displacement[:, 0]).max() < 1e-10
+
+
+def test_a_motion_that_no_spring_holds_is_named():
+    with pytest.raises(fc.ModelError, match=r"1 rigid-body motion is not supported: .*translation along x"):
+        block_on_springs().check()
+
+
+def test_stiffness_is_that_of_the_full_circle():
+    model = fc.Model(fc.generate.block((WIDTH, HEIGHT), (4, 3)), "axisymmetric")
+    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model.couple("BOTTOM", "y")
+    model.add_spring("BOTTOM_LEFT", y=70.0)
+    model.fix("LEFT", "x")
+    model.add_pressure("TOP", PRESSURE)
+    settled = PRESSURE * np.pi * WIDTH**2 / 70.0
+    np.testing.assert_allclose(last(model).displacement[model.mesh.points_of("BOTTOM"), 1], -settled, rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["axial", "y"])
+def test_two_blocks_joined_by_springs_hang_in_series(kind):
+    mesh = fc.generate.block_on_block(
+        size_lower=(WIDTH, 1.0), size_upper=(WIDTH, 1.0), divisions_lower=(1, 2), divisions_upper=(1, 2)
+    )
+    apart = mesh.points.copy()
+    apart[mesh.points_of("UPPER"), 1] += 0.5
+    model = fc.Model(mesh.replace(points=apart), "plane_strain")
+    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model.fix("LOWER_BOTTOM", "xy")
+    model.fix("UPPER_LEFT", "x")
+    model.add_traction("UPPER_TOP", y=PRESSURE)
+    for lower, upper in (("LOWER_TOP_LEFT", "UPPER_BOTTOM_LEFT"), ("LOWER_TOP_RIGHT", "UPPER_BOTTOM_RIGHT")):
+        model.add_spring(lower, upper, **{kind: 40.0})
+    step = last(model)
+    pull = PRESSURE * WIDTH
+    np.testing.assert_allclose(
+        step.displacement[model.mesh.points_of("UPPER_TOP"), 1], 2 * PRESSURE / E + pull / 80.0, rtol=1e-12
+    )
+    np.testing.assert_allclose([s.tension(step.displacement)[0] for s in model.springs], pull / 2, rtol=1e-11)
+    np.testing.assert_allclose(step.reaction.sum(axis=0), [0.0, -pull], atol=1e-10)
+
+
+def test_an_oblique_spring_resists_along_its_line_only():
+    mesh = fc.generate.box((1.0, 1.0, 1.0), (1, 1, 1))
+    corner = int(np.argmax(mesh.points.sum(axis=1)))
+    opposite = int(np.argmin(mesh.points.sum(axis=1)))
+    model = fc.Model(mesh, "3d")
+    model.add_spring(opposite, corner, axial=3.0)
+    (spring,) = model.springs
+    along = np.zeros((mesh.n_points, 3))
+    along[corner] = (0.3, 0.2, 0.1)
+    np.testing.assert_allclose(spring.tension(along), 3.0 * 0.6 / np.sqrt(3.0), rtol=1e-14)
+    along[corner] = (1.0, -1.0, 0.0)
+    np.testing.assert_allclose(spring.tension(along), 0.0, atol=1e-15)
+
+
+def test_a_far_end_without_a_body_may_be_fixed_or_is_told():
+    mesh = fc.generate.block((WIDTH, HEIGHT), (1, 1))
+    points = np.vstack([mesh.points, [[-1.0, 0.0]]])
+    mesh = mesh.replace(points=points, point_groups={**mesh.point_groups, "ANCHOR": [len(points) - 1]})
+
+    def pulled(anchored):
+        model = fc.Model(mesh, "plane_strain")
+        model.add_material(fc.LinearElastic(E=E, nu=0.0))
+        model.fix("BOTTOM_LEFT", "y")
+        model.fix("BOTTOM_RIGHT", "y")
+        model.add_spring("ANCHOR", "BOTTOM_LEFT", axial=5.0)
+        model.add_force("BOTTOM_LEFT", x=2.0, distribute=False)
+        if anchored:
+            model.fix("ANCHOR", "xy")
+        return model
+
+    step = last(pulled(True))
+    assert step.displacement[mesh.point("BOTTOM_LEFT"), 0] == pytest.approx(0.4, rel=1e-12)
+    assert step.reaction[mesh.point("ANCHOR"), 0] == pytest.approx(-2.0, rel=1e-12)
+    with pytest.raises(fc.ModelError, match="not supported"):
+        pulled(False).check()
+
+
+def test_a_spring_shares_the_load_with_a_contact():
+    # Pushed 0.2 down onto a plane 0.1 below, the springs bear 0.1 each way and the contact the rest.
+    model = fc.Model(fc.generate.block((WIDTH, HEIGHT), (1, 3)), "plane_strain")
+    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model.fix("LEFT", "x")
+    model.prescribe("TOP", y=-0.2)
+    model.add_spring("BOTTOM_LEFT", y=50.0)
+    model.add_spring("BOTTOM_RIGHT", y=50.0)
+    plane = fc.obstacles.HalfSpace((0.0, -0.1), (0.0, 1.0))
+    model.add_obstacle("floor", secondary="BOTTOM", obstacle=plane, formulation="node_to_segment")
+    step = last(model)
+    total = E * 0.1 / HEIGHT * WIDTH
+    assert step.contact["floor"].force[1] == pytest.approx(total - 100.0 * 0.1, rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("NOWHERE",), "NOWHERE"),
+        (("BOTTOM",), "has no component"),
+        (("BOTTOM", None, "z"), "component"),
+        (("BOTTOM", None, "axial"), "no second node"),
+        (("BOTTOM", "TOP_LEFT", "axial"), "one node at each end, but finds 2 and 1"),
+        (("TOP_LEFT", "TOP_LEFT", "axial"), "both ends are point"),
+        ((99, None, "y"), "point 99 is not in the mesh"),
+    ],
+)
+def test_messages(arguments, message):
+    model = fc.Model(fc.generate.block((WIDTH, HEIGHT), (1, 1)), "plane_strain")
+    group, *rest = arguments
+    stiffness = {rest[1]: 1.0} if len(rest) == 2 else {}
+    with pytest.raises(fc.FastcontactError, match=message):
+        model.add_spring(group, *rest[:1], **stiffness)
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, "stiff"])
+def test_stiffness_must_be_a_positive_number(value):
+    model = fc.Model(fc.generate.block((WIDTH, HEIGHT), (1, 1)), "plane_strain")
+    with pytest.raises(fc.ModelError, match=r"stiffness .*(positive|finite)"):
+        model.add_spring("BOTTOM", y=value)
+
+
+def test_case_files_know_springs():
+    data = {
+        "kinematics": "plane_strain",
+        "mesh": {"generator": "block-on-block"},
+        "material": [{"E": E, "nu": 0.0}],
+        "support": [{"group": "LEFT", "x": 0.0}],
+        "pressure": [{"group": "TOP", "value": PRESSURE}],
+        "spring": [{"group": "BOTTOM", "y": 50.0}, {"group": "TOP_LEFT", "to": "BOTTOM_RIGHT", "axial": 1e-9}],
+    }
+    mesh = fc.generate.block((WIDTH, HEIGHT), (1, 3))
+    case = build_case(data, name="springs", mesh=mesh)
+    step = last(case.model)
+    np.testing.assert_allclose(step.displacement[case.mesh.points_of("BOTTOM"), 1], -0.2, rtol=1e-9)
+    with pytest.raises(fc.CaseError, match=r"spring\[0\]\.stiffness"):
+        build_case({**data, "spring": [{"group": "BOTTOM", "stiffness": 1.0}]}, name="springs", mesh=mesh)

@@ -1,0 +1,97 @@
+"""Friction between mirrored bodies does nothing: they stick everywhere, as if each were pressed on a smooth plane.
+
+Without friction two-body contact is not quite symmetric itself, since at the edge of the contact the normal of one side
+leans; friction takes up what that leaves. So the two bodies with friction are compared with each on a smooth plane.
+"""
+
+import functools
+import warnings
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+
+MESHES = {"tri3": {"size": 6.0}, "tri6": {"size": 8.0}, "quad4": {"arc_sizes": (0.5, 4.0), "radial_sizes": (0.5, 4.0)}}
+FACETS = [("node_to_segment", {}), ("node_to_segment", {"normals": "averaged"})]
+FIELDS = [("continuous", {}), ("mortar", {"multipliers": "standard"})]
+
+
+def spheres(element):
+    mesh = fc.generate.half_spheres(element, **MESHES[element])
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model.fix("A1A2", "x")
+    model.prescribe("A2B2", y=-2.0)
+    model.prescribe("A1B1", y=2.0)
+    return model
+
+
+def pressed(element, formulation, steps=1, friction=0.3, **options):
+    model = spheres(element)
+    model.add_contact("pair", secondary="CONT1", primary="CONT2", formulation=formulation, friction=friction, **options)
+    return fc.solve(model, fc.linear_ramp(steps), linear_solver="direct")
+
+
+@functools.cache
+def on_a_plane(element, formulation, augmentation=None):
+    model = spheres(element)
+    options = {} if augmentation is None else {"augmentation": augmentation}
+    for side, normal in (("CONT1", -1.0), ("CONT2", 1.0)):
+        plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, normal))
+        model.add_obstacle(side, secondary=side, obstacle=plane, formulation=formulation, **options)
+    with warnings.catch_warnings():  # of the two bodies, which know nothing of each other
+        warnings.filterwarnings("ignore", "bodies .* interpenetrate", fc.FastcontactWarning)
+        return fc.solve(model, fc.linear_ramp(1), linear_solver="direct")[-1]
+
+
+def apart(one, other):
+    return max(
+        np.abs(one.displacement - other.displacement).max() / np.abs(other.displacement).max(),
+        np.abs(one.stress - other.stress).max() / np.abs(other.stress).max(),
+    )
+
+
+@pytest.mark.parametrize("steps", [1, 5])
+@pytest.mark.parametrize("element", ["tri3", "tri6"])
+@pytest.mark.parametrize(("formulation", "options"), FACETS)
+def test_node_to_segment_with_friction_is_each_body_on_a_smooth_plane(element, formulation, options, steps):
+    found = pressed(element, formulation, steps, **options)
+    assert apart(found[-1], on_a_plane(element, "node_to_segment")) < 1e-8
+    for step in found:
+        contact = step.contact["pair"]
+        assert contact.sticking[contact.active].all()
+        assert abs(contact.dissipation) < 1e-9 * np.abs(contact.force[1])  # times a slip of 1
+
+
+@pytest.mark.parametrize(("element", "exact"), [("tri3", 1e-2), ("quad4", 1e-3)])
+@pytest.mark.parametrize(("formulation", "options"), FIELDS)
+def test_fields_of_multipliers_stick_everywhere_without_work(element, exact, formulation, options):
+    step = pressed(element, formulation, **options)[-1]
+    contact = step.contact["pair"]
+    assert contact.sticking[contact.active].all()
+    assert abs(contact.dissipation) < 1e-9 * np.abs(contact.force[1])
+    # Points with pressure and a gap, which the augmentation leaves at the edge, face each other at a slant.
+    assert np.abs(contact.shear).max() < exact * contact.pressure_max
+    if element == "quad4":  # whose contact has many facets, and a flat one at the axis
+        axis = int(np.argmin(contact.coordinates[:, 0]))
+        assert np.abs(contact.shear[axis]).max() < 1e-6 * contact.pressure_max
+    assert apart(step, on_a_plane(element, "continuous", 2.0)) < 0.1 * exact
+
+
+@pytest.mark.parametrize(("formulation", "options"), FIELDS)
+def test_what_fields_of_multipliers_miss_vanishes_with_the_gaps_they_leave(formulation, options):
+    step = pressed("tri3", formulation, augmentation=1e5, **options)[-1]
+    assert apart(step, on_a_plane("tri3", "continuous", 2e5)) < 1e-8
+
+
+@pytest.mark.parametrize("multipliers", ["dual"])
+def test_dual_multipliers_dissipate_nothing_on_a_fine_path(multipliers):
+    for step in pressed("quad4", "mortar", 5, multipliers=multipliers):
+        assert abs(step.contact["pair"].dissipation) < 1e-9 * np.abs(step.contact["pair"].force[1])
+
+
+def test_frictionless_and_frictional_forces_agree_but_for_the_edge():
+    smooth, rough = (pressed("quad4", "continuous", friction=mu)[-1].contact["pair"] for mu in (0.0, 0.3))
+    assert rough.force[1] == pytest.approx(smooth.force[1], rel=1e-3)
+    assert rough.pressure_max == pytest.approx(smooth.pressure_max, rel=2e-3)

@@ -1,0 +1,173 @@
+"""Point contact in three dimensions against Hertz at equal force: spheres and ellipsoids on a rigid plane or as one.
+
+A quarter of every body is meshed. Radii are taken from first moments of the contact force: under Hertz's pressure its
+mean distance from an axis of the ellipse is 3/8 of the semi-axis.
+"""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+
+E, NU = 1000.0, 0.3
+slow = pytest.mark.slow
+
+
+def measured(contact, vertical):
+    """Force of the four quarters, pressure at the pole, semi-axes, and pressure of the ellipsoid that fits best.
+
+    The fit (in the mean square over the ellipse) weighs nodal forces with Hertz's shape, whose square has the integral
+    pi a b / 8 over a quarter. It is for six-node facets, whose corners no force belongs to: pressures there are noisy.
+    """
+    push = contact.force_vectors[:, vertical] * np.sign(contact.force[vertical])
+    across = np.abs(np.delete(contact.coordinates, vertical, axis=1))
+    semi_axes = push @ across / push.sum() / 0.375
+    inside = np.maximum(1 - ((across / semi_axes) ** 2).sum(axis=1), 0.0)
+    fitted = push @ np.sqrt(inside) / (np.pi * semi_axes.prod() / 8)
+    return 4 * push.sum(), contact.pressure[np.argmax(inside)], semi_axes, fitted
+
+
+def errors(contact, vertical, R_x, R_y, fit=False):
+    """Relative errors of the largest pressure and of both semi-axes, at equal force."""
+    force, pressure, semi_axes, fitted = measured(contact, vertical)
+    theory = fc.analytic.hertz_elliptical(E1=E, nu1=NU, R1x=R_x, R1y=R_y, force=force)
+    expected = np.array([theory.pressure_max, theory.radius_x, theory.radius_y])
+    return np.array([fitted if fit else pressure, *semi_axes]) / expected - 1
+
+
+@cache
+def ellipsoid_on_plane(element, formulation, size, stretch=1.0, growth=0.4, far=None, force=None):
+    """Contact of an elastic half-ellipsoid pressed on a rigid plane; its radii are 1 and stretch^2, the contact 0.1 wide.
+
+    By the displacement of its flat side, or by a force on that.
+    """
+    sphere = fc.generate.sphere_octant(
+        element, R=1.0, contact_size=0.1 * size, contact_radius=0.13, growth=growth, size=far
+    )
+    mesh = sphere.replace(points=sphere.points * [1.0, 1.0, stretch])
+    model = fc.Model(mesh, "3d")
+    model.add_material(fc.LinearElastic(E=E, nu=NU))
+    model.fix("SYMMETRY_X", "x")
+    model.fix("SYMMETRY_Z", "z")
+    if force is None:
+        model.prescribe("SPHERE_TOP", y=-0.01)
+    else:
+        model.couple("SPHERE_TOP", "y")
+        model.add_force("SPHERE_TOP", y=-force)
+    plane = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    model.add_obstacle("hertz", secondary="CONT_SPHERE", obstacle=plane, formulation=formulation)
+    return fc.solve(model, fc.linear_ramp(1), linear_solver="direct")[-1].contact["hertz"]
+
+
+@cache
+def block_under_paraboloid(element, formulation, size, R_y=200.0, growth=0.4):
+    """Contact of an elastic block under a rigid paraboloid of radii 100 and `R_y`, 8 contact radii wide and deep."""
+    theory = fc.analytic.hertz_elliptical(E1=E, nu1=NU, R1x=100.0, R1y=R_y, force=1.0)
+    a, b = theory.radius_x, theory.radius_y
+    mesh = fc.generate.graded_block(
+        element, width=8 * b, contact_radius=1.25 * a, contact_radius_y=1.25 * b, contact_size=size * a, growth=growth
+    )
+    model = fc.Model(mesh, "3d")
+    model.add_material(fc.LinearElastic(E=E, nu=NU))
+    model.fix("SYMMETRY_X", "x")
+    model.fix("SYMMETRY_Y", "y")
+    model.fix("BOTTOM", "z")
+    curvature = np.array([1 / 100.0, 1 / R_y])
+    paraboloid = fc.obstacles.Height(lambda x: (0.5 * x**2 @ curvature, x * curvature), "above")
+    model.add_obstacle(
+        "hertz", secondary="CONTACT", obstacle=paraboloid, motion={"z": -theory.approach}, formulation=formulation
+    )
+    return fc.solve(model, fc.linear_ramp(1), linear_solver="direct")[-1].contact["hertz"]
+
+
+@pytest.mark.parametrize(
+    ("element", "formulation", "size", "fit"),
+    [
+        ("hex8", "node_to_segment", 0.25, False),
+        pytest.param("hex8", "node_to_segment", 0.18, False, marks=slow),
+        pytest.param("hex8", "continuous", 0.17, False, marks=slow),
+        pytest.param("tet10", "continuous", 0.4, True, marks=slow),
+    ],
+)
+def test_a_sphere_on_a_rigid_plane_is_hertz_at_equal_force(element, formulation, size, fit):
+    """A half-sphere with 4 to 6 edges over the contact radius, a tenth of its own: 9 800 unknowns with 4."""
+    options = {"growth": 0.6, "far": 0.5} if element == "tet10" else {}
+    contact = ellipsoid_on_plane(element, formulation, size, **options)
+    assert np.abs(errors(contact, 1, 1.0, 1.0, fit)).max() < 0.01
+
+
+@pytest.mark.slow
+def test_a_sphere_driven_by_its_force_carries_it():
+    """Hertz's force for a contact radius of a tenth of the sphere's; pressure and radius as above."""
+    theory = fc.analytic.hertz_point(E1=E, nu1=NU, R1=1.0, radius=0.1)
+    contact = ellipsoid_on_plane("hex8", "node_to_segment", 0.2, force=theory.force / 4)
+    force, pressure, radii, _ = measured(contact, 1)
+    assert force == pytest.approx(theory.force, rel=1e-8)
+    assert pressure == pytest.approx(theory.pressure_max, rel=0.01)
+    assert radii == pytest.approx(theory.radius, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("element", "formulation", "size", "growth", "fit"),
+    [
+        ("hex8", "node_to_segment", 0.18, 0.4, False),
+        ("hex20", "continuous", 0.5, 0.6, False),
+        pytest.param("hex8", "continuous", 0.18, 0.4, False, marks=slow),
+        pytest.param("tet10", "continuous", 0.5, 0.6, True, marks=slow),
+        pytest.param("hex20", "continuous", 0.3, 0.6, False, marks=slow),
+    ],
+)
+def test_an_elliptical_contact_is_hertz_at_equal_force(element, formulation, size, growth, fit):
+    """Radii 1 : 2, semi-axes 1 : 1.58; 9 000 to 15 000 unknowns."""
+    contact = block_under_paraboloid(element, formulation, size, growth=growth)
+    assert np.abs(errors(contact, 2, 100.0, 200.0, fit)).max() < 0.01
+
+
+def test_a_rigid_sphere_on_a_block_of_tetrahedra_is_hertz_at_equal_force():
+    contact = block_under_paraboloid("tet10", "continuous", 0.5, R_y=100.0, growth=0.6)
+    assert np.abs(errors(contact, 2, 100.0, 100.0, fit=True)).max() < 0.01
+
+
+@pytest.mark.slow
+def test_an_elastic_ellipsoid_on_a_rigid_plane_is_hertz_at_equal_force():
+    """The sphere's mesh stretched by the root of 2, so that its radii at the pole are 1 and 2."""
+    contact = ellipsoid_on_plane("hex8", "node_to_segment", 0.2, np.sqrt(2))
+    assert np.abs(errors(contact, 1, 1.0, 2.0)).max() < 0.01
+
+
+@pytest.mark.parametrize("case", ["sphere", "ellipse"])
+def test_errors_fall_with_the_mesh(case):
+    """Of pressure and semi-axes together: each alone may pass through zero. Cells grow slower on finer meshes."""
+    found = []
+    for size in (0.5, 0.35, 0.25):
+        if case == "sphere":
+            contact = ellipsoid_on_plane("hex8", "node_to_segment", size, growth=1.6 * size)
+            found.append(np.linalg.norm(errors(contact, 1, 1.0, 1.0)))
+        else:
+            contact = block_under_paraboloid("hex8", "node_to_segment", size, growth=1.6 * size)
+            found.append(np.linalg.norm(errors(contact, 2, 100.0, 200.0)))
+    assert found[2] < found[1] < found[0]
+    assert found[2] < 0.5 * found[0]
+
+
+@pytest.mark.slow
+def test_the_stress_below_the_pole_on_tetrahedra_is_the_pressure():
+    """Averaged over the cells at the pole it is smoother than the pressure field of six-node facets."""
+    theory = fc.analytic.hertz_point(E1=E, nu1=NU, R1=100.0, force=1.0)
+    radius = theory.radius
+    mesh = fc.generate.graded_block(
+        "tet10", width=8 * radius, contact_radius=1.25 * radius, contact_size=0.3 * radius, growth=1.0
+    )
+    model = fc.Model(mesh, "3d")
+    model.add_material(fc.LinearElastic(E=E, nu=NU))
+    model.fix("SYMMETRY_X", "x")
+    model.fix("SYMMETRY_Y", "y")
+    model.fix("BOTTOM", "z")
+    model.add_obstacle(
+        "hertz", secondary="CONTACT", obstacle=fc.obstacles.paraboloid(100.0), motion={"z": -theory.approach}
+    )
+    last = fc.solve(model, fc.linear_ramp(1), linear_solver="direct")[-1]
+    at_force = theory.at_force(4 * abs(last.contact["hertz"].force[2]))
+    assert -last.stress[mesh.point("POLE"), 2] == pytest.approx(at_force.pressure_max, rel=0.01)

@@ -1,0 +1,80 @@
+"""Line contact in plane strain against Hertz at equal force: a rigid cylinder on a block, a half-cylinder on a plane."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+
+E, NU, R = 1000.0, 0.3, 100.0
+
+
+def measured(contact, radius_of):
+    """Force of both halves, pressure at the pole, and half-width from the first moment of the pressure.
+
+    Under Hertz's pressure the mean distance of the force from the middle is 4 / (3 pi) of the half-width.
+    """
+    push = contact.force_vectors[:, 1] * np.sign(contact.force[1])
+    distance = np.abs(contact.coordinates[:, 0])
+    return 2 * push.sum(), contact.pressure[np.argmin(distance)], radius_of(push @ distance / push.sum())
+
+
+@cache
+def against_hertz(element, formulation, size):
+    """Relative errors of pressure and half-width of a block under a parabola, in half-widths of 1 about; growth 0.3."""
+    mesh = fc.generate.graded_block(element, width=20.0, contact_radius=1.25, contact_size=size, growth=0.3)
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(E=E, nu=NU))
+    model.fix("SYMMETRY_X", "x")
+    model.fix("BOTTOM", "y")
+    model.add_obstacle(
+        "hertz", secondary="CONTACT", obstacle=fc.obstacles.paraboloid(R), motion={"y": -0.025}, formulation=formulation
+    )
+    contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["hertz"]
+    force, pressure, half_width = measured(contact, lambda mean: 0.75 * np.pi * mean)
+    theory = fc.analytic.hertz_line(E1=E, nu1=NU, R1=R, force=force)
+    inner, outer = contact.radius
+    assert inner - size < theory.radius < outer + size
+    return abs(pressure / theory.pressure_max - 1), abs(half_width / theory.radius - 1)
+
+
+@pytest.mark.parametrize(("element", "formulation", "size", "bound"), [
+    ("quad4", "node_to_segment", 0.1, 3e-3),
+    ("quad4", "continuous", 0.1, 3e-3),
+    ("quad8", "continuous", 0.2, 1e-3),
+    ("quad9", "continuous", 0.2, 1e-3),
+    ("tri6", "continuous", 0.1, 5e-3),
+])  # fmt: skip
+def test_a_rigid_cylinder_on_a_block_is_hertz_at_equal_force(element, formulation, size, bound):
+    """What is left of quadratic elements, 4e-4, is the block of 20 half-widths that stands for a half plane."""
+    assert max(against_hertz(element, formulation, size)) < bound
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+def test_errors_fall_with_the_mesh(formulation):
+    errors = [np.hypot(*against_hertz("quad4", formulation, size)) for size in (0.4, 0.2, 0.1)]
+    assert errors[2] < errors[1] < errors[0]
+    assert errors[2] < 0.3 * errors[0]
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
+def test_a_cylinder_driven_by_its_force_on_an_elastic_block(formulation):
+    """Two bodies of different stiffness; contact carries the force given, pressure and half-width are Hertz's."""
+    bodies = {"E1": 1000.0, "nu1": 0.3, "E2": 4000.0, "nu2": 0.2}
+    theory = fc.analytic.hertz_line(**bodies, R1=50.0, radius=2.0)
+    mesh = fc.generate.cylinder_on_block("quad8", R=50.0, size=8.0, contact_size=0.25)
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(E=bodies["E1"], nu=bodies["nu1"]), "CYLINDER")
+    model.add_material(fc.LinearElastic(E=bodies["E2"], nu=bodies["nu2"]), "BLOCK")
+    model.fix("AXIS", "x")
+    model.fix("BLOCK_BOTTOM", "y")
+    model.couple("CYLINDER_TOP", "y")
+    model.add_force("CYLINDER_TOP", y=-theory.force / 2)
+    model.add_contact("hertz", secondary="CONT_CYLINDER", primary="CONT_BLOCK", formulation=formulation)
+    contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["hertz"]
+    force, pressure, half_width = measured(contact, lambda mean: 0.75 * np.pi * mean)
+    assert force == pytest.approx(theory.force, rel=1e-8)
+    if formulation != "node_to_segment":  # which oscillates on quadratic facets
+        assert pressure == pytest.approx(theory.pressure_max, rel=0.01)
+    assert half_width == pytest.approx(theory.radius, rel=0.01)

@@ -1,0 +1,180 @@
+"""Turning, mirroring, moving far away and renumbering change rounding only."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from images import Image, ball, cylinder, differences, discs, floating, floating_ball, image_of, on_plane, solved
+from scipy.spatial.transform import Rotation
+
+import fastcontact as fc
+from fastcontact.contact.pairing import tangents
+from fastcontact.search import closest
+
+FORMULATIONS = ("node_to_segment", "continuous", "mortar")
+QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
+CYCLE = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # a third of a turn about x = y = z
+# A thousand times the size of the bodies: coordinates there are exact to 1e-13 of them, displacements to 1e-11.
+FAR = {2: (3e4, -5e4), 3: (3e4, -5e4, 1e4)}
+
+
+def whole_supports():
+    """Problems whose supports are whole vectors, so that they can be turned by any angle."""
+    for formulation in FORMULATIONS:
+        for friction in (0.0, 0.3):
+            name = f"{formulation}, friction {friction}"
+            yield f"cylinder {name}", cylinder(formulation, friction=friction)
+            yield f"ball {name}", ball(formulation, friction=friction)
+    yield "cylinder dual", cylinder("mortar", multipliers="dual", friction=0.3)
+    yield "cylinder quadratic", cylinder("mortar", "quad8")
+    yield "cylinder facet normals", cylinder("continuous", normals="facet")
+    yield "ball dual", ball("mortar", multipliers="dual", friction=0.3)
+    yield "ball tetrahedra", ball("node_to_segment", "tet4", friction=0.3)
+    for formulation in FORMULATIONS[:2]:
+        for dim in (2, 3):
+            yield f"plane {dim} {formulation}", on_plane(dim, formulation=formulation, friction=0.3)
+
+
+def along_axes():
+    """Problems with supports along axes."""
+    for formulation in FORMULATIONS:
+        yield f"discs {formulation}", discs(formulation)
+        yield f"floating {formulation}", floating(formulation)
+        yield f"floating ball {formulation}", floating_ball(formulation)
+
+
+WHOLE, AXES = dict(whole_supports()), dict(along_axes())
+ALL = WHOLE | AXES
+LONG = ("ball continuous, friction 0.3", "ball mortar, friction 0.3")
+
+
+def cases(names):
+    return [pytest.param(name, marks=pytest.mark.slow) if name in LONG else name for name in names]
+
+
+@cache
+def original(name):
+    return solved(ALL[name], Image())[0]
+
+
+def agrees(name, image, tolerance=1e-9):
+    found, one, _ = differences(ALL[name], image, original(name))
+    assert max(found.values()) < tolerance, max(found, key=found.get)
+    assert any(contact.active.any() for contact in one.contact.values())
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_turning_by_any_angle(name):
+    if ALL[name].mesh.dim == 3:
+        turn = Rotation.random(random_state=1).as_matrix()
+    else:
+        turn = Rotation.from_euler("z", 30, degrees=True).as_matrix()[:2, :2]
+    agrees(name, Image(Q=turn))
+
+
+@pytest.mark.parametrize("name", cases(name for name in ALL if ALL[name].kinematics != "axisymmetric"))
+def test_turning_axes_into_axes(name):
+    """Ninety degrees in the plane; in space x to y, y to z, z to x."""
+    agrees(name, Image(Q=QUARTER_TURN if ALL[name].mesh.dim == 2 else CYCLE))
+
+
+@pytest.mark.parametrize("name", cases(ALL))
+def test_mirroring(name):
+    job = ALL[name]
+    axis = 1 if job.kinematics == "axisymmetric" else 0
+    mirror = np.eye(job.mesh.dim)
+    mirror[axis, axis] = -1.0
+    agrees(name, Image(Q=mirror))
+
+
+@pytest.mark.parametrize("name", cases(ALL))
+def test_far_from_the_origin(name):
+    job = ALL[name]
+    agrees(name, Image(shift=(0.0, 5e4) if job.kinematics == "axisymmetric" else FAR[job.mesh.dim]), 1e-8)
+
+
+@pytest.mark.parametrize("name", cases(ALL))
+def test_renumbering(name):
+    agrees(name, Image(seed=3))
+
+
+@settings(max_examples=8, deadline=None, derandomize=True)
+@given(
+    name=st.sampled_from([name for name in WHOLE if WHOLE[name].mesh.dim == 2]),
+    angle=st.floats(-180, 180),
+    shift=st.tuples(st.floats(-500, 500), st.floats(-500, 500)),
+    seed=st.one_of(st.none(), st.integers(0, 999)),
+)
+def test_any_rigid_motion_and_numbering_in_the_plane(name, angle, shift, seed):
+    turn = Rotation.from_euler("z", angle, degrees=True).as_matrix()[:2, :2]
+    agrees(name, Image(Q=turn, shift=shift, seed=seed))
+
+
+@settings(max_examples=6, deadline=None, derandomize=True)
+@given(
+    name=st.sampled_from([name for name in WHOLE if WHOLE[name].mesh.dim == 3 and name not in LONG]),
+    quaternion=st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1),
+    shift=st.tuples(*[st.floats(-500, 500)] * 3),
+    seed=st.one_of(st.none(), st.integers(0, 999)),
+)
+def test_any_rigid_motion_and_numbering_in_space(name, quaternion, shift, seed):
+    agrees(name, Image(Q=Rotation.from_quat(quaternion).as_matrix(), shift=shift, seed=seed))
+
+
+# --- what these rest on ---------------------------------------------------------------------------------------------
+
+
+def test_renumbered_meshes_are_the_same_mesh():
+    """The check of this file's own tool: groups, measure and outer shape survive."""
+    mesh = ball("mortar").mesh
+    other, order = image_of(mesh, Image(seed=5))
+    assert np.array_equal(other.points, mesh.points[order])
+    assert fc.quality(other).measure == pytest.approx(fc.quality(mesh).measure, rel=1e-12)
+    for name in mesh.group_names:
+        assert set(order[other.points_of(name)]) == set(mesh.points_of(name).tolist())
+    assert list(order[:20]) != list(range(20))
+
+
+@pytest.mark.parametrize("n_nodes", [3, 4, 6, 8, 9])
+def test_projections_far_from_the_origin(n_nodes):
+    """A thousand times as far as the facets are large: to what the coordinates there are exact."""
+    element = {3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8", 9: "quad9"}[n_nodes]
+    flat = fc.generate.block((1.0, 1.0), (3, 3), element)
+    corners = np.insert(flat.points, 2, 0.1 * np.sin(3 * flat.points[:, 0]) * flat.points[:, 1], axis=1)[
+        flat.cells[element]
+    ]
+    points = np.random.default_rng(2).uniform([0, 0, 0.05], [1, 1, 0.3], (50, 3))
+    shift = np.array([3e2, -1e3, 7e2])
+    near, far = closest(points, corners), closest(points + shift, corners + shift)
+    assert np.abs(far.position - shift - near.position).max() < 1e-11
+    assert np.abs(far.distance - near.distance).max() < 1e-11
+    assert np.abs(far.normal - near.normal).max() < 1e-10
+
+
+def test_tangents_turn_with_their_normals_and_are_smooth():
+    random = np.random.default_rng(4)
+    normals = np.array([0.0, 0.0, 1.0]) + 0.8 * random.uniform(-1, 1, (200, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    first, second = tangents(normals)
+    frames = np.stack([normals, first, second], axis=1)
+    assert np.abs(frames @ frames.transpose(0, 2, 1) - np.eye(3)).max() < 1e-14
+    assert np.abs(np.linalg.det(frames) - 1).max() < 1e-14
+    # They change no faster than the normals, up to the tangent of half the angle to the mean.
+    apart = np.linalg.norm(normals[:, None] - normals, axis=2)
+    assert (np.linalg.norm(first[:, None] - first, axis=2) <= 2.0 * apart + 1e-12).all()
+    # Turned with the surface, they are the same but for one angle common to all.
+    turn = Rotation.random(random_state=3).as_matrix()
+    other = tangents(normals @ turn.T)
+    cosine = np.einsum("nd,nd->n", other[0], first @ turn.T)
+    sine = np.einsum("nd,nd->n", other[0], second @ turn.T)
+    assert cosine == pytest.approx(cosine[0], abs=1e-13)
+    assert sine == pytest.approx(sine[0], abs=1e-13)
+
+
+def test_tangents_of_a_closed_surface():
+    around = np.vstack([np.eye(3), -np.eye(3), [[0.6, 0.0, -0.8], [-0.6, 0.0, 0.8]]])
+    first, second = tangents(around)
+    frames = np.stack([around, first, second], axis=1)
+    assert np.abs(frames @ frames.transpose(0, 2, 1) - np.eye(3)).max() < 1e-14

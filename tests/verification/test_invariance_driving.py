@@ -1,0 +1,114 @@
+"""A body driven by a force ends where one driven by a displacement does, to 1e-8, in every formulation."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+
+FORMULATIONS = [
+    ("node_to_segment", {}),
+    ("continuous", {}),
+    ("continuous", {"integration": "simpson"}),
+    ("mortar", {}),
+    ("mortar", {"multipliers": "dual"}),
+    ("node_to_segment", {"friction": 0.2}),
+    ("continuous", {"friction": 0.2}),
+    ("mortar", {"friction": 0.2}),
+    ("mortar", {"multipliers": "dual", "friction": 0.2}),
+]
+
+
+def cylinder(element, kinematics="plane_strain"):
+    """Half a cylinder (a half-sphere in axisymmetry) on a block."""
+    mesh = fc.generate.cylinder_on_block(element, R=50.0, size=12.0, contact_size=1.5)
+    model = fc.Model(mesh, kinematics)
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("AXIS", "x")
+    model.fix("BLOCK_BOTTOM", "y")
+    return model, "CYLINDER_TOP", ("CONT_CYLINDER", "CONT_BLOCK"), 0.8
+
+
+def sphere(element):
+    """A quarter of a half-sphere on a block."""
+    mesh = fc.generate.sphere_on_block(
+        element, size=25.0, contact_size=4.0, contact_radius=6.0, block_size=(30.0, 30.0), growth=1.0
+    )
+    model = fc.Model(mesh, "3d")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("SYMMETRY_X", "x")
+    model.fix("SYMMETRY_Z", "z")
+    model.fix("BLOCK_BOTTOM", "y")
+    return model, "SPHERE_TOP", ("CONT_SPHERE", "CONT_BLOCK"), 1.0
+
+
+def same(make, formulation, options, solver="direct", tolerance=1e-12, obstacle=None):
+    """Move the top face down, then push the coupled face by the force found; compare everything."""
+    results, force = [], 0.0
+    for driven in (False, True):
+        model, top, (secondary, primary), depth = make()
+        if obstacle is None:
+            model.add_contact("pair", secondary=secondary, primary=primary, formulation=formulation, **options)
+        else:
+            model.add_obstacle("pair", secondary=secondary, obstacle=obstacle, formulation=formulation, **options)
+        if driven:
+            model.couple(top, "y")
+            model.add_force(top, y=-force)
+        else:
+            model.prescribe(top, y=-depth)
+        last = fc.solve(model, fc.linear_ramp(1), linear_solver=solver, linear_tolerance=tolerance)[-1]
+        results.append(last)
+        force = abs(last.contact["pair"].force[1])
+    moved, pushed = results
+    assert np.abs(pushed.displacement - moved.displacement).max() < 1e-8 * depth
+    assert np.abs(pushed.stress - moved.stress).max() < 1e-8 * np.abs(moved.stress).max()
+    one, other = moved.contact["pair"], pushed.contact["pair"]
+    assert np.abs(other.pressure - one.pressure).max() < 1e-8 * one.pressure_max
+    assert np.array_equal(other.active, one.active)
+    assert one.active.sum() > 1
+    assert pushed.iterations["regularised"]["relative_to_load"] < (1e-11 if solver == "direct" else 1e-8)
+
+
+@pytest.mark.parametrize(("formulation", "options"), FORMULATIONS)
+@pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric"])
+def test_a_cylinder_or_sphere_in_the_plane(formulation, options, kinematics):
+    same(lambda: cylinder("quad4", kinematics), formulation, options)
+
+
+@pytest.mark.parametrize(("formulation", "options"), [f for f in FORMULATIONS if f[0] != "node_to_segment"])
+def test_on_quadratic_facets(formulation, options):
+    same(lambda: cylinder("quad8"), formulation, options)
+
+
+@pytest.mark.parametrize(
+    ("formulation", "options"),
+    [pytest.param(*f, marks=pytest.mark.slow) if f == ("continuous", {"friction": 0.2}) else f for f in FORMULATIONS],
+)
+def test_a_sphere_in_space(formulation, options):
+    same(lambda: sphere("hex8"), formulation, options)
+
+
+@pytest.mark.parametrize(("formulation", "options"), [FORMULATIONS[0], FORMULATIONS[3], FORMULATIONS[4]])
+def test_with_multigrid(formulation, options):
+    same(lambda: sphere("hex8"), formulation, options, solver="amg")
+
+
+def alone(dim):
+    """A half-cylinder or half-sphere without a block."""
+    if dim == 2:
+        mesh = fc.generate.quarter_disc("quad4", body="upper", R=50.0, arc_sizes=(1.5, 8.0), radial_sizes=(1.5, 8.0))
+        names, secondary, top = (("A1A2", "x"),), "CONT2", "A2B2"
+    else:
+        mesh = fc.generate.sphere_octant("hex8", size=25.0, contact_size=4.0, contact_radius=6.0, growth=1.0)
+        names, secondary, top = (("SYMMETRY_X", "x"), ("SYMMETRY_Z", "z")), "CONT_SPHERE", "SPHERE_TOP"
+    model = fc.Model(mesh, "plane_strain" if dim == 2 else "3d")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    for group, axis in names:
+        model.fix(group, axis)
+    return model, top, (secondary, ""), 1.0
+
+
+@pytest.mark.parametrize(("formulation", "options"), FORMULATIONS[:2])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_on_a_rigid_plane(formulation, options, dim):
+    plane = fc.obstacles.HalfSpace((0.0,) * dim, (0.0, 1.0, 0.0)[:dim])
+    same(lambda: alone(dim), formulation, options, obstacle=plane)

@@ -1,0 +1,118 @@
+"""Contact at the price of a linear solution: iterations counted, not timed, so that the same holds on any machine."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+
+import fastcontact as fc
+from fastcontact.analysis import Analysis, Criteria
+
+
+def with_material(mesh):
+    model = fc.Model(mesh, kinematics="3d")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    return model
+
+
+def blocks(n, formulation="node_to_segment"):
+    """Return two cubes whose meshes do not match, pressed together."""
+    m = round(0.7 * n)
+    parts = [
+        fc.generate.renamed(mesh, {group: f"{group}_{name}" for group in mesh.cell_groups})
+        for name, mesh in {
+            "LOW": fc.generate.box((1.0, 1.0, 1.0), (n, n, n), name="LOW"),
+            "HIGH": fc.generate.box((1.0, 1.0, 1.0), (m, m, m), origin=(0.0, 0.0, 1.0), name="HIGH"),
+        }.items()
+    ]
+    model = with_material(fc.generate.union(*parts))
+    model.fix("ZMIN_LOW", "xyz")
+    model.prescribe("ZMAX_HIGH", x=0.0, y=0.0, z=-0.01)
+    model.add_contact("c", secondary="ZMIN_HIGH", primary="ZMAX_LOW", formulation=formulation)
+    return model
+
+
+def sphere(size, formulation="node_to_segment"):
+    mesh = fc.generate.sphere_on_block("hex8", R=1.0, size=size, contact_size=size / 3, contact_radius=0.2)
+    model = with_material(mesh)
+    model.fix("SYMMETRY_X", "x")
+    model.fix("SYMMETRY_Z", "z")
+    model.fix("BLOCK_BOTTOM", "y")
+    model.prescribe("SPHERE_TOP", y=-0.02)
+    model.add_contact("c", secondary="CONT_SPHERE", primary="CONT_BLOCK", formulation=formulation)
+    return model
+
+
+def prepared(model, tolerance=1e-8, steps=1):
+    return Analysis(model, "amg", tolerance, Criteria(geometry=tolerance), fc.linear_ramp(steps))
+
+
+def counted(analysis, work):
+    before = analysis.solver.counters.iterations
+    work()
+    return analysis.solver.counters.iterations - before
+
+
+def linear_iterations(analysis):
+    lift = analysis._lift(1.0)
+    loaded = analysis.solver.load(analysis.system.right(np.zeros_like(lift), lift))
+    return counted(analysis, lambda: loaded.solve(csr_array((0, len(lift))), np.empty(0)))
+
+
+@pytest.mark.parametrize("n", [16, pytest.param(28, marks=pytest.mark.slow)])
+def test_linear_and_tied_solutions_take_the_same_few_iterations_at_any_size(n):
+    analysis = prepared(blocks(n))
+    assert linear_iterations(analysis) <= 13
+    lift = analysis._lift(1.0)
+    rows = analysis.pairs["c"].constraints(np.zeros(analysis.model.mesh.points.shape))
+    B, gap0 = analysis.system.rows(rows.B, rows.gap0, lift)
+    all_rows = np.flatnonzero(np.diff(B.indptr) > 0)
+    loaded = analysis.solver.load(analysis.system.right(np.zeros_like(lift), lift))
+    for tied in (all_rows, all_rows[::2]):
+        assert counted(analysis, lambda tied=tied: loaded.solve(B[tied], -gap0[tied])) <= 14
+    assert analysis.solver.counters.setups == 1
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "mortar"])
+def test_a_cold_contact_step_costs_at_most_1_6_linear_solutions(formulation):
+    analysis = prepared(sphere(0.12, formulation))
+    one = linear_iterations(analysis)
+    assert one <= 15
+    assert counted(analysis, lambda: analysis.step(1, 1.0)) <= 1.6 * one
+    assert analysis.solver.counters.setups == 1
+
+
+@pytest.mark.parametrize(("tolerance", "price"), [(1e-8, 16), (1e-4, 8)])
+def test_twenty_steps_with_converged_geometry_cost_few_linear_solutions(tolerance, price):
+    analysis = prepared(sphere(0.12), tolerance, 20)
+    one = linear_iterations(analysis)
+    total = sum(
+        counted(analysis, lambda index=index, instant=instant: analysis.step(index, instant))
+        for index, instant in enumerate(analysis.ramp.instants, start=1)
+    )
+    assert total <= price * one
+    assert analysis.solver.counters.setups == 1
+
+
+def test_precision_is_an_option_that_changes_no_digit_that_counts():
+    model = sphere(0.18)
+    single, double = (
+        fc.solve(model, fc.linear_ramp(1), linear_solver="amg", linear_precision=precision)[-1]
+        for precision in ("single", "double")
+    )
+    assert np.abs(single.displacement - double.displacement).max() < 1e-8 * np.abs(double.displacement).max()
+    with pytest.raises(fc.ModelError, match="'single' or 'double', not 'half'"):
+        fc.solve(model, linear_solver="amg", linear_precision="half")
+
+
+def test_left_solutions_and_extrapolated_starts_end_where_the_direct_solver_does():
+    model = sphere(0.18)
+    steps = [
+        fc.solve(model, fc.linear_ramp(6), linear_solver=name, linear_tolerance=1e-10)[-1] for name in ("direct", "amg")
+    ]
+    direct, amg = steps
+    assert np.abs(amg.displacement - direct.displacement).max() < 1e-8 * np.abs(direct.displacement).max()
+    assert (
+        np.abs(amg.contact["c"].pressure - direct.contact["c"].pressure).max()
+        < 1e-6 * np.abs(direct.contact["c"].pressure).max()
+    )
+    assert np.array_equal(amg.contact["c"].active, direct.contact["c"].active)

@@ -1,0 +1,100 @@
+"""Penalty: pressure = penalty times penetration, exactly; the exact method is its limit."""
+
+import numpy as np
+import pytest
+from two_bodies import blocks, boxes, held, touching
+
+import fastcontact as fc
+
+FORMULATIONS = ("node_to_segment", "continuous", "mortar")
+MODULUS = {"plane_strain": 1000.0 / 0.91, "axisymmetric": 1000.0, "3d": 1000.0}
+
+
+@pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric", "3d"])
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_a_penalty_is_an_elastic_layer(formulation, kinematics):
+    """Two blocks of stiffness E / h in series with the penalty."""
+    mesh = boxes() if kinematics == "3d" else blocks()
+    stiffness, penalty = MODULUS[kinematics] / 10.0, 5e4
+    model = touching(held(mesh, kinematics), formulation, penalty=penalty)
+    last = fc.solve(model, fc.linear_ramp(1))[-1]
+    pressure = 0.02 / (1 / stiffness + 1 / penalty)
+    contact, axis = last.contact["pair"], mesh.dim - 1
+    assert contact.pressure == pytest.approx(pressure, rel=1e-10)
+    assert np.abs(last.stress[:, axis] + pressure).max() < 1e-10 * pressure
+    assert contact.gap == pytest.approx(-pressure / penalty, rel=1e-9)
+    assert contact.penetration == pytest.approx(pressure / penalty, rel=1e-9)
+
+
+@pytest.mark.parametrize("element", ["quad4", "quad8", "tri6"])
+@pytest.mark.parametrize("formulation", ["continuous", "mortar"])
+def test_quadratic_facets_and_meshes_that_do_not_match(formulation, element):
+    upper = (4, 3) if formulation == "mortar" else (3, 2)
+    model = touching(held(blocks(element, upper=upper)), formulation, penalty=1e5)
+    contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["pair"]
+    assert contact.pressure == pytest.approx(0.02 / (0.01 * 0.91 + 1e-5), rel=1e-10)
+    assert contact.penetration == pytest.approx(contact.pressure[0] / 1e5, rel=1e-8)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_penetration_falls_as_the_penalty_grows(formulation, forma04):
+    mesh = fc.generate.half_spheres("quad4")
+    exact = fc.solve(forma04(mesh, formulation), fc.linear_ramp(2))[-1].contact["hertz"]
+    depths, errors = [], []
+    for penalty in (1e6, 1e7, 1e8):
+        model = forma04(mesh, formulation, penalty=penalty)
+        contact = fc.solve(model, fc.linear_ramp(2))[-1].contact["hertz"]
+        depths.append(contact.penetration)
+        errors.append(abs(contact.force[1] / exact.force[1] - 1))
+    if formulation == "node_to_segment":
+        assert np.array(depths) * [1e6, 1e7, 1e8] == pytest.approx(exact.pressure_max, rel=0.02)
+    # Proportional to the compliance of the layer, to first order.
+    assert errors[0] / errors[1] == pytest.approx(10.0, rel=0.05)
+    assert errors[1] / errors[2] == pytest.approx(10.0, rel=0.05)
+    assert errors[2] < 1e-4
+
+
+def test_a_soft_penalty_is_told_with_a_number():
+    model = touching(held(blocks()), "node_to_segment", penalty=1e3)
+    with pytest.warns(
+        fc.FastcontactWarning, match=r"'pair' penetrates by 0.00198.*, which is 9.9%.*from 1000 to about"
+    ):
+        last = fc.solve(model, fc.linear_ramp(1))[-1]
+    assert "raise its penalty" in last.warnings[0]
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_friction_is_not_softened_by_a_penalty(formulation):
+    """What sticks stays where it stuck, step after step: a penalty acts along the normal alone."""
+    found = {}
+    for penalty in (1e5, None):
+        model = fc.Model(blocks(), "plane_strain")
+        model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+        model.fix("LOWER_BOTTOM", "xy")
+        model.prescribe("UPPER_TOP", x=1e-4, y=-0.02)
+        touching(model, formulation, friction=0.5, penalty=penalty, normals="averaged")
+        found[penalty] = fc.solve(model, fc.Ramp((1.0, 2.0, 3.0, 4.0), ((0.0, 0.0), (1.0, 1.0), (4.0, 1.0))))
+    steps = found[1e5]
+    first, last = steps[0].contact["pair"], steps[-1].contact["pair"]
+    assert first.sticking.any()
+    assert np.abs(steps[-1].displacement - steps[0].displacement).max() < 1e-12
+    assert last.force == pytest.approx(first.force, rel=1e-9)
+    assert last.force == pytest.approx(found[None][-1].contact["pair"].force, rel=0.01)
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+def test_a_penalty_against_an_obstacle(formulation):
+    model = fc.Model(fc.generate.block((10.0, 5.0), (4, 2), "quad4"), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("LEFT", "x")
+    model.prescribe("TOP", y=-0.01)
+    floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, formulation=formulation, penalty=1e5)
+    contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["floor"]
+    assert contact.pressure == pytest.approx(0.01 / (5 * 0.91e-3 + 1e-5), rel=1e-10)
+
+
+@pytest.mark.parametrize("penalty", [0.0, -1.0, float("nan"), "stiff"])
+def test_a_penalty_is_a_positive_number(penalty):
+    with pytest.raises(fc.FastcontactError, match=r"penalty.* of contact 'pair'|the penalty of contact 'pair'"):
+        touching(held(blocks()), "mortar", penalty=penalty)

@@ -1,0 +1,132 @@
+"""Press fits by a negative clearance, against Lame: nothing is left but the error of the mesh."""
+
+import numpy as np
+import pytest
+from two_bodies import rings
+
+import fastcontact as fc
+
+INTERFERENCE = 0.02
+SHAFT, HUB = fc.LinearElastic(E=1000.0, nu=0.3), fc.LinearElastic(E=500.0, nu=0.25)
+LAME = fc.analytic.press_fit_cylinders(
+    E_inner=1000.0, nu_inner=0.3, E_outer=500.0, nu_outer=0.25,
+    inner_radius=1.0, interface_radius=2.0, outer_radius=3.0, interference=INTERFERENCE,
+)  # fmt: skip
+
+
+def quarter(element, shaft, hub, formulation, swap=False, overlap=0.0, **options):
+    """A quarter of shaft and hub in plane strain, with so many facets on each; errors of pressure and displacement."""
+    mesh = rings(element, inner=(1.0, 2.0 + overlap), divisions=((shaft, shaft // 3), (hub, hub // 3)))
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(SHAFT, "SHAFT")
+    model.add_material(HUB, "HUB")
+    model.fix("XAXIS", "y")
+    model.fix("YAXIS", "x")
+    sides = ("SHAFT_OUTER", "HUB_INNER") if swap else ("HUB_INNER", "SHAFT_OUTER")
+    model.add_contact("fit", secondary=sides[0], primary=sides[1], formulation=formulation, **options)
+    return model, fc.solve(model, fc.linear_ramp(1))[-1]
+
+
+def errors(model, last):
+    """Errors of the mean pressure at the interface and of the mean displacement of the rim."""
+    contact = last.contact["fit"]
+    rim = np.linalg.norm(last.displacement[model.mesh.points_of("HUB_OUTER")], axis=1).mean()
+    return contact.pressure.mean() / LAME.pressure - 1, rim / float(LAME.outer.displacement(3.0)) - 1
+
+
+def rate(sizes, found):
+    return -np.polyfit(np.log(sizes), np.log(np.abs(found)), 1)[0]
+
+
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize(("formulation", "element", "normals", "expected", "finest"), [
+    ("continuous", "quad4", "facet", 1.9, 3e-3), ("mortar", "quad8", "averaged", 3.5, 5e-6),
+    ("continuous", "quad8", "averaged", 3.5, 5e-6), ("node_to_segment", "quad9", "averaged", 3.5, 5e-6),
+])  # fmt: skip
+def test_matching_meshes_leave_the_error_of_the_mesh(formulation, element, normals, expected, finest, swap):
+    sizes = (3, 6, 9, 15)
+    found = []
+    for n in sizes:
+        model, last = quarter(element, n, n, formulation, swap, clearance=-INTERFERENCE, normals=normals)
+        assert last.contact["fit"].active.all()
+        found.append(errors(model, last)[1])
+    assert rate(sizes, found) > expected
+    assert abs(found[-1]) < finest
+
+
+def test_meshes_that_do_not_match_converge_as_fast_with_mortar():
+    """Arcs of second order differ by the fourth power of their length."""
+    sizes = (6, 12, 18, 24)
+    found = [
+        errors(*quarter("quad8", n, 3 * n // 2, "mortar", clearance=-INTERFERENCE)) for n in sizes
+    ]  # fmt: skip
+    pressure, displacement = np.array(found).T
+    assert rate(sizes, displacement) > 3.5
+    assert abs(displacement[-1]) < 5e-5
+    assert abs(pressure[-1]) < 1e-3
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
+def test_in_axisymmetry_the_interface_is_exact(formulation):
+    """Two tubes held between plates: the straight interface leaves only the error of u = A r + B / r."""
+    sizes = (2, 3, 4, 6)
+    for element, expected, finest in (("quad4", 1.9, 3e-3), ("quad8", 3.7, 1e-5)):
+        found = []
+        for n in sizes:
+            model = tubes(element, n, 2 if formulation == "mortar" else 3)
+            model.add_contact(
+                "fit", secondary="HUB_LEFT", primary="SHAFT_RIGHT", formulation=formulation, clearance=-INTERFERENCE
+            )
+            contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["fit"]
+            assert np.ptp(contact.pressure) < 1e-9 * LAME.pressure
+            found.append(contact.pressure.mean() / LAME.pressure - 1)
+        assert rate(sizes, found) > expected
+        assert abs(found[-1]) < finest
+
+
+def tubes(element, n, along):
+    """Shaft and hub as tubes of unit length; `along` divisions of the shaft, three of the hub."""
+    shaft = fc.generate.block((1.0, 1.0), (n, along), element, (1.0, 0.0), name="SHAFT")
+    hub = fc.generate.block((1.0, 1.0), (n, 3), element, (2.0, 0.0), name="HUB")
+    named = [
+        fc.generate.renamed(m, {g: f"{p}_{g}" for g in ("LEFT", "RIGHT", "TOP", "BOTTOM")})
+        for m, p in ((shaft, "SHAFT"), (hub, "HUB"))
+    ]  # fmt: skip
+    model = fc.Model(fc.generate.union(*named), "axisymmetric")
+    model.add_material(SHAFT, "SHAFT")
+    model.add_material(HUB, "HUB")
+    for part in ("SHAFT", "HUB"):
+        model.fix(f"{part}_TOP", "y")
+        model.fix(f"{part}_BOTTOM", "y")
+    return model
+
+
+def test_an_interference_by_clearance_is_that_of_the_geometry_to_first_order():
+    """A shaft made too large, and one that is told to be: they differ by the interference over the radius."""
+    apart = []
+    for scale in (1.0, 0.1):
+        d = scale * INTERFERENCE
+        told = errors(*quarter("quad8", 9, 9, "mortar", clearance=-d))[1]
+        made = errors(*quarter("quad8", 9, 9, "mortar", overlap=d))[1]
+        apart.append((1 + made) / (1 + told) - 1)
+    assert abs(apart[0]) < INTERFERENCE / 2.0
+    assert apart[0] / apart[1] == pytest.approx(10.0, rel=0.02)
+
+
+@pytest.mark.parametrize("element", ["quad4", "quad8"])
+def test_the_two_sides_may_be_swapped(element):
+    one, other = (
+        errors(*quarter(element, 8, 8, "mortar", swap, clearance=-INTERFERENCE, normals="averaged"))
+        for swap in (False, True)
+    )  # fmt: skip
+    mesh_error = max(abs(one[1]), abs(other[1]))
+    assert abs(one[1] - other[1]) < mesh_error
+
+
+def test_curved_sides_need_averaged_normals():
+    """Opposite a node the normal of either facet is off by half their angle, and the pairing flips for ever."""
+    with pytest.raises(fc.ConvergenceError, match='normals="averaged"'):
+        quarter("quad4", 8, 8, "node_to_segment", clearance=-INTERFERENCE, normals="facet")
+    model, last = quarter("quad4", 8, 8, "node_to_segment", clearance=-INTERFERENCE, normals="averaged")
+    assert last.iterations["geometry_updates"] <= 10
+    assert abs(errors(model, last)[1]) < 5e-3

@@ -1,0 +1,162 @@
+"""Tied contact: bodies glued along meshes that need not match."""
+
+import numpy as np
+import pytest
+from two_bodies import SIDES, blocks, boxes, held, rings, touching
+
+import fastcontact as fc
+from fastcontact.generate import merge_points
+
+FORMULATIONS = ("node_to_segment", "continuous", "mortar")
+ONCE = fc.linear_ramp(1)
+SKEW = np.array([[2e-3, 1e-3, -4e-4], [3e-3, -1e-3, 7e-4], [5e-4, -2e-3, 1e-3]])
+
+
+def stretched(mesh, **options):
+    """The outside of both bodies moves as a linear function of position: so must everything."""
+    dim = mesh.dim
+    model = fc.Model(mesh, "3d" if dim == 3 else "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    ends = ("L_ZMIN", "U_ZMAX") if dim == 3 else ("LOWER_BOTTOM", "UPPER_TOP")
+    for group in ends:
+        model.prescribe(group, **{axis: linear(k, dim) for k, axis in enumerate("xyz"[:dim])})
+    sides = ("XMIN", "XMAX", "YMIN", "YMAX") if dim == 3 else ("LEFT", "RIGHT")
+    for body in ("L", "U") if dim == 3 else ("LOWER", "UPPER"):
+        for side in sides:
+            traction = stress(dim) @ outward(side, dim)
+            model.add_traction(f"{body}_{side}", **dict(zip("xyz", traction, strict=False)))
+    return touching(model, **{"kind": "tied", **options})
+
+
+def linear(k, dim):
+    return lambda x: x @ SKEW[k, :dim]
+
+
+def stress(dim):
+    strain = 0.5 * (SKEW + SKEW.T)
+    if dim == 2:
+        strain = np.pad(strain[:2, :2], ((0, 1), (0, 1)))
+    lame, shear = 1000.0 * 0.3 / (1.3 * 0.4), 1000.0 / 2.6
+    return (lame * np.trace(strain) * np.eye(3) + 2 * shear * strain)[:dim, :dim]
+
+
+def outward(side, dim):
+    axis = {"LEFT": 0, "RIGHT": 0}.get(side, "XYZ".find(side[0]))
+    return (-1.0 if side.endswith(("LEFT", "MIN")) else 1.0) * np.eye(dim)[axis]
+
+
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("element", ["tri3", "tri6", "quad4", "quad8", "quad9", "hex8", "tet4", "hex20", "tet10"])
+def test_mortar_ties_meshes_that_do_not_match_exactly(element, swap):
+    """The linear patch test, with stretching, shearing and turning, under tension and shear in the interface."""
+    flat = element[:3] in ("tri", "qua")
+    mesh = blocks(element, upper=(4, 3)) if flat else boxes(element, lower=(2, 3, 1), upper=(3, 2, 1))
+    last = fc.solve(stretched(mesh, formulation="mortar", swap=swap), ONCE)[-1]
+    dim = mesh.dim
+    exact = mesh.points @ SKEW[:dim, :dim].T
+    assert np.abs(last.displacement - exact).max() < 1e-10 * np.abs(exact).max()
+    contact = last.contact["pair"]
+    assert contact.active.all()
+    assert contact.sticking.all()
+    # What the secondary side feels: the traction of the uniform stress on its outer normal.
+    sigma = stress(dim)
+    normal = (1.0 if swap else -1.0) * np.eye(dim)[-1]
+    assert contact.pressure == pytest.approx(-normal @ sigma @ normal, rel=1e-9)
+    along = sigma @ normal - (normal @ sigma @ normal) * normal
+    assert contact.shear == pytest.approx(np.tile(along, (len(contact.shear), 1)), rel=1e-9, abs=1e-9)
+    area = 10.0 ** (dim - 1)
+    assert contact.force == pytest.approx(sigma @ normal * area, rel=1e-10, abs=1e-9)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("make", [blocks, boxes])
+def test_matching_meshes_are_tied_as_if_they_were_one(make, formulation):
+    mesh = make()
+    one = merge_points(mesh, tolerance=1e-9)
+    models = []
+    for m in (mesh, one):
+        model = fc.Model(m, "3d" if m.dim == 3 else "plane_strain")
+        model.add_material(fc.LinearElastic(E=1000.0, nu=0.3), "L_BOX" if m.dim == 3 else "LOWER")
+        model.add_material(fc.LinearElastic(E=300.0, nu=0.4), "U_BOX" if m.dim == 3 else "UPPER")
+        model.fix("L_ZMIN" if m.dim == 3 else "LOWER_BOTTOM", "xyz"[: m.dim])
+        model.add_traction("U_ZMAX" if m.dim == 3 else "UPPER_TOP", **dict(zip("xyz"[: m.dim], (1.0, 2.0, 3.0))))
+        models.append(model)
+    touching(models[0], formulation, kind="tied")
+    glued, whole = (fc.solve(model, ONCE)[-1] for model in models)
+    nearest = [np.flatnonzero((np.abs(one.points - x) < 1e-9).all(axis=1))[0] for x in mesh.points]
+    assert np.abs(glued.displacement - whole.displacement[nearest]).max() < 1e-9 * np.abs(whole.displacement).max()
+
+
+@pytest.mark.parametrize("turn", [0.0, 1e-3])
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_curved_sides_are_tied_without_stress_as_they_lie(formulation, turn):
+    """Facets of two circles leave gaps and overlaps, which the tie keeps: exactly when moved, nearly when turned."""
+    mesh = rings("quad4", divisions=((6, 2), (8, 2)))
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.prescribe("HUB_OUTER", x=lambda x: 0.1 - turn * x[:, 1], y=lambda x: 0.2 + turn * x[:, 0])
+    model.add_contact("pair", secondary="SHAFT_OUTER", primary="HUB_INNER", formulation=formulation, kind="tied")
+    last = fc.solve(model, ONCE)[-1]
+    exact = np.array([0.1, 0.2]) + turn * mesh.points[:, ::-1] * [-1.0, 1.0]
+    # Across a gap the two sides of a turning body move apart by the angle times the gap: 2 (1 - cos(pi / 24)) at most.
+    across = turn * 2.0 * (1.0 - np.cos(np.pi / 24))
+    assert np.abs(last.displacement - exact).max() < 1e-12 + across
+    assert np.abs(last.stress).max() < 1e-9 + 1000.0 * across
+
+
+def test_a_tied_pair_is_linear_and_sits_beside_contact_with_friction():
+    """Load and unload leave nothing behind; another pair slides meanwhile."""
+    mesh = blocks(upper=(4, 3))
+    for step, load in zip(fc.solve(held_and_pulled(mesh), fc.Ramp((0.5, 1.0, 1.5, 2.0), ((0, 0), (1, 1), (2, 0)))),
+                          (0.5, 1.0, 0.5, 0.0), strict=True):  # fmt: skip
+        assert step.contact["pair"].force[1] == pytest.approx(-20.0 * load, abs=1e-9)
+        assert step.iterations["geometry_updates"] <= 1
+    mesh = fc.generate.union(blocks(), moved(blocks(), 20.0))
+    secondary, primary = SIDES["plane"]
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("LOWER_BOTTOM", "xy")
+    model.fix("R_LOWER_BOTTOM", "xy")
+    for side in ("UPPER_TOP", "R_UPPER_TOP"):
+        model.prescribe(side, x=0.05, y=-0.02)
+    model.add_contact("slides", secondary=secondary, primary=primary, formulation="node_to_segment", friction=0.2)
+    model.add_contact("glued", secondary="R_" + secondary, primary="R_" + primary, formulation="mortar", kind="tied")
+    both = fc.solve(model, fc.linear_ramp(2))[-1]
+    model.contact.pop()
+    model.add_contact("glued", secondary="R_" + secondary, primary="R_" + primary, formulation="mortar")
+    alone = fc.solve(model, fc.linear_ramp(2))[-1]
+    assert both.contact["slides"].pressure == pytest.approx(alone.contact["slides"].pressure, rel=1e-10)
+    assert not both.contact["slides"].sticking.all()
+    assert np.abs(both.contact["glued"].force[0]) > 5 * np.abs(alone.contact["glued"].force[0])
+
+
+def held_and_pulled(mesh):
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("LOWER_BOTTOM", "xy")
+    model.add_traction("UPPER_TOP", y=2.0)
+    return touching(model, "mortar", kind="tied")
+
+
+def moved(mesh, by):
+    points = mesh.points + [by, 0.0]
+    return fc.generate.renamed(mesh.replace(points=points), lambda name: f"R_{name}")
+
+
+@pytest.mark.parametrize(("options", "words"), [
+    ({"kind": "glued"}, "kind of contact 'pair' 'glued'.*bilateral.*tied"),
+    ({"kind": "tied", "friction": 0.3}, "contact 'pair' is tied, which knows no friction"),
+    ({"kind": "bilateral", "friction": 0.3}, "contact 'pair' is bilateral, which knows no friction"),
+    ({"kind": "tied", "clearance": 0.1}, "is tied, which keeps the sides as they lie, exactly: leave out 'clearance'"),
+    ({"kind": "tied", "penalty": 1e3}, "leave out 'penalty'"),
+])  # fmt: skip
+def test_what_contradicts_itself_is_refused(options, words):
+    with pytest.raises(fc.ContactError, match=words):
+        touching(held(blocks()), "mortar", **options)
+
+
+def test_an_obstacle_cannot_be_tied():
+    model = fc.Model(fc.generate.block((1.0, 1.0), (2, 2), "quad4"), "plane_strain")
+    floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    with pytest.raises(fc.ContactError, match="'floor' cannot be tied to a rigid obstacle: prescribe"):
+        model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, kind="tied")

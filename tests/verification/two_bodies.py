@@ -1,0 +1,66 @@
+"""Pairs of small bodies that contact options are tried on: blocks, boxes, rings."""
+
+import numpy as np
+
+import fastcontact as fc
+from fastcontact.generate import block, box, renamed, union
+
+YOUNG, POISSON = 1000.0, 0.3
+SIDES = {"plane": ("CONT_UPPER", "CONT_LOWER"), "space": ("U_ZMIN", "L_ZMAX")}
+
+
+def blocks(element="quad4", lower=(3, 2), upper=(3, 2), apart=0.0):
+    """Two blocks of 10 by 5 on each other along y = 0, the upper one lifted."""
+    mesh = fc.generate.block_on_block(divisions_lower=lower, divisions_upper=upper, element=element)
+    points = mesh.points.copy()
+    points[mesh.points_of("UPPER"), 1] += apart
+    return mesh.replace(points=points)
+
+
+def boxes(element="hex8", lower=(2, 3, 2), upper=(2, 3, 2), apart=0.0):
+    """Two boxes of 10 by 10 by 5 on each other along z = 0, the upper one lifted; groups as of `box`, after L_ or U_."""
+    parts = []
+    for side, divisions, z in (("L", lower, -5.0), ("U", upper, apart)):
+        part = box((10.0, 10.0, 5.0), divisions, element, (0.0, 0.0, z))
+        parts.append(renamed(part, {name: f"{side}_{name}" for name in part.group_names}))
+    return union(*parts)
+
+
+def held(mesh, kinematics="plane_strain", approach=0.02):
+    """The lower body stands, the upper one goes down by `approach`; both slide along their left sides."""
+    model = fc.Model(mesh, kinematics)
+    model.add_material(fc.LinearElastic(E=YOUNG, nu=POISSON))
+    if kinematics == "3d":
+        for side in "LU":
+            model.fix(f"{side}_XMIN", "x")
+            model.fix(f"{side}_YMIN", "y")
+        model.fix("L_ZMIN", "z")
+        model.prescribe("U_ZMAX", z=-approach)
+    else:
+        for side in ("LOWER", "UPPER"):
+            model.fix(f"{side}_LEFT", "x")
+        model.fix("LOWER_BOTTOM", "y")
+        model.prescribe("UPPER_TOP", y=-approach)
+    return model
+
+
+def touching(model, formulation, swap=False, **options):
+    """Let the two bodies touch; return the model."""
+    secondary, primary = SIDES["space" if model.mesh.dim == 3 else "plane"][:: -1 if swap else 1]
+    model.add_contact("pair", secondary=secondary, primary=primary, formulation=formulation, **options)
+    return model
+
+
+def ring(element, inner, outer, divisions, name):
+    """A quarter of a ring in polar cells: groups name, name_INNER, name_OUTER, and XAXIS, YAXIS on the cuts."""
+    flat = block((1.0, 1.0), divisions, element, name=name)
+    angle, radius = 0.5 * np.pi * (1.0 - flat.points[:, 0]), inner + (outer - inner) * flat.points[:, 1]
+    points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+    points[np.abs(points) < 1e-14 * outer] = 0.0
+    sides = {"BOTTOM": f"{name}_INNER", "TOP": f"{name}_OUTER", "LEFT": "YAXIS", "RIGHT": "XAXIS"}
+    return renamed(flat.replace(points=points), lambda group: sides.get(group, group if group == name else None))
+
+
+def rings(element, inner=(1.0, 2.0), outer=(2.0, 3.0), divisions=((6, 3), (6, 3))):
+    """Two quarters of rings around each other, SHAFT and HUB."""
+    return union(ring(element, *inner, divisions[0], "SHAFT"), ring(element, *outer, divisions[1], "HUB"))
