@@ -7,7 +7,8 @@ with meshes that do not match, tied where they touch. ``sphere``: a quarter of a
 the full load and 20 steps, geometry converged.
 
 CPU seconds are those of the process. L is one linear solution of the same mesh to the same tolerance without set-up,
-measured in the same run; ``triad`` is the memory bandwidth of a core then. A small problem runs first and compiles the kernels.
+measured in the same run; ``triad`` is the memory bandwidth of a core then. A small problem runs first and compiles
+the kernels.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ PATIENCE, SHORTEST, UPHILL = 40, 1e-3, 3
 # Relative changes down to which starts are swept, and the sweeps that one may take.
 SWEPT, MOST_SWEEPS = (1e-1, 1e-2, 1e-3, 1e-4), 2000
 # Edges of the cones in three dimensions, and the largest complementarity problem.
-EDGES, LARGEST = (8, 16, 32), 6000
+EDGES, LARGEST = (8, 16, 32), 2500
 # Edges repeat each other, which pivots do not bear: their problem is shifted by this fraction.
 SHIFT = 1e-6
 
@@ -249,6 +249,6 @@ def _on_edges(problem: _Problem, edges: int) -> Array | None:
     q = SHIFT * (0.5 + np.arange(size) * 0.6180339887498949 % 1.0)  # no two alike
     q[:last] += X.T @ problem.free.ravel()
     z = np.empty(size)
-    if lemke.pivot(M, q, z, 20 * size) < 0:
+    if lemke.pivot(M, q, z, 5 * size) < 0:
         return None
     return (X @ z[:last]).reshape(1 + k, m)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lstsq
-from scipy.sparse import csr_array, vstack
+from scipy.sparse import block_array, csr_array, diags_array, vstack
 
 from fastcontact import coulomb
 from fastcontact.active_set import Compliance
@@ -22,6 +22,8 @@ from fastcontact.linear import Loaded
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+# A direction of slip in which a constraint gives less than this, relative to its gap, is none.
+IDLE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +114,8 @@ def solve(
     k, m = len(tangents), len(gap0)
     R = csr_array(vstack([matrix[rows] for matrix in (B, *tangents)], format="csr"))
     free, F = loaded.reduce(R)
-    idle = _idle(F, k)
+    Q = _aligned(F) if k == 2 else None
+    idle = _idle(F if Q is None else Q @ (Q @ F).T, k)
     if compliance is not None and len(rows):
         F += _turned(compliance.block(rows), np.stack([along[rows] for along in directions]))
     if loose is not None:
@@ -121,20 +124,26 @@ def solve(
     if softness is not None:
         F[np.arange(len(rows)), np.arange(len(rows))] += softness[rows]
     free = free.reshape(1 + k, -1) + np.vstack([gap0[rows], *(slip0[:, rows])])
+    start = None
+    if guess is not None and guess.tangential.shape == (m, k):
+        start = np.vstack([guess.multiplier, guess.tangential.T])[:, rows]
+    if Q is not None:
+        F, free = np.asarray(Q @ (Q @ F).T), (Q @ free.ravel()).reshape(free.shape)
+        start = None if start is None else (Q @ start.ravel()).reshape(free.shape)
     if len(idle):
         F[idle], F[:, idle], free.ravel()[idle] = 0.0, 0.0, 0.0
         F[idle, idle] = np.diag(F).max()
     equations = np.zeros(len(rows), bool) if held is None else held[rows]
-    start = None
-    if guess is not None and guess.tangential.shape == (m, k):
-        start = np.vstack([guess.multiplier, guess.tangential.T])[:, rows]
     found = _coulomb(F, free, friction[rows], closed[rows], equations, start)
+    y, relative = found.y, found.gaps
+    if Q is not None:
+        y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)
     full, gaps = np.zeros((1 + k, m)), np.full((1 + k, m), np.inf)
-    full[:, rows], gaps[:, rows] = found.y, found.gaps
+    full[:, rows], gaps[:, rows] = y, relative
     gaps[1:, ~usable] = 0.0
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)
     active[rows], sticking[rows] = found.closed, found.sticking
-    u = loaded.displacement(R.T @ found.y.ravel())
+    u = loaded.displacement(R.T @ y.ravel())
     return FrictionalEquilibrium(
         u, full[0], gaps[0], full[1:].T, gaps[1:].T, active, sticking, found.settled, found.residual, found.iterations
     )
@@ -180,6 +189,26 @@ def _turned(C: Array, along: Array) -> Array:
     return np.asarray(np.tile(C, (parts, parts)) * (frame @ frame.T))
 
 
+def _aligned(F: Array) -> csr_array | None:
+    """Return Q that turns two tangents so that one of them is idle where supports leave one direction of slip.
+
+    In a plane of symmetry both tangents may lie across it; then neither is idle by itself. None where nothing turns.
+    """
+    m = len(F) // 3
+    n, a, b = np.arange(3 * m).reshape(3, m)
+    gap = np.maximum(F[n, n], np.finfo(float).tiny)
+    first, second = F[a, a] - F[a, n] ** 2 / gap, F[b, b] - F[b, n] ** 2 / gap
+    mixed = F[a, b] - F[a, n] * F[b, n] / gap
+    apart = np.hypot(0.5 * (first - second), mixed)
+    largest, least = 0.5 * (first + second) + apart, 0.5 * (first + second) - apart
+    across = (least <= IDLE * np.maximum(largest, gap)) & (np.abs(mixed) > IDLE * np.maximum(largest, gap))
+    if not across.any():
+        return None
+    angle = np.where(across, 0.5 * np.arctan2(2 * mixed, first - second), 0.0)
+    c, s, zero = diags_array(np.cos(angle)), diags_array(np.sin(angle)), csr_array((m, m))
+    return csr_array(block_array([[diags_array(np.ones(m)), zero, zero], [zero, c, s], [zero, -s, c]], format="csr"))
+
+
 def _idle(F: Array, k: int) -> NDArray[np.intp]:
     """Return the rows of tangents along which supports leave no motion, or none but that of the gap.
 
@@ -188,4 +217,4 @@ def _idle(F: Array, k: int) -> NDArray[np.intp]:
     m = len(F) // (1 + k)
     tangent, normal = np.arange(m, (1 + k) * m), np.tile(np.arange(m), k)
     own, gap, both = F[tangent, tangent], F[normal, normal], F[tangent, normal]
-    return tangent[own * gap - both * both <= 1e-10 * gap * np.maximum(own, gap)]
+    return tangent[own * gap - both * both <= IDLE * gap * np.maximum(own, gap)]

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from typing import Any
+
+import numpy as np
 
 from fastcontact.cli import _results
+from fastcontact.errors import CaseError
 
 HELP = "plot the deformed mesh with its von Mises stress, or force and radius over the load"
 
@@ -12,21 +16,35 @@ HELP = "plot the deformed mesh with its von Mises stress, or force and radius ov
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     _results.arguments(parser)
-    parser.add_argument("--png", metavar="FILE", required=True, help="picture to write")
-    parser.add_argument("--history", action="store_true", help="force and contact radius over the load instead")
+    parser.add_argument("--png", metavar="FILE", help="picture to write")
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--history", action="store_true", help="force and contact radius over the load instead")
+    what.add_argument("--axis", action="store_true", help="stresses along the axis under the contact, against theory")
+    what.add_argument(
+        "--zones", action="store_true", help="where the contact is open, closed and slides, over the load"
+    )
+    what.add_argument("--view", action="store_true", help="an interactive window (PyVista) instead of a picture")
+    parser.add_argument("--mirrored", action="store_true", help="draw the full section beyond the axis, too")
     parser.add_argument("--scale", type=float, default=1.0, help="factor on the displacements (default 1)")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the picture."""
+    """Write the picture, or show the window."""
     from fastcontact import plot
     from fastcontact.cli._pictures import save
     from fastcontact.io.result_reader import open_results
 
+    if not (options.png or options.view):
+        raise CaseError("name the picture to write with --png FILE, or ask for a window with --view")
     with open_results(options.file) as results:
         step = _results.chosen_step(results, options.step)
         case = _results.case_data(results)
-        if options.history:
+        if options.view:
+            plot.view(results, step, scale=options.scale, title=case["title"], screenshot=options.png)
+            return 0
+        if options.axis or options.zones:
+            axes = _of_contact(options, results, step, case)
+        elif options.history:
             name = _results.chosen_contact(step, options.contact)
             axes = plot.history(
                 list(results),
@@ -39,9 +57,27 @@ def run(options: argparse.Namespace) -> int:
         else:
             title = f"{case['title']}\nload factor {step.load_factor:g}, displacements x {options.scale:g}"
             axes = plot.deformed_shape(
-                results.mesh, step, scale=options.scale, title=title.strip(), units=case["units"]
-            )
+                results.mesh, step, scale=options.scale, mirrored=options.mirrored, title=title.strip(),
+                units=case["units"],
+            )  # fmt: skip
     save(axes, options.png)
     if not options.quiet:
         print(f"wrote {options.png}")
     return 0
+
+
+def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> Any:
+    """Draw what belongs to one contact pair: its zones over the load, or the stresses under it."""
+    from fastcontact import plot
+
+    name = _results.chosen_contact(step, options.contact)
+    if options.zones:
+        return plot.contact_zones(list(results), name, title=case["title"], units=case["units"])
+    theory = case["theories"].get(name)
+    theory = getattr(theory, "hertz", theory)
+    curves = {"theory, equal approach": theory} if hasattr(theory, "stress_on_axis") else {}
+    force = float(np.linalg.norm(step.contact[name].force)) / case["shares"].get(name, 1.0)
+    if curves and hasattr(theory, "at_force") and force > 0:
+        curves["theory, equal force"] = theory.at_force(force)
+    title = f"{case['title']}\nstresses on the axis, load factor {step.load_factor:g}".strip()
+    return plot.axis_stress(results.mesh, step, name, curves, title=title, units=case["units"])

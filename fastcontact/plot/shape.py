@@ -25,6 +25,7 @@ def deformed_shape(
     *,
     scale: float = 1.0,
     edges: bool | None = None,
+    mirrored: bool = False,
     title: str = "",
     units: Units = UNITS,
     view: tuple[float, float] = (25.0, -60.0),
@@ -42,6 +43,8 @@ def deformed_shape(
         Factor on the displacements.
     edges : bool, optional
         Draw the cells' edges; by default up to 5000 cells, or facets of the surface in 3D.
+    mirrored : bool
+        In 2D, draw the other half beyond x = 0, too: the full section of an axisymmetric body.
     title, units
         As in `pressure_profile`.
     view : (float, float)
@@ -55,10 +58,13 @@ def deformed_shape(
     """
     solid = mesh.dim == 3
     place = mesh.points + scale * step.displacement
-    axes = new_axes(ax, (7.0, 7.0) if solid else _size(place), "3d" if solid else None)
+    both = np.concatenate([place, place * [-1.0, 1.0]]) if mirrored and not solid else place
+    axes = new_axes(ax, (7.0, 7.0) if solid else _size(both), "3d" if solid else None)
     field = (
         draw_solid(axes, mesh, place, step.von_mises, edges, view) if solid else _draw(axes, mesh, place, step, edges)
     )
+    if both is not place:
+        _draw(axes, mesh, place * [-1.0, 1.0], step, edges)
     top = int(np.argmax(step.von_mises))
     where = ", ".join(f"{x:.2f}" for x in mesh.points[top])
     label = f"maximum {step.von_mises[top]:.1f} at ({where})"
@@ -70,7 +76,7 @@ def deformed_shape(
     if solid:
         axes.set_zlabel(f"z [{units['length']}]")
     axes.set_title(title or f"Deformed shape (displacements x {scale:g}), load factor {step.load_factor:g}")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.02 if solid else -0.09 if ax is not None else _below(place)))
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.02 if solid else -0.09 if ax is not None else _below(both)))
     return axes
 
 

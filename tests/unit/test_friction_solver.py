@@ -59,6 +59,26 @@ def test_dropping_a_column_of_the_field_adds_what_it_represented():
     np.testing.assert_allclose(Z @ Z.T, wanted, atol=1e-13)
 
 
+def test_tangents_turn_to_the_slip_that_supports_leave():
+    # Two constraints that see only y and z of two nodes, in oblique frames: each has one direction of slip.
+    rng = np.random.default_rng(9)
+    normal = unit_vectors(rng, 2, 3)
+    R = np.zeros((6, 6))
+    for part, along in enumerate([normal, *tangents(normal)]):
+        for i in range(2):
+            R[2 * part + i, 3 * i : 3 * i + 3] = along[i]
+    A = rng.normal(size=(6, 6))
+    K_inverse = A @ A.T
+    held = [0, 3]
+    K_inverse[held], K_inverse[:, held] = 0.0, 0.0
+    F = R @ K_inverse @ R.T
+    assert not len(friction._idle(F, 2))
+    Q = friction._aligned(F)
+    np.testing.assert_allclose((Q @ Q.T).toarray(), np.eye(6), atol=1e-15)
+    np.testing.assert_array_equal(friction._idle(Q @ (Q @ F).T, 2), [4, 5])
+    assert friction._aligned(R @ (A @ A.T) @ R.T) is None
+
+
 def test_what_does_not_settle_is_told_with_its_numbers(monkeypatch):
     monkeypatch.setattr(coulomb, "PATIENCE", 0)
     monkeypatch.setattr(coulomb, "SWEPT", ())

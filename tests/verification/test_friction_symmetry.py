@@ -91,6 +91,30 @@ def test_dual_multipliers_dissipate_nothing_on_a_fine_path(multipliers):
         assert abs(step.contact["pair"].dissipation) < 1e-9 * np.abs(step.contact["pair"].force[1])
 
 
+@pytest.mark.parametrize(("formulation", "exact"), [("node_to_segment", 1e-9), ("continuous", 1e-4)])
+def test_mirrored_bodies_in_space_stay_mirrored(formulation, exact):
+    # Supports hold one direction of slip at the nodes of the planes of symmetry, and all at the pole.
+    body = fc.generate.sphere_octant("hex8", size=25.0, contact_size=3.0, contact_radius=10.0)
+    upper = fc.generate.renamed(body, {name: f"U_{name}" for name in body.group_names})
+    names = {name: name.replace("U_", "L_") for name in upper.group_names}
+    mesh = fc.generate.union(upper, fc.generate.mirrored(upper, "y", at=body.points[:, 1].min(), rename=names))
+    model = fc.Model(mesh, "3d")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    for side, approach in (("U", -1.0), ("L", 1.0)):
+        model.fix(f"{side}_SYMMETRY_X", "x")
+        model.fix(f"{side}_SYMMETRY_Z", "z")
+        model.prescribe(f"{side}_SPHERE_TOP", y=approach)
+    sides = {"secondary": "U_CONT_SPHERE", "primary": "L_CONT_SPHERE"}
+    model.add_contact("pair", formulation=formulation, friction=0.3, **sides)
+    step = fc.solve(model, fc.linear_ramp(1), linear_solver="direct")[-1]
+    contact, half = step.contact["pair"], body.n_points
+    assert contact.active.sum() > 4
+    assert contact.sticking[contact.active].all()
+    assert abs(contact.dissipation) < 1e-9 * np.abs(contact.force[1])
+    mirrored = step.displacement[half:] * (1.0, -1.0, 1.0)
+    assert np.abs(step.displacement[:half] - mirrored).max() < exact
+
+
 def test_frictionless_and_frictional_forces_agree_but_for_the_edge():
     smooth, rough = (pressed("quad4", "continuous", friction=mu)[-1].contact["pair"] for mu in (0.0, 0.3))
     assert rough.force[1] == pytest.approx(smooth.force[1], rel=1e-3)
