@@ -33,7 +33,7 @@ def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "",
         raise FastcontactError("the interactive view needs PyVista: pip install 'fastcontact[view]'") from error
     grid = results.to_pyvista(step)
     grid.points = grid.points + scale * grid.point_data["displacement"]
-    plotter = pyvista.Plotter(off_screen=screenshot is not None)
+    plotter: Any = pyvista.Plotter(off_screen=screenshot is not None)
     plotter.add_mesh(
         grid, scalars="von_mises", show_edges=grid.n_cells <= 5000, line_width=0.3, cmap="viridis",
         scalar_bar_args={"vertical": True, "title": "von Mises stress"},
@@ -41,5 +41,5 @@ def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "",
     plotter.add_text(title or f"load factor {step.load_factor:g}", font_size=10)
     if results.mesh.dim == 2:
         plotter.view_xy()
-    plotter.add_axes()  # type: ignore[call-arg]
+    plotter.add_axes()
     plotter.show(screenshot=screenshot or False)
