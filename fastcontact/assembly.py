@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 
-from fastcontact import elements
+from fastcontact import elements, parallel
 from fastcontact.errors import MeshError
 from fastcontact.kernels import pattern as pattern_kernels
 from fastcontact.kernels import solid
@@ -82,11 +83,18 @@ def stiffness(
     data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))
     loops = solid.loops(mesh.dim)
     for name, block in mesh.solids.items():
-        N, dN, weights = elements.get(name).tables
-        bad = loops.add_stiffness(
-            mesh.points, block, N, dN, weights, moduli, material[name], kinematics == "axisymmetric",
-            pattern.slots[name], data,
-        )  # fmt: skip
+        tables = elements.get(name).tables
+
+        def add(rows: tuple[int, int], name: str = name, block: NDArray[np.int32] = block, tables: Any = tables) -> int:
+            return int(
+                loops.add_stiffness(
+                    mesh.points, block, *tables, moduli, material[name], kinematics == "axisymmetric",
+                    pattern.slots[name], *rows, data,
+                )
+            )  # fmt: skip
+
+        found = parallel.shared(add, parallel.ranges(pattern.indptr, len(block)))
+        bad = min((number for number in found if number >= 0), default=-1)
         if bad >= 0:
             where = mesh.points[block[bad]].mean(axis=0)
             raise MeshError(

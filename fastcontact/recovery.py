@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact import elements
+from fastcontact import elements, parallel
 from fastcontact.kernels import solid, solid2d
 from fastcontact.mesh import Mesh
 
@@ -25,7 +25,15 @@ def stress_at_points(
     for name, block in mesh.solids.items():
         N, dN, weights = elements.get(name).tables
         out = np.empty((len(block), len(weights), moduli.shape[1]))
-        loops.stress(mesh.points, block, N, dN, moduli, material[name], kinematics == "axisymmetric", displacement, out)
+
+        def fill(rows: tuple[int, int], name: str = name, N: Array = N, dN: Array = dN, out: Array = out) -> None:
+            part = slice(*rows)
+            loops.stress(
+                mesh.points, mesh.cells[name][part], N, dN, moduli, material[name][part], kinematics == "axisymmetric",
+                displacement, out[part],
+            )  # fmt: skip
+
+        parallel.shared(fill, parallel.portions(len(block)))
         values[name] = out
     return values
 

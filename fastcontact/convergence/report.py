@@ -23,7 +23,8 @@ body { font-family: system-ui, sans-serif; line-height: 1.45; color: #1b1b1b; ba
 h1 { font-size: 1.6rem; } h2 { font-size: 1.25rem; margin-top: 2.2rem; border-bottom: 1px solid #ccc; }
 table { border-collapse: collapse; margin: 0.8rem 0; font-variant-numeric: tabular-nums; font-size: 0.9rem; }
 th, td { padding: 0.25rem 0.6rem; text-align: right; border-bottom: 1px solid #ddd; white-space: nowrap; }
-th { background: #f3f3f3; white-space: normal; vertical-align: bottom; } th:first-child, td:first-child { text-align: left; white-space: normal; }
+th { background: #f3f3f3; white-space: normal; vertical-align: bottom; }
+th:first-child, td:first-child { text-align: left; white-space: normal; }
 caption { text-align: left; font-weight: 600; padding: 0.4rem 0; }
 .wide { overflow-x: auto; } img { max-width: 100%; height: auto; } p.say { max-width: 50rem; }
 pre { background: #f6f6f6; padding: 0.8rem; overflow-x: auto; font-size: 0.85rem; }

@@ -32,9 +32,19 @@ def _map(points, cell, N, dN, q, gradient):
 
 
 @kernel
-def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric, slots, data):
-    """Add element stiffness blocks to `data` (n_blocks, 2, 2), written in place at `slots`.
+def _touches(slots, c, first, last):
+    """Return whether a cell has a node whose row of blocks lies in [first, last)."""
+    for a in range(slots.shape[1]):
+        if first <= slots[c, a, a] < last:
+            return True
+    return False
 
+
+@kernel
+def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric, slots, first, last, data):
+    """Add element stiffness blocks to `data` (n_blocks, 2, 2), written in place at those `slots` in [first, last).
+
+    These are whole rows of nodes, so that threads may share the rows; each adds in the order of the cells.
     Returns the number of the first cell with a Jacobian that is not positive, or -1. Only the terms of the moduli
     that couple normal strains with each other and shear with itself are used (isotropy, or orthotropy along x, y).
     """
@@ -42,6 +52,8 @@ def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric,
     gradient = np.empty((n_nodes, 2))
     local = np.empty((n_nodes, n_nodes, 2, 2))
     for c in range(n_cells):
+        if not _touches(slots, c, first, last):
+            continue
         D = moduli[material[c]]
         shear = D[3, 3]
         local[:] = 0.0
@@ -71,10 +83,13 @@ def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric,
             local[b, b, 1, 0] = local[b, b, 0, 1]  # equal but for round-off; K is symmetric to the last bit
             for a in range(b + 1):
                 upper, lower = slots[c, a, b], slots[c, b, a]
-                for i in range(2):
-                    for j in range(2):
-                        data[upper, i, j] += local[a, b, i, j]
-                        if a != b:
+                if first <= upper < last:
+                    for i in range(2):
+                        for j in range(2):
+                            data[upper, i, j] += local[a, b, i, j]
+                if a != b and first <= lower < last:
+                    for i in range(2):
+                        for j in range(2):
                             data[lower, j, i] += local[a, b, i, j]
     return -1
 

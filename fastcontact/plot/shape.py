@@ -83,12 +83,12 @@ def deformed_shape(
 def _size(place: Array) -> tuple[float, float]:
     """Return width and height of a picture that the body fills, beside colours, labels and title [inches]."""
     width, height = np.ptp(place, axis=0) / np.ptp(place, axis=0).max()
-    return max(5.0 * float(width) + 2.2, 5.0), max(5.0 * float(height) + 1.6, 3.4)
+    return max(5.0 * float(width) + 2.2, 5.0), max(5.0 * float(height) + 2.0, 3.6)
 
 
 def _below(place: Array) -> float:
     """Return where the legend begins, in heights of such axes: half an inch leaves room for the label of the axis."""
-    return -0.5 / (_size(place)[1] - 1.6)
+    return -0.5 / (_size(place)[1] - 2.0)
 
 
 def _draw(ax: Axes, mesh: Mesh, place: Array, step: StepResult, edges: bool | None) -> Any:

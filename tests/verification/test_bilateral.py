@@ -102,3 +102,20 @@ def test_a_body_may_hang_on_a_bilateral_pair():
     last = fc.solve(model, fc.linear_ramp(2))[-1]
     assert np.abs(last.stress[:, 1] - 2.0).max() < 1e-9
     assert last.iterations["regularised"]["relative_to_load"] < 1e-9
+
+
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("make", [blocks, boxes])
+@pytest.mark.parametrize(("options", "expected"), [
+    ({"kind": "tied"}, -1.0), ({"kind": "bilateral"}, -1.0), ({"clearance": 0.005}, 0.75),
+    ({"clearance_primary": -0.01}, 1.5),
+], ids=str)  # fmt: skip
+def test_dual_multipliers_keep_the_same_terms(make, options, expected, swap):
+    mesh = make(upper=(4, 3) if make is blocks else (3, 2, 2))
+    kinematics = "3d" if mesh.dim == 3 else "plane_strain"
+    approach = -0.02 if "kind" in options else 0.02
+    model = touching(held(mesh, kinematics, approach), "mortar", swap, multipliers="dual", **options)
+    last = fc.solve(model, fc.linear_ramp(1))[-1]
+    pressure = expected * MODULUS[kinematics] * 0.002
+    assert np.abs(last.stress[:, mesh.dim - 1] + pressure).max() < 1e-10 * abs(pressure)
+    assert last.contact["pair"].pressure == pytest.approx(pressure, rel=1e-10)

@@ -139,7 +139,7 @@ def held_and_pulled(mesh):
 
 
 def moved(mesh, by):
-    points = mesh.points + [by, 0.0]
+    points = mesh.points + np.array([by, 0.0])
     return fc.generate.renamed(mesh.replace(points=points), lambda name: f"R_{name}")
 
 

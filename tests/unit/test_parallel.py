@@ -1,0 +1,79 @@
+"""Work shared by threads: ranges that cover everything, and the same bits for any number of them."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact import _jit, assembly, parallel, recovery
+import itertools
+
+
+@pytest.fixture
+def threads(monkeypatch):
+    def use(count):
+        monkeypatch.setattr(parallel, "WORTHWHILE", 0)
+        monkeypatch.setattr(_jit, "threads", lambda: count)
+
+    return use
+
+
+@pytest.mark.parametrize("count", [1, 2, 7])
+def test_ranges_cover_everything_once(threads, count):
+    threads(count)
+    found = parallel.portions(20)
+    assert len(found) == count
+    assert [k for low, high in found for k in range(low, high)] == list(range(20))
+    indptr = np.array([0, 3, 4, 9, 9, 12, 20, 21, 30])
+    found = parallel.ranges(indptr, 100)
+    assert found[0][0] == 0
+    assert found[-1][1] == 30
+    assert all(end == start for (_, end), (start, _) in itertools.pairwise(found))
+    assert {end for pair in found for end in pair} <= set(indptr.tolist())
+
+
+def test_little_work_is_not_shared():
+    assert parallel.portions(parallel.WORTHWHILE - 1) == [(0, parallel.WORTHWHILE - 1)]
+
+
+@pytest.mark.parametrize("element", ["tri3", "tri6", "quad4", "quad8", "tet4", "tet10", "hex8", "hex20", "wedge6"])
+def test_assembly_and_recovery_give_the_same_bits_for_any_number_of_threads(threads, element):
+    solid = element[:3] in ("tet", "hex", "wed")
+    mesh = (
+        fc.generate.box((1.0, 2.0, 1.0), (3, 2, 2), element)
+        if solid
+        else fc.generate.block((1.0, 2.0), (4, 3), element)
+    )
+    random = np.random.default_rng(7)
+    mesh = mesh.replace(points=mesh.points + 0.02 * random.random(mesh.points.shape))
+    kinematics = "3d" if solid else "axisymmetric"
+    model = fc.Model(mesh, kinematics)
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    moduli, material = model.material_numbers()
+    u = random.random(mesh.points.shape)
+    found = []
+    for count in (1, 2, 3, 5):
+        threads(count)
+        K = assembly.stiffness(mesh, kinematics, moduli, material)
+        stress = recovery.stress_at_points(mesh, kinematics, moduli, material, u)
+        found.append((K.data.tobytes(), stress[element].tobytes()))
+    assert len(set(found)) == 1
+
+
+def test_a_degenerate_cell_is_named_by_its_lowest_number_whatever_the_threads(threads):
+    mesh = fc.generate.block((1.0, 1.0), (6, 6), "quad4")
+    points = mesh.points.copy()
+    block = mesh.cells["quad4"]
+    # Two cells inside out: whichever thread ends first, the first one is told.
+    for cell in (4, 31):
+        a, b = block[cell][0], block[cell][2]
+        points[a], points[b] = points[b].copy(), points[a].copy()
+    bad = mesh.replace(points=points)
+    material = {"quad4": np.zeros(36, np.int32)}
+    moduli = fc.LinearElastic(E=1.0, nu=0.3).moduli("plane_strain")[None]
+    texts = []
+    for count in (1, 4):
+        threads(count)
+        with pytest.raises(fc.MeshError, match="not positive") as caught:
+            assembly.stiffness(bad, "plane_strain", moduli, material)
+        texts.append(str(caught.value))
+    assert texts[0] == texts[1]
