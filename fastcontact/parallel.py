@@ -6,6 +6,7 @@ own cells; nothing is added across threads.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
@@ -14,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact import _jit
-import itertools
 
 Result = TypeVar("Result")
 # With fewer cells the start of threads costs more than they save.

@@ -40,13 +40,6 @@ class Candidates:
         """Return the positions (n, dim) for nodal `coordinates` (n_points, dim)."""
         return np.einsum("nk,nkd->nd", self.shape, coordinates[self.nodes])
 
-    @property
-    def nearest(self) -> NDArray[np.int32]:
-        """The node (n,) of the largest weight of each; of equal ones the first."""
-        largest = np.argmax(self.shape, axis=1)
-        found: NDArray[np.int32] = self.nodes[np.arange(len(largest)), largest]
-        return found
-
     def belonging_to(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return which candidates (n,) lie nearer to nodes of `mask` (n_points,) than to all others."""
         inside = mask[self.nodes]
@@ -106,7 +99,6 @@ def pair(
         allowed = _allowed(primary, found, projection_tolerance)
         return Pairing(found.facet, found.xi, found.normal, found.overhang <= allowed)
     at_nodes = nodal_normals(primary, coordinates)
-    facet, xi, overhang = found.facet, found.xi, found.overhang
     project = along_normals if coordinates.shape[1] == 3 else along_line_normals
     facet, xi, overhang = project(candidates, primary, coordinates, at_nodes, found)
     normal = interpolated(at_nodes, places(primary, facet, xi))

@@ -1,11 +1,12 @@
 """Work shared by threads: ranges that cover everything, and the same bits for any number of them."""
 
+import itertools
+
 import numpy as np
 import pytest
 
 import fastcontact as fc
 from fastcontact import _jit, assembly, parallel, recovery
-import itertools
 
 
 @pytest.fixture

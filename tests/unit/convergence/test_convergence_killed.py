@@ -23,7 +23,7 @@ def test_a_killed_sweep_redoes_no_finished_run(root, tmp_path):
     os.killpg(first.pid, signal.SIGKILL)
     first.wait()
     kept = finished(store)
-    assert 3 <= len(kept)
+    assert len(kept) >= 3
     assert not target.exists() or len(kept) == 12
     subprocess.run(command, check=True, timeout=300)
     after = finished(store)
