@@ -119,3 +119,16 @@ def test_dual_multipliers_keep_the_same_terms(make, options, expected, swap):
     pressure = expected * MODULUS[kinematics] * 0.002
     assert np.abs(last.stress[:, mesh.dim - 1] + pressure).max() < 1e-10 * abs(pressure)
     assert last.contact["pair"].pressure == pytest.approx(pressure, rel=1e-10)
+
+
+@pytest.mark.parametrize("multipliers", ["standard", "dual"])
+@pytest.mark.parametrize(
+    "options", [{"kind": "tied"}, {"kind": "bilateral"}, {"kind": "bilateral_once_closed"}], ids=str
+)
+def test_multigrid_finds_the_same(options, multipliers):
+    """Equations that always hold go through elimination or compliance like constraints that are closed."""
+    model = held(boxes(upper=(3, 2, 2)), "3d", 0.02)
+    touching(model, "mortar", multipliers=multipliers, **options)
+    one, other = (fc.solve(model, PRESS_AND_PULL, linear_solver=name)[-1] for name in ("amg", "direct"))
+    assert np.abs(one.displacement - other.displacement).max() < 1e-8 * np.abs(other.displacement).max()
+    assert one.contact["pair"].pressure == pytest.approx(-2.0, rel=1e-7)
