@@ -6,6 +6,7 @@ kept, so further active sets and pairings cost a small dense solution and one so
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable
 
 import numpy as np
@@ -24,12 +25,13 @@ class ComplianceCache:
     ----------
     n : int
         Size of K.
-    solve_many : callable
-        Maps right-hand sides (n, k) to solutions (n, k).
+    solve_many : method
+        Of the solver that keeps this cache; maps right-hand sides (n, k) to solutions (n, k).
     """
 
     def __init__(self, n: int, solve_many: Callable[[Array], Array]) -> None:
-        self._solve_many = solve_many
+        # Not held: solver and cache would keep each other, and factors, the largest thing there is, alive.
+        self._solve_many = weakref.WeakMethod(solve_many)
         self._place = np.full(n, -1, np.intp)
         self._dofs = np.empty(0, np.intp)
         self._values = np.empty((0, 0))
@@ -51,6 +53,8 @@ class ComplianceCache:
         old = len(self._dofs)
         self._dofs = np.concatenate([self._dofs, new])
         self._place[new] = np.arange(old, len(self._dofs))
+        solve_many = self._solve_many()
+        assert solve_many is not None, "the cache outlived its solver"
         grown = np.empty((len(self._dofs), len(self._dofs)))
         grown[:old, :old] = self._values
         # A few right-hand sides at a time: whole columns of K^-1 are long, and only short parts of them are kept.
@@ -58,7 +62,7 @@ class ComplianceCache:
             chunk = new[first : first + CHUNK]
             unit = np.zeros((len(self._place), len(chunk)))
             unit[chunk, np.arange(len(chunk))] = 1.0
-            grown[:, old + first : old + first + len(chunk)] = self._solve_many(unit)[self._dofs]
+            grown[:, old + first : old + first + len(chunk)] = solve_many(unit)[self._dofs]
         grown[old:, :old] = grown[:old, old:].T
         self._values = grown
 
