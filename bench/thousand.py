@@ -70,9 +70,8 @@ def main() -> int:
             if number == WARM:
                 open_before = handles()
             if (number + 1) % max(runs // 10, 1) == 0:
-                print(
-                    f"run {number + 1:5d}: {memory[-1]:7.1f} MB, {1e3 * np.median(seconds[-100:]):6.1f} ms CPU, {handles()} handles"
-                )
+                milliseconds = 1e3 * np.median(seconds[-100:])
+                print(f"run {number + 1:5d}: {memory[-1]:7.1f} MB, {milliseconds:6.1f} ms CPU, {handles()} handles")
     growth = memory[-1] - memory[WARM]
     tenth = max((runs - WARM) // 10, 1)
     drift = float(np.median(seconds[-tenth:]) / np.median(seconds[WARM : WARM + tenth]))

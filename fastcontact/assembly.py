@@ -16,6 +16,8 @@ from fastcontact.kernels import solid
 from fastcontact.mesh import Mesh
 
 Array = NDArray[np.float64]
+# Numbers in a page of memory.
+PAGE = 512
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,19 +83,25 @@ def stiffness(
     """
     pattern = pattern or sparsity(mesh)
     data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))
+    if parallel.portions(max(map(len, mesh.solids.values()), default=0))[1:]:
+        data.reshape(-1)[::PAGE] = 0.0  # threads that are the first to touch a page of memory wait for each other
     loops = solid.loops(mesh.dim)
     for name, block in mesh.solids.items():
         tables = elements.get(name).tables
 
-        def add(rows: tuple[int, int], name: str = name, block: NDArray[np.int32] = block, tables: Any = tables) -> int:
+        owner, parts = parallel.owners(block, mesh.n_points)
+
+        def add(
+            part: int, name: str = name, block: NDArray[np.int32] = block, tables: Any = tables, owner: Any = owner
+        ) -> int:
             return int(
                 loops.add_stiffness(
                     mesh.points, block, *tables, moduli, material[name], kinematics == "axisymmetric",
-                    pattern.slots[name], *rows, data,
+                    pattern.slots[name], owner, part, data,
                 )
             )  # fmt: skip
 
-        found = parallel.shared(add, parallel.ranges(pattern.indptr, len(block)))
+        found = parallel.shared(add, range(parts))
         bad = min((number for number in found if number >= 0), default=-1)
         if bad >= 0:
             where = mesh.points[block[bad]].mean(axis=0)

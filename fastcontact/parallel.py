@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,28 +17,37 @@ from numpy.typing import NDArray
 from fastcontact import _jit
 
 Result = TypeVar("Result")
+Part = TypeVar("Part")
 # With fewer cells the start of threads costs more than they save.
 WORTHWHILE = 20_000
+MOST = 255
 
 
-def shared(work: Callable[[tuple[int, int]], Result], ranges: Sequence[tuple[int, int]]) -> list[Result]:
-    """Return the results of `work` on every range, each in a thread of its own."""
-    if len(ranges) == 1:
-        return [work(ranges[0])]
-    with ThreadPoolExecutor(len(ranges)) as pool:
-        return list(pool.map(work, ranges))
+def shared(work: Callable[[Part], Result], parts: Sequence[Part]) -> list[Result]:
+    """Return the results of `work` on every part, each in a thread of its own."""
+    if len(parts) == 1:
+        return [work(parts[0])]
+    with ThreadPoolExecutor(len(parts)) as pool:
+        return list(pool.map(work, parts))
 
 
 def portions(count: int) -> list[tuple[int, int]]:
     """Return ranges of nearly equal size that cover 0 to `count`: one a thread, or one for little work."""
-    n = _jit.threads() if count >= WORTHWHILE else 1
+    n = min(_jit.threads(), MOST) if count >= WORTHWHILE else 1
     ends = np.linspace(0, count, n + 1).astype(int).tolist()
     return list(itertools.pairwise(ends))
 
 
-def ranges(indptr: NDArray[Any], count: int) -> list[tuple[int, int]]:
-    """Return ranges of a sparse matrix's entries that hold whole rows: one a thread, or one for fewer cells."""
-    n = _jit.threads() if count >= WORTHWHILE else 1
-    rows = np.linspace(0, len(indptr) - 1, n + 1).astype(int)
-    ends = np.asarray(indptr)[rows].tolist()
-    return list(itertools.pairwise(ends))
+def owners(cells: NDArray[np.int32], n_points: int) -> tuple[NDArray[np.uint8], int]:
+    """Return the part (n_points,) that each point belongs to, and the number of parts.
+
+    A point belongs to the first portion of the cells that has it, so that a part's rows are those of its own cells but for
+    a seam.
+    """
+    owner = np.zeros(n_points, np.uint8)
+    found = portions(len(cells))
+    for part in range(len(found) - 1, 0, -1):
+        owner[cells[slice(*found[part])]] = part
+    if len(found) > 1:
+        owner[cells[slice(*found[0])]] = 0
+    return owner, len(found)

@@ -6,6 +6,7 @@ import contextlib
 import json
 import sys
 from collections.abc import Sequence
+from functools import cache
 from importlib import metadata
 from typing import Any
 
@@ -102,6 +103,7 @@ def _write_groups(parent: Any, name: str, groups: Any) -> None:
     _packed(group, "members", np.concatenate([np.empty(0, np.int32), *groups.values()]))
 
 
+@cache
 def _versions() -> dict[str, str]:
     import h5py
 

@@ -32,27 +32,29 @@ def _map(points, cell, N, dN, q, gradient):
 
 
 @kernel
-def _touches(slots, c, first, last):
-    """Return whether a cell has a node whose row of blocks lies in [first, last)."""
-    for a in range(slots.shape[1]):
-        if first <= slots[c, a, a] < last:
-            return True
-    return False
+def _owned(cells, c, owner, part, mine):
+    """Fill `mine` (n_nodes,) with which nodes of a cell have the owner `part`; return whether any has."""
+    found = False
+    for a in range(cells.shape[1]):
+        mine[a] = owner[cells[c, a]] == part
+        found = found or mine[a]
+    return found
 
 
 @kernel
-def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric, slots, first, last, data):
-    """Add element stiffness blocks to `data` (n_blocks, 2, 2), written in place at those `slots` in [first, last).
+def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric, slots, owner, part, data):
+    """Add element stiffness blocks to `data` (n_blocks, 2, 2), in the rows of nodes with ``owner[node] == part``.
 
-    These are whole rows of nodes, so that threads may share the rows; each adds in the order of the cells.
+    `data` is written in place at `slots`. Threads share the nodes; each adds to its rows in the order of the cells.
     Returns the number of the first cell with a Jacobian that is not positive, or -1. Only the terms of the moduli
     that couple normal strains with each other and shear with itself are used (isotropy, or orthotropy along x, y).
     """
     n_cells, n_nodes = cells.shape
     gradient = np.empty((n_nodes, 2))
     local = np.empty((n_nodes, n_nodes, 2, 2))
+    mine = np.empty(n_nodes, np.bool_)
     for c in range(n_cells):
-        if not _touches(slots, c, first, last):
+        if not _owned(cells, c, owner, part, mine):
             continue
         D = moduli[material[c]]
         shear = D[3, 3]
@@ -83,11 +85,11 @@ def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric,
             local[b, b, 1, 0] = local[b, b, 0, 1]  # equal but for round-off; K is symmetric to the last bit
             for a in range(b + 1):
                 upper, lower = slots[c, a, b], slots[c, b, a]
-                if first <= upper < last:
+                if mine[a]:
                     for i in range(2):
                         for j in range(2):
                             data[upper, i, j] += local[a, b, i, j]
-                if a != b and first <= lower < last:
+                if a != b and mine[b]:
                     for i in range(2):
                         for j in range(2):
                             data[lower, j, i] += local[a, b, i, j]

@@ -123,19 +123,20 @@ def _integrate_products(x, slopes, weights, gradient, g):
 
 
 @kernel
-def _touches(slots, c, first, last):
-    """Return whether a cell has a node whose row of blocks lies in [first, last)."""
-    for a in range(slots.shape[1]):
-        if first <= slots[c, a, a] < last:
-            return True
-    return False
+def _owned(cells, c, owner, part, mine):
+    """Fill `mine` (n_nodes,) with which nodes of a cell have the owner `part`; return whether any has."""
+    found = False
+    for a in range(cells.shape[1]):
+        mine[a] = owner[cells[c, a]] == part
+        found = found or mine[a]
+    return found
 
 
 @kernel
-def _add_block(flat, first, last, upper, lower, k00, k01, k02, k10, k11, k12, k20, k21, k22):
-    """Add a block of a node pair, and its transpose on the other side of the diagonal, where in [first, last)."""
+def _add_block(flat, at_upper, at_lower, upper, lower, k00, k01, k02, k10, k11, k12, k20, k21, k22):
+    """Add a block of a node pair, and its transpose on the other side of the diagonal, where asked for."""
     u, v = 9 * upper, 9 * lower
-    if first <= upper < last:
+    if at_upper:
         flat[u] += k00
         flat[u + 1] += k01
         flat[u + 2] += k02
@@ -145,7 +146,7 @@ def _add_block(flat, first, last, upper, lower, k00, k01, k02, k10, k11, k12, k2
         flat[u + 6] += k20
         flat[u + 7] += k21
         flat[u + 8] += k22
-    if u != v and first <= lower < last:
+    if u != v and at_lower:
         flat[v] += k00
         flat[v + 1] += k10
         flat[v + 2] += k20
@@ -158,7 +159,7 @@ def _add_block(flat, first, last, upper, lower, k00, k01, k02, k10, k11, k12, k2
 
 
 @kernel
-def _add_isotropic(g, coupling, shear, slots, c, first, last, flat):
+def _add_isotropic(g, coupling, shear, slots, c, mine, flat):
     """Add the blocks of a cell for Lame's constants: K_ij = lambda g_ij + mu g_ji + mu g_kk delta_ij."""
     for b in range(g.shape[1]):
         for a in range(b + 1):
@@ -171,13 +172,13 @@ def _add_isotropic(g, coupling, shear, slots, c, first, last, flat):
             if a == b:  # equal but for round-off; K is symmetric to the last bit
                 k10, k20, k21 = k01, k02, k12
             _add_block(
-                flat, first, last, slots[c, a, b], slots[c, b, a],
+                flat, mine[a], mine[b], slots[c, a, b], slots[c, b, a],
                 both * xx + trace, k01, k02, k10, both * yy + trace, k12, k20, k21, both * zz + trace,
             )  # fmt: skip
 
 
 @kernel
-def _add_general(g, tensors, m, products, block, slots, c, first, last, flat):
+def _add_general(g, tensors, m, products, block, slots, c, mine, flat):
     """Add the blocks of a cell for any moduli: K_ij = D_ikjl g_kl; `products` and `block` (9,) are overwritten."""
     for b in range(g.shape[1]):
         for a in range(b + 1):
@@ -192,16 +193,16 @@ def _add_general(g, tensors, m, products, block, slots, c, first, last, flat):
             if a == b:  # as above
                 block[3], block[6], block[7] = block[1], block[2], block[5]
             _add_block(
-                flat, first, last, slots[c, a, b], slots[c, b, a],
+                flat, mine[a], mine[b], slots[c, a, b], slots[c, b, a],
                 block[0], block[1], block[2], block[3], block[4], block[5], block[6], block[7], block[8],
             )  # fmt: skip
 
 
 @kernel
-def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric, slots, first, last, data):
-    """Add element stiffness blocks to `data` (n_blocks, 3, 3), written in place at those `slots` in [first, last).
+def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric, slots, owner, part, data):
+    """Add element stiffness blocks to `data` (n_blocks, 3, 3), in the rows of nodes with ``owner[node] == part``.
 
-    These are whole rows of nodes, so that threads may share the rows; each adds in the order of the cells.
+    `data` is written in place at `slots`. Threads share the nodes; each adds to its rows in the order of the cells.
     Returns the number of the first cell with a Jacobian that is not positive, or -1. The products of gradients are
     integrated first; the moduli, constant in a cell, come in once at the end.
     """
@@ -212,18 +213,19 @@ def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric,
         isotropic[m] = _is_isotropic(moduli[m])
     x, gradient = np.empty((3, n_nodes)), np.empty((3, n_nodes))
     g, products, block = np.empty((6, n_nodes, n_nodes)), np.empty(9), np.empty(9)
+    mine = np.empty(n_nodes, np.bool_)
     flat = data.reshape(-1)
     for c in range(n_cells):
-        if not _touches(slots, c, first, last):
+        if not _owned(cells, c, owner, part, mine):
             continue
         _gather(points, cells, c, x)
         if not _integrate_products(x, slopes, weights, gradient, g):
             return c
         m = material[c]
         if isotropic[m]:
-            _add_isotropic(g, moduli[m, 0, 1], moduli[m, 3, 3], slots, c, first, last, flat)
+            _add_isotropic(g, moduli[m, 0, 1], moduli[m, 3, 3], slots, c, mine, flat)
         else:
-            _add_general(g, tensors, m, products, block, slots, c, first, last, flat)
+            _add_general(g, tensors, m, products, block, slots, c, mine, flat)
     return -1
 
 

@@ -1,7 +1,5 @@
 """Work shared by threads: ranges that cover everything, and the same bits for any number of them."""
 
-import itertools
-
 import numpy as np
 import pytest
 
@@ -24,12 +22,13 @@ def test_ranges_cover_everything_once(threads, count):
     found = parallel.portions(20)
     assert len(found) == count
     assert [k for low, high in found for k in range(low, high)] == list(range(20))
-    indptr = np.array([0, 3, 4, 9, 9, 12, 20, 21, 30])
-    found = parallel.ranges(indptr, 100)
-    assert found[0][0] == 0
-    assert found[-1][1] == 30
-    assert all(end == start for (_, end), (start, _) in itertools.pairwise(found))
-    assert {end for pair in found for end in pair} <= set(indptr.tolist())
+    cells = np.random.default_rng(count).integers(0, 50, (40, 4)).astype(np.int32)
+    owner, parts = parallel.owners(cells, 60)
+    assert parts == count
+    low = [k for k, (first, last) in enumerate(parallel.portions(40)) for _ in range(first, last)]
+    for point in range(50):
+        having = np.flatnonzero((cells == point).any(axis=1))
+        assert not len(having) or owner[point] == low[having[0]]
 
 
 def test_little_work_is_not_shared():
