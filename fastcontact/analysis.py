@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fastcontact import active_set, friction, linear, recovery
+from fastcontact import active_set, friction, linear, recovery, step_control
 from fastcontact.acceleration import Anderson
 from fastcontact.assembly import rigid_modes, stiffness
 from fastcontact.contact.constraints import Constraints, stacked
@@ -69,6 +69,10 @@ class Criteria:
         'SANS'); for small motions only. Without friction the state then does not depend on the steps that lead to it.
     max_geometry_updates, max_active_set_iterations : int
         Limits per step, and per pairing.
+    max_halvings : int
+        How many times a load step that does not converge is cut in halves before the analysis gives up (DECOUPE).
+        Parts of a step are steps of their own, so that friction slides along their path; only the instants of the ramp
+        give a result, whose ``iterations["substeps"]`` lists the ends of its parts. 0: never.
     """
 
     relative: float = 1e-6
@@ -78,12 +82,15 @@ class Criteria:
     keep_pairing: bool = False
     max_geometry_updates: int = 60
     max_active_set_iterations: int = 200
+    max_halvings: int = 4
 
     def __post_init__(self) -> None:
         if not self.relative > 0 or not self.geometry > 0:
             raise ModelError("the convergence criteria `relative` and `geometry` must be positive")
         if self.geometry_updates is not None and self.geometry_updates < 0:
             raise ModelError(f"geometry_updates = {self.geometry_updates} must be None or a whole number >= 0")
+        if self.max_halvings < 0 or int(self.max_halvings) != self.max_halvings:
+            raise ModelError(f"max_halvings = {self.max_halvings} must be a whole number >= 0")
         if self.keep_pairing and self.geometry_updates:
             raise ModelError(
                 f"keep_pairing leaves no room for geometry_updates = {self.geometry_updates}: give one or the other"
@@ -128,7 +135,8 @@ def solve(
     MeshError, ModelError, ContactError
         If the model is wrong.
     ConvergenceError
-        If a step does not converge; steps before it have been handed to `on_step`.
+        If a step does not converge, nor in parts (`Criteria.max_halvings`); steps before it have been handed to
+        `on_step`.
 
     Warns
     -----
@@ -138,9 +146,12 @@ def solve(
     """
     ramp = ramp or linear_ramp()
     analysis = Analysis(model, linear_solver, linear_tolerance, criteria or Criteria(), ramp, linear_precision)
-    steps = []
+    steps: list[StepResult] = []
+    begin = ramp.table[0][0]
     for index, instant in enumerate(ramp.instants, start=1):
-        step = analysis.step(index, instant, last=index == len(ramp))
+        last, halvings = index == len(ramp), analysis.criteria.max_halvings
+        step = step_control.advance(analysis, index, begin, instant, last, halvings)
+        begin = instant
         steps.append(step)
         if on_step is not None:
             on_step(step)

@@ -34,6 +34,7 @@ _SOLVE = {
     "keep_pairing": bool,
     "max_geometry_updates": int,
     "max_active_set_iterations": int,
+    "max_halvings": int,
 }
 _AXES = {"x": _NUMBER, "y": _NUMBER, "z": _NUMBER}
 # Tables of loads, relations and springs: their keys, the method of the model that takes them, and the keys they need.

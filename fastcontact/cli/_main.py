@@ -27,15 +27,16 @@ class Parser(argparse.ArgumentParser):
         raise FastcontactError(f"{message}; see '{self.prog} --help'")
 
 
-def parser() -> argparse.ArgumentParser:
-    """Return the parser with every sub-command of this package."""
+def parser(command: str | None = None) -> argparse.ArgumentParser:
+    """Return the parser with every sub-command of this package, the arguments only of `command` if it is one of them."""
     top = Parser(prog="fastcontact", description="Elastic contact by finite elements, fast.")
     top.add_argument("--version", action="version", version=f"fastcontact {fastcontact.__version__}")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for _, name, _ in pkgutil.iter_modules(cli.__path__):
-        if not name.startswith("_"):
-            module = importlib.import_module(f"{cli.__name__}.{name}")
-            sub = commands.add_parser(name, help=module.HELP, description=module.HELP)
+    names = [name for _, name, _ in pkgutil.iter_modules(cli.__path__) if not name.startswith("_")]
+    for name in names:
+        module = importlib.import_module(f"{cli.__name__}.{name}")
+        sub = commands.add_parser(name, help=module.HELP, description=module.HELP)
+        if command not in names or command == name:  # some take long to find out what they offer
             module.arguments(sub)
             sub.set_defaults(run=module.run)
             loudness = sub.add_mutually_exclusive_group()
@@ -47,7 +48,8 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     try:
-        arguments = parser().parse_args(argv)
+        given = sys.argv[1:] if argv is None else list(argv)
+        arguments = parser(given[0] if given else None).parse_args(given)
         handler = logging.StreamHandler()
         handler.setFormatter(logging.Formatter("%(message)s"))
         log.handlers[:] = [handler]

@@ -10,7 +10,8 @@ corner forces of six-node triangles vanish and those of eight-node quadrangles p
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +62,7 @@ class NodeToSegment(Formulation):
 
     def areas(self) -> Array:
         """Return the integrals of the nodes' shape functions."""
-        areas = nodal_areas(self.secondary, self.points, self.axisymmetric)
+        areas = self._areas
         return np.where(areas > 1e-12 * areas.max(), areas, np.inf)
 
     def pressure(self, multiplier: Array) -> Array:
@@ -70,9 +71,16 @@ class NodeToSegment(Formulation):
         The nodal areas of quadratic facets are not positive (zero at the axis), so division by them means nothing.
         """
         if self.secondary.order == 1:
-            return multiplier / nodal_areas(self.secondary, self.points, self.axisymmetric)
-        mass = mass_matrix(self.secondary, self.points, self.axisymmetric)
-        return splu(mass.tocsc()).solve(multiplier)
+            return multiplier / self._areas
+        return self._mass.solve(multiplier)
+
+    @cached_property
+    def _areas(self) -> Array:
+        return nodal_areas(self.secondary, self.points, self.axisymmetric)
+
+    @cached_property
+    def _mass(self) -> Any:
+        return splu(mass_matrix(self.secondary, self.points, self.axisymmetric).tocsc())
 
     def closed_nodes(self, active: NDArray[np.bool_], gap: Array, pressure: Array) -> NDArray[np.bool_]:
         """Return the active constraints: there is one per node."""

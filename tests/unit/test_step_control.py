@@ -1,0 +1,97 @@
+"""Load steps cut in halves: the same end as with those steps asked for, and nothing left of what failed."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact import step_control
+from fastcontact.analysis import Analysis, Criteria
+
+FEW = 6  # geometry updates: too few for the whole load, enough for a part of it
+
+
+def spheres(friction=0.3):
+    mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3)
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model.fix("A1A2", "x")
+    model.prescribe("A2B2", y=-2.0)
+    model.prescribe("A1B1", y=+2.0)
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2", friction=friction)
+    return model
+
+
+def analysis_of(steps=1, **criteria):
+    return Analysis(spheres(), "direct", 1e-10, Criteria(**criteria), fc.linear_ramp(steps))
+
+
+def close(found, expected, relative=1e-10):
+    np.testing.assert_allclose(found, expected, rtol=0, atol=relative * np.abs(expected).max())
+
+
+def test_a_step_that_fails_whole_ends_as_if_its_parts_had_been_asked_for():
+    with pytest.raises(fc.ConvergenceError, match="did not settle in 6 updates"):
+        analysis_of(max_geometry_updates=FEW).step(1, 1.0)
+    handed = []
+    criteria = Criteria(max_geometry_updates=FEW)
+    (step,) = fc.solve(spheres(), fc.linear_ramp(1), linear_solver="direct", criteria=criteria, on_step=handed.append)
+    assert [(each.index, each.load_factor) for each in handed] == [(1, 1.0)]
+    ends = step.iterations["substeps"]
+    assert len(ends) > 1
+    assert ends[-1] == 1.0
+    parts = fc.solve(spheres(), fc.Ramp(tuple(ends)), linear_solver="direct", criteria=Criteria())
+    close(step.displacement, parts[-1].displacement)
+    found, expected = step.contact["hertz"], parts[-1].contact["hertz"]
+    close(found.pressure, expected.pressure)
+    close(found.shear, expected.shear)
+    np.testing.assert_array_equal(found.sticking, expected.sticking)
+    assert found.dissipation == pytest.approx(sum(part.contact["hertz"].dissipation for part in parts), rel=1e-8)
+    assert found.dissipation > expected.dissipation > 0.0
+    assert step.iterations["linear_iterations"] >= 0
+    assert len(step.iterations["history"]) > step.iterations["geometry_updates"] >= len(ends)
+
+
+def test_without_friction_halves_end_where_one_whole_step_does():
+    limits = {"max_active_set_iterations": 2, "geometry_updates": 0}
+    model = spheres(friction=None)
+    with pytest.raises(fc.ConvergenceError, match="did not settle in 2 iterations"):
+        fc.solve(model, fc.linear_ramp(1), linear_solver="direct", criteria=Criteria(**limits, max_halvings=0))
+    (step,) = fc.solve(model, fc.linear_ramp(1), linear_solver="direct", criteria=Criteria(**limits))
+    asked = fc.Ramp(tuple(step.iterations["substeps"]))
+    steps = fc.solve(model, asked, linear_solver="direct", criteria=Criteria(geometry_updates=0))
+    close(step.displacement, steps[-1].displacement)
+
+
+def test_a_step_that_cannot_converge_says_how_often_it_was_cut():
+    handed = []
+    criteria = Criteria(max_geometry_updates=2, max_halvings=2)
+    with pytest.raises(fc.ConvergenceError, match=r"step 1 was cut in halves 2 times, .* 0 to 0\.25 fails") as caught:
+        fc.solve(spheres(), fc.linear_ramp(1), linear_solver="direct", criteria=criteria, on_step=handed.append)
+    assert not handed
+    assert len(caught.value.history) == 3
+    assert all(entry["displacement_change"] > 0 for entry in caught.value.history)
+
+
+def test_a_failed_step_leaves_no_trace():
+    analysis, undisturbed = analysis_of(2), analysis_of(2)
+    analysis.step(1, 0.5)
+    undisturbed.step(1, 0.5)
+    generous, analysis.criteria = analysis.criteria, Criteria(max_geometry_updates=1)
+    with pytest.raises(fc.ConvergenceError):
+        step_control.advance(analysis, 2, 0.5, 1.0, True, 1)
+    analysis.criteria = generous
+    step, expected = analysis.step(2, 1.0), undisturbed.step(2, 1.0)
+    np.testing.assert_array_equal(step.displacement, expected.displacement)
+    np.testing.assert_array_equal(step.contact["hertz"].shear, expected.contact["hertz"].shear)
+    assert step.iterations == expected.iterations
+
+
+def test_steps_that_converge_are_not_cut():
+    (step,) = fc.solve(spheres(), fc.linear_ramp(1), linear_solver="direct")
+    assert "substeps" not in step.iterations
+
+
+@pytest.mark.parametrize("halvings", [-1, 1.5])
+def test_the_number_of_halvings_is_checked(halvings):
+    with pytest.raises(fc.ModelError, match="max_halvings"):
+        Criteria(max_halvings=halvings)
