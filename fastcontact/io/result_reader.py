@@ -68,7 +68,8 @@ class Results(Sequence[StepResult]):
     warnings : tuple of str
         Every warning of the run and its steps, once.
     log : object
-        Log of the run, None if there is none.
+        Log of the run, None if there is none; ``{"failed_step": history}``, the iterations of the step (or the part of
+        it) that failed, if the run did not converge.
     complete : bool
         Whether the run came to its end: False after a crash, and while it goes on.
     error : str

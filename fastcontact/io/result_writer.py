@@ -111,7 +111,10 @@ class ResultWriter:
             self.close()
             return
         with contextlib.suppress(FileError):  # the first error is the one to tell
-            self._finish({"error": f"{type(error).__name__}: {error}"})
+            run: dict[str, Any] = {"error": f"{type(error).__name__}: {error}"}
+            if isinstance(error, ConvergenceError):
+                run["log"] = {"failed_step": error.history}
+            self._finish(run)
 
     def write(self, step: StepResult) -> None:
         """Append a step; when this returns the step is safe from a crash of the process.
