@@ -508,11 +508,10 @@ class Analysis:
         reaction, residual = self.system.balance(self.K @ self.u - contact_force - self.external)
         force = max(float(np.abs(forces).max(initial=0.0)) for forces in (reaction, contact_force, self.external))
         self.largest_force = max(self.largest_force, force)
-        K = self.K
-        row_sums = largest_row_sum(K.indptr, K.indices, K.data.reshape(-1), self.u, K.blocksize[0])
-        round_off = max(1e-13, self.solver.tolerance) * 10 * row_sums
-        round_off = max(round_off, SLACK * self.largest_force)
-        bound = max(self.criteria.relative * force, self.criteria.absolute or 0.0, round_off)
+        bound = max(self.criteria.relative * force, self.criteria.absolute or 0.0)
+        # Without forces the criterion is 0/0: round-off of the internal forces decides, which costs a product with K.
+        round_off = 0.0 if 0.0 < residual <= bound else self._force_round_off()
+        bound = max(bound, round_off)
         if history:
             history[-1]["residual"] = float(residual / force) if force > round_off else 0.0
         if not residual <= bound:
@@ -523,6 +522,12 @@ class Analysis:
             )
         n_dofs = self.model.n_dofs
         return reaction[:n_dofs] + ground_force(self.model.springs, self.u[:n_dofs])
+
+    def _force_round_off(self) -> float:
+        """Return how far internal forces may be off by round-off and the tolerance of the linear solver [force]."""
+        K = self.K
+        row_sums = largest_row_sum(K.indptr, K.indices, K.data.reshape(-1), self.u, K.blocksize[0])
+        return max(max(1e-13, self.solver.tolerance) * 10 * row_sums, SLACK * self.largest_force)
 
     def _result(
         self, index: int, instant: float, reaction: Array, constraints: Constraints | None,

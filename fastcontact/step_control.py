@@ -79,10 +79,9 @@ def _parts(
         if halved == limit or not begin < middle < end:
             if not halved:
                 raise
-            what = (
-                f"{error} (step {index} was cut in halves {halved} times, the part from {begin:.6g} to {end:.6g} fails)"
-            )
-            raise ConvergenceError(what, error.history) from error
+            often = "once" if halved == 1 else f"{halved} times"
+            part = f"step {index} was cut in halves {often}, the part from {begin:.6g} to {end:.6g} fails"
+            raise ConvergenceError(f"{error} ({part})", error.history) from error
     restore(state)
     first = _parts(analysis, index, begin, middle, False, limit, halved + 1)
     return first + _parts(analysis, index, middle, end, last, limit, halved + 1)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.errors import FileError, ModelError
+from fastcontact.errors import ConvergenceError, FileError, ModelError
 from fastcontact.io import _result_layout as layout
 from fastcontact.io._result_header import BYTES, ROWS, as_json, growing_table, write_geometry, write_own
 from fastcontact.io._targets import PathLike, PathLock, checked_target, reserve

@@ -158,13 +158,19 @@ def test_wrong_options_of_run(extra, message, solved, capsys, tmp_path, monkeypa
 
 
 def test_no_convergence_is_exit_code_two_and_keeps_finished_steps(solved, tmp_path, capsys):
-    text = CASE.replace("[probes]", "[solve]\nmax_geometry_updates = 2\ngeometry = 1e-3\n[probes]")
+    text = CASE.replace("[probes]", "[solve]\nmax_halvings = 1\nmax_geometry_updates = 2\ngeometry = 1e-3\n[probes]")
     case = tmp_path / "hard.toml"
     case.write_text(text.replace("steps = 3", "instants = [0.001, 1.0]"))
     code = main(["run", str(case), "-o", str(tmp_path / "hard.vtkhdf")])
     assert code == 2
-    assert capsys.readouterr().err.startswith("no convergence: ")
-    assert len(fc.open_results(tmp_path / "hard.vtkhdf")) == 1
+    told = capsys.readouterr().err
+    assert told.startswith("no convergence: ")
+    assert "step 2 was cut in halves once, the part from " in told
+    results = fc.open_results(tmp_path / "hard.vtkhdf")
+    assert len(results) == 1
+    assert not results.complete
+    assert results.error.split(": ", 1) == ["ConvergenceError", told.removeprefix("no convergence: ").strip()]
+    assert [entry["displacement_change"] > 0 for entry in results.log["failed_step"]] == [True] * 3
 
 
 def test_steps_and_pairs_that_do_not_exist(solved, capsys):

@@ -6,18 +6,19 @@ import pytest
 import fastcontact as fc
 from fastcontact import step_control
 from fastcontact.analysis import Analysis, Criteria
+from fastcontact.generate import block
 
 FEW = 6  # geometry updates: too few for the whole load, enough for a part of it
 
 
-def spheres(friction=0.3):
+def spheres(friction=0.3, **options):
     mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3)
     model = fc.Model(mesh, "axisymmetric")
     model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
     model.fix("A1A2", "x")
     model.prescribe("A2B2", y=-2.0)
     model.prescribe("A1B1", y=+2.0)
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2", friction=friction)
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2", friction=friction, **options)
     return model
 
 
@@ -72,17 +73,66 @@ def test_a_step_that_cannot_converge_says_how_often_it_was_cut():
     assert all(entry["displacement_change"] > 0 for entry in caught.value.history)
 
 
-def test_a_failed_step_leaves_no_trace():
-    analysis, undisturbed = analysis_of(2), analysis_of(2)
-    analysis.step(1, 0.5)
-    undisturbed.step(1, 0.5)
-    generous, analysis.criteria = analysis.criteria, Criteria(max_geometry_updates=1)
+def driven(**options):
+    model = fc.Model(block((2.0, 1.0), (16, 8), "quad4", origin=(-1.0, -1.0)), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("BOTTOM", "xy")
+    ball = fc.obstacles.Sphere((0.0, 3.0), 3.0)
+    model.add_obstacle("ball", secondary="TOP", obstacle=ball, friction=0.2, **options)
+    return model
+
+
+def floating():
+    mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3)
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model.fix("A1A2", "x")
+    model.fix("A1B1", "y")
+    model.add_force("A2B2", y=-3e5)
+    model.couple("A2B2", "y")
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2")
+    return model
+
+
+MODELS = {
+    "floating": floating,
+    "once closed": lambda: spheres(friction=0.0, kind="bilateral_once_closed"),
+    "friction": spheres,
+    "motion": lambda: driven(motion={"y": -0.05, "x": 0.02}),
+    "force": lambda: driven(force={"y": -15.0}),
+}
+
+
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+@pytest.mark.parametrize("name", list(MODELS))
+def test_a_failed_step_leaves_no_trace(name, solver):
+    analyses = [Analysis(MODELS[name](), solver, 1e-10, Criteria(), fc.linear_ramp(4)) for _ in range(2)]
+    for analysis in analyses:
+        for index in (1, 2, 3):
+            analysis.step(index, index / 4)
+    disturbed, undisturbed = analyses
+    generous, disturbed.criteria = disturbed.criteria, Criteria(max_geometry_updates=0)
     with pytest.raises(fc.ConvergenceError):
-        step_control.advance(analysis, 2, 0.5, 1.0, True, 1)
-    analysis.criteria = generous
-    step, expected = analysis.step(2, 1.0), undisturbed.step(2, 1.0)
+        step_control.advance(disturbed, 4, 0.75, 1.0, True, 1)
+    disturbed.criteria = generous
+    step, expected = disturbed.step(4, 1.0), undisturbed.step(4, 1.0)
     np.testing.assert_array_equal(step.displacement, expected.displacement)
-    np.testing.assert_array_equal(step.contact["hertz"].shear, expected.contact["hertz"].shear)
+    for pair, contact in step.contact.items():
+        np.testing.assert_array_equal(contact.pressure, expected.contact[pair].pressure)
+        np.testing.assert_array_equal(contact.shear, expected.contact[pair].shear)
+    assert step.iterations == expected.iterations
+
+
+def test_parts_that_converged_before_one_failed_are_taken_back():
+    model = spheres(friction=0.0)
+    analysis = Analysis(model, "direct", 1e-10, Criteria(max_geometry_updates=FEW), fc.linear_ramp(1))
+    with pytest.raises(fc.ConvergenceError, match=r"the part from 0\.25 to 0\.3125 fails"):
+        step_control.advance(analysis, 1, 0.0, 1.0, True, 4)
+    assert not analysis.u.any()
+    analysis.criteria = Criteria()
+    (expected,) = fc.solve(model, fc.linear_ramp(1), linear_solver="direct")
+    step = analysis.step(1, 1.0)
+    np.testing.assert_array_equal(step.displacement, expected.displacement)
     assert step.iterations == expected.iterations
 
 

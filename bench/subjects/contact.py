@@ -1,0 +1,137 @@
+"""A cold contact step and 20 steps, in linear solutions L of the same mesh, solver and tolerance without contact.
+
+All three include the preparation of the linear solver (hierarchy or factors) and leave out mesh and assembly. For L
+the contact is dropped: supports and prescribed displacements alone hold both bodies. ``sphere-on-block`` is solved by
+multigrid, ``forma04c`` by what "auto" chooses, both node-to-segment with converged geometry.
+"""
+
+import time
+
+import numpy as np
+from scipy.sparse import csr_array
+
+import fastcontact as fc
+from fastcontact import _jit, linear
+from fastcontact.analysis import Analysis, Criteria, near_nullspace
+from fastcontact.benchmark import peak_bytes
+from fastcontact.errors import FastcontactError, unknown
+
+SIZES = (1_500, 10_000, 40_000)
+TOLERANCE = 1e-8
+
+
+def sphere_on_block(dofs):
+    h = 0.06 * (114_036 / dofs) ** (1 / 3)
+    for _ in range(3):
+        mesh = fc.generate.sphere_on_block("hex8", R=1.0, size=h, contact_size=h / 3, contact_radius=0.2)
+        if 0.9 < 3 * mesh.n_points / dofs < 1.1:
+            break
+        h *= (3 * mesh.n_points / dofs) ** (1 / 3)
+    model = fc.Model(mesh, kinematics="3d")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("SYMMETRY_X", "x")
+    model.fix("SYMMETRY_Z", "z")
+    model.fix("BLOCK_BOTTOM", "y")
+    model.prescribe("SPHERE_TOP", y=-0.02)
+    model.add_contact("c", secondary="CONT_SPHERE", primary="CONT_BLOCK", formulation="node_to_segment")
+    return model
+
+
+def forma04c(dofs):
+    def mesh(scale):
+        return fc.generate.half_spheres(
+            "quad4", arc_sizes=(1.5 * scale, 3.0 * scale), radial_sizes=(1.5 * scale, 4.5 * scale),
+            segments=max(2, round(6 / scale)),
+        )  # fmt: skip
+
+    scale = (2 * mesh(1.0).n_points / dofs) ** 0.5
+    model = fc.Model(mesh(scale), kinematics="axisymmetric")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model.fix("A1A2", "x")
+    model.prescribe("A2B2", y=-2.0)
+    model.prescribe("A1B1", y=2.0)
+    model.add_contact("c", secondary="CONT1", primary="CONT2", formulation="node_to_segment")
+    return model
+
+
+PROBLEMS = {"sphere-on-block": (sphere_on_block, "amg"), "forma04c": (forma04c, "auto")}
+
+
+def prepared(analysis, solver):
+    modes = analysis.system.unknowns_of(near_nullspace(analysis.model))
+    solver.prepare(analysis.system.matrix, modes, analysis.system.involved(analysis.surface_dofs))
+    return solver
+
+
+def fresh(analysis, name):
+    return linear.make(name, dim=analysis.model.mesh.dim, n_dofs=analysis.model.n_dofs, tolerance=TOLERANCE)
+
+
+def started(model, name, count):
+    return Analysis(model, name, TOLERANCE, Criteria(geometry=TOLERANCE), fc.linear_ramp(count))
+
+
+def linear_solution(analysis, solver):
+    lift = analysis._lift(1.0)
+    loaded = solver.load(analysis.system.right(np.zeros_like(lift), lift))
+    before = solver.counters.iterations
+    loaded.solve(csr_array((0, len(lift))), np.empty(0))
+    return solver.counters.iterations - before
+
+
+def cpu(work):
+    before = time.process_time()
+    result = work()
+    return result, time.process_time() - before
+
+
+def steps(analysis):
+    for index, instant in enumerate(analysis.ramp.instants, start=1):
+        analysis.step(index, instant)
+
+
+def detailed(problem, dofs):
+    """Return the figures of one problem, warm: a small one runs first and compiles."""
+    if problem not in PROBLEMS:
+        raise FastcontactError(unknown("problem", problem, list(PROBLEMS)))
+    make, name = PROBLEMS[problem]
+    figures(make(min(dofs, 1_500)), name)
+    return {"problem": problem, **figures(make(dofs), name), "peak_bytes": peak_bytes(), "threads": _jit.threads()}
+
+
+def measured_linear(analysis, name):
+    """Return iterations and the CPU seconds of preparation and solution; its solver is gone afterwards."""
+    solver, setup = cpu(lambda: prepared(analysis, fresh(analysis, name)))
+    iterations, solution = cpu(lambda: linear_solution(analysis, solver))
+    return iterations, setup, solution
+
+
+def figures(model, name):
+    analysis = started(model, name, 1)
+    iterations, setup, solution = measured_linear(analysis, name)
+    L = setup + solution
+    _, cold = cpu(lambda: steps(analysis))
+    del analysis
+    analysis = started(model, name, 20)
+    counters = analysis.solver.counters
+    before = counters.iterations
+    _, twenty = cpu(lambda: steps(analysis))
+    return {
+        "n_dofs": model.n_dofs,
+        "linear": {"cpu_s": L, "iterations": iterations, "setup_cpu_s": setup},
+        "cold_step": {"cpu_s": setup + cold, "ratio_to_linear": (setup + cold) / L},
+        "twenty_steps": {
+            "cpu_s": setup + twenty, "ratio_to_linear": (setup + twenty) / L, "setups": counters.setups,
+            "linear_iterations": counters.iterations - before,
+        },
+    }  # fmt: skip
+
+
+def works(size):
+    model = sphere_on_block(size)
+    idle = started(model, "amg", 1)
+    return model.n_dofs, {
+        "cold step, whole": lambda: steps(started(model, "amg", 1)),
+        "20 steps, whole": lambda: steps(started(model, "amg", 20)),
+        "linear": lambda: linear_solution(idle, prepared(idle, fresh(idle, "amg"))),
+    }

@@ -1,0 +1,37 @@
+"""One linear solution of a cube of hex8 with its preparation: direct against multigrid (see bench/linear.py too)."""
+
+import numpy as np
+
+import fastcontact as fc
+from fastcontact import linear
+from fastcontact.analysis import Analysis, Criteria, near_nullspace
+
+SIZES = (1_500, 6_000, 20_000)
+
+
+def works(size):
+    n = max(2, round((size / 3) ** (1 / 3)) - 1)
+    model = fc.Model(fc.generate.box((1.0, 1.0, 1.0), (n, n, n)), kinematics="3d")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("ZMIN", "xyz")
+    model.prescribe("ZMAX", x=0.0, y=0.0, z=-0.01)
+    analysis = Analysis(model, "amg", 1e-8, Criteria())
+    K, modes = analysis.system.matrix, analysis.system.unknowns_of(near_nullspace(model))
+    lift = analysis._lift(1.0)
+    right = analysis.system.right(np.zeros_like(lift), lift)
+
+    def solution(name):
+        solver = linear.make(name, dim=3, n_dofs=model.n_dofs, tolerance=1e-8)
+        solver.prepare(K, modes)
+        return solver.load(right)
+
+    return model.n_dofs, {
+        "direct": lambda: solved(solution("direct"), lift),
+        "amg": lambda: solved(solution("amg"), lift),
+    }
+
+
+def solved(loaded, lift):
+    from scipy.sparse import csr_array
+
+    return loaded.solve(csr_array((0, len(lift))), np.empty(0))

@@ -1,0 +1,67 @@
+"""How a benchmark is timed: warm, medians, CPU seconds of all threads and child processes beside the wall clock."""
+
+from __future__ import annotations
+
+import resource
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+Work = Callable[[], Any]
+REPEATS = 3
+
+
+def cpu_seconds() -> float:
+    """Return the CPU seconds [s] of this process, all threads, and of its finished children."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
+
+
+def peak_bytes() -> int:
+    """Return the largest resident memory of this process so far [byte]."""
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
+
+
+def once(work: Work) -> tuple[float, float]:
+    """Return the CPU and wall seconds of one call."""
+    cpu, wall = cpu_seconds(), time.perf_counter()
+    work()
+    return cpu_seconds() - cpu, time.perf_counter() - wall
+
+
+def measured(subject: ModuleType, size: int, repeats: int = REPEATS) -> dict[str, Any]:
+    """Time all works of a subject at one size.
+
+    Parameters
+    ----------
+    subject : module
+        ``works(size)`` returns the number of unknowns and named works; the last of them is what the others are
+        measured in.
+    size : int
+        About how many unknowns.
+    repeats : int
+        Counted calls of each work, after one that compiles and fills the caches.
+
+    Returns
+    -------
+    dict
+        ``n_dofs``, ``peak_bytes`` of the process so far, and ``works``: by name the medians ``cpu_s`` and ``wall_s``,
+        and ``ratio``, CPU seconds in those of the last work.
+    """
+    n_dofs, works = subject.works(size)
+    for work in works.values():
+        work()
+    # In turn, so that a machine that slows down does so for all works alike.
+    runs = [{name: once(work) for name, work in works.items()} for _ in range(repeats)]
+    found = {}
+    for name in works:
+        cpu, wall = zip(*(run[name] for run in runs), strict=True)
+        found[name] = {"cpu_s": statistics.median(cpu), "wall_s": statistics.median(wall)}
+    unit = found[next(reversed(found))]["cpu_s"]
+    for entry in found.values():
+        entry["ratio"] = entry["cpu_s"] / unit if unit else float("nan")
+    return {"n_dofs": n_dofs, "peak_bytes": peak_bytes(), "works": found}

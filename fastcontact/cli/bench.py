@@ -1,0 +1,92 @@
+"""``fastcontact bench``: the benchmark suite of the checkout."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from fastcontact.errors import FastcontactError, FileError
+
+HELP = "run the benchmarks of the checkout"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of this command."""
+    parser.add_argument("names", nargs="*", metavar="NAME", help="benchmarks (default: all)")
+    parser.add_argument("--smallest", action="store_true", help="the smallest size of each, once: does it run?")
+    parser.add_argument("--sizes", type=int, nargs="+", metavar="N", help="about how many unknowns")
+    parser.add_argument("--json", metavar="FILE", help="write figures and environment")
+    parser.add_argument("--png", metavar="FOLDER", help="draw time and memory against unknowns, a picture a benchmark")
+    parser.add_argument("--compare", metavar="FILE", help="compare with a run stored by --json")
+    parser.add_argument("--problem", metavar="NAME", help="with contact: sphere-on-block or forma04c, in detail")
+    parser.add_argument("--dofs", type=int, metavar="N", help="with --problem: about how many unknowns")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the benchmarks, print the table, write what was asked for."""
+    if any(size < 1 for size in [*(options.sizes or ()), *([] if options.dofs is None else [options.dofs])]):
+        raise FastcontactError("--sizes and --dofs must be positive: give about how many unknowns the problem has")
+    if options.problem or options.dofs:
+        return _contact(options)
+    from fastcontact import benchmark
+
+    before = _stored(options.compare) if options.compare else None
+    results: dict[str, Any] = {}
+    show = sys.stderr.isatty() and not options.quiet
+    for name in options.names or benchmark.names():
+        subject = benchmark.load(name)
+        sizes = subject.SIZES[:1] if options.smallest else options.sizes or subject.SIZES
+        for size in sizes:
+            if show:
+                print(f"{name} {size} ...", file=sys.stderr)
+            found = benchmark.measured(subject, size, 1 if options.smallest else 3)
+            results.setdefault(name, []).append(found)
+    if not options.quiet:
+        print("\n".join(benchmark.lines(results, before)))
+    if options.json:
+        _write(options.json, {"environment": benchmark.environment(), "results": results})
+    if options.png:
+        _draw(options.png, results)
+    return 0
+
+
+def _contact(options: argparse.Namespace) -> int:
+    if options.names != ["contact"] or not options.problem or not options.dofs:
+        raise FastcontactError("--problem and --dofs go together, with the benchmark 'contact' alone")
+    from fastcontact import benchmark
+
+    found = benchmark.load("contact").detailed(options.problem, options.dofs)
+    if not options.quiet:
+        print(json.dumps(found, indent=1))
+    if options.json:
+        _write(options.json, found)
+    return 0
+
+
+def _stored(path: str) -> Any:
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))["results"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise FileError(f"'{path}' is no stored run of the benchmarks ({error}): make one with --json") from error
+
+
+def _write(path: str, content: Any) -> None:
+    try:
+        Path(path).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"cannot write '{path}': {error}") from error
+
+
+def _draw(path: str, results: dict[str, Any]) -> None:
+    from fastcontact.benchmark.pictures import scaling
+
+    for name, sizes in results.items():
+        if len({entry["n_dofs"] for entry in sizes}) > 1:
+            try:
+                Path(path).mkdir(parents=True, exist_ok=True)
+                scaling(name, sizes).savefig(Path(path) / f"{name}.png")
+            except OSError as error:
+                raise FileError(f"cannot write the picture of '{name}' in '{path}': {error}") from error
