@@ -172,6 +172,10 @@ class Analysis:
         self.ramp = ramp or linear_ramp()
         model.check(self.ramp)
         self.model, self.criteria = model, criteria
+        self.solver = linear.make(
+            linear_solver, dim=model.mesh.dim, n_dofs=model.n_dofs, tolerance=linear_tolerance,
+            precision=linear_precision,
+        )  # fmt: skip
         self.pairs: dict[str, Formulation] = {pair.name: model.bind(pair) for pair in model.contact}
         self.moduli, self.material = model.material_numbers()
         self.driven = driven = model.driven
@@ -188,10 +192,6 @@ class Analysis:
         motions = driven.motions(free_motions(model.mesh, model.kinematics, supported, model.holding_rows()))
         self.floating = Floating(motions, self.system, involved) if len(motions) else None
         matrix = self.floating.with_springs(self.system.matrix) if self.floating else self.system.matrix
-        self.solver = linear.make(
-            linear_solver, dim=model.mesh.dim, n_dofs=model.n_dofs, tolerance=linear_tolerance,
-            precision=linear_precision,
-        )  # fmt: skip
         modes = driven.near_nullspace(near_nullspace(model))
         self.solver.prepare(matrix, self.system.unknowns_of(modes), involved)
         self.shape = (driven.n_dofs // model.mesh.dim, model.mesh.dim)

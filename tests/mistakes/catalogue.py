@@ -320,6 +320,11 @@ COMMANDS = [
     ("result is a folder", ["run", "case.toml", "-o", "."], r"is a folder: name a file in it"),
     ("option misspelled", ["run", "case.toml", "--jsn", "a.json"], r"unrecognized arguments: --jsn"),
     ("unknown command", ["runn", "case.toml"], r"invalid choice: 'runn'.*run"),
+    (
+        "unknown linear solver",
+        ["run", "case.toml", "--linear", "direkt"],
+        r"unknown linear solver 'direkt': did you mean 'direct'",
+    ),
     ("no threads", ["run", "case.toml", "--threads", "0"], r"--threads 0 must lie between 1 and \d+"),
     ("mesh maker misspelled", ["mesh", "half-sphere", "-o", "a.med"], r"invalid choice: 'half-sphere'.*half-spheres"),
     (
