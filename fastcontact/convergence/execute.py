@@ -172,8 +172,8 @@ def _on_executor(executor: Executor, jobs: Sequence[Job], rest: list[int]) -> It
     futures: dict[Future[Result], int] = {}
     try:
         with _environment(_ONE_THREAD, "1"):
-            # The last job is the largest mesh: started first, it does not keep the others waiting at the end.
-            for index in reversed(rest):
+            # The largest first, so that none keeps the others waiting at the end.
+            for index in sorted(rest, key=lambda index: -jobs[index].size):
                 futures[executor.submit(run, jobs[index], 1)] = index
         for future in as_completed(futures):
             yield futures[future], future.result()

@@ -49,6 +49,8 @@ class Job:
         The case's mesh, where it was read from a file.
     marks : dict
         What tells this run from its fellows, e.g. ``level``; goes into the results.
+    size : float
+        How much work it is, to compare with its fellows.
     """
 
     label: str
@@ -58,6 +60,7 @@ class Job:
     recipe: Recipe | None
     base: Mesh | None
     marks: dict[str, Any]
+    size: float = 0.0
 
     @property
     def key(self) -> str:

@@ -262,6 +262,7 @@ def _job(case: Case, chosen: Settings, combination: Combination, level: int) -> 
         pair=chosen.pair,
         recipe=recipe(chosen, combination.element, level),
         base=case.mesh if chosen.generator is None else None,
+        size=level,
         marks={"level": level, "element": combination.element, "formulation": combination.formulation},
     )
 

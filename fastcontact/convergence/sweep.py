@@ -16,8 +16,8 @@ from fastcontact import errors
 from fastcontact.case import Case, build_case, read_case
 from fastcontact.convergence.execute import Progress, run_all
 from fastcontact.convergence.job import Job, case_data
-from fastcontact.convergence.levels import recipe
-from fastcontact.convergence.settings import one_combination, settings
+from fastcontact.convergence.levels import make_mesh, recipe
+from fastcontact.convergence.settings import Combination, Settings, one_combination, settings
 from fastcontact.convergence.store import Store
 from fastcontact.convergence.substitute import substituted
 from fastcontact.errors import CaseError
@@ -202,8 +202,14 @@ def _job(case: Case, choice: dict[str, Value], element: str | None, formulation:
         pair=chosen.pair,
         recipe=recipe(chosen, member.element, finer),
         base=case.mesh if chosen.generator is None else None,
+        size=_points(chosen, member),
         marks={**choice, "combination": f"{member}, level {finer}"},
     )
+
+
+def _points(chosen: Settings, member: Combination) -> float:
+    """Return the points of the coarsest mesh, which tell which of the runs is the largest."""
+    return make_mesh(recipe(chosen, member.element, 0), None).n_points if chosen.generator is not None else 0
 
 
 def _point(choice: dict[str, Value], result: dict[str, Any]) -> Point:
