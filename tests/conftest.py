@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import fastcontact as fc
+from fastcontact import linear
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
@@ -14,9 +15,32 @@ SHARED = ROOT.parent / "shared"
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Let other folders of code_aster's cases be tried."""
+    parser.addoption("--linear-solver", help="what the choice 'auto' stands for in this run: direct, cholmod, amg, ...")
     parser.addoption(
         "--cases", type=Path, default=SHARED / "cases", help="folder of validation specs (JSON) with their meshes (MED)"
     )
+
+
+@pytest.fixture(scope="session", autouse=True)
+def linear_solver(request: pytest.FixtureRequest):
+    """The linear solver that ``--linear-solver`` names, in place of the automatic choice; iterative ones to round-off.
+
+    Every test that leaves the choice open must pass with every solver.
+    """
+    name = request.config.getoption("--linear-solver")
+    if name is None:
+        yield
+        return
+    make = linear.make
+
+    def given(asked: str, **options):
+        if asked == "auto":
+            options["tolerance"] = min(options.get("tolerance", 1e-10), 1e-13)
+        return make(name if asked == "auto" else asked, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(linear, "make", given)
+        yield
 
 
 @pytest.fixture(scope="session")
