@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fastcontact import active_set, friction, linear, recovery, step_control
+from fastcontact import active_set, friction, linear, recovery, restart, step_control
 from fastcontact.acceleration import Anderson
 from fastcontact.assembly import rigid_modes, stiffness
 from fastcontact.contact.constraints import Constraints, stacked
@@ -106,8 +106,9 @@ def solve(
     linear_precision: str | None = None,
     criteria: Criteria | None = None,
     on_step: Callable[[StepResult], None] | None = None,
+    resume: Sequence[StepResult] = (),
 ) -> list[StepResult]:
-    """Solve a model along a load ramp.
+    """Solve a model along a load ramp, from its beginning or after steps that are there already.
 
     Parameters
     ----------
@@ -124,16 +125,21 @@ def solve(
     criteria : Criteria, optional
         Convergence criteria and the handling of the geometry.
     on_step : callable, optional
-        Called with every `StepResult` as soon as its step has converged, e.g. ``ResultWriter.write``.
+        Called with every new `StepResult` as soon as its step has converged, e.g. ``ResultWriter.write``.
+    resume : sequence of StepResult
+        Steps of the same case to go on after: what `solve` returned, ``open_results(path)`` or ``ResultWriter.done``;
+        none by default. The analysis goes on with the instants of the ramp after the last of them and ends as if it had
+        never stopped. Linear solver, tolerances and limits may be others, and so may the ramp from there on.
 
     Returns
     -------
     list of StepResult
+        Those to go on after, and the new ones. Of all these only the last one keeps its `restart`.
 
     Raises
     ------
     MeshError, ModelError, ContactError
-        If the model is wrong.
+        If the model is wrong, or is another one than that of the steps to go on after.
     ConvergenceError
         If a step does not converge, nor in parts (`Criteria.max_halvings`); steps before it have been handed to
         `on_step`.
@@ -144,17 +150,27 @@ def solve(
         If bodies interpenetrate where no contact is defined, a penalty lets them penetrate by more than 1 % of the
         largest displacement, or strains leave the range of linear kinematics.
     """
-    ramp = ramp or linear_ramp()
-    analysis = Analysis(model, linear_solver, linear_tolerance, criteria or Criteria(), ramp, linear_precision)
-    steps: list[StepResult] = []
-    begin = ramp.table[0][0]
-    for index, instant in enumerate(ramp.instants, start=1):
-        last, halvings = index == len(ramp), analysis.criteria.max_halvings
-        step = step_control.advance(analysis, index, begin, instant, last, halvings)
+    ramp, criteria = ramp or linear_ramp(), criteria or Criteria()
+    case = restart.identity(model, ramp, criteria)
+    steps, begin = list(resume), ramp.table[0][0]
+    if steps:
+        restart.check(steps[-1], case)
+    instants = restart.remaining(ramp, steps)
+    if not instants:
+        return steps
+    analysis = Analysis(model, linear_solver, linear_tolerance, criteria, ramp, linear_precision)
+    if steps:
+        restart.put_back(analysis, steps[-1])
+        begin = steps[-1].load_factor
+    for index, instant in enumerate(instants, start=steps[-1].index + 1 if steps else 1):
+        step = step_control.advance(analysis, index, begin, instant, instant == instants[-1], criteria.max_halvings)
+        step = replace(step, restart=restart.taken(analysis, case))
         begin = instant
-        steps.append(step)
         if on_step is not None:
             on_step(step)
+        if steps and steps[-1].restart is not None:
+            steps[-1] = replace(steps[-1], restart=None)
+        steps.append(step)
     return steps
 
 
@@ -193,6 +209,8 @@ class Analysis:
         self.floating = Floating(motions, self.system, involved) if len(motions) else None
         matrix = self.floating.with_springs(self.system.matrix) if self.floating else self.system.matrix
         modes = driven.near_nullspace(near_nullspace(model))
+        if self.floating is not None:
+            involved = np.union1d(involved, self.floating.dofs)
         self.solver.prepare(matrix, self.system.unknowns_of(modes), involved)
         self.shape = (driven.n_dofs // model.mesh.dim, model.mesh.dim)
         self.u = np.zeros(driven.n_dofs)
@@ -236,15 +254,16 @@ class Analysis:
         before = self.solver.counters.iterations
         self.expected = 0.0  # displacement, for the first step under forces only
         if self.pairs and self.external.any() and not (self.u.any() or lift.any()):
-            self.expected = float(np.abs(loaded.displacement(np.zeros(len(lift)))).max())
+            self.expected = float(np.abs(loaded.everywhere(np.zeros(len(lift)))).max())
         if self.pairs and self.model.springs:
             # Weak springs alone would let bodies move far; contact takes that back, but not its round-off.
-            alone = float(np.abs(loaded.displacement(np.zeros(len(lift)))).max())
+            alone = float(np.abs(loaded.everywhere(np.zeros(len(lift)))).max())
             self.round_off = max(self.round_off, 16 * np.finfo(float).eps * alone)
         history: list[dict[str, Any]] = []
         if self.pairs:
             constraints, state = self._contact(loaded, lift, history)
             force = constraints.force(state)
+            self._move_everything(loaded, state, force, lift)
         else:
             guess = self.system.unknowns(self.u, lift)
             v = loaded.solve(csr_array((0, len(lift))), np.empty(0), guess=guess)[0]
@@ -358,6 +377,12 @@ class Analysis:
             )
         return constraints, state
 
+    def _move_everything(self, loaded: linear.Loaded, state: active_set.State, force: Array, lift: Array) -> None:
+        """Let all points follow the contact forces (n_dofs,), where so far those near the contact did."""
+        if self.floating is not None and self.settled is not None:
+            lift = lift + self.floating.rigid(self.settled.position)
+        self.u = self.system.displacement(loaded.everywhere(self.system.reduced(force), state.u), lift)
+
     def _smoother(self) -> str:
         """Return the advice for pairs that may flip between the facets at a node."""
         faceted = [name for name, pair in self.pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
@@ -412,6 +437,7 @@ class Analysis:
                 constraints.friction if constraints.friction is not None else np.zeros(len(gap0)), usable,
                 compliance=constraints.compliance, directions=constraints.directions, closed=active,
                 held=constraints.held, softness=constraints.softness, loose=constraints.loose, guess=self.rubbing,
+                elsewhere=self.system.unknowns(self.u, lift),
             )  # fmt: skip
             self.rubbing = state
         else:

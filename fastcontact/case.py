@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -143,8 +144,7 @@ def read_case(path: str | Path) -> Case:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        reason = "it does not exist" if not path.exists() else str(error)
-        raise CaseError(f"cannot read the case file '{path}': {reason}") from error
+        raise CaseError(f"cannot read the case file '{path}': {_unreadable(path, error)}") from error
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -153,6 +153,17 @@ def read_case(path: str | Path) -> Case:
         return build_case(data, name=path.stem, folder=path.parent, text=text)
     except CaseError as error:
         raise CaseError(f"{path}: {error}") from error
+
+
+def _unreadable(path: Path, error: Exception) -> str:
+    """Return why a case file cannot be read, and what to do."""
+    if path.is_dir():
+        return "it is a folder; name a file in it"
+    if not path.exists():
+        return "it does not exist"
+    if isinstance(error, OSError):
+        return error.strerror or type(error).__name__
+    return "it is no text in UTF-8; name a TOML file"
 
 
 def build_case(
@@ -233,9 +244,41 @@ def _check_keys(where: str, data: Any, known: Mapping[str, Any]) -> None:
             raise CaseError(f"the value of '{label}' must be of type {names}, not {value!r}")
 
 
-def _parameters(function: Callable[..., Any]) -> list[str]:
-    """Return the names of the arguments of a function."""
-    return list(inspect.signature(function).parameters)
+def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) -> Any:
+    """Call `function` with the keys of a table of a case file.
+
+    Raises
+    ------
+    CaseError
+        If a key is unknown or missing, or a value is of another type than the function wants, or refused by it.
+    """
+    parameters = inspect.signature(function).parameters
+    _check_keys(where, arguments, dict.fromkeys(parameters))
+    missing = [key for key, p in parameters.items() if p.default is p.empty and key not in arguments]
+    if missing:
+        raise CaseError(f"'{where}' needs {' and '.join(repr(key) for key in missing)}")
+    for key, value in arguments.items():
+        wanted = str(parameters[key].annotation)
+        if "float" in wanted and isinstance(value, str) and "str" not in wanted:
+            raise CaseError(f"the value of '{where}.{key}' must be a number, not {value!r}")
+    try:
+        return function(**arguments)
+    except (TypeError, ValueError) as error:
+        given = ", ".join(f"{key} = {value!r}" for key, value in arguments.items())
+        raise CaseError(f"'{where}': {given} are not of the kinds that it takes ({error})") from error
+    except FastcontactError as error:
+        raise CaseError(f"'{where}': {error}") from error
+
+
+@contextlib.contextmanager
+def _at(where: str) -> Iterator[None]:
+    """Put before the message of an error the place in the case file that it comes from."""
+    try:
+        yield
+    except CaseError:
+        raise
+    except FastcontactError as error:
+        raise type(error)(f"{where}: {error}") from error
 
 
 def _tables(where: str, entries: Any) -> list[dict[str, Any]]:
@@ -253,10 +296,8 @@ def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:
     name = data["generator"]
     if name not in generate.GENERATORS:
         raise CaseError(unknown("mesh.generator", str(name), generate.GENERATORS))
-    make = generate.GENERATORS[name]
-    arguments = {key: value for key, value in data.items() if key != "generator"}
-    _check_keys("mesh", arguments, dict.fromkeys(_parameters(make)))
-    return make(**{key: tuple(v) if isinstance(v, list) else v for key, v in arguments.items()})
+    arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in data.items() if key != "generator"}
+    return called("mesh", generate.GENERATORS[name], arguments)
 
 
 def _model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
@@ -266,12 +307,14 @@ def _model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
         for key in ("E", "nu"):
             if key not in entry:
                 raise CaseError(f"material[{i}] needs '{key}'")
-        model.add_material(LinearElastic(E=float(entry["E"]), nu=float(entry["nu"])), entry.get("groups"))
+        with _at(f"material[{i}]"):
+            model.add_material(LinearElastic(E=float(entry["E"]), nu=float(entry["nu"])), entry.get("groups"))
     for i, entry in enumerate(_tables("support", data.get("support", []))):
         _check_keys(f"support[{i}]", entry, {"group": str, **_AXES, "ramp": list})
         if "group" not in entry:
             raise CaseError(f"support[{i}] needs 'group'")
-        model.prescribe(**_arguments(f"support[{i}]", entry))
+        with _at(f"support[{i}]"):
+            model.prescribe(**_arguments(f"support[{i}]", entry))
     _add_loads(model, data)
     for name, entry in data.get("contact", {}).items():
         if not isinstance(entry, dict):
@@ -279,7 +322,8 @@ def _model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
         for key in ("secondary", "primary"):
             if not isinstance(entry.get(key), str):
                 raise CaseError(f"contact.{name} needs '{key}', the name of a group of facets")
-        model.add_contact(name, **entry)
+        with _at(f"contact.{name}"):
+            model.add_contact(name, **entry)
     for name, entry in data.get("obstacle", {}).items():
         _add_obstacle(model, name, entry, folder)
     return model
@@ -298,7 +342,8 @@ def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
     for key in ("motion", "force"):
         if key in rest:
             _check_keys(f"{where}.{key}", rest[key], _AXES)
-    model.add_obstacle(name, obstacle=obstacle, **_arguments(where, rest))
+    with _at(where):
+        model.add_obstacle(name, obstacle=obstacle, **_arguments(where, rest))
 
 
 def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
@@ -313,12 +358,8 @@ def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
             raise CaseError(f"'{where}' needs 'group', the facets of the rigid surface")
         file = arguments.pop("file", None)
         return MeshedSurface(mesh if file is None else read_mesh(folder / file), **arguments)
-    factory = SHAPES[kind]
-    _check_keys(where, arguments, dict.fromkeys(_parameters(factory)))
-    try:
-        return factory(**arguments)
-    except (TypeError, ValueError) as error:
-        raise CaseError(f"'{where}': {error}") from error
+    shape: Obstacle = called(where, SHAPES[kind], arguments)
+    return shape
 
 
 def _add_loads(model: Model, data: dict[str, Any]) -> None:
@@ -330,7 +371,8 @@ def _add_loads(model: Model, data: dict[str, Any]) -> None:
             for key in needed:
                 if key not in entry:
                     raise CaseError(f"{where} needs '{key}'")
-            add(model, **_arguments(where, entry))
+            with _at(where):
+                add(model, **_arguments(where, entry))
 
 
 def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
@@ -403,13 +445,7 @@ def _theory(where: str, data: dict[str, Any]) -> Any:
         raise CaseError(f"'{where}' needs the key 'kind', one of {', '.join(analytic.THEORIES)}")
     if data["kind"] not in analytic.THEORIES:
         raise CaseError(unknown(f"{where}.kind", str(data["kind"]), analytic.THEORIES))
-    factory = analytic.THEORIES[data["kind"]]
-    arguments = {key: value for key, value in data.items() if key != "kind"}
-    _check_keys(where, arguments, dict.fromkeys(_parameters(factory)))
-    try:
-        return factory(**arguments)
-    except (TypeError, FastcontactError) as error:
-        raise CaseError(f"'{where}': {error}") from error
+    return called(where, analytic.THEORIES[data["kind"]], {key: v for key, v in data.items() if key != "kind"})
 
 
 def described(data: dict[str, Any]) -> dict[str, Any]:

@@ -79,6 +79,7 @@ def solve(
     softness: Array | None = None,
     loose: Array | None = None,
     guess: FrictionalEquilibrium | None = None,
+    elsewhere: Array | None = None,
 ) -> FrictionalEquilibrium:
     """Find displacement and contact forces under contact and friction.
 
@@ -109,6 +110,8 @@ def solve(
         Z of a further compliance ``Z Z.T`` of normal and tangential forces.
     guess : FrictionalEquilibrium, optional
         A solution with nearly the same forces; one of other constraints is passed over.
+    elsewhere : ndarray (n,), optional
+        Displacement to keep where no constraint acts, see `Loaded.near`.
     """
     rows = np.flatnonzero(usable)
     k, m = len(tangents), len(gap0)
@@ -143,7 +146,7 @@ def solve(
     gaps[1:, ~usable] = 0.0
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)
     active[rows], sticking[rows] = found.closed, found.sticking
-    u = loaded.displacement(R.T @ y.ravel())
+    u = loaded.near(R.T @ y.ravel(), elsewhere)
     return FrictionalEquilibrium(
         u, full[0], gaps[0], full[1:].T, gaps[1:].T, active, sticking, found.settled, found.residual, found.iterations
     )

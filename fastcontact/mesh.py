@@ -163,7 +163,7 @@ class Mesh:
             If there is no cell group of that name.
         """
         if group not in self.cell_groups:
-            raise MeshError(unknown("group of cells", group, self.cell_groups))
+            raise MeshError(self._no_group("group of cells", group, self.cell_groups))
         rows = self.split(self.cell_groups[group])
         return {name: self.cells[name][r] for name, r in rows.items() if dim is None or elements.get(name).dim == dim}
 
@@ -178,9 +178,16 @@ class Mesh:
         if group in self.point_groups:
             return self.point_groups[group]
         if group not in self.cell_groups:
-            raise MeshError(unknown("group", group, self.group_names))
+            raise MeshError(self._no_group("group", group, self.group_names))
         blocks = [block.ravel() for block in self.cells_of(group).values()]
         return np.unique(np.concatenate(blocks)) if blocks else np.empty(0, np.int32)
+
+    def _no_group(self, kind: str, group: str, known: Iterable[str]) -> str:
+        if not self.group_names:
+            return (
+                f"the mesh has no groups at all, so none is '{group}': name groups in the mesher, or with Mesh.with_groups"
+            )
+        return unknown(kind, group, known)
 
     def point(self, group: str) -> int:
         """Return the number of the only point of a group.

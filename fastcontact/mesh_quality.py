@@ -105,9 +105,11 @@ def check_cells(mesh: Mesh) -> None:
     ------
     MeshError
         If a cell is degenerate (its area or volume is nothing but rounding) or inverted (clockwise, or folded so
-        that the Jacobian is negative at a quadrature point); the message names the first one and says where.
+        that the Jacobian is negative at a quadrature point), or stands there twice; the message names the first one
+        and says where.
     """
     for name in mesh.solids:
+        _check_twice(mesh, name)
         verdict = _verdict(mesh, name)
         for bad, what, remedy in (
             (verdict.flat, "degenerate", "remove it or merge its points differently"),
@@ -117,6 +119,24 @@ def check_cells(mesh: Mesh) -> None:
                 row = int(np.flatnonzero(bad)[0])
                 cell = _described(mesh, name, row, verdict.measure[row])
                 raise MeshError(f"{cell} is {what}, one of {int(bad.sum())} such cells: {remedy}")
+
+
+def _check_twice(mesh: Mesh, name: str) -> None:
+    """Raise MeshError if two cells of an element have the same nodes: together they would be twice as stiff."""
+    nodes = mesh.cells[name].astype(np.int64)
+    # Sums tell most cells apart; only those with equal sums are compared node by node.
+    key = nodes.sum(axis=1) * mesh.n_points + (nodes * nodes % 1_000_003).sum(axis=1)
+    order = np.argsort(key, kind="stable")
+    alike = np.flatnonzero(key[order[1:]] == key[order[:-1]])
+    rows = np.unique(np.concatenate([order[alike], order[alike + 1]]))
+    _, first, count = np.unique(np.sort(nodes[rows], axis=1), axis=0, return_index=True, return_counts=True)
+    if (count > 1).any():
+        row = int(rows[first[count > 1].min()])
+        centre = ", ".join(f"{x:.6g}" for x in mesh.points[nodes[row]].mean(axis=0))
+        raise MeshError(
+            f"cell {mesh.offsets[name] + row} ({name} at ({centre})) stands in the mesh {int(count.max())} times, one of "
+            f"{int((count > 1).sum())} such cells: remove the copies"
+        )
 
 
 def _described(mesh: Mesh, name: str, row: int, measure: float) -> str:

@@ -710,6 +710,10 @@ def _table(ramp: History, what: str) -> Table | None:
 
 def _check_sides(mesh: Mesh, pair: ContactPair, secondary: Surface, primary: Surface) -> None:
     """Refuse sides that share nodes or cannot face each other."""
+    if pair.secondary == pair.primary:
+        raise ContactError(
+            f"contact '{pair.name}' has '{pair.primary}' on both sides: name the group of the other body as one of them"
+        )
     shared = np.intersect1d(secondary.points, primary.points)
     if len(shared):
         raise ContactError(

@@ -134,6 +134,9 @@ class StepResult:
         What the step warned of.
     cell_fields : dict of str to ndarray (n_solids,)
         Further numbers of every solid cell, in the order of ``mesh.solids``, e.g. an estimated error.
+    restart : dict, optional
+        What the next step owes to this one and those before it, see `restart`: plain numbers, strings and arrays. Result
+        files keep that of their last step.
     """
 
     index: int
@@ -147,3 +150,4 @@ class StepResult:
     iterations: dict[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     cell_fields: dict[str, Array] = field(default_factory=dict)
+    restart: dict[str, Any] | None = field(default=None, repr=False)

@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from fastcontact.analysis import Analysis
     from fastcontact.results import StepResult
 
-# What a step changes: of the analysis, of each of its pairs, of the primary side of a pair, of the extrapolation.
+# What a step changes: of the analysis, of each of its pairs, of the primary side of a pair, of the extrapolation, of
+# the right-hand sides that a direct solver knows.
 # Arrays among it are replaced, never written into; dictionaries and lists are copied.
 _ANALYSIS = (
     "u", "before", "external", "expected", "active", "pressure", "parts", "largest_force", "largest_work", "round_off",
@@ -20,6 +21,7 @@ _ANALYSIS = (
 _PAIR = ("before", "_closed")
 _SIDE = ("now", "before")
 _EXTRAPOLATION = ("ratio", "_loads", "_states")
+_LOADS = ("_loads", "_solutions")
 
 State = list[tuple[Any, dict[str, Any]]]
 
@@ -27,6 +29,8 @@ State = list[tuple[Any, dict[str, Any]]]
 def snapshot(analysis: Analysis) -> State:
     """Return all that a load step changes in `analysis`, for `restore`."""
     found = [_kept(analysis, _ANALYSIS), _kept(analysis.extrapolation, _EXTRAPOLATION)]
+    if hasattr(analysis.solver, "known_loads"):
+        found.append(_kept(analysis.solver.known_loads, _LOADS))
     for pair in analysis.pairs.values():
         found += [_kept(pair, _PAIR), _kept(pair.terms, ("factor",)), _kept(pair.primary, _SIDE)]
     return found

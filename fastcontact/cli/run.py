@@ -24,6 +24,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     parser.add_argument("case", help="case file (TOML), or the name of a ready case: see 'fastcontact cases'")
     parser.add_argument("-o", "--output", help="result file (default: the case's name with .vtkhdf, here)")
+    parser.add_argument(
+        "--resume", action="store_true", help="go on after the last complete step of the result file, if it holds any"
+    )
     parser.add_argument("--json", metavar="FILE", help="write a summary of the last step and the iterations")
     parser.add_argument("--plot", metavar="PNG", help="plot the contact pressure of the last step against theory")
     parser.add_argument("--linear", metavar="SOLVER", help="linear solver: auto, direct or amg (default: the case's)")
@@ -37,6 +40,7 @@ def run(options: argparse.Namespace) -> int:
     from fastcontact.analysis import solve
     from fastcontact.case import read_case
     from fastcontact.io.result_writer import ResultWriter
+    from fastcontact.restart import remaining
 
     started = time.perf_counter()
     if options.threads is not None:
@@ -45,11 +49,13 @@ def run(options: argparse.Namespace) -> int:
     output = Path(options.output or f"{case.name}.vtkhdf")
     _check_targets(options.json, options.plot)
     read = time.perf_counter()
-    progress = Progress(len(case.ramp), show=sys.stderr.isatty() and not options.quiet)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FastcontactWarning)
         fields = (ERROR,) if options.estimate_error else ()
-        with ResultWriter(output, case.model, case_text=case.text, cell_fields=fields) as writer:
+        with ResultWriter(output, case.model, case_text=case.text, cell_fields=fields, resume=options.resume) as writer:
+            done = writer.done
+            total = len(done) + len(remaining(case.ramp, done))
+            progress = Progress(total, show=sys.stderr.isatty() and not options.quiet)
 
             def on_step(step: Any) -> None:
                 writer.write(_estimated(case.model, step) if fields else step)
@@ -63,10 +69,12 @@ def run(options: argparse.Namespace) -> int:
                     linear_tolerance=case.linear_tolerance,
                     criteria=case.criteria,
                     on_step=on_step,
+                    resume=done,
                 )
             finally:
                 progress.close()
-    texts = [str(entry.message) for entry in caught if issubclass(entry.category, FastcontactWarning)]
+    told = [str(entry.message) for entry in caught if issubclass(entry.category, FastcontactWarning)]
+    texts = list(dict.fromkeys([*(text for step in done for text in step.warnings), *told]))
     solved = time.perf_counter()
     timings = {"read": read - started, "solve": solved - read, "cpu": time.process_time()}
     numbers = summary.summarise(case, steps, timings, texts)
@@ -80,8 +88,17 @@ def run(options: argparse.Namespace) -> int:
         print(f"warning: {text}", file=sys.stderr)
     if not options.quiet:
         print("\n".join(summary.lines(numbers)))
-        print(f"  wrote {output}" + "".join(f", {path}" for path in (options.json, options.plot) if path))
+        print("  " + _written(output, len(done), len(steps), [path for path in (options.json, options.plot) if path]))
     return 0
+
+
+def _written(output: Path, done: int, total: int, others: list[str]) -> str:
+    """Return what was written, and how much of it was there before."""
+    if done == total:
+        nothing = f"{output} was complete with {total} steps, nothing was left to solve"
+        return "; wrote ".join([nothing, ", ".join(others)] if others else [nothing])
+    after = f" (went on after step {done})" if done else ""
+    return f"wrote {', '.join([f'{output}{after}', *others])}"
 
 
 def _estimated(model: Any, step: Any) -> Any:

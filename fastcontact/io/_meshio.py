@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import difflib
 import io
 import logging
 import threading
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact import elements
-from fastcontact.errors import FastcontactWarning, FileError, MeshError, unknown
+from fastcontact.errors import FastcontactWarning, FileError, MeshError
 from fastcontact.io import _abaqus
 from fastcontact.io._blocks import VERTEX, Block, build_mesh, merged, without_duplicates
 from fastcontact.mesh import Mesh
@@ -52,6 +53,7 @@ NODE_ORDER: dict[str, Orders] = {
 }
 
 KEEPS_ALL = "write a .med file to keep them"
+USUAL = (".med", ".msh", ".vtu", ".vtk", ".inp", ".xdmf", ".mesh")
 OTHER_FORMATS = "write .med, .vtu or .msh instead"
 
 
@@ -98,7 +100,9 @@ def _format(path: Path, writing: bool) -> str:
     formats = meshio.extension_to_filetypes
     names = next((formats[suffix] for suffix in suffixes if suffix in formats), None)
     if names is None:
-        raise FileError(f"'{path}': {unknown('mesh file suffix', path.suffix, formats)}")
+        near = difflib.get_close_matches(path.suffix, formats, n=1, cutoff=0.7)
+        remedy = f"did you mean '{near[0]}'?" if near else f"use {', '.join(USUAL)} or another format of meshio"
+        raise FileError(f"'{path}': unknown mesh file suffix '{path.suffix}': {remedy}")
     if "gmsh" not in names:
         return str(names[0])
     if writing:

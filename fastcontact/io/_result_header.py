@@ -93,6 +93,9 @@ def write_own(file: Any, mesh: Mesh, kinematics: str, case_text: str) -> None:
     own.create_group("contact")
     growing_table(own, "steps", layout.STEP_ROW)
     growing_table(own, "notes", np.uint8, rows=BYTES)
+    growing_table(own, "runs", layout.RUN_ROW)
+    for number in (0, 1):
+        growing_table(own, layout.restart_table(number), np.uint8, rows=int(np.clip(8 * mesh.n_points, BYTES, 1 << 20)))
 
 
 def _write_groups(parent: Any, name: str, groups: Any) -> None:

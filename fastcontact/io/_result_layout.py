@@ -16,7 +16,8 @@ from fastcontact.results import StepResult
 Array = NDArray[np.float64]
 Flags = NDArray[np.int8]
 
-SCHEMA = 1
+# 1: until the restart state came in. 2: restart state of the last step, any number of run records.
+SCHEMA = 2
 
 # Point data by name, with the number of components that viewers expect; stress is a symmetric tensor.
 POINT_FIELDS = {
@@ -36,6 +37,14 @@ XDMF_TYPES = {
 }
 
 STEP_ROW = np.dtype([("index", "<i8"), ("load_factor", "<f8"), ("notes_first", "<i8"), ("notes_count", "<i8")])
+
+# How a run ended: the steps that were complete then, and where its record stands among the notes.
+RUN_ROW = np.dtype([("n_steps", "<i8"), ("first", "<i8"), ("count", "<i8")])
+
+
+def restart_table(number: int) -> str:
+    """Return the name of the table for the restart state of a step: two take turns, so that the last one stays whole."""
+    return f"restart{number % 2}"
 
 
 def contact_row(dim: int) -> np.dtype[Any]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fastcontact.errors import FileError
 from fastcontact.io import _result_layout as layout
 from fastcontact.io._files import existing_file
+from fastcontact.io._packing import unpacked
 from fastcontact.io._targets import PathLike
 from fastcontact.mesh import Mesh
 from fastcontact.results import ContactResult, StepResult
@@ -57,10 +58,12 @@ class Results(Sequence[StepResult]):
     ----------
     path : pathlib.Path
         The file.
+    schema : int
+        Version of the layout of the file.
     mesh : Mesh
         The mesh with its groups.
     kinematics, case_text : str
-        Kinematics of the analysis and the case file, empty if there was none.
+        Kinematics of the analysis and the case file, empty if there was none; that of the last steps if it changed.
     versions : dict of str to str
         Versions of the packages that computed the results.
     load_factors : ndarray (n_steps,)
@@ -78,15 +81,16 @@ class Results(Sequence[StepResult]):
 
     def __init__(self, path: PathLike) -> None:
         self.path = Path(path)
-        self._file = _opened(self.path)
+        self._file, self._below = _opened(self.path)
         try:
             with self._explained():
                 self._read_header(self._file["fastcontact"])
         except BaseException:
-            self._file.close()
+            self.close()
             raise
 
     def _read_header(self, own: Any) -> None:
+        self.schema = int(own.attrs["schema"])
         self._n_steps = int(self._file["VTKHDF/Steps"].attrs["NSteps"])
         self.mesh = _read_mesh(own["mesh"])
         self.kinematics: str = _text(own["kinematics"])
@@ -96,12 +100,23 @@ class Results(Sequence[StepResult]):
         if len(self._rows) != self._n_steps:
             raise ValueError(f"only {len(self._rows)} of {self._n_steps} steps")
         self.load_factors: NDArray[np.float64] = np.ascontiguousarray(self._rows["load_factor"])
-        run: dict[str, Any] = _text(own["run"]) if "run" in own else {}
-        self.log: Any = run.get("log")
-        self.error: str = run.get("error", "")
-        self.complete = "run" in own and not self.error
-        of_steps = [text for number in range(self._n_steps) for text in self._notes(number)["warnings"]]
-        self.warnings: tuple[str, ...] = tuple(dict.fromkeys([*run.get("warnings", ()), *of_steps]))
+        run = self._run_record(own)
+        self.log: Any = (run or {}).get("log")
+        self.error: str = (run or {}).get("error", "")
+        self.complete = run is not None and not self.error
+        notes = [self._notes(number) for number in range(self._n_steps)]
+        self.case_text = next((note["case"] for note in reversed(notes) if "case" in note), self.case_text)
+        of_steps = [text for note in notes for text in note["warnings"]]
+        self.warnings: tuple[str, ...] = tuple(dict.fromkeys([*(run or {}).get("warnings", ()), *of_steps]))
+
+    def _run_record(self, own: Any) -> dict[str, Any] | None:
+        """Return how the run ended; None while it goes on, after a crash, and when steps have been added since."""
+        if "runs" not in own:  # schema 1
+            return _text(own["run"]) if "run" in own else None
+        rows = own["runs"][-1:]
+        if not len(rows) or rows["n_steps"][0] != self._n_steps or not rows["count"][0]:
+            return None
+        return self._note(int(rows["first"][0]), int(rows["count"][0]))
 
     def __len__(self) -> int:
         return self._n_steps
@@ -142,6 +157,7 @@ class Results(Sequence[StepResult]):
     def close(self) -> None:
         """Close the file; the steps already read stay valid, no further ones can be read."""
         self._file.close()
+        self._below.close()
 
     def to_pyvista(self, step: int | StepResult) -> Any:
         """Return a step as a ``pyvista.UnstructuredGrid`` of the solid cells, with all fields and groups.
@@ -174,7 +190,9 @@ class Results(Sequence[StepResult]):
 
     def _notes(self, number: int) -> dict[str, Any]:
         row = self._rows[number]
-        first, count = int(row["notes_first"]), int(row["notes_count"])
+        return self._note(int(row["notes_first"]), int(row["notes_count"]))
+
+    def _note(self, first: int, count: int) -> dict[str, Any]:
         return json.loads(self._file["fastcontact/notes"][first : first + count].tobytes())
 
     def _read_step(self, number: int) -> StepResult:
@@ -194,13 +212,27 @@ class Results(Sequence[StepResult]):
                 iterations=notes["iterations"],
                 warnings=tuple(notes["warnings"]),
                 cell_fields=self._cell_fields(number),
+                restart=self._restart(number) if number == self._n_steps - 1 else None,
             )
 
+    def _restart(self, number: int) -> dict[str, Any] | None:
+        """Return the restart state of the last step; None where there is none, or steps were written since we opened."""
+        own, name = self._file["fastcontact"], layout.restart_table(number)
+        try:
+            kept = unpacked(own[name][()]) if name in own else {}
+        except (ValueError, LookupError, TypeError):
+            return None
+        return kept["restart"] if kept.get("step") == number else None
+
+    @property
+    def cell_field_names(self) -> list[str]:
+        """Names of the cell fields that change from step to step."""
+        static = layout.cell_fields(self.mesh)
+        return [name for name in self._file["VTKHDF/CellData"] if name not in static]
+
     def _cell_fields(self, number: int) -> dict[str, NDArray[np.float64]]:
-        """Return the cell fields that change from step to step."""
-        data, static = self._file["VTKHDF/CellData"], layout.cell_fields(self.mesh)
-        n = len(self._file["VTKHDF/Types"])
-        return {name: data[name][number * n : (number + 1) * n] for name in data if name not in static}
+        data, n = self._file["VTKHDF/CellData"], len(self._file["VTKHDF/Types"])
+        return {name: data[name][number * n : (number + 1) * n] for name in self.cell_field_names}
 
     def _field(self, name: str, number: int, width: int | None = None) -> NDArray[np.float64]:
         n = self.mesh.n_points
@@ -226,8 +258,8 @@ class Results(Sequence[StepResult]):
             raise FileError(f"'{self.path}' {_DAMAGED} ({reason}): compute it again or restore a copy") from error
 
 
-def _opened(path: Path) -> Any:
-    """Open the file and make sure that it is one of ours and not from the future."""
+def _opened(path: Path) -> tuple[Any, Any]:
+    """Return the open file, and that below it, once sure that it is one of ours and not from the future."""
     import h5py
 
     existing_file(path)
@@ -235,9 +267,12 @@ def _opened(path: Path) -> Any:
         raise FileError(f"'{path}' may not be read: ask its owner for the permission")
     if not h5py.is_hdf5(path):
         raise FileError(f"'{path}' is no HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
+    # A file object of our own: HDF5 would hand out again what this process has open, with what it knew of the file then.
+    below = open(path, "rb")  # noqa: SIM115
     try:
-        file = h5py.File(path, "r", locking=False)
+        file = h5py.File(below, "r")
     except OSError as error:
+        below.close()
         reason = str(error).splitlines()[0]
         raise FileError(f"'{path}' {_DAMAGED} ({reason}): compute it again or restore a copy") from error
     try:
@@ -250,7 +285,7 @@ def _opened(path: Path) -> Any:
         if schema is None:
             raise FileError(f"'{path}' holds no fastcontact results: name a file that fastcontact wrote (.vtkhdf)")
         raise FileError(f"'{path}' has schema {schema}, this fastcontact reads up to {layout.SCHEMA}: update it")
-    return file
+    return file, below
 
 
 def _text(dataset: Any) -> Any:
@@ -278,17 +313,18 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
     if len(rows) != count:
         raise ValueError(f"the contact table of '{name}' is cut off")
     columns = {column: np.ascontiguousarray(rows[column]) for column in rows.dtype.names}
-    for mask in ("active", "sticking"):
+    for mask in {"active", "sticking"} & set(columns):
         columns[mask] = columns[mask].astype(bool)
     inner, outer = step["radius"].tolist()
-    # Absent from files of version 0.1.
-    moved = step["obstacle_displacement"].copy() if "obstacle_displacement" in step.dtype.names else np.array([np.nan])
+    # Early files of schema 1 know no shear and no sticking, no dissipation, no obstacles: what they hold came without.
+    known = step.dtype.names
+    moved = step["obstacle_displacement"].copy() if "obstacle_displacement" in known else np.array([np.nan])
     return ContactResult(
         name=name,
         formulation=formulation,
         force=step["force"].copy(),
         radius=(inner, outer),
-        dissipation=float(step["dissipation"]),
+        dissipation=float(step["dissipation"]) if "dissipation" in known else 0.0,
         obstacle_displacement=moved if np.isfinite(moved).all() else None,
         **columns,
     )

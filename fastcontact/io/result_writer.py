@@ -9,6 +9,7 @@ Room on the disk is reserved before, because HDF5 loses the whole file when one 
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 from collections.abc import Iterable, Iterator
 from types import TracebackType
@@ -19,7 +20,11 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import ConvergenceError, FileError, ModelError
 from fastcontact.io import _result_layout as layout
+from fastcontact.io._commits import CommittedFile
+from fastcontact.io._packing import packed
 from fastcontact.io._result_header import BYTES, ROWS, as_json, growing_table, write_geometry, write_own
+from fastcontact.io._resuming import taken_up
+from fastcontact.io._step_checks import check_cell_fields, check_shapes, checked_fields
 from fastcontact.io._targets import PathLike, PathLock, checked_target, reserve
 from fastcontact.mesh import Mesh
 from fastcontact.results import ContactResult, StepResult
@@ -48,26 +53,31 @@ class ResultWriter:
         Whether an existing result file may be replaced.
     cell_fields : iterable of str
         Names of the `StepResult.cell_fields` that every step brings; viewers show them, the XDMF sidecar does not.
+    resume : bool
+        Whether to keep the steps of an existing file of this mesh and write after them. A file that is not there yet, or
+        holds no complete step, is begun. The file is not touched before there is something to add.
 
     Attributes
     ----------
     path : pathlib.Path
         The file, absolute.
     n_steps : int
-        Number of steps written.
+        Number of steps in the file.
+    done : list of StepResult
+        The steps that the file held when it was taken up, for ``solve(..., resume=out.done)``; none without `resume`.
 
     Raises
     ------
     FileError
-        If the file cannot be written, exists and must not be replaced, is no result file, or has another
-        writer.
+        If the file cannot be written, exists and must not be replaced, is no result file, has another writer, or is
+        to be resumed but belongs to another mesh.
     ModelError
         If `mesh` is neither a mesh nor a model.
 
     Examples
     --------
     >>> with ResultWriter("punch.vtkhdf", model) as out:  # doctest: +SKIP
-    ...     fastcontact.analysis(model, ramp=fastcontact.linear_ramp(20), on_step=out.write)
+    ...     fastcontact.solve(model, ramp=fastcontact.linear_ramp(20), on_step=out.write)
     """
 
     def __init__(
@@ -79,6 +89,7 @@ class ResultWriter:
         case_text: str = "",
         overwrite: bool = True,
         cell_fields: Iterable[str] = (),
+        resume: bool = False,
     ) -> None:
         if not isinstance(mesh, Mesh):
             if not isinstance(getattr(mesh, "mesh", None), Mesh) or not hasattr(mesh, "kinematics"):
@@ -88,18 +99,32 @@ class ResultWriter:
             mesh = mesh.mesh
         self.path = checked_target(path)
         self.n_steps = 0
-        self._cell_fields = _checked_fields(cell_fields, mesh)
+        self.done: list[StepResult] = []
+        self._cell_fields = checked_fields(cell_fields, mesh)
         self._mesh: Mesh = mesh
         self._pairs: dict[str, Any] = {}
         self._file: Any = None
+        self._closed = self._ended = False
+        self._new_case: str | None = None
         with self._explained("begun"):
             self._lock = PathLock(self.path)
             try:
-                _check_replaceable(self.path, overwrite)
-                self._begin(str(kinematics), case_text)
+                if resume:
+                    self._take_up(str(kinematics), case_text)
+                if not self.done:
+                    _check_replaceable(self.path, overwrite or resume)
+                    self._begin(str(kinematics), case_text)
             except BaseException:
                 self._lock.release()
                 raise
+
+    def _take_up(self, kinematics: str, case_text: str) -> None:
+        """Look whether the file holds steps to write after."""
+        found = taken_up(self.path, self._mesh, kinematics, self._cell_fields)
+        if found is not None:
+            self.done, self._ended = found.steps, found.complete
+            self.n_steps = len(self.done)
+            self._new_case = case_text if case_text and case_text != found.case_text else None
 
     def __enter__(self) -> ResultWriter:
         return self
@@ -109,6 +134,9 @@ class ResultWriter:
     ) -> None:
         if error is None:
             self.close()
+            return
+        if self._file is None and not isinstance(error, ConvergenceError):
+            self._give_up()  # nothing was added: whatever went wrong says nothing about the steps that are there
             return
         with contextlib.suppress(FileError):  # the first error is the one to tell
             run: dict[str, Any] = {"error": f"{type(error).__name__}: {error}"}
@@ -124,16 +152,22 @@ class ResultWriter:
         FileError
             If the file is closed, the step does not fit the mesh, or the disk takes no more.
         """
-        if self._file is None:
+        if self._closed:
             raise FileError(f"'{self.path}' is closed: write steps before close, or inside the with block")
-        _check_shapes(self._mesh, step)
-        _check_cell_fields(self._mesh, step, self._cell_fields)
+        check_shapes(self._mesh, step)
+        check_cell_fields(self._mesh, step, self._cell_fields)
         with self._explained(f"written at step {step.index}"):
-            self._reserve(_step_size(self._mesh, step))
+            self._open()
+            self._check_in_place()
+            restart = packed({"step": self.n_steps, "restart": step.restart})
+            self._reserve(_step_size(self._mesh, step) + restart.nbytes)
             self._append_fields(step)
             self._append_tables(step)
+            _set_start(self._file["fastcontact"][layout.restart_table(self.n_steps)], restart)
             self._file.flush()
             self._append_step_rows(step)
+            self._file.flush()
+            self._file["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(self.n_steps + 1))
             self._file.flush()
         self.n_steps += 1
 
@@ -155,24 +189,52 @@ class ResultWriter:
         self._finish({"log": log, "warnings": [str(warning) for warning in warnings]})
 
     def _finish(self, run: dict[str, Any]) -> None:
-        if self._file is None:
+        if self._closed:
+            return
+        if self._file is None and self._ended and "error" not in run:
+            self._give_up()  # a complete file stays as it is
             return
         text = as_json(run)
         try:
             with self._explained("closed"):
+                self._open()
                 try:
                     self._reserve(len(text))
-                    self._file["fastcontact"].create_dataset("run", data=text)
-                    self._file.flush()
+                    self._append_run(np.frombuffer(text.encode("ascii"), np.uint8))
                 finally:
-                    _close_trimmed(self._file)
+                    try:
+                        self._file.close()
+                    finally:
+                        self._below.close()
         finally:
             self._file = None
-            self._lock.release()
+            self._give_up()
+
+    def _give_up(self) -> None:
+        self._closed = True
+        self._lock.release()
+
+    def _open(self) -> None:
+        """Open a file that was taken up, once there is something to add to it."""
+        import h5py
+
+        if self._file is None:
+            self._below = CommittedFile(self.path)
+            self._file = h5py.File(self._below, "r+")
+            self._pairs = {json.loads(pair["name"][()]): pair for pair in self._file["fastcontact/contact"].values()}
+
+    def _check_in_place(self) -> None:
+        """Refuse to go on writing to a file that nobody would find."""
+        with contextlib.suppress(OSError):
+            if os.path.samestat(os.fstat(self._below.fileno()), os.stat(self.path)):
+                return
+        raise FileError(
+            f"'{self.path}' is no longer there: the file or its folder was removed, moved or replaced after "
+            f"{self.n_steps} steps. Put it back and resume, or start again"
+        )
 
     def _reserve(self, size: int) -> None:
-        start, descriptor = self._file.id.get_filesize(), self._file.id.get_vfd_handle()
-        reserve(descriptor, self.path.parent, start, size + MARGIN)
+        reserve(self._below.fileno(), self.path.parent, self._below.end, size + MARGIN)
 
     @contextlib.contextmanager
     def _explained(self, what: str) -> Iterator[None]:
@@ -203,7 +265,7 @@ class ResultWriter:
             with contextlib.suppress(OSError):
                 temporary.unlink()
         # Closed in between because Windows renames no open file; without locks viewers may follow.
-        self._file = h5py.File(self.path, "r+", locking=False)
+        self._open()
 
     def _append_fields(self, step: StepResult) -> None:
         first = self.n_steps * self._mesh.n_points
@@ -212,7 +274,9 @@ class ResultWriter:
             data[name].resize(first + len(values), axis=0)
             data[name][first:] = values
         for name in self._cell_fields:
-            _extend(self._file["VTKHDF/CellData"][name], step.cell_fields[name])
+            field, values = self._file["VTKHDF/CellData"][name], step.cell_fields[name]
+            field.resize((self.n_steps + 1) * len(values), axis=0)
+            field[self.n_steps * len(values) :] = values
 
     def _append_tables(self, step: StepResult) -> None:
         own = self._file["fastcontact"]
@@ -221,7 +285,8 @@ class ResultWriter:
                 self._pairs[name] = _new_pair(own["contact"], name, self._mesh.dim)
         for name, pair in self._pairs.items():
             _append_contact(pair, self.n_steps, step.contact.get(name))
-        notes = {
+        notes: dict[str, Any] = {} if self._new_case is None else {"case": self._new_case}
+        notes |= {
             "contact": [[name, contact.formulation] for name, contact in step.contact.items()],
             "iterations": step.iterations,
             "warnings": list(step.warnings),
@@ -230,6 +295,14 @@ class ResultWriter:
         row = (step.index, step.load_factor, len(own["notes"]), len(text))
         _extend(own["notes"], text)
         _set_row(own["steps"], self.n_steps, np.array(row, layout.STEP_ROW))
+
+    def _append_run(self, text: NDArray[np.uint8]) -> None:
+        own = self._file["fastcontact"]
+        row = np.array((self.n_steps, len(own["notes"]), len(text)), layout.RUN_ROW)
+        _extend(own["notes"], text)
+        self._file.flush()
+        _set_row(own["runs"], len(own["runs"]), row)
+        self._file.flush()
 
     def _append_step_rows(self, step: StepResult) -> None:
         steps = self._file["VTKHDF/Steps"]
@@ -241,7 +314,6 @@ class ResultWriter:
         for name in self._cell_fields:
             first = self.n_steps * len(self._file["VTKHDF/Types"])
             _set_row(steps["CellDataOffsets"][name], self.n_steps, first)
-        steps.attrs.modify("NSteps", np.int64(self.n_steps + 1))
 
 
 def _check_replaceable(path: Any, overwrite: bool) -> None:
@@ -276,57 +348,6 @@ def _step_size(mesh: Mesh, step: StepResult) -> int:
     fields += 8 * sum(map(np.size, step.cell_fields.values()))
     contact = sum((len(pair.points) + 2 * ROWS) * row + BYTES for pair in step.contact.values())
     return int(1.01 * fields) + contact + len(as_json([step.iterations, step.warnings]))
-
-
-def _check_shapes(mesh: Mesh, step: StepResult) -> None:
-    n, dim = mesh.n_points, mesh.dim
-    vector, scalar = (n, dim), (n,)
-    expected = {
-        "displacement": vector,
-        "reaction": vector,
-        "stress": (n, 4 if dim == 2 else 6),
-        "von_mises": scalar,
-        "von_mises_signed": scalar,
-    }
-    for name, shape in expected.items():
-        found = np.shape(getattr(step, name))
-        if found != shape:
-            raise FileError(f"step {step.index}: {name} has shape {found}, but the mesh of the file needs {shape}")
-    for name, contact in step.contact.items():
-        _check_contact(f"step {step.index}, contact '{name}'", contact, mesh)
-
-
-def _checked_fields(names: Iterable[str], mesh: Mesh) -> tuple[str, ...]:
-    """Return names of cell fields that neither stand in a file already nor cannot be written."""
-    found = tuple(names)
-    for name in found:
-        if name in layout.cell_fields(mesh) or not name.isidentifier():
-            raise FileError(
-                f"'{name}' cannot be the name of a cell field: it is taken or no plain word; choose another"
-            )
-    return found
-
-
-def _check_cell_fields(mesh: Mesh, step: StepResult, names: Iterable[str]) -> None:
-    count = sum(map(len, mesh.solids.values()))
-    for name in names:
-        found = np.shape(step.cell_fields.get(name, ()))
-        if found != (count,):
-            raise FileError(
-                f"step {step.index}: the cell field '{name}' that was announced has shape {found}, but ({count},) is "
-                "needed, a number for each solid cell"
-            )
-
-
-def _check_contact(where: str, contact: ContactResult, mesh: Mesh) -> None:
-    row = layout.contact_row(mesh.dim)
-    for name in row.names or ():
-        found, shape = np.shape(getattr(contact, name)), (len(contact.points), *row[name].shape)
-        if found != shape:
-            raise FileError(f"{where}: {name} has shape {found}, but {shape} is needed")
-    outside = np.asarray(contact.points)[(contact.points < 0) | (contact.points >= mesh.n_points)]
-    if len(outside):
-        raise FileError(f"{where}: point {outside[0]} is not in the mesh of {mesh.n_points} points")
 
 
 def _new_pair(parent: Any, name: str, dim: int) -> Any:
@@ -365,12 +386,8 @@ def _set_row(table: Any, number: int, value: Any) -> None:
     table[number] = value
 
 
-def _close_trimmed(file: Any) -> None:
-    """Close an HDF5 file, cut what was reserved in vain, and see it to the disk, against a power failure."""
-    size, descriptor = file.id.get_filesize(), os.dup(file.id.get_vfd_handle())
-    try:
-        file.close()
-        os.ftruncate(descriptor, size)
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+def _set_start(table: Any, values: NDArray[Any]) -> None:
+    """Overwrite a table from its start; it never shrinks, because HDF5 would give the room to something else."""
+    if len(table) < len(values):
+        table.resize(len(values), axis=0)
+    table[: len(values)] = values

@@ -40,8 +40,10 @@ def make(
     Raises
     ------
     ModelError
-        If there is no such solver, or a package that it needs is missing.
+        If there is no such solver, a package that it needs is missing, or the tolerance is no relative one.
     """
+    if not 0.0 < tolerance < 1.0:
+        raise ModelError(f"the tolerance {tolerance} of the linear solver must lie between 0 and 1, such as 1e-10")
     if name == "auto":
         name, reason = chosen(dim, n_dofs)
         log.info("linear solver: %s, %s", name, reason)

@@ -7,7 +7,7 @@ kept, so further active sets and pairings cost a small dense solution and one so
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,12 @@ class ComplianceCache:
         Size of K.
     solve_many : method
         Of the solver that keeps this cache; maps right-hand sides (n, k) to solutions (n, k).
+
+    Attributes
+    ----------
+    asked : list of ndarray of int
+        Degrees of freedom in the order in which they were solved for: round-off, and what an iterative solver leaves,
+        depend on it.
     """
 
     def __init__(self, n: int, solve_many: Callable[[Array], Array]) -> None:
@@ -35,6 +41,7 @@ class ComplianceCache:
         self._place = np.full(n, -1, np.intp)
         self._dofs = np.empty(0, np.intp)
         self._values = np.empty((0, 0))
+        self.asked: list[NDArray[np.intp]] = []
 
     def give(self, dofs: NDArray[np.intp], values: Array) -> None:
         """Take rows and columns `dofs` (k,) of ``K^-1``, known by other means; only while nothing is kept yet."""
@@ -49,8 +56,14 @@ class ComplianceCache:
         place = self._place[dofs]
         return self._values[np.ix_(place, place)]
 
+    def ask_again(self, asked: Iterable[NDArray[np.intp]]) -> None:
+        """Solve for what another cache of this matrix was asked for, in its order; see `asked`."""
+        for dofs in asked:
+            self.of(dofs)
+
     def _extend(self, new: NDArray[np.intp]) -> None:
         old = len(self._dofs)
+        self.asked.append(new)
         self._dofs = np.concatenate([self._dofs, new])
         self._place[new] = np.arange(old, len(self._dofs))
         solve_many = self._solve_many()

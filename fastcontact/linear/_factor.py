@@ -10,9 +10,11 @@ from scipy.sparse import bsr_array, csc_array, csr_array
 
 from fastcontact.errors import ModelError
 from fastcontact.linear._compliance import ComplianceCache, multipliers, reduced
+from fastcontact.linear._known_loads import KnownLoads
 from fastcontact.linear._solver import Counters, Monitor
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 SINGULAR = "the stiffness matrix is singular: support the rigid-body motions of every body"
 
 
@@ -50,7 +52,11 @@ class FactorSolver:
         """Return ``K^-1 F`` for right-hand sides (n,) or (n, k)."""
         raise NotImplementedError
 
-    def prepare(self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None) -> None:
+    def _extended(self, u: Array) -> Array:
+        """Return the displacement (n,) under forces on the unknowns `last` alone, which move by u (m,)."""
+        raise NotImplementedError
+
+    def prepare(self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None) -> None:
         """Factorise K; see `LinearSolver.prepare`.
 
         Raises
@@ -61,24 +67,50 @@ class FactorSolver:
         self.n = K.shape[0]
         self._factorise(K.tocsc())
         self.counters.setups += 1
+        self._begin()
+
+    def _begin(self, last: Indices | None = None, inverse: Array | None = None) -> None:
+        """Forget other matrices; take rows and columns `last` (m,) of ``K^-1`` (m, m), where the factors give them."""
         self.compliance = ComplianceCache(self.n, self._solve)
+        self.last, self._inverse = last, inverse
+        if last is not None and inverse is not None:
+            self.compliance.give(last, inverse)
+        self.known_loads = KnownLoads()
 
     def load(self, f: Array) -> Any:
         """Return the prepared matrix with right-hand side `f`."""
-        return LoadedFactor(self, f)
+        return LoadedFactor(self, f, self.known_loads.solution(f, self.back_substitute))
+
+    def memory(self) -> dict[str, Any]:
+        """See `LinearSolver.memory`: columns of ``K^-1`` asked for, and right-hand sides that others are made of."""
+        return {"asked": list(self.compliance.asked), "loads": self.known_loads.memory()}
+
+    def remember(self, memory: dict[str, Any]) -> None:
+        """See `LinearSolver.remember`."""
+        self.compliance.ask_again(memory["asked"])
+        self.known_loads.remember(memory["loads"], self.n, self._solve)
+
+    def response(self, force: Array) -> Array:
+        """Return what forces on the unknowns `last` (m,) move these by."""
+        assert self._inverse is not None
+        return self._inverse @ force
 
     def back_substitute(self, f: Array) -> Array:
         """Return ``K^-1 f``."""
         self.counters.iterations += 1
         return self._solve(f)
 
+    def extend(self, u: Array) -> Array:
+        """Return the displacement (n,) under forces on the unknowns `last` alone, which move by u (m,)."""
+        self.counters.iterations += 1
+        return self._extended(u)
+
 
 class LoadedFactor:
-    """See `linear._solver.Loaded`."""
+    """See `linear._solver.Loaded`; `free` is the displacement without constraints."""
 
-    def __init__(self, solver: FactorSolver, f: Array) -> None:
-        self._solver, self._f = solver, f
-        self._free = solver.back_substitute(f)
+    def __init__(self, solver: FactorSolver, f: Array, free: Array) -> None:
+        self._solver, self._f, self._free = solver, f, free
 
     def solve(
         self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
@@ -87,13 +119,31 @@ class LoadedFactor:
         if B.shape[0] == 0:
             return self._free, np.empty(0)
         multiplier = multipliers(self._solver.compliance, B, c - B @ self._free, C)
-        return self._solver.back_substitute(self._f + B.T @ multiplier), multiplier
+        return self.near(B.T @ multiplier, guess), multiplier
 
     def reduce(self, R: csr_array) -> tuple[Array, Array]:
         return R @ self._free, reduced(self._solver.compliance, R)
 
-    def displacement(self, force: Array) -> Array:
-        return self._solver.back_substitute(self._f + force)
+    def near(self, force: Array, elsewhere: Array | None) -> Array:
+        moved = self._moved(force) if elsewhere is not None else None
+        if elsewhere is None or moved is None:
+            return self.everywhere(force)
+        u, last = elsewhere.copy(), self._solver.last
+        u[last] = self._free[last] + moved
+        return u
+
+    def everywhere(self, force: Array, u: Array | None = None) -> Array:
+        moved = self._moved(force)
+        if moved is None:
+            return self._solver.back_substitute(self._f + force)
+        return self._free + self._solver.extend(moved) if force.any() else self._free.copy()
+
+    def _moved(self, force: Array) -> Array | None:
+        """Return what a force moves the unknowns `last` by; None where it acts on others, too."""
+        last = self._solver.last
+        if last is None or np.count_nonzero(force) != np.count_nonzero(force[last]):
+            return None
+        return self._solver.response(force[last])
 
 
 def singular() -> ModelError:

@@ -244,11 +244,20 @@ class Hierarchy:
         """Memory [bytes]."""
         return sum(level.nbytes for level in self.levels) + self.coarse.nbytes
 
+    @property
+    def bounds(self) -> list[float]:
+        """Bounds of the smoothers by level."""
+        return [level.bound for level in self.levels]
+
+    @bounds.setter
+    def bounds(self, values: Sequence[float]) -> None:
+        for level, bound in zip(self.levels, values, strict=True):
+            level.bound = bound
+        self._factors = [chebyshev(bound, DEGREE) for bound in values]
+
     def raise_bounds(self, factor: float) -> None:
         """Raise the bounds of the smoothers, until the next `set_bounds`."""
-        for level in self.levels:
-            level.bound *= factor
-        self._factors = [chebyshev(level.bound, DEGREE) for level in self.levels]
+        self.bounds = [factor * bound for bound in self.bounds]
 
     def set_bounds(self, anew: Sequence[int] = ()) -> None:
         """Set the bounds of the smoothers to those of K, but for levels `anew`, where they are estimated again."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,8 +42,16 @@ class Loaded(Protocol):
         """Return ``R K^-1 f`` (m,) and the compliance ``R K^-1 R.T`` (m, m) of rows R (m, n)."""
         ...
 
-    def displacement(self, force: Array) -> Array:
-        """Return ``K^-1 (f + force)`` (n,)."""
+    def near(self, force: Array, elsewhere: Array | None) -> Array:
+        """Return ``K^-1 (f + force)`` (n,) at all unknowns that equations may involve.
+
+        Solvers for which other unknowns cost extra leave those as they are in `elsewhere` (n,), where that is given.
+        `solve` does the same with its `guess`.
+        """
+        ...
+
+    def everywhere(self, force: Array, u: Array | None = None) -> Array:
+        """Return ``K^-1 (f + force)`` (n,); `u` is what `near` or `solve` found for it."""
         ...
 
 
@@ -72,4 +80,12 @@ class LinearSolver(Protocol):
 
     def load(self, f: Array) -> Loaded:
         """Take the right-hand side f (n,)."""
+        ...
+
+    def memory(self) -> dict[str, Any]:
+        """Return what the last digits of later solutions owe to earlier ones: plain numbers, strings and arrays."""
+        ...
+
+    def remember(self, memory: dict[str, Any]) -> None:
+        """Take the `memory` of a solver of the same kind that was prepared for the same matrix."""
         ...

@@ -9,6 +9,7 @@ their degrees of freedom, one solution each, kept for the whole analysis.
 from __future__ import annotations
 
 import logging
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +96,25 @@ class Amg:
     def load(self, f: Array) -> _Loaded:
         """Return the prepared matrix with right-hand side `f`."""
         return _Loaded(self, f)
+
+    def memory(self) -> dict[str, Any]:
+        """See `LinearSolver.memory`: what the hierarchy is tied for, how it was strengthened, columns of ``K^-1``."""
+        tied = None
+        if self._tied_as is not None:
+            rows = self._tied_as.tie
+            arrays = (self._tied_as.pivots, rows.indptr, rows.indices, rows.data)
+            tied = dict(zip(("pivots", "indptr", "indices", "data"), arrays, strict=True))
+        kept = {"precision": self.precision, "bounds": self.hierarchy.bounds, "asked": list(self.compliance.asked)}
+        return {**kept, "tied": tied}
+
+    def remember(self, memory: dict[str, Any]) -> None:
+        """See `LinearSolver.remember`."""
+        if memory["precision"] != self.precision:
+            self.precision = memory["precision"]
+            self._build()
+        self.compliance.ask_again(memory["asked"])
+        self.tie(memory["tied"] and _tied_again(memory["tied"], self.hierarchy.n))
+        self.hierarchy.bounds = memory["bounds"]
 
     def tie(self, elimination: Elimination | None) -> None:
         """Change the hierarchy to that of the eliminated matrix.
@@ -229,6 +249,13 @@ class Amg:
         return elimination.multiplier(self._forces(elimination, u, f))
 
 
+def _tied_again(tied: dict[str, Any], n: int) -> Elimination:
+    """Return the elimination that a hierarchy was tied for; right-hand side and multipliers are of no more use."""
+    m = len(tied["pivots"])
+    rows = csr_array((tied["data"], tied["indices"], tied["indptr"]), shape=(m, n))
+    return Elimination(tied["pivots"], rows, np.zeros(m), csr_array((m, m)))
+
+
 def _alike(new: Elimination | None, old: Elimination | None) -> bool:
     """Return whether two eliminations have the same pivots and nearly the same weights."""
     if new is None or old is None or not np.array_equal(new.pivots, old.pivots):
@@ -258,8 +285,11 @@ class _Loaded:
     def reduce(self, R: csr_array) -> tuple[Array, Array]:
         return R @ self._unloaded(), reduced(self._solver.compliance, R)
 
-    def displacement(self, force: Array) -> Array:
+    def near(self, force: Array, elsewhere: Array | None) -> Array:
         return self._solver.solution(self._f + force, None, None)
+
+    def everywhere(self, force: Array, u: Array | None = None) -> Array:
+        return self.near(force, None) if u is None else u
 
     def _unloaded(self) -> Array:
         """Return the displacement without contact forces."""

@@ -1,23 +1,24 @@
 """Direct solver: one sparse factorisation of K serves the whole analysis, constraints through their compliance.
 
 The unknowns that constraints may involve are eliminated last. Their compliance then is the inverse of the trailing
-block of the factors, ``(K^-1)_cc = (L_cc U_cc)^-1``, and costs no solution with K at all. SuperLU orders by itself only,
-so K is factorised twice: once for a fill-reducing order, once in that order with those unknowns moved to the end.
+block of the factors, ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, and costs no solution with K at all; what the other unknowns
+do under contact forces follows from theirs by half a solution.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 from scipy.sparse import bsr_array, csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from fastcontact.errors import ModelError
-from fastcontact.linear._compliance import ComplianceCache
 from fastcontact.linear._factor import FactorSolver, singular
+from fastcontact.linear._order import fill_reducing
+from fastcontact.linear._symmetric import SymmetricFactors
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 # Beyond this many unknowns last, their dense block costs more than the solutions it saves.
 LAST_UP_TO = 4000
 
@@ -28,11 +29,16 @@ class Direct(FactorSolver):
     name = "direct"
 
     def __repr__(self) -> str:
-        if not hasattr(self, "_lu"):
+        if not hasattr(self, "_factors"):
             return "Direct(SuperLU, not prepared)"
-        return f"Direct(SuperLU, {self._lu.shape[0]} unknowns, {self._lu.nnz} entries, {12e-6 * self._lu.nnz:.1f} MB)"
+        return f"Direct(SuperLU, {self.n} unknowns, {self._factors.nnz} entries, {self.nbytes / 1e6:.1f} MB)"
 
-    def prepare(self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None) -> None:
+    @property
+    def nbytes(self) -> int:
+        """Memory of the factors [bytes]; SuperLU's own are estimated."""
+        return self._factors.nbytes if isinstance(self._factors, SymmetricFactors) else 12 * self._factors.nnz
+
+    def prepare(self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None) -> None:
         """Factorise K; see `LinearSolver.prepare`.
 
         Raises
@@ -40,18 +46,24 @@ class Direct(FactorSolver):
         ModelError
             If K is singular.
         """
-        matrix = K.tocsc()
         self.n = K.shape[0]
-        self._lu = self._factorised(matrix, "MMD_AT_PLUS_A")
-        self._order: NDArray[np.intp] | None = None
-        self.compliance = ComplianceCache(K.shape[0], self._solve)
+        self._factors: SymmetricFactors | SuperLU
         if involved is not None and 0 < len(involved) <= LAST_UP_TO:
-            last = np.zeros(K.shape[0], bool)
-            last[involved] = True
-            order = np.argsort(self._lu.perm_c)
-            self._order = np.concatenate([order[~last[order]], order[last[order]]])
-            self._lu = self._factorised(csc_array(matrix[self._order][:, self._order]), "NATURAL")
-            self.compliance.give(self._order[-len(involved) :], self._trailing_inverse(len(involved)))
+            self._factors = self._with_last(K, involved)
+            self._begin(involved, self._factors.last_inverse())
+        else:
+            self._factors = self._factorised(K.tocsc(), "MMD_AT_PLUS_A")
+            self._begin()
+
+    def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors:
+        order = fill_reducing(K, last)
+        lu = self._factorised(csc_array(K.tocsc()[order][:, order]), "NATURAL")
+        if not np.array_equal(lu.perm_r, lu.perm_c):
+            raise ModelError("the stiffness matrix needed pivoting: it is not positive definite")
+        # SuperLU may reorder independent branches of the elimination, which leaves what depends on what as it is.
+        place = np.empty(self.n, np.intp)
+        place[order] = lu.perm_c
+        return SymmetricFactors(lu.L, lu.U.diagonal(), place, last)
 
     def _factorised(self, matrix: csc_array, order: str) -> SuperLU:
         try:
@@ -61,31 +73,12 @@ class Direct(FactorSolver):
         self.counters.setups += 1
         return lu
 
-    def _trailing_inverse(self, count: int) -> Array:
-        """Return the inverse of the trailing block: the rows and columns of ``K^-1`` for the last unknowns.
-
-        SuperLU may still reorder independent branches of the elimination, which leaves the block what it is.
-        """
-        lu = self._lu
-        row, column = np.argsort(lu.perm_r), np.argsort(lu.perm_c)
-        n = lu.shape[0]
-        at = np.flatnonzero(column >= n - count)
-        if not np.array_equal(row, column):
-            raise ModelError("the stiffness matrix needed pivoting: it is not positive definite")
-        L, U = lu.L.tocsr()[at][:, at].toarray(), lu.U.tocsr()[at][:, at].toarray()
-        lower = solve_triangular(L, np.eye(count), lower=True, unit_diagonal=True)
-        inverse = solve_triangular(U, lower)
-        back = np.empty(count, np.intp)
-        back[column[at] - (n - count)] = np.arange(count)
-        inverse = inverse[np.ix_(back, back)]
-        return 0.5 * (inverse + inverse.T)
-
     def _solve(self, F: Array) -> Array:
-        if self._order is None:
-            return self._lu.solve(F)
-        U = np.empty_like(F)
-        U[self._order] = self._lu.solve(np.ascontiguousarray(F[self._order]))
-        return U
+        return self._factors.solve(F)
+
+    def _extended(self, u: Array) -> Array:
+        assert isinstance(self._factors, SymmetricFactors)
+        return self._factors.extended(u)
 
 
 SOLVER = Direct

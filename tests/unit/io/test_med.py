@@ -606,7 +606,7 @@ def test_links_out_of_the_file_are_refused(tmp_path):
     with h5py.File(tmp_path / "linked.med", "w") as file:
         file.create_group("ENS_MAA")["mesh"] = h5py.ExternalLink("target.med", "/ENS_MAA/mesh")
         file["soft"] = h5py.SoftLink("/ENS_MAA/mesh")
-    with pytest.raises(FileError, match=r"refers to another file at 'ENS_MAA/mesh' \(1 such"):
+    with pytest.raises(FileError, match="refers to another file at '/ENS_MAA/mesh'"):
         read_med_mesh(tmp_path / "linked.med")
 
 

@@ -1,0 +1,153 @@
+"""A file for HDF5 to write on whose every state on the disk, write by write, is a file that opens.
+
+HDF5 writes the records of its indices in no particular order. A process that is killed between two of them may leave an
+index that leads beyond the end of the file, or that has lost entries on their way from one node to the next, and with
+them steps that were complete. Here writes are held back until HDF5 flushes, and then done in an order in which each of
+them alone is harmless: what lies where nothing was, to which nothing leads yet; the superblock, which knows the end of
+the file; nodes of indices from the root down, so that entries are found in their new node before they vanish from the
+old one; all else; and tables of names last (HDF5 File Format Specification 3.0, sections II.A and III.A).
+"""
+
+from __future__ import annotations
+
+import bisect
+import os
+from pathlib import Path
+
+# Where HDF5 begins its superblock, the nodes of its indices and its tables of names.
+SUPERBLOCK, NODE, NAMES = b"\x89HDF\r\n\x1a\n", b"TREE", b"SNOD"
+
+
+class CommittedFile:
+    """What `h5py.File` asks of a file that it is given in place of a name; writes wait for `flush`.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        An existing HDF5 file.
+
+    Attributes
+    ----------
+    end : int
+        Where the contents end, as HDF5 last told; the file may take more room.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = open(path, "r+b", buffering=0)  # noqa: SIM115
+        self._position = 0
+        self._pending: dict[int, bytes] = {}
+        self.end = self._contents()
+        self._starts, self._ends = [0], [self.end]  # of what has been written, in order and apart
+
+    def _contents(self) -> int:
+        """Return where the contents of the file end, whatever room it takes."""
+        head = self._file.read(48)
+        size = self._file.seek(0, os.SEEK_END)
+        known = head.startswith(SUPERBLOCK) and head[8] == 0 and head[13] == 8  # version 0, addresses of eight bytes
+        return min(int.from_bytes(head[40:48], "little"), size) if known else size
+
+    def fileno(self) -> int:
+        """Return the descriptor of the file."""
+        return self._file.fileno()
+
+    def tell(self) -> int:
+        """Return the position."""
+        return self._position
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Set the position from the start, from itself or from the end."""
+        base = {os.SEEK_SET: 0, os.SEEK_CUR: self._position, os.SEEK_END: self._size()}[whence]
+        self._position = base + offset
+        return self._position
+
+    def _size(self) -> int:
+        waiting = max((place + len(data) for place, data in self._pending.items()), default=0)
+        return max(os.fstat(self.fileno()).st_size, waiting)
+
+    def readinto(self, buffer: memoryview) -> int:
+        """Fill a buffer from the position on, with what waits where something does; zeros beyond the end."""
+        size, start = len(buffer), self._position
+        data = bytearray(size)
+        self._file.seek(start)
+        count = 0
+        while count < size and (part := self._file.read(size - count)):
+            data[count : count + len(part)] = part
+            count += len(part)
+        for place, waiting in self._pending.items():
+            first, last = max(place, start), min(place + len(waiting), start + size)
+            if first < last:
+                data[first - start : last - start] = waiting[first - place : last - place]
+        buffer[:] = data
+        self._position += size
+        return size
+
+    def read(self, size: int) -> bytes:
+        """Return `size` bytes; see `readinto`."""
+        buffer = bytearray(size)
+        self.readinto(memoryview(buffer))
+        return bytes(buffer)
+
+    def write(self, data: bytes) -> int:
+        """Take data for the position; later data replace earlier ones."""
+        data, start = bytes(data), self._position
+        end = start + len(data)
+        for place in [p for p, old in self._pending.items() if p < end and start < p + len(old)]:
+            old = self._pending.pop(place)
+            if place < start:
+                self._pending[place] = old[: start - place]
+            if end < place + len(old):
+                self._pending[end] = old[end - place :]
+        self._pending[start] = data
+        self._position = end
+        return len(data)
+
+    def truncate(self, size: int) -> int:
+        """Take note of where the contents end; the file is cut when it is closed."""
+        self.end = size
+        return size
+
+    def flush(self) -> None:
+        """Write what waits, in an order in which every write may be the last one."""
+        waiting = sorted(self._pending.items(), key=lambda entry: self._turn(*entry))
+        for place, data in waiting:
+            self._put(place, data)
+        for place, data in waiting:
+            self._note(place, place + len(data))
+        self._pending.clear()
+
+    def _turn(self, place: int, data: bytes) -> tuple[int, int, int]:
+        """Return the turn of a write: what is new, superblock, nodes from the root down, all else, names."""
+        if not self._overlaps(place, place + len(data)):
+            return 0, 0, place
+        if place == 0:
+            return 1, 0, 0
+        if data.startswith(NODE):
+            return 2, -data[5], place
+        return (4 if data.startswith(NAMES) else 3), 0, place
+
+    def _overlaps(self, start: int, end: int) -> bool:
+        number = bisect.bisect_left(self._ends, start + 1)
+        return number < len(self._starts) and self._starts[number] < end
+
+    def _note(self, start: int, end: int) -> None:
+        """Remember that something has been written there."""
+        first, last = bisect.bisect_left(self._ends, start), bisect.bisect_right(self._starts, end)
+        if first < last:
+            start, end = min(start, self._starts[first]), max(end, self._ends[last - 1])
+        self._starts[first:last], self._ends[first:last] = [start], [end]
+
+    def _put(self, place: int, data: bytes) -> None:
+        self._file.seek(place)
+        view = memoryview(data)
+        while view:
+            view = view[self._file.write(view) :]
+
+    def close(self) -> None:
+        """Cut the file behind its contents and see it to the disk, against a power failure; once is enough."""
+        if self._file.closed:
+            return
+        try:
+            self._file.truncate(self.end)
+            os.fsync(self.fileno())
+        finally:
+            self._file.close()

@@ -1,0 +1,217 @@
+"""Keeps meshio's readers within bounds: one file, its true size, an end to every loop.
+
+meshio believes the sizes that a file declares, and several of its readers wait for a line that never comes. While one
+reads, the modules of meshio see stand-ins for `numpy`, `open`, `zlib`, `lzma` and `gzip`, which are the same but refuse
+what a file of this size cannot mean. They are put in place for the length of a block only, by one thread at a time.
+"""
+
+from __future__ import annotations
+
+import builtins
+import gzip
+import lzma
+import os
+import sys
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from fastcontact.io import _hdf5
+
+# Lines read beyond the end of a file before a reader is stopped.
+ENDS = 10_000
+# What an array may take [bytes], or times the size of the file if that is more: a number takes two bytes of text and
+# eight of memory, and readers make some room for things that are not in the file.
+PLAUSIBLE_BYTES = 1 << 26
+PLAUSIBLE_EXPANSION = 32
+# What a packed file may grow to, in the same way: XML and numbers as text compress tenfold.
+UNPACKED_BYTES = 1 << 27
+UNPACKED_EXPANSION = 30
+# Formats that are HDF5 files, and those that consist of several files.
+HDF5_FORMATS = ("cgns", "h5m", "hmf", "exodus")
+SEVERAL_FILES = ("tetgen", "xdmf", "dolfin-xml")
+
+
+class Implausible(Exception):
+    """What a file declares cannot be meant."""
+
+
+@contextmanager
+def bounded(path: Path, file_format: str) -> Iterator[None]:
+    """Put the stand-ins in place while meshio reads `path`; not for two threads at once.
+
+    Raises
+    ------
+    FileError
+        If the file is an HDF5 file that leads elsewhere or declares what it cannot hold.
+    Implausible
+        Inside the block, if meshio is made to read another file, to take more memory than the file can mean, or to
+        wait beyond its end.
+    """
+    if file_format in HDF5_FORMATS:
+        with _hdf5.opened(path):
+            pass
+    size = os.path.getsize(path)
+    limit, most = max(PLAUSIBLE_BYTES, PLAUSIBLE_EXPANSION * size), max(UNPACKED_BYTES, UNPACKED_EXPANSION * size)
+    allowed = path.resolve().parent if file_format in SEVERAL_FILES else path.resolve()
+    stand_ins: dict[str, Any] = {
+        "np": _Bounded(np, _arrays(limit)),
+        "zlib": _Bounded(zlib, {"decompress": lambda data: _unpacked(zlib.decompressobj(), data, most)}),
+        "lzma": _Bounded(lzma, {"decompress": lambda data: _unpacked(lzma.LZMADecompressor(), data, most)}),
+    }
+    with ExitStack() as stack:
+        for name, module in list(sys.modules.items()):
+            if name.startswith("meshio.") and module is not None:
+                for attribute, stand_in in stand_ins.items():
+                    if getattr(module, attribute, None) is not None:
+                        stack.enter_context(patch.object(module, attribute, stand_in))
+                stack.enter_context(patch.object(module, "open", _opener(allowed), create=True))
+        stack.enter_context(patch("h5py.File", _checked_hdf5(allowed)) if file_format == "xdmf" else ExitStack())
+        if path.suffix.lower() == ".gz":
+            _check_packed(path, most)
+        yield
+
+
+class _Bounded:
+    """A module with some of its functions replaced."""
+
+    def __init__(self, module: Any, replaced: dict[str, Callable[..., Any]]) -> None:
+        self._module = module
+        self.__dict__.update(replaced)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._module, name)
+
+
+def _arrays(limit: int) -> dict[str, Callable[..., Any]]:
+    """Return numpy's functions that make arrays of a size that comes from a file."""
+
+    def check(shape: Any, dtype: Any) -> None:
+        counts = [int(n) for n in np.atleast_1d(shape).tolist()] if np.size(shape) else []
+        size = int(np.prod(counts, dtype=object)) * np.dtype(dtype).itemsize
+        if min(counts, default=0) < 0 or size > limit:
+            raise Implausible(f"it declares an array of {size:.3g} bytes, which a file of its size cannot hold")
+
+    def made(function: Callable[..., Any]) -> Callable[..., Any]:
+        def make(shape: Any, dtype: Any = float, *args: Any, **kwargs: Any) -> Any:
+            check(shape, dtype)
+            return function(shape, dtype, *args, **kwargs)
+
+        return make
+
+    def full(shape: Any, fill_value: Any, dtype: Any = None, **kwargs: Any) -> Any:
+        check(shape, float if dtype is None else dtype)
+        return np.full(shape, fill_value, dtype, **kwargs)
+
+    def arange(*args: Any, **kwargs: Any) -> Any:
+        check(max(int(abs(float(a))) for a in args), int)
+        return np.arange(*args, **kwargs)
+
+    def fromfile(file: Any, dtype: Any = float, count: Any = -1, sep: str = "", **kwargs: Any) -> Any:
+        # In NumPy -1 means everything, and other negative counts are no error everywhere.
+        if int(count) < -1:
+            raise Implausible(f"it declares {int(count)} numbers")
+        check(max(int(count), 0), dtype)
+        if hasattr(file, "count_end"):
+            file.count_end(os.fstat(file.fileno()).st_size)
+        return np.fromfile(file, dtype, int(count), sep, **kwargs)
+
+    return {
+        "empty": made(np.empty), "zeros": made(np.zeros), "ones": made(np.ones), "full": full,
+        "arange": arange, "fromfile": fromfile,
+    }  # fmt: skip
+
+
+class _Ending:
+    """An open file that counts how often it is read beyond its end."""
+
+    def __init__(self, file: Any) -> None:
+        self._file, self._ends = file, 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._file, name)
+
+    def __enter__(self) -> _Ending:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self._file.close()
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self._file)
+
+    def __next__(self) -> Any:
+        return next(self._file)
+
+    def _counted(self, found: Any) -> Any:
+        if not found:
+            self._ends += 1
+            if self._ends > ENDS:
+                raise Implausible("it ends where more must come")
+        return found
+
+    def count_end(self, size: int) -> None:
+        """Count a read by number that begins at the end."""
+        self._counted(self._file.tell() < size)
+
+    def readline(self, *args: Any) -> Any:
+        """Read a line."""
+        return self._counted(self._file.readline(*args))
+
+    def read(self, *args: Any) -> Any:
+        """Read a part."""
+        return self._counted(self._file.read(*args)) if args != (0,) else self._file.read(0)
+
+
+def _opener(allowed: Path) -> Callable[..., Any]:
+    def guarded_open(name: Any, mode: str = "r", *args: Any, **kwargs: Any) -> Any:
+        _check_place(name, allowed)
+        if set(mode) & set("wax+"):
+            raise Implausible("reading it would write a file")
+        return _Ending(builtins.open(name, mode, *args, **kwargs))
+
+    return guarded_open
+
+
+def _check_place(name: Any, allowed: Path) -> None:
+    """Refuse a file that is neither the one allowed nor, where that is a folder, in it."""
+    found = Path(os.fspath(name)).resolve()
+    if allowed not in (found, found.parent):
+        raise Implausible(f"it refers to the file '{found}', which is not beside it")
+
+
+def _checked_hdf5(allowed: Path) -> Callable[..., Any]:
+    import h5py
+
+    original = h5py.File
+
+    def checked(name: Any, mode: str = "r", *args: Any, **kwargs: Any) -> Any:
+        _check_place(name, allowed)
+        with _hdf5.opened(name):
+            pass
+        return original(name, "r", *args, **kwargs)
+
+    return checked
+
+
+def _unpacked(unpacker: Any, data: bytes, most: int) -> bytes:
+    found = bytes(unpacker.decompress(data, most))
+    if len(found) >= most:
+        raise Implausible(f"it unpacks to more than {most} bytes")
+    if not unpacker.eof:
+        raise Implausible("a packed part of it is cut off")
+    return found
+
+
+def _check_packed(path: Path, most: int) -> None:
+    total = 0
+    with gzip.open(path, "rb") as file:
+        while piece := file.read(1 << 20):
+            total += len(piece)
+            if total > most:
+                raise Implausible(f"it unpacks to more than {most} bytes: unpack it first")

@@ -1,0 +1,79 @@
+"""Plain data with arrays as one run of bytes, and back: nothing is ever executed, and damage is noticed.
+
+A line of ASCII JSON with sizes and checksum, the data as JSON with places instead of arrays, the arrays one after the other.
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_ARRAY = "__array__"
+# Kinds of numbers that an array may hold: bool, signed and unsigned integers, floats.
+_KINDS = "biuf"
+
+
+def packed(data: Any) -> NDArray[np.uint8]:
+    """Return `data` as bytes (n,): dictionaries with string keys, lists, strings, numbers, None and arrays of numbers."""
+    arrays: list[bytes] = []
+    text = json.dumps(_without_arrays(data, arrays)).encode("ascii")
+    body = b"".join([text, *arrays])
+    head = json.dumps({"text": len(text), "size": len(body), "checksum": zlib.crc32(body)}).encode("ascii")
+    return np.frombuffer(head + b"\n" + body, np.uint8)
+
+
+def unpacked(values: NDArray[np.uint8]) -> Any:
+    """Return what `packed` was given; bytes beyond its end do not matter.
+
+    Raises
+    ------
+    ValueError
+        If the bytes are not whole, or not from `packed`.
+    """
+    raw = values.tobytes()
+    line, found, body = raw[:200].partition(b"\n")
+    if not found:
+        raise ValueError("no packed data")
+    head = json.loads(line)
+    body = raw[len(line) + 1 : len(line) + 1 + int(head["size"])]
+    if len(body) != head["size"] or zlib.crc32(body) != head["checksum"]:
+        raise ValueError("packed data are cut off or changed")
+    text = int(head["text"])
+    return _with_arrays(json.loads(body[:text]), body[text:])
+
+
+def _without_arrays(data: Any, arrays: list[bytes]) -> Any:
+    if isinstance(data, np.ndarray):
+        place = sum(map(len, arrays))
+        arrays.append(np.ascontiguousarray(data).tobytes())
+        return {_ARRAY: [place, data.dtype.str, list(data.shape)]}
+    if isinstance(data, np.generic):
+        return data.item()
+    if isinstance(data, dict):
+        return {str(key): _without_arrays(value, arrays) for key, value in data.items()}
+    if isinstance(data, (list, tuple)):
+        return [_without_arrays(value, arrays) for value in data]
+    return data
+
+
+def _with_arrays(data: Any, raw: bytes) -> Any:
+    if isinstance(data, dict):
+        if _ARRAY in data:
+            place, kind, shape = data[_ARRAY]
+            return _array(place, kind, shape, raw)
+        return {key: _with_arrays(value, raw) for key, value in data.items()}
+    if isinstance(data, list):
+        return [_with_arrays(value, raw) for value in data]
+    return data
+
+
+def _array(place: int, kind: str, shape: list[int], raw: bytes) -> NDArray[Any]:
+    dtype = np.dtype(kind)
+    if dtype.kind not in _KINDS:
+        raise ValueError(f"an array of {kind} is none of ours")
+    count = int(np.prod(shape, dtype=np.int64))
+    return np.frombuffer(raw, dtype, count, place).reshape(shape).copy()

@@ -1,0 +1,108 @@
+"""Triangular solutions with the factors of a symmetric matrix, column blocks of equal structure (supernodes) at a time.
+
+L (n, n) is lower triangular with a unit diagonal, column by column: `start` (n + 1,) and `values`, the diagonal first.
+The columns ``first[s]`` to ``first[s + 1] - 1`` of supernode s share the rows ``rows[begin[s] : begin[s + 1]]`` below
+them; between themselves they are full.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact._jit import kernel
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int32]
+Offsets = NDArray[np.int64]
+
+
+@kernel
+def supernodes(start: Indices, rows: Indices, first: Offsets, begin: Offsets) -> int:
+    """Find the supernodes of L with row numbers `rows` (nnz,), sorted; return how many.
+
+    `first` and `begin` (n + 1,) are filled; the rows that they share are moved to the front of `rows`.
+    """
+    n = len(start) - 1
+    count, kept = 0, 0
+    begin[0] = 0
+    for j in range(n):
+        if j == 0 or not _continues(start, rows, j):
+            first[count] = j
+            count += 1
+        if j == n - 1 or not _continues(start, rows, j + 1):
+            # No column after this one is part of its supernode; what moves is moved to places that were read before.
+            for k in range(start[j] + 1, start[j + 1]):
+                rows[kept] = rows[k]
+                kept += 1
+            begin[count] = kept
+    first[count] = n
+    return count
+
+
+@kernel
+def _continues(start: Indices, rows: Indices, j: int) -> bool:
+    """Return whether column j has the rows of column j - 1 without the first."""
+    before, now = start[j - 1] + 1, start[j]
+    length = start[j + 1] - now
+    if start[j] - before != length:
+        return False
+    for k in range(length):
+        if rows[before + k] != rows[now + k]:
+            return False
+    return True
+
+
+@kernel
+def forward(start: Indices, values: Array, first: Offsets, begin: Offsets, rows: Indices, x: Array) -> None:
+    """Replace x (n,) by ``L^-1 x``."""
+    moved = np.empty(len(x))
+    for s in range(len(first) - 1):
+        low, high = first[s], first[s + 1]
+        below = begin[s + 1] - begin[s]
+        moved[:below] = 0.0
+        for j in range(low, high):
+            xj = x[j]
+            at = start[j] + 1
+            for k in range(j + 1, high):
+                x[k] -= values[at] * xj
+                at += 1
+            for k in range(below):
+                moved[k] += values[at + k] * xj
+        for k in range(below):
+            x[rows[begin[s] + k]] -= moved[k]
+
+
+@kernel
+def backward(
+    start: Indices, values: Array, first: Offsets, begin: Offsets, rows: Indices, given: NDArray[np.bool_], x: Array
+) -> None:
+    """Replace x (n,) by the solution of ``L.T y = x`` in which the entries `given` (n,) keep their values.
+
+    Nothing that is given may stand before something that it depends on: with j given, so are all rows of column j.
+    """
+    gathered = np.empty(len(x))
+    for s in range(len(first) - 2, -1, -1):
+        low, high = first[s], first[s + 1]
+        below = begin[s + 1] - begin[s]
+        for k in range(below):
+            gathered[k] = x[rows[begin[s] + k]]
+        for j in range(high - 1, low - 1, -1):
+            if given[j]:
+                continue
+            at = start[j] + 1
+            total = 0.0
+            for k in range(j + 1, high):
+                total += values[at] * x[k]
+                at += 1
+            # Four sums at a time: one alone waits for each of its additions.
+            a, b, c, d = 0.0, 0.0, 0.0, 0.0
+            whole = below - below % 4
+            for k in range(0, whole, 4):
+                a += values[at + k] * gathered[k]
+                b += values[at + k + 1] * gathered[k + 1]
+                c += values[at + k + 2] * gathered[k + 2]
+                d += values[at + k + 3] * gathered[k + 3]
+            for k in range(whole, below):
+                a += values[at + k] * gathered[k]
+            x[j] -= total + ((a + b) + (c + d))

@@ -1,0 +1,53 @@
+"""Solutions for right-hand sides that a load ramp combines from a few."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+# Right-hand sides kept: loads and supports have seldom more ramps.
+KEPT = 4
+# What a combination may miss of a right-hand side, in 2-norms: its round-off.
+MISSED = 16 * np.finfo(float).eps
+
+
+class KnownLoads:
+    """Keeps the last right-hand sides and their solutions; combines them where that is exact to round-off."""
+
+    def __init__(self) -> None:
+        self._loads: list[Array] = []
+        self._solutions: list[Array] = []
+
+    def solution(self, f: Array, solve: Callable[[Array], Array]) -> Array:
+        """Return the solution (n,) for f (n,); `solve` finds one that is new."""
+        size = float(np.linalg.norm(f))
+        if size == 0.0:
+            return np.zeros_like(f)
+        if self._loads:
+            known = np.column_stack(self._loads)
+            weights = np.linalg.lstsq(known, f, rcond=None)[0]
+            if np.linalg.norm(f - known @ weights) <= MISSED * size:
+                return np.asarray(np.column_stack(self._solutions) @ weights)
+        f = f / size
+        u = solve(f)
+        self._keep(f, u)
+        return size * u
+
+    def _keep(self, f: Array, u: Array) -> None:
+        self._loads, self._solutions = [*self._loads[1 - KEPT :], f], [*self._solutions[1 - KEPT :], u]
+
+    def memory(self) -> list[dict[str, Array | NDArray[np.intp]]]:
+        """Return the right-hand sides kept, few of whose entries are not zero: ``places`` and ``values``."""
+        places = [np.flatnonzero(f) for f in self._loads]
+        return [{"places": at, "values": f[at]} for at, f in zip(places, self._loads, strict=True)]
+
+    def remember(self, memory: Sequence[dict[str, Any]], n: int, solve: Callable[[Array], Array]) -> None:
+        """Take the `memory` of others for the same matrix (n, n); see `solution` for `solve`."""
+        for kept in memory:
+            f = np.zeros(n)
+            f[kept["places"]] = kept["values"]
+            self._keep(f, solve(f))

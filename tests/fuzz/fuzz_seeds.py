@@ -1,0 +1,188 @@
+"""Small valid files of every format that fastcontact reads: what the fuzzer starts from."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import shutil
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+import fastcontact as fc
+from fastcontact.io.med import write_med_mesh, write_med_results
+from fastcontact.io.tables import history_table, write_csv
+
+DATA = Path(__file__).resolve().parents[2] / "data"
+
+# Formats by what reads them; the meshes of meshio go by their suffix, with a mark for the kind of the file.
+MESHIO = {
+    "gmsh22.msh": {"file_format": "gmsh22", "binary": False},
+    "gmsh22-binary.msh": {"file_format": "gmsh22", "binary": True},
+    "gmsh40.msh": {"file_format": "gmsh40", "binary": False},
+    "gmsh40-binary.msh": {"file_format": "gmsh40", "binary": True},
+    "gmsh41.msh": {"file_format": "gmsh", "binary": False},
+    "gmsh41-binary.msh": {"file_format": "gmsh", "binary": True},
+    "vtk42.vtk": {"file_format": "vtk42", "binary": False},
+    "vtk42-binary.vtk": {"file_format": "vtk42", "binary": True},
+    "vtk51.vtk": {"file_format": "vtk51", "binary": False},
+    "vtk51-binary.vtk": {"file_format": "vtk51", "binary": True},
+    "ascii.vtu": {"file_format": "vtu", "binary": False},
+    "binary.vtu": {"file_format": "vtu", "binary": True, "compression": None},
+    "zlib.vtu": {"file_format": "vtu", "binary": True, "compression": "zlib"},
+    "lzma.vtu": {"file_format": "vtu", "binary": True, "compression": "lzma"},
+    "xml.xdmf": {"file_format": "xdmf", "data_format": "XML"},
+    "hdf.xdmf": {"file_format": "xdmf", "data_format": "HDF"},
+    "abaqus.inp": {"file_format": "abaqus"},
+    "medit.mesh": {"file_format": "medit"},
+    "medit.meshb": {"file_format": "medit"},
+    "nastran.bdf": {"file_format": "nastran"},
+    "flac3d.f3grid": {"file_format": "flac3d"},
+    "mdpa.mdpa": {"file_format": "mdpa"},
+    "avsucd.avs": {"file_format": "avsucd"},
+    "permas.post": {"file_format": "permas"},
+    "tecplot.dat": {"file_format": "tecplot"},
+    "ugrid.ugrid": {"file_format": "ugrid"},
+    "netgen.vol": {"file_format": "netgen"},
+    "netgen.vol.gz": {"file_format": "netgen"},
+    "h5m.h5m": {"file_format": "h5m"},
+    "hmf.hmf": {"file_format": "hmf"},
+    "cgns.cgns": {"file_format": "cgns"},
+    "su2.su2": {"file_format": "su2"},
+    "dolfin.xml": {"file_format": "dolfin-xml"},
+    "tetgen.node": {"file_format": "tetgen"},
+    "obj.obj": {"file_format": "obj"},
+    "off.off": {"file_format": "off"},
+    "ply.ply": {"file_format": "ply", "binary": False},
+    "ply-binary.ply": {"file_format": "ply", "binary": True},
+    "stl.stl": {"file_format": "stl", "binary": False},
+    "stl-binary.stl": {"file_format": "stl", "binary": True},
+    "wkt.wkt": {"file_format": "wkt"},
+}
+
+
+def small_mesh() -> fc.Mesh:
+    """Two blocks of unlike elements, with groups of solids, facets and points."""
+    points = [(x, y) for y in (0.0, 1.0, 2.0) for x in (0.0, 1.0, 2.0)]
+    cells = {
+        "quad4": [(0, 1, 4, 3), (1, 2, 5, 4)],
+        "tri3": [(3, 4, 7), (3, 7, 6)],
+        "line2": [(0, 1), (1, 2), (6, 7)],
+    }
+    groups = {"LOWER": [0, 1], "UPPER": [2, 3], "BOTTOM": [4, 5], "TOP": [6]}
+    return fc.Mesh(points, cells, groups, {"CORNER": [0], "MIDDLE": [3, 4]})
+
+
+def solid_mesh(tetrahedra: bool = False) -> fc.Mesh:
+    """A cube of eight hexahedra, or one cut into six tetrahedra."""
+    if not tetrahedra:
+        return fc.generate.GENERATORS["box"](divisions=(2, 2, 2))
+    corners = [(i & 1, i >> 1 & 1, i >> 2) for i in range(8)]
+    cells = [(0, 1, 3, 7), (0, 3, 2, 7), (0, 2, 6, 7), (0, 6, 4, 7), (0, 4, 5, 7), (0, 5, 1, 7)]
+    return fc.Mesh(corners, {"tet4": cells, "tri3": [(0, 1, 3), (0, 3, 2)]}, {"BASE": [6, 7]})
+
+
+def contact_case() -> tuple[fc.Model, list[fc.StepResult]]:
+    """A tiny solved contact problem."""
+    mesh = fc.generate.half_spheres("tri3", size=12.0)
+    model = fc.Model(mesh, kinematics="axisymmetric", case_text='title = "tiny"\n')
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model.fix("A1A2", "x")
+    model.prescribe("A2B2", y=-0.5)
+    model.prescribe("A1B1", y=+0.5)
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="node_to_segment")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return model, list(fc.solve(model, ramp=fc.linear_ramp(2)))
+
+
+def make_seeds(folder: Path) -> dict[str, Path]:
+    """Write a valid file of each format into `folder`; return them by the name of their kind."""
+    folder.mkdir(parents=True, exist_ok=True)
+    seeds = {"flat.med": folder / "flat.med", "solid.med": folder / "solid.med"}
+    write_med_mesh(seeds["flat.med"], small_mesh())
+    write_med_mesh(seeds["solid.med"], solid_mesh())
+    model, steps = contact_case()
+    seeds["fields.rmed"] = folder / "fields.rmed"
+    write_med_results(seeds["fields.rmed"], model.mesh, steps)
+    seeds["results.vtkhdf"] = folder / "results.vtkhdf"
+    with fc.ResultWriter(seeds["results.vtkhdf"], model) as out:
+        for step in steps:
+            out.write(step)
+    seeds["table.csv"] = folder / "table.csv"
+    write_csv(seeds["table.csv"], history_table(steps), {"force_y": "N"})
+    seeds |= {f"{path.stem}.toml": _case(path, folder) for path in sorted((DATA / "cases").glob("*.toml"))}
+    return seeds | _foreign(folder)
+
+
+def _case(path: Path, folder: Path) -> Path:
+    """Copy a ready case; the meshes it names are copied beside it."""
+    target = folder / path.name
+    text = path.read_text(encoding="utf-8")
+    if "../meshes/" in text:
+        for mesh in (DATA / "meshes").glob("*.med"):
+            if mesh.name in text:
+                shutil.copy(mesh, folder / mesh.name)
+        text = text.replace("../meshes/", "")
+    target.write_text(text, encoding="utf-8")
+    return target
+
+
+def _foreign(folder: Path) -> dict[str, Path]:
+    """Write the formats of meshio, each with the richest mesh that it takes."""
+    import meshio
+
+    flat, solid, tets = small_mesh(), solid_mesh(), solid_mesh(tetrahedra=True)
+    surface = fc.Mesh(tets.points, {"tri3": [(0, 1, 3), (0, 3, 2), (1, 5, 3)]})
+    triangles = fc.Mesh(flat.points, {"tri3": flat.cells["tri3"]})
+    candidates = [_for_meshio(mesh) for mesh in (flat, solid, tets, surface, triangles)]
+    seeds = {}
+    for name, options in MESHIO.items():
+        path = folder / name
+        # meshio's reader of tetgen never ends on a file without tetrahedra.
+        for mesh in candidates[2:3] if name.endswith(".node") else candidates:
+            said = io.StringIO()
+            with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                try:
+                    meshio.write(path, mesh(_carried(options["file_format"])), **options)
+                    meshio.read(path, file_format=options["file_format"].rstrip("0124") or None)
+                except (Exception, SystemExit):
+                    path.unlink(missing_ok=True)
+                    continue
+            seeds[name] = path
+            break
+    return seeds
+
+
+def _carried(file_format: str) -> str:
+    """Return what stands for groups in a format."""
+    if file_format.startswith("gmsh"):
+        return "physical"
+    return "arrays" if file_format in ("vtk42", "vtk51", "vtu", "xdmf") else "sets" if file_format == "abaqus" else ""
+
+
+def _for_meshio(mesh: fc.Mesh):
+    """Return a function that makes meshio's mesh with physical tags, arrays or sets."""
+    import meshio
+
+    from fastcontact import elements
+
+    points = np.pad(mesh.points, [(0, 0), (0, 3 - mesh.dim)])
+    cells = [(elements.get(name).meshio, np.array(block)) for name, block in mesh.cells.items()]
+
+    def build(carried: str):
+        parts: dict = {"points": points, "cells": cells}
+        if carried == "physical":
+            tags = [np.full(len(block), 1 + i) for i, (_, block) in enumerate(cells)]
+            parts["cell_data"] = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+            parts["field_data"] = {"FIRST": np.array([1, mesh.dim])}
+        if carried == "arrays":
+            parts["cell_data"] = {"cell_group:FIRST": [np.ones(len(block), np.int32) for _, block in cells]}
+            parts["point_data"] = {"point_group:ODD": np.arange(len(points), dtype=np.int32) % 2}
+        if carried == "sets":
+            parts["point_sets"] = {"ODD": np.arange(1, len(points), 2)}
+        return meshio.Mesh(**parts)
+
+    return build

@@ -1,0 +1,95 @@
+"""A process that makes damaged files and reads them, one after the other, under limits of memory and time.
+
+Takes numbers from its standard input, a line each, and answers with a line of JSON.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import resource
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import fuzz_files
+import fuzz_readers
+
+MEMORY = 1 << 30  # bytes more than a process that has read all formats once
+SECONDS = 10
+_OPENED = 0x20 | 0x2 | 0x100 | 0x200  # IN_OPEN, IN_MODIFY, IN_CREATE, IN_DELETE
+
+
+class Watch:
+    """Tells whether anything was opened or changed in a folder, also by libraries (Linux only)."""
+
+    def __init__(self, folder: Path) -> None:
+        library = ctypes.CDLL(None, use_errno=True)
+        self._file = library.inotify_init1(os.O_NONBLOCK) if hasattr(library, "inotify_init1") else -1
+        if self._file >= 0:
+            library.inotify_add_watch(self._file, os.fsencode(folder), _OPENED)
+
+    def touched(self) -> bool:
+        try:
+            return bool(os.read(self._file, 1 << 16)) if self._file >= 0 else False
+        except BlockingIOError:
+            return False
+
+
+class Opened:
+    """Collects the files that Python opens or changes while it is on, other than those in `folder`."""
+
+    def __init__(self, folder: Path) -> None:
+        self.on, self.names, self._folder = False, [], os.fspath(folder)
+        sys.addaudithook(self._hear)
+
+    def _hear(self, event: str, arguments: tuple) -> None:
+        if not self.on or event not in ("open", "os.remove", "os.rename", "os.mkdir", "subprocess.Popen", "os.system"):
+            return
+        name = arguments[0]
+        if not isinstance(name, (str, bytes)):
+            return
+        full = os.path.realpath(os.fsdecode(name).replace("\0", "?"))
+        known = full.startswith((self._folder, sys.prefix, sys.base_prefix, "/proc", "/sys", "/dev", "/usr/lib"))
+        if not known and "__pycache__" not in full and not full.endswith((".py", ".pyc", ".med")):
+            self.names.append(f"{event} {full}")
+
+
+def main() -> None:
+    """Answer until the input ends."""
+    seed, seeds_folder, folder, outside = int(sys.argv[1]), *map(Path, sys.argv[2:5])
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    seeds = {name: seeds_folder / file for name, file in json.loads((seeds_folder / "seeds.json").read_text()).items()}
+    warnings.simplefilter("ignore")
+    for path in seeds.values():
+        fuzz_readers.outcome(path)
+    with open("/proc/self/statm", encoding="ascii") as file:
+        used = int(file.read().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, used + MEMORY))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
+    opened = Opened(folder)
+    print(json.dumps({"ready": True}), file=answers, flush=True)
+    for line in sys.stdin:
+        number = int(line)
+        name, path = fuzz_files.make_file(number, seed, seeds, folder, outside)
+        # Named before it is read, so that the file is known if reading kills this process.
+        print(json.dumps({"number": number, "name": name, "path": str(path)}), file=answers, flush=True)
+        resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time()) + SECONDS + 1, hard))
+        watch, started = Watch(outside), time.process_time()
+        opened.on, opened.names = True, []
+        kind, message = fuzz_readers.outcome(path)
+        opened.on = False
+        if watch.touched() or opened.names:
+            kind, message = "outside", f"{opened.names} {message}"
+        if watch._file >= 0:
+            os.close(watch._file)
+        seconds = time.process_time() - started
+        print(json.dumps({"kind": kind, "message": message[:500], "seconds": seconds}), file=answers, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,140 @@
+"""The comparison with other programs: ours runs, absent ones are told as absent, those that are there agree."""
+
+import importlib.util
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+FOLDER = Path(__file__).resolve().parents[2] / "bench" / "peers"
+# Of code_aster's training case, mesh-converged; the smallest mesh is 0.7 % stiffer.
+FORCE = 659_773.14
+
+
+def run(tmp_path, *arguments):
+    """Run the comparison; return its output and its figures."""
+    file = tmp_path / "figures.json"
+    command = [sys.executable, str(FOLDER), *arguments, "--smallest", "--cold", "--json", str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout, json.loads(file.read_text())
+
+
+def module(name):
+    spec = importlib.util.spec_from_file_location(f"bench_peers_{name}", FOLDER / f"{name}.py")
+    loaded = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = loaded  # dataclasses look themselves up
+    spec.loader.exec_module(loaded)
+    return loaded
+
+
+def fake(tmp_path, reaction):
+    """Return an interpreter that has every module and runs a command of the shell in place of any script."""
+    path = tmp_path / "python"
+    path.write_text(f'#!/bin/sh\n[ "$1" = -c ] && exit 0\n{reaction}\n')
+    path.chmod(0o755)
+    return path
+
+
+def test_our_own_column(tmp_path):
+    text, figures = run(tmp_path, "forma04", "--only", "fastcontact")
+    (found,) = figures["runs"]
+    assert found["in_ours"] == 1.0
+    assert found["cpu_s"] > 0.1
+    assert found["peak_bytes"] > 5e7
+    assert found["answer"]["force"] == pytest.approx(FORCE, rel=0.01)
+    assert f"{found['cpu_s']:.2f}" in text
+    assert "fastcontact_api.py PROBLEM.npz 3 ANSWER" in text
+
+
+@pytest.mark.parametrize("problem", ["half", "octant"])
+def test_rigid_plane_is_half_of_the_problem(tmp_path, problem):
+    _, figures = run(tmp_path, problem, "--only", "fastcontact")
+    part = 0.25 if problem == "octant" else 1.0
+    assert figures["runs"][0]["answer"]["force"] == pytest.approx(part * FORCE, rel=0.02)
+
+
+def test_absent_peers_are_told_as_absent(tmp_path):
+    nowhere = tmp_path / "no" / "python"
+    text, figures = run(tmp_path, "forma04", "--only", "fastcontact", "getfem", "--python", f"getfem={nowhere}")
+    assert "GetFEM: absent (apt-get install python3-getfem)" in text
+    assert figures["absent"] == {"getfem": "apt-get install python3-getfem"}
+    assert [found["program"] for found in figures["runs"]] == ["fastcontact"]
+
+
+def test_an_interpreter_without_the_module_does_not_do(tmp_path):
+    bare = fake(tmp_path, "exit 0")
+    bare.write_text("#!/bin/sh\nexit 1\n")
+    _, figures = run(tmp_path, "half", "--only", "fastcontact", "dolfinx", "--python", f"dolfinx={bare}")
+    assert list(figures["absent"]) == ["dolfinx"]
+
+
+def test_a_peer_that_fails_says_so(tmp_path):
+    python = fake(tmp_path, "echo matrix is singular; exit 3")
+    text, figures = run(tmp_path, "half", "--only", "fastcontact", "dolfinx", "--python", f"dolfinx={python}")
+    assert "ended with status 3: matrix is singular" in text
+    assert figures["runs"][1]["status"] == 3
+    assert "answer" not in figures["runs"][1]
+
+
+@pytest.mark.parametrize(
+    ("problem", "peer", "tolerance"),
+    [
+        ("forma04", "getfem", 0.03),  # contact geometry at rest
+        ("forma04", "getfem-deformed", 0.01),
+        ("forma04", "calculix", 0.01),
+        ("forma04", "kratos", 0.03),  # another weight of the gap
+        ("half", "dolfinx", 1e-6),  # the same discrete problem
+        ("octant", "dolfinx", 1e-6),
+    ],
+)
+def test_peers_that_are_there_agree(tmp_path, problem, peer, tolerance):
+    _, figures = run(tmp_path, problem, "--only", "fastcontact", peer)
+    if figures["absent"]:
+        pytest.skip(f"{peer} is not installed: {figures['absent'][peer]}")
+    ours, theirs = figures["runs"]
+    assert theirs["status"] == 0, theirs["said"]
+    assert theirs["n_dofs"] == ours["n_dofs"]
+    assert theirs["answer"]["force"] == pytest.approx(ours["answer"]["force"], rel=tolerance)
+
+
+def test_costs_of_a_process(tmp_path):
+    measured = module("process").measured
+    busy = "import time\nx = b'x' * 400_000_000\nwhile time.process_time() < 0.5: pass"
+    found = measured([sys.executable, "-c", busy], threads=1, folder=tmp_path, limit_s=60)
+    assert found["status"] == 0
+    assert 0.5 <= found["cpu_s"] < 2.0
+    assert 4e8 < found["peak_bytes"] < 6e8
+    idle = measured([sys.executable, "-c", "import time; time.sleep(0.5)"], threads=1, folder=tmp_path, limit_s=60)
+    assert idle["wall_s"] >= 0.5
+    assert idle["cpu_s"] < 0.4
+
+
+def test_a_process_beyond_its_limit_is_ended(tmp_path):
+    found = module("process").measured(
+        [sys.executable, "-c", "while True: pass"], threads=1, folder=tmp_path, limit_s=1
+    )
+    assert found["status"] in (-signal.SIGXCPU, -signal.SIGKILL)
+    assert 0.9 < found["cpu_s"] < 3.0
+
+
+def test_programs_stand_on_the_same_mesh():
+    """The half model is the upper body of the whole one, node by node; both contact surfaces mirror each other."""
+    problems = module("problems")
+    whole, half = problems.forma04(1_000), problems.half(500)
+    upper = np.unique(whole["cells"][whole["upper"]])
+    np.testing.assert_allclose(whole["points"][upper], half["points"], atol=1e-12)
+    lower = whole["points"][np.unique(whole["facets_CONT1"])]
+    other = whole["points"][np.unique(whole["facets_CONT2"])]
+    np.testing.assert_allclose(np.sort(lower[:, 0]), np.sort(other[:, 0]), atol=1e-12)
+    np.testing.assert_allclose(whole["points"][whole["POLE"]], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("problem", ["forma04", "half", "octant"])
+def test_sizes_are_those_asked_for(problem):
+    found = module("problems").PROBLEMS[problem](6_000)
+    assert found["points"].size == pytest.approx(6_000, rel=0.1)

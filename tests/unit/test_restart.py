@@ -1,0 +1,274 @@
+"""An analysis that goes on after some steps ends as if it had never stopped, and only with the case that it was."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact import restart, step_control
+from fastcontact.analysis import Analysis, Criteria
+from fastcontact.generate import block, box, renamed, union
+
+FRICTIONLESS, FRICTION = 1e-12, 1e-10
+UP_AND_DOWN = fc.Ramp((1.0, 2.0, 3.0, 4.0, 5.0), ((0.0, 0.0), (3.0, 1.0), (5.0, 0.3)))
+
+
+class Stopped(Exception):
+    """What ends an analysis in the middle."""
+
+
+def stopped_after(count, model, ramp, **options):
+    """The steps handed over until the analysis is stopped, the last one with its restart state."""
+    steps = []
+
+    def on_step(step):
+        steps.append(step)
+        if len(steps) == count:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        fc.solve(model, ramp, on_step=on_step, **options)
+    return steps
+
+
+def assert_same(found, expected, relative):
+    """All that two steps hold, to `relative` of the largest entry of each field."""
+
+    def close(name, one, other):
+        one, other = np.asarray(one, float), np.asarray(other, float)
+        assert one.shape == other.shape, name
+        finite = np.isfinite(other)
+        np.testing.assert_array_equal(np.isfinite(one), finite, err_msg=name)
+        size = np.abs(other[finite]).max(initial=0.0)
+        assert np.abs(one[finite] - other[finite]).max(initial=0.0) <= relative * size, name
+
+    assert (found.index, found.load_factor) == (expected.index, expected.load_factor)
+    for name in ("displacement", "stress", "von_mises", "von_mises_signed", "reaction"):
+        close(name, getattr(found, name), getattr(expected, name))
+    assert list(found.contact) == list(expected.contact)
+    for pair, other in expected.contact.items():
+        one = found.contact[pair]
+        for name in ("gap", "pressure", "multiplier", "force_vectors", "normal", "force", "radius", "shear", "abscissa"):
+            close(f"{pair}.{name}", getattr(one, name), getattr(other, name))
+        for name in ("points", "active", "sticking"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+        work = np.abs(other.force_vectors).max() * np.abs(expected.displacement).max()
+        assert abs(one.dissipation - other.dissipation) <= relative * work
+        if other.obstacle_displacement is not None:
+            close("obstacle", one.obstacle_displacement, other.obstacle_displacement)
+    for name in ("geometry_updates", "active_set_iterations", "substeps"):
+        assert found.iterations.get(name) == expected.iterations.get(name), name
+    assert len(found.iterations["history"]) == len(expected.iterations["history"])
+    assert found.warnings == expected.warnings
+
+
+def check_resumed(make, ramp, relative, after=(1, 3), **options):
+    """Stop after some steps, go on with a new model; all later steps are those of an uninterrupted analysis."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fc.FastcontactWarning)
+        whole = fc.solve(make(), ramp, **options)
+        for count in after:
+            steps = stopped_after(count, make(), ramp, **options)
+            again = fc.solve(make(), ramp, resume=steps, **options)
+            assert len(again) == len(whole)
+            for found, expected in zip(again[count:], whole[count:], strict=True):
+                assert_same(found, expected, relative)
+    return whole
+
+
+def spheres(formulation="node_to_segment", **options):
+    mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3)
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model.fix("A1A2", "x")
+    model.prescribe("A2B2", y=-2.0)
+    model.prescribe("A1B1", y=+2.0)
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation=formulation, **options)
+    return model
+
+
+def boxes(formulation="node_to_segment", shift=0.02, **options):
+    """Two boxes, the upper one lowered and pushed aside."""
+    parts = []
+    for side, divisions, z in (("L", (3, 3, 2), -5.0), ("U", (2, 2, 2), 0.0)):
+        part = box((10.0, 10.0, 5.0), divisions, "hex8", (0.0, 0.0, z))
+        parts.append(renamed(part, {name: f"{side}_{name}" for name in part.group_names}))
+    model = fc.Model(union(*parts), "3d")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("L_ZMIN", "xyz")
+    model.prescribe("U_ZMAX", x=shift, y=0.0, z=-0.04)
+    model.add_contact("pair", secondary="U_ZMIN", primary="L_ZMAX", formulation=formulation, **options)
+    return model
+
+
+def indented(dim=2, force=True, springs=False, **options):
+    """A block and a ball, driven by a force or by a motion along an arc of its own."""
+    if dim == 2:
+        model = fc.Model(block((2.0, 1.0), (12, 6), "quad4", origin=(-1.0, -1.0)), "plane_strain")
+        top, down, bottom, held = "TOP", "y", "BOTTOM", "xy"
+    else:
+        model = fc.Model(box((2.0, 2.0, 1.0), (4, 4, 2), "hex8", (-1.0, -1.0, -1.0)), "3d")
+        top, down, bottom, held = "ZMAX", "z", "ZMIN", "xyz"
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix(bottom, held)
+    if springs:
+        model.add_spring(top, x=3.0)
+    ball = fc.obstacles.Sphere((0.0,) * (dim - 1) + (3.0,), 3.0)
+    driving = {"force": {down: -8.0}, "motion": {"x": 0.01}} if force else {"motion": {"x": 0.08, down: -0.05}}
+    model.add_obstacle("ball", secondary=top, obstacle=ball, **driving, **options)
+    return model
+
+
+FORMULATIONS = ("node_to_segment", "continuous", "mortar")
+
+
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_two_bodies_in_axisymmetry(formulation, friction, solver):
+    def make():
+        return spheres(formulation, friction=friction)
+
+    check_resumed(make, UP_AND_DOWN, FRICTION if friction else FRICTIONLESS, linear_solver=solver)
+
+
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_two_bodies_in_space(formulation, friction, solver):
+    def make():
+        return boxes(formulation, friction=friction)
+
+    check_resumed(make, fc.linear_ramp(4), FRICTION if friction else FRICTIONLESS, after=(2,), linear_solver=solver)
+
+
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+@pytest.mark.parametrize("options", [{}, {"friction": 0.2}], ids=str)
+@pytest.mark.parametrize(("dim", "force"), [(2, True), (2, False), (3, True), (3, False)])
+def test_obstacles_that_move(dim, force, options, solver):
+    def make():
+        return indented(dim, force, **options)
+
+    check_resumed(make, fc.linear_ramp(4), FRICTION if options else FRICTIONLESS, after=(2,), linear_solver=solver)
+
+
+VARIANTS = {
+    "dual mortar": {"formulation": "mortar", "multipliers": "dual"},
+    "penalty": {"penalty": 1e5},
+    "closed for good": {"kind": "bilateral_once_closed"},
+    "tied": {"kind": "tied"},
+    "clearance": {"clearance": -0.1, "clearance_ramp": ((0.0, 0.0), (5.0, 1.0))},
+}
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_terms_of_a_pair(name):
+    check_resumed(lambda: spheres(**VARIANTS[name]), UP_AND_DOWN, FRICTIONLESS)
+
+
+@pytest.mark.parametrize(
+    "criteria", [{"geometry_updates": 1}, {"keep_pairing": True}, {"max_geometry_updates": 8}], ids=str
+)
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_geometry_updates_and_steps_cut_in_halves(criteria, friction):
+    whole = check_resumed(
+        lambda: spheres(friction=friction),
+        fc.linear_ramp(4),
+        FRICTION if friction else FRICTIONLESS,
+        criteria=Criteria(**criteria),
+        linear_solver="direct",
+    )
+    if "max_geometry_updates" in criteria and friction:
+        assert any("substeps" in step.iterations for step in whole)
+
+
+def test_bodies_on_springs():
+    check_resumed(lambda: indented(springs=True), fc.linear_ramp(4), FRICTIONLESS)
+
+
+def test_an_analysis_that_failed_goes_on_from_its_last_step():
+    """Without enough updates for a step nor leave to cut it, and then with both."""
+    ramp, steps = fc.Ramp((0.05, 0.1, 1.0)), []
+    few = Criteria(max_geometry_updates=8, max_halvings=0)
+    with pytest.raises(fc.ConvergenceError):
+        fc.solve(spheres(friction=0.3), ramp, criteria=few, on_step=steps.append)
+    assert steps
+    with pytest.raises(fc.ConvergenceError):
+        fc.solve(spheres(friction=0.3), ramp, criteria=few, resume=steps)
+    again = fc.solve(spheres(friction=0.3), ramp, resume=steps)
+    for found, expected in zip(again, fc.solve(spheres(friction=0.3), ramp), strict=True):
+        assert_same(found, expected, FRICTION)
+
+
+def test_the_same_bits():
+    steps = stopped_after(2, spheres("continuous"), fc.linear_ramp(4), linear_solver="direct")
+    again = fc.solve(spheres("continuous"), fc.linear_ramp(4), resume=steps, linear_solver="direct")
+    whole = fc.solve(spheres("continuous"), fc.linear_ramp(4), linear_solver="direct")
+    np.testing.assert_array_equal(again[-1].displacement, whole[-1].displacement)
+
+
+def test_only_the_last_step_keeps_its_state_and_what_was_given_stays_as_it_is():
+    first = fc.solve(spheres(), fc.Ramp((0.2, 0.4)))
+    assert [step.restart is None for step in first] == [True, False]
+    steps = fc.solve(spheres(), fc.Ramp((0.2, 0.4, 1.0)), resume=first)
+    assert [step.restart is None for step in steps] == [True, True, False]
+    assert len(first) == 2
+    assert first[-1].restart is not None
+
+
+def test_nothing_is_left_to_do_at_the_end_of_the_ramp():
+    steps = fc.solve(spheres(), fc.linear_ramp(2))
+    handed = []
+    assert fc.solve(spheres(), fc.linear_ramp(2), resume=steps, on_step=handed.append) == steps
+    assert not handed
+
+
+def test_the_ramp_may_change_from_there_on():
+    steps = fc.solve(spheres(), fc.Ramp((0.2, 0.4)))
+    finer = fc.solve(spheres(), fc.Ramp((0.4 * (1 + 1e-15), 0.6, 0.8)), resume=steps)
+    assert [step.load_factor for step in finer] == [0.2, 0.4, 0.6, 0.8]
+    assert [step.index for step in finer] == [1, 2, 3, 4]
+    back = fc.Ramp((0.4, 0.8), ((0.0, 0.0), (0.4, 0.4), (0.8, 0.0)))
+    assert fc.solve(spheres(), back, resume=steps)[-1].contact["hertz"].force[1] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_solver_tolerances_and_limits_may_change():
+    steps = fc.solve(spheres(), fc.Ramp((0.2, 0.4)), linear_solver="amg")
+    again = fc.solve(spheres(), fc.Ramp((0.4, 0.8)), resume=steps, linear_solver="direct", criteria=Criteria(1e-5))
+    whole = fc.solve(spheres(), fc.Ramp((0.2, 0.4, 0.8)), linear_solver="direct")
+    assert_same_to = np.abs(whole[-1].displacement).max() * 1e-8
+    assert np.abs(again[-1].displacement - whole[-1].displacement).max() < assert_same_to
+
+
+def test_a_step_without_its_state_is_refused():
+    steps = fc.solve(spheres(), fc.linear_ramp(2))
+    with pytest.raises(fc.ModelError, match="step 1 does not hold what it takes to go on from it: resume from the last"):
+        fc.solve(spheres(), fc.linear_ramp(2), resume=steps[:1])
+
+
+def test_all_that_a_step_changes_is_kept_or_set_anew():
+    """A name that `step_control` learns must be looked at here."""
+    anew = {"before", "external", "expected", "parts", "settled", "rubbing"}  # as a step begins
+    kept = {"u", "active", "pressure", *restart.NUMBERS}
+    assert set(step_control._ANALYSIS) == anew | kept
+    assert set(step_control._PAIR) == {"before", "_closed"}
+    assert set(step_control._SIDE) == {"now", "before"}
+    assert set(step_control._EXTRAPOLATION) == {"ratio", "_loads", "_states"}
+
+
+def test_a_strengthened_multigrid_cycle_is_remembered():
+    """Bounds raised, precision changed, ties of the last solution: what a fresh solver would not know."""
+    model, ramp = spheres("continuous"), fc.linear_ramp(3)
+    analysis = Analysis(model, "amg", 1e-10, Criteria(), ramp)
+    analysis.step(1, 0.5)
+    analysis.solver._strengthen(4)
+    analysis.solver.hierarchy.raise_bounds(1.3)
+    memory = analysis.solver.memory()
+    other = Analysis(model, "amg", 1e-10, Criteria(), ramp)
+    other.solver.remember(memory)
+    assert other.solver.precision == "double"
+    assert other.solver.hierarchy.bounds == analysis.solver.hierarchy.bounds
+    f = np.random.default_rng(0).normal(size=other.solver.hierarchy.n)
+    solutions = [each.solver.solution(f, each.solver._tied, None) for each in (analysis, other)]
+    np.testing.assert_array_equal(*solutions)

@@ -1,0 +1,156 @@
+"""Factors with the contact unknowns last: order, triangular kernels, displacements under contact forces, known loads."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csc_array, random_array
+from scipy.sparse.linalg import splu
+
+import fastcontact as fc
+from fastcontact.analysis import Analysis, Criteria
+from fastcontact.assembly import stiffness
+from fastcontact.kernels import triangular
+from fastcontact.linear._known_loads import KnownLoads
+from fastcontact.linear._order import fill_reducing
+from fastcontact.linear.direct import Direct
+from fastcontact.system import with_supports
+
+
+def supported(n=3):
+    """The stiffness of a cube that stands on its bottom, and the unknowns of its top."""
+    mesh = fc.generate.box((1.0, 1.0, 1.0), (n, n, n))
+    model = fc.Model(mesh, kinematics="3d")
+    model.add_material(fc.LinearElastic(E=7.0, nu=0.3))
+    fixed = np.repeat(mesh.points[:, 2] == 0.0, 3)
+    top = np.flatnonzero(np.repeat(mesh.points[:, 2] == 1.0, 3))
+    return with_supports(stiffness(mesh, "3d", *model.material_numbers()), fixed), top
+
+
+def prepared(last=True):
+    K, top = supported()
+    solver = Direct()
+    solver.prepare(K, np.empty((K.shape[0], 0)), top if last else None)
+    return K, top, solver
+
+
+def lower(n, density, seed):
+    """A lower triangular matrix with a unit diagonal, some of whose columns share their structure."""
+    rng = np.random.default_rng(seed)
+    A = random_array((n, n), density=density, rng=rng)
+    L = splu(csc_array(A + A.T + 10 * n * np.eye(n)), diag_pivot_thresh=0.0, options={"SymmetricMode": True}).L
+    return csc_array(L)
+
+
+@pytest.mark.parametrize(("n", "density"), [(1, 0.0), (7, 0.0), (40, 0.05), (60, 0.3), (30, 1.0)])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_triangular_kernels_are_those_of_numpy(n, density, seed):
+    L = lower(n, density, seed)
+    dense, b = L.toarray(), np.random.default_rng(seed).normal(size=n)
+    first, begin, rows = np.empty(n + 1, np.int64), np.empty(n + 1, np.int64), L.indices.copy()
+    count = triangular.supernodes(L.indptr, rows, first, begin)
+    shape = L.indptr, L.data, first[: count + 1], begin[: count + 1], rows[: begin[count]]
+    x = b.copy()
+    triangular.forward(*shape, x)
+    np.testing.assert_allclose(dense @ x, b, atol=1e-13)
+    x = b.copy()
+    triangular.backward(*shape, np.zeros(n, bool), x)
+    np.testing.assert_allclose(dense.T @ x, b, atol=1e-13)
+    given = np.zeros(n, bool)
+    given[n // 2 :] = True
+    x = b.copy()
+    triangular.backward(*shape, given, x)
+    np.testing.assert_array_equal(x[given], b[given])
+    np.testing.assert_allclose((dense.T @ x)[~given], b[~given], atol=1e-13)
+
+
+def test_columns_with_the_same_rows_share_them():
+    L = lower(30, 1.0, 0)
+    first, begin = np.empty(31, np.int64), np.empty(31, np.int64)
+    assert triangular.supernodes(L.indptr, L.indices.copy(), first, begin) == 1
+    assert begin[1] == 0
+
+
+def test_the_order_keeps_factors_as_small_as_superlu_does():
+    K, _ = supported(10)
+    order = fill_reducing(K, np.empty(0, np.intp))
+    options = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+    ours = splu(csc_array(K.tocsc()[order][:, order]), permc_spec="NATURAL", **options)
+    theirs = splu(K.tocsc(), permc_spec="MMD_AT_PLUS_A", **options)
+    assert ours.nnz < 1.1 * theirs.nnz
+
+
+def test_contact_is_eliminated_last():
+    K, top = supported()
+    order = fill_reducing(K, top)
+    np.testing.assert_array_equal(np.sort(order), np.arange(K.shape[0]))
+    np.testing.assert_array_equal(np.sort(order[-len(top) :]), top)
+
+
+@pytest.mark.parametrize("last", [True, False])
+@pytest.mark.parametrize("shape", [(), (3,)])
+def test_solutions_are_those_of_dense_algebra(last, shape):
+    K, _, solver = prepared(last)
+    F = np.random.default_rng(3).normal(size=(K.shape[0], *shape))
+    exact = np.linalg.solve(K.toarray(), F)
+    np.testing.assert_allclose(solver._solve(F), exact, atol=1e-12 * np.abs(exact).max())
+    assert solver.counters.setups == 1
+    assert solver.nbytes > 0
+
+
+def test_contact_takes_its_compliance_and_all_displacements_from_the_factors():
+    K, top, solver = prepared()
+    exact = np.linalg.inv(K.toarray())
+    np.testing.assert_allclose(solver.compliance.of(top), exact[np.ix_(top, top)], atol=1e-13 * np.abs(exact).max())
+    force = np.zeros(K.shape[0])
+    force[top[5:9]] = [1.0, -2.0, 0.5, 3.0]
+    f = np.random.default_rng(4).normal(size=K.shape[0])
+    loaded, u = solver.load(f), exact @ (f + force)
+    before, elsewhere = solver.counters.iterations, np.full(K.shape[0], 17.0)
+    near = loaded.near(force, elsewhere)
+    assert solver.counters.iterations == before
+    np.testing.assert_allclose(near[top], u[top], atol=1e-12 * np.abs(u).max())
+    np.testing.assert_array_equal(np.delete(near, top), 17.0)
+    np.testing.assert_allclose(loaded.everywhere(force, near), u, atol=1e-12 * np.abs(u).max())
+    assert solver.counters.iterations == before + 1
+
+
+def test_forces_elsewhere_cost_a_solution():
+    K, _, solver = prepared()
+    force = np.random.default_rng(4).normal(size=K.shape[0])
+    u = solver.load(np.zeros(K.shape[0])).near(force, np.zeros(K.shape[0]))
+    np.testing.assert_allclose(K @ u, force, atol=1e-12)
+
+
+def test_loads_that_others_combine_to_cost_nothing():
+    A = np.diag(np.arange(1.0, 9.0))
+    solved = []
+
+    def solve(f):
+        solved.append(f)
+        return np.linalg.solve(A, f)
+
+    known, (f, g) = KnownLoads(), np.random.default_rng(5).normal(size=(2, 8))
+    for load in (f, 0.3 * f, g, 2.0 * f - 0.1 * g, 0.0 * f):
+        np.testing.assert_allclose(A @ known.solution(load, solve), load, atol=1e-14)
+    assert len(solved) == 2
+    other = KnownLoads()
+    other.remember(known.memory(), 8, solve)
+    solved.clear()
+    np.testing.assert_array_equal(other.solution(f + g, solve), known.solution(f + g, solve))
+    assert not solved
+
+
+def test_only_a_few_loads_are_kept():
+    known, rng = KnownLoads(), np.random.default_rng(6)
+    for _ in range(7):
+        known.solution(rng.normal(size=20), lambda f: f)
+    assert len(known.memory()) == 4
+
+
+def test_a_ramp_costs_one_factorisation_and_a_solution_a_step(forma04):
+    mesh = fc.generate.half_spheres("quad4", arc_sizes=(2.0, 4.0), radial_sizes=(2.0, 6.0), segments=5)
+    analysis = Analysis(forma04(mesh), "direct", 1e-10, Criteria(), fc.linear_ramp(5))
+    updates = [analysis.step(k, k / 5).iterations["geometry_updates"] for k in range(1, 6)]
+    assert min(updates) >= 2
+    assert analysis.solver.counters.setups == 1
+    # One for the loads of all steps, and one for what each step's contact forces do inside the bodies.
+    assert analysis.solver.counters.iterations == 1 + 5
