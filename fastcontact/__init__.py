@@ -6,9 +6,11 @@ Public names load when first used, so that ``import fastcontact`` costs next to 
 from __future__ import annotations
 
 import importlib
+import logging
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+logging.getLogger(__name__).addHandler(logging.NullHandler())  # nothing on screen unless someone listens
 
 if TYPE_CHECKING:
     from fastcontact import analytic, generate, obstacles, plot, recovery, topology

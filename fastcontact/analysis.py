@@ -11,32 +11,27 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fastcontact import active_set, friction, linear, recovery, restart, step_control
+from fastcontact import active_set, doubts, friction, linear, plausibility, recovery, restart, step_control
 from fastcontact.acceleration import Anderson
 from fastcontact.assembly import rigid_modes, stiffness
 from fastcontact.contact.constraints import Constraints, stacked
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.result import contact_result, deep
+from fastcontact.contact.result import contact_result
 from fastcontact.contact.rigid import RigidSide
-from fastcontact.contact.surface import Surface
 from fastcontact.errors import ConvergenceError, FastcontactWarning, ModelError
 from fastcontact.extrapolation import Extrapolation
 from fastcontact.floating import SLACK, Floating, Settled
 from fastcontact.kernels.multigrid import largest_row_sum
 from fastcontact.model import Model, combined, multiplier
-from fastcontact.overlap import penetration
 from fastcontact.ramp import Ramp, linear_ramp
 from fastcontact.results import ContactResult, StepResult
-from fastcontact.rigid_motions import body_name, free_motions, generalised, resisting, stopped_at
+from fastcontact.rigid_motions import free_motions, generalised, resisting, stopped_at
 from fastcontact.springs import ground_force, stiffened
 from fastcontact.system import System
-from fastcontact.topology import bodies
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Strain and rotation beyond which linear kinematics are worth a warning.
-SMALL = 0.1
 # One active-set iteration per pairing is cheapest near the solution but may cycle; after so many, settle the set first.
 SEMISMOOTH_UPDATES = 8
 # Pairings after which an iterative solver starts again from the last step instead of the extrapolated state.
@@ -89,6 +84,11 @@ class Criteria:
             raise ModelError("the convergence criteria `relative` and `geometry` must be positive")
         if self.geometry_updates is not None and self.geometry_updates < 0:
             raise ModelError(f"geometry_updates = {self.geometry_updates} must be None or a whole number >= 0")
+        for name, least in (("max_geometry_updates", 0), ("max_active_set_iterations", 1)):
+            if getattr(self, name) < least:
+                raise ModelError(f"{name} = {getattr(self, name)} must be a whole number >= {least}")
+        if self.absolute is not None and not self.absolute >= 0:
+            raise ModelError(f"the convergence criterion absolute = {self.absolute} must be a force >= 0, or None")
         if self.max_halvings < 0 or int(self.max_halvings) != self.max_halvings:
             raise ModelError(f"max_halvings = {self.max_halvings} must be a whole number >= 0")
         if self.keep_pairing and self.geometry_updates:
@@ -147,8 +147,11 @@ def solve(
     Warns
     -----
     FastcontactWarning
-        If bodies interpenetrate where no contact is defined, a penalty lets them penetrate by more than 1 % of the
-        largest displacement, or strains leave the range of linear kinematics.
+        At the beginning, if the model is doubtful: units that slipped, poor cells, integrals that are not exact, nodes
+        that coincide. At the end, if bodies interpenetrate where no contact is defined, a contact never closed, was lost
+        or is not resolved by the mesh, a penalty lets it penetrate by more than 1 % of the largest displacement, strains
+        or rotations leave the range of linear kinematics, or a fixed number of geometry updates was too small. The
+        results of the first and of the last step keep the texts.
     """
     ramp, criteria = ramp or linear_ramp(), criteria or Criteria()
     case = restart.identity(model, ramp, criteria)
@@ -159,6 +162,9 @@ def solve(
     if not instants:
         return steps
     analysis = Analysis(model, linear_solver, linear_tolerance, criteria, ramp, linear_precision)
+    for text in analysis.doubts if not steps else ():
+        warnings.warn(text, FastcontactWarning, stacklevel=2)
+    analysis.touched = {name: True for step in steps for name, found in step.contact.items() if found.active.any()}
     if steps:
         restart.put_back(analysis, steps[-1])
         begin = steps[-1].load_factor
@@ -188,6 +194,9 @@ class Analysis:
         self.ramp = ramp or linear_ramp()
         model.check(self.ramp)
         self.model, self.criteria = model, criteria
+        self.doubts = plausibility.doubts(model)
+        self.unsettled: tuple[int, float] | None = None  # geometry updates asked for, change by the last one
+        self.touched: dict[str, bool] = {}  # pairs that were closed at the end of a step
         self.solver = linear.make(
             linear_solver, dim=model.mesh.dim, n_dofs=model.n_dofs, tolerance=linear_tolerance,
             precision=linear_precision,
@@ -350,7 +359,8 @@ class Analysis:
                 }
             )
             if not (state.settled or in_loop):
-                raise ConvergenceError(self._cycling(state, constraints), history)
+                history[-1]["nodes"] = self._nearest_nodes(np.flatnonzero(state.active != state.wanted))
+                raise ConvergenceError(self._cycling(state, history[-1]["nodes"], constraints), history)
             # Iterative solvers leave a noise of their tolerance; asking for less would never end.
             enough = max(max(criteria.geometry, self.solver.tolerance) * size, self.round_off)
             finished = tolerance <= self.solver.tolerance or not self.solver.iterative
@@ -368,13 +378,15 @@ class Analysis:
                 self.u, self.active = start, last_active
                 accelerated.restart()
         if fixed_updates is None:
+            history[-1]["nodes"] = self._most_moved(u - before)
             raise ConvergenceError(
                 f"the contact geometry did not settle in {limit} updates: the displacement still changes by "
-                f"{history[-1]['displacement_change']:.1e} of its largest component, {history[-1]['active']} "
-                f"constraints are active. Use more load steps, a finer mesh on the primary side, {self._smoother()}or a "
+                f"{history[-1]['displacement_change']:.1e} of its largest component, most at "
+                f"{self._named_nodes(history[-1]['nodes'])}, {history[-1]['active']} constraints are active. Use more load steps, a finer mesh on the primary side, {self._smoother()}or a "
                 "fixed number of updates",
                 history,
             )
+        self.unsettled = (limit, history[-1]["displacement_change"]) if limit and not criteria.keep_pairing else None
         return constraints, state
 
     def _move_everything(self, loaded: linear.Loaded, state: active_set.State, force: Array, lift: Array) -> None:
@@ -499,6 +511,7 @@ class Analysis:
             raise ConvergenceError(
                 f"the loads pull bodies away, no contact stops them ({'; '.join(self.floating.names)}; resultant up to "
                 f"{np.abs(work).max():.3g}): reverse the loads or add supports",
+                smaller_steps_help=False,
             )
         return found
 
@@ -510,7 +523,34 @@ class Analysis:
             f"{self.largest_work:.3g}. Add a support, or use more load steps"
         )
 
-    def _cycling(self, state: active_set.State, constraints: Constraints) -> str:
+    def _nearest_nodes(self, rows: NDArray[np.intp]) -> dict[str, list[int]]:
+        """Return, by contact pair, the secondary nodes next to constraints, counted through the pairs."""
+        found, first = {}, 0
+        for name, part in self.parts.items():
+            own = rows[(rows >= first) & (rows < first + len(part.gap0))] - first
+            first += len(part.gap0)
+            if len(own):
+                points = self.pairs[name].secondary.points
+                apart = part.positions[own][:, None] - self.model.mesh.points[points][None]
+                found[name] = np.unique(points[np.linalg.norm(apart, axis=2).argmin(axis=1)]).tolist()
+        return found
+
+    def _most_moved(self, change: Array) -> dict[str, list[int]]:
+        """Return, by contact pair, the three secondary nodes whose displacement changes (n_dofs,) most."""
+        size = np.linalg.norm(change.reshape(self.shape), axis=1)
+        sides = {name: pair.secondary.points for name, pair in self.pairs.items()}
+        return {name: points[np.argsort(-size[points], kind="stable")[:3]].tolist() for name, points in sides.items()}
+
+    def _named_nodes(self, nodes: dict[str, list[int]]) -> str:
+        """Return nodes by contact pair in words, with the places of the first three."""
+        texts = []
+        for name, points in nodes.items():
+            listed = ", ".join(f"{p} {np.array2string(self.model.mesh.points[p], precision=4)}" for p in points[:3])
+            more = f" and {len(points) - 3} more" if len(points) > 3 else ""
+            texts.append(f"points {listed}{more} of contact '{name}'")
+        return "; ".join(texts)
+
+    def _cycling(self, state: active_set.State, nodes: dict[str, list[int]], constraints: Constraints) -> str:
         if isinstance(state, friction.FrictionalEquilibrium):
             assert constraints.friction is not None
             return (
@@ -518,12 +558,8 @@ class Analysis:
                 f"equations are {state.residual:.1e} of the largest force off. With the coefficient of friction "
                 f"{constraints.friction.max():g} there may be no solution to find: use more load steps or less friction"
             )
-        wrong = np.flatnonzero(state.active != state.wanted)
-        what = (
-            f"{len(wrong)} constraints still change (first near {constraints.positions[wrong[0]]})"
-            if len(wrong)
-            else ""
-        )
+        count = int((state.active != state.wanted).sum())
+        what = f"{count} constraints still change, at {self._named_nodes(nodes)}" if count else ""
         return (
             f"the active set did not settle in {state.iterations} iterations: "
             f"{what or 'sliding constraints still turn'}. Use more load steps or the direct linear solver"
@@ -572,61 +608,21 @@ class Analysis:
             contact[name] = contact_result(name, pair, self.parts[name], state, u, rows)
             pair.end_step(self.parts[name], state.active[rows])
             first = rows.stop
+        self.touched |= {name: True for name, found in contact.items() if found.active.any()}
         return StepResult(
             index, instant, u.copy(), stress, recovery.von_mises(stress), recovery.von_mises_signed(stress),
-            reaction.reshape(-1, mesh.dim), contact, iterations, tuple(self._warn(stress, contact, last)),
+            reaction.reshape(-1, mesh.dim), contact, iterations,
+            tuple(self._warn(index, instant, stress, contact, last)),
         )  # fmt: skip
 
-    def _warn(self, stress: Array, contact: dict[str, ContactResult], last: bool) -> list[str]:
-        """Warn, at the last step, of interpenetration without contact, large strains and springs that still carry."""
-        if not last:
-            return []
-        found = self._interpenetration() + self._large_strain(stress) + self._carrying_springs()
-        found += [text for name, pair in self.pairs.items() for text in deep(pair, contact[name], self.u)]
+    def _warn(self, index: int, instant: float, stress: Array, contact: dict[str, ContactResult], last: bool) -> list[str]:
+        """Warn of what is doubtful: of the model at the first step, of the state at the last one."""
+        found = doubts.at_the_end(self, instant, stress, contact) if last else []
+        if last and self.unsettled:
+            found += doubts.unsettled(*self.unsettled)
         for text in found:
             warnings.warn(text, FastcontactWarning, stacklevel=4)
-        return found
-
-    def _interpenetration(self) -> list[str]:
-        mesh = self.model.mesh
-        _, body = bodies(mesh)
-        joined = {
-            frozenset((int(body[p.secondary.points[0]]), int(body[p.primary.points[0]])))
-            for p in self.pairs.values()
-            if isinstance(p.primary, Surface)
-        }
-        texts: list[str] = []
-        seen: set[frozenset[int]] = set()
-        coordinates = mesh.points + self.displacement
-        deep = sorted(penetration(mesh, self.model.kinematics, coordinates), key=lambda entry: -entry[2])
-        for number, other, depth, where in deep:
-            both = frozenset((number, other))
-            if both not in joined | seen and depth > 1e-9 * np.ptp(mesh.points, axis=0).max():
-                seen.add(both)
-                texts.append(
-                    f"bodies {body_name(mesh, body, number)} and {body_name(mesh, body, other)} interpenetrate by "
-                    f"{depth:.6g} near {np.array2string(where, precision=4)}, and no contact is defined between them: "
-                    "add_contact for the groups that meet"
-                )
-        return texts
-
-    def _carrying_springs(self) -> list[str]:
-        if self.floating is None or self.settled is None:
-            return []
-        told = self.floating.report(self.settled, self.largest_work)
-        if told["relative_to_load"] <= self.criteria.relative:
-            return []
-        return [
-            f"the springs that regularise {'; '.join(told['motions'])} still carry {told['relative_to_load']:.1e} of "
-            "the load: rigid motions are so much larger than deformations that round-off leaves no more"
-        ]
-
-    def _large_strain(self, stress: Array) -> list[str]:
-        stiffest = min(material.shear_modulus for material, _ in self.model.materials)
-        strain = float(recovery.von_mises(stress).max(initial=0.0) / (3 * stiffest))
-        if strain <= SMALL:
-            return []
-        return [f"the largest equivalent strain is {strain:.3f}, beyond the {SMALL} where linear kinematics hold well"]
+        return self.doubts * (index == 1) + found
 
 
 def near_nullspace(model: Model) -> Array:

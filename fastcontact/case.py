@@ -302,6 +302,7 @@ def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:
 
 def _model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
     model = Model(mesh, data["kinematics"], case_text=text)
+    model.units = dict(data.get("units", {}))
     for i, entry in enumerate(_tables("material", data["material"])):
         _check_keys(f"material[{i}]", entry, {"E": _NUMBER, "nu": _NUMBER, "groups": (list, str)})
         for key in ("E", "nu"):
@@ -358,8 +359,8 @@ def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
             raise CaseError(f"'{where}' needs 'group', the facets of the rigid surface")
         file = arguments.pop("file", None)
         return MeshedSurface(mesh if file is None else read_mesh(folder / file), **arguments)
-    shape: Obstacle = called(where, SHAPES[kind], arguments)
-    return shape
+    obstacle: Obstacle = called(where, SHAPES[kind], arguments)
+    return obstacle
 
 
 def _add_loads(model: Model, data: dict[str, Any]) -> None:

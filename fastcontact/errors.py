@@ -38,11 +38,16 @@ class ConvergenceError(FastcontactError):
     ----------
     history : list of dict
         One entry per iteration of the failed step: residual, active constraints, displacement change.
+    smaller_steps_help : bool
+        Whether the step may converge in parts.
     """
 
-    def __init__(self, message: str, history: Sequence[Mapping[str, Any]] = ()) -> None:
+    def __init__(
+        self, message: str, history: Sequence[Mapping[str, Any]] = (), *, smaller_steps_help: bool = True
+    ) -> None:
         super().__init__(message)
         self.history = [dict(entry) for entry in history]
+        self.smaller_steps_help = smaller_steps_help
 
 
 class FastcontactWarning(UserWarning):

@@ -146,13 +146,14 @@ class BodyForce:
     def vector(self, mesh: Mesh, kinematics: str) -> Array:
         """See `Load`."""
         forces = np.zeros((mesh.n_points, mesh.dim))
-        for element, cells in self._cells(mesh):
+        for element, cells in self.cells(mesh):
             x, N, J, weights = _mapped(mesh, element, cells)
             volume = np.linalg.det(J) * weights
             _add(forces, cells, N, _density(self, x, _turned(volume, x, kinematics)))
         return forces
 
-    def _cells(self, mesh: Mesh) -> Iterator[tuple[str, Indices]]:
+    def cells(self, mesh: Mesh) -> Iterator[tuple[str, Indices]]:
+        """Give the solid cells that the load acts on, by element."""
         if self.groups is None:
             yield from mesh.solids.items()
             return

@@ -23,6 +23,18 @@ def _read_only(values: ArrayLike, dtype: Any) -> NDArray[Any]:
     return array
 
 
+def _numbers(what: str, values: ArrayLike) -> NDArray[Any]:
+    """Return whole numbers as an array that loses nothing when it becomes one of 32 bits."""
+    array = np.asarray(values)
+    if array.size == 0:
+        return array.astype(np.int32)
+    if array.dtype.kind not in "iuf" or (array.dtype.kind == "f" and not np.array_equal(array, np.floor(array))):
+        raise MeshError(f"{what} must be given by whole numbers, counted from 0, not by {array.dtype} values")
+    if array.min() < -(2**31) or array.max() >= 2**31:
+        raise MeshError(f"{what} name the number {array.max()}, beyond the 2147483647 that a mesh can count to")
+    return array
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """Points, cells and named groups.
@@ -79,7 +91,7 @@ class Mesh:
     @staticmethod
     def _checked_cells(name: str, block: ArrayLike, n_points: int) -> Indices:
         element = elements.get(name)
-        conn = _read_only(block, np.int32)
+        conn = _read_only(_numbers(f"cells of {name}", block), np.int32)
         if conn.size == 0:
             conn = conn.reshape(0, element.n_nodes)
         if conn.ndim != 2 or conn.shape[1] != element.n_nodes:
@@ -92,7 +104,7 @@ class Mesh:
     def _checked_groups(kind: str, groups: Mapping[str, ArrayLike], count: int) -> Mapping[str, Indices]:
         checked = {}
         for name, members in groups.items():
-            numbers = np.unique(np.asarray(members, dtype=np.int32))
+            numbers = np.unique(_numbers(f"{kind} group '{name}'", members).astype(np.int32))
             if len(numbers) and (numbers[0] < 0 or numbers[-1] >= count):
                 raise MeshError(f"{kind} group '{name}' names {kind} {numbers[-1]}, but there are {count}")
             numbers.setflags(write=False)

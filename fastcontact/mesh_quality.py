@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 
 # A Jacobian below this fraction of the squared (cubed) longest edge is rounding, not area.
 _FLAT = 1e-12
+# Smallest over largest Jacobian of a cell, largest angle [degrees], volume over the cube of the longest edge beyond which
+# a cell is poor.
+EVEN, WIDE, THICK = 0.05, 175.0, 1e-4
 
 
 @dataclass(frozen=True)
@@ -121,6 +124,34 @@ def check_cells(mesh: Mesh) -> None:
                 raise MeshError(f"{cell} is {what}, one of {int(bad.sum())} such cells: {remedy}")
 
 
+def poorest_cell(mesh: Mesh) -> str:
+    """Return a sentence about the poorest solid cell of a mesh if it spoils the solution, else an empty string.
+
+    A cell is poor whose Jacobian is nearly zero somewhere, in 2D one with an angle near 180 degrees (Babuska and Aziz,
+    1976: small angles do no harm), in 3D one that is nearly flat.
+    """
+    for name in mesh.solids:
+        measure, low, high, longest = _extremes(mesh, name)
+        ratio = low / high
+        row = int(np.argmin(ratio))
+        if ratio[row] < EVEN:
+            cell = _described(mesh, name, row, measure[row])
+            return f"{cell} is poor: its smallest Jacobian is {ratio[row]:.2g} of its largest; move its nodes or remesh"
+        if mesh.dim == 2:
+            angle = np.degrees(_angles(mesh.points[mesh.cells[name][:, : _corners(name)]]).max(axis=1))
+            row = int(np.argmax(angle))
+            if angle[row] > WIDE:
+                cell = _described(mesh, name, row, measure[row])
+                return f"{cell} is poor: it has an angle of {angle[row]:.1f} degrees; move its nodes or remesh"
+            continue
+        flatness = measure / longest**3
+        row = int(np.argmin(flatness))
+        if flatness[row] < THICK:
+            cell = _described(mesh, name, row, measure[row])
+            return f"{cell} is poor: its volume is only {flatness[row]:.1e} of its longest edge cubed; remesh there"
+    return ""
+
+
 def _check_twice(mesh: Mesh, name: str) -> None:
     """Raise MeshError if two cells of an element have the same nodes: together they would be twice as stiff."""
     nodes = mesh.cells[name].astype(np.int64)
@@ -185,11 +216,17 @@ class _Verdict:
 
 def _verdict(mesh: Mesh, name: str) -> _Verdict:
     """Judge the cells of a solid element by their Jacobians at the default quadrature points."""
+    measure, low, high, longest = _extremes(mesh, name)
+    rounding = _FLAT * longest**mesh.dim
+    flat = np.maximum(np.abs(low), np.abs(high)) <= rounding
+    return _Verdict(measure, flat, (low <= rounding) & ~flat)
+
+
+def _extremes(mesh: Mesh, name: str) -> tuple[Array, Array, Array, Array]:
+    """Return, each (n_cells,), area or volume, smallest and largest Jacobian, longest edge of the cells of an element."""
     element = elements.get(name)
     _, gradients, weights = element.tables
     low, high, measure, longest = np.empty((4, len(mesh.cells[name])))
     edges = np.array(element.edges, np.intp)
     jacobians.extremes(mesh.points, mesh.cells[name], gradients, weights, edges, low, high, measure, longest)
-    rounding = _FLAT * longest**mesh.dim
-    flat = np.maximum(np.abs(low), np.abs(high)) <= rounding
-    return _Verdict(measure, flat, (low <= rounding) & ~flat)
+    return measure, low, high, longest

@@ -42,7 +42,14 @@ from fastcontact.relations import Relation, stacked_rows
 from fastcontact.rigid_motions import free_motions, generalised, resisting, unstopped
 from fastcontact.springs import Springs, between, check_stiffness, grounded, stacked
 from fastcontact.system import ConstrainedMotion
-from fastcontact.validation import check_forces, check_motions, check_overlap, check_ramps
+from fastcontact.validation import (
+    check_forces,
+    check_motions,
+    check_overlap,
+    check_penetration,
+    check_ramps,
+    check_supports,
+)
 
 Array = NDArray[np.float64]
 log = logging.getLogger("fastcontact")
@@ -147,6 +154,7 @@ class Model:
         self.mesh = mesh
         self.kinematics = kinematics
         self.case_text = case_text
+        self.units: dict[str, str] = {}  # names of the units of length, force, pressure where they are known
         self.materials: list[tuple[LinearElastic, tuple[str, ...] | None]] = []
         self.supports: list[Support] = []
         self.loads: list[Load] = []
@@ -164,12 +172,12 @@ class Model:
         return self.mesh.n_points * self.mesh.dim
 
     def add_material(self, material: LinearElastic, groups: Sequence[str] | str | None = None) -> None:
-        """Give a material to groups of solid cells, by default to all; later calls override earlier ones.
+        """Give a material to groups of solid cells, by default to all; groups override what was given to all before.
 
         Raises
         ------
         MeshError, ModelError
-            If a group is unknown or holds no solid cells.
+            If a group is unknown or holds no solid cells. A cell with two materials shows when the model is checked.
         """
         names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
         for name in names or ():
@@ -529,6 +537,12 @@ class Model:
     def _add_pair(self, pair: ContactPair) -> None:
         if pair.name in {other.name for other in self.contact}:
             raise ContactError(f"there is already a contact pair '{pair.name}': names must differ")
+        for other in self.contact:
+            if pair.primary and {pair.secondary, pair.primary} == {other.secondary, other.primary}:
+                raise ContactError(
+                    f"contact '{pair.name}' joins '{pair.secondary}' and '{pair.primary}', which contact '{other.name}' "
+                    "joins already: leave out one of the two"
+                )
         self.bind(pair)
         self.contact.append(pair)
 
@@ -565,20 +579,34 @@ class Model:
         Raises
         ------
         ModelError
-            If cells are left without a material; their groups are named.
+            If cells are left without a material, or have two; their groups are named.
         """
         if not self.materials:
             raise ModelError("no material: call add_material(LinearElastic(E=..., nu=...)) for the solid cells")
         numbers = {name: np.full(len(block), -1, np.int32) for name, block in self.mesh.solids.items()}
         for index, (_, groups) in enumerate(self.materials):
             for name in numbers if groups is None else ():
+                self._check_material(index, None, numbers[name])
                 numbers[name][:] = index
             for group in groups or ():
                 for name, rows in self.mesh.split(self.mesh.cell_groups[group]).items():
                     if name in numbers:
+                        self._check_material(index, group, numbers[name][rows])
                         numbers[name][rows] = index
         self._check_all_have_material(numbers)
         return np.stack([material.moduli(self.kinematics) for material, _ in self.materials]), numbers
+
+    def _check_material(self, index: int, group: str | None, given: NDArray[np.int32]) -> None:
+        """Refuse a material for cells that have another one already, which was not given to all cells."""
+        new = self.materials[index][0]
+        for number in np.unique(given[given >= 0]):
+            old, groups = self.materials[number]
+            if old != new and (groups is not None or group is None):
+                raise ModelError(
+                    f"{int((given == number).sum())} cells of {'the mesh' if group is None else repr(group)} have two "
+                    f"materials, E = {old.E:g}, nu = {old.nu:g} and E = {new.E:g}, nu = {new.nu:g}: give each group one; "
+                    "one for all other cells comes first, without groups"
+                )
 
     def _check_all_have_material(self, numbers: dict[str, NDArray[np.int32]]) -> None:
         without = {name: np.flatnonzero(values < 0) for name, values in numbers.items()}
@@ -636,14 +664,19 @@ class Model:
         ModelError
             If a load is a function that fails, or acts on points that nothing holds.
         """
-        related = np.zeros(self.mesh.n_points, bool)
-        related[self.holding_rows().indices // self.mesh.dim] = True
+        related = self._related()
         by_ramp: dict[Table | None, Array] = {}
         for load in self.loads:
             forces = load.vector(self.mesh, self.kinematics)
             check_forces(self.mesh, forces, related, load.name)
             by_ramp[load.ramp] = by_ramp.get(load.ramp, 0.0) + forces
         return by_ramp
+
+    def _related(self) -> NDArray[np.bool_]:
+        """Return which points (n_points,) relations and springs hold."""
+        related = np.zeros(self.mesh.n_points, bool)
+        related[self.holding_rows().indices // self.mesh.dim] = True
+        return related
 
     def check(self, ramp: Ramp | None = None) -> None:
         """Check the whole model, and its histories against `ramp`; `solve` does so before any numerics.
@@ -663,6 +696,9 @@ class Model:
             named += [(f"the clearance of contact '{p.name}'", p.clearance_ramp) for p in self.contact]
             check_ramps(named, ramp.instants)
         self._check_relations(fixed, prescribed, ramp or Ramp((1.0,)))
+        check_supports(self.mesh, [(s.name, s.group) for s in self.supports], self._related())
+        for pair in self.contact:
+            check_penetration(pair.name, self.bind(pair))
         check_overlap(
             self.mesh, self.kinematics, [(p.secondary, p.primary) for p in self.contact if p.obstacle is None]
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,12 +12,13 @@ if TYPE_CHECKING:
     from fastcontact.analysis import Analysis
     from fastcontact.results import StepResult
 
+log = logging.getLogger("fastcontact")
 # What a step changes: of the analysis, of each of its pairs, of the primary side of a pair, of the extrapolation, of
 # the right-hand sides that a direct solver knows.
 # Arrays among it are replaced, never written into; dictionaries and lists are copied.
 _ANALYSIS = (
     "u", "before", "external", "expected", "active", "pressure", "parts", "largest_force", "largest_work", "round_off",
-    "settled", "rubbing",
+    "settled", "rubbing", "touched", "unsettled",
 )  # fmt: skip
 _PAIR = ("before", "_closed")
 _SIDE = ("now", "before")
@@ -62,7 +64,8 @@ def advance(
     Raises
     ------
     ConvergenceError
-        If a part that was halved `max_halvings` times does not converge; the analysis is then as it was at `begin`.
+        If a part that was halved `max_halvings` times does not converge, or one that no halving can help; the analysis is
+        then as it was at `begin`.
     """
     state = snapshot(analysis)
     try:
@@ -80,12 +83,14 @@ def _parts(
     try:
         return [analysis.step(index, end, last=last)]
     except ConvergenceError as error:
-        if halved == limit or not begin < middle < end:
+        if halved == limit or not begin < middle < end or not error.smaller_steps_help:
             if not halved:
                 raise
             often = "once" if halved == 1 else f"{halved} times"
             part = f"step {index} was cut in halves {often}, the part from {begin:.6g} to {end:.6g} fails"
-            raise ConvergenceError(f"{error} ({part})", error.history) from error
+            raise ConvergenceError(f"{error} ({part})", error.history, smaller_steps_help=False) from error
+        reason = str(error).split(". ")[0]
+        log.warning("step %d from %.6g to %.6g does not converge, cut in halves: %s", index, begin, end, reason)
     restore(state)
     first = _parts(analysis, index, begin, middle, False, limit, halved + 1)
     return first + _parts(analysis, index, middle, end, last, limit, halved + 1)

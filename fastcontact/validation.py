@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.errors import ModelError
+from fastcontact.errors import ContactError, ModelError
 from fastcontact.mesh import Mesh
 from fastcontact.overlap import penetration
 from fastcontact.ramp import Table
 from fastcontact.rigid_motions import FreeMotions, body_name
 from fastcontact.topology import bodies
+
+if TYPE_CHECKING:
+    from fastcontact.contact.formulations import Formulation
 
 Array = NDArray[np.float64]
 
@@ -51,6 +55,43 @@ def check_forces(mesh: Mesh, forces: Array, related: NDArray[np.bool_], name: st
         raise ModelError(
             f"{name} acts on {len(lost)} points that belong to no solid cell (first: point {lost[0]}): "
             "name a group of the body, or tie the points to it with couple or relate"
+        )
+
+
+def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: NDArray[np.bool_]) -> None:
+    """Raise ModelError if a support (name, group) holds only points that no solid cell or relation (n_points,) has."""
+    carried = related.copy()
+    for block in mesh.solids.values():
+        carried[block] = True
+    for name, group in supports:
+        points = mesh.points_of(group)
+        if not carried[points].any():
+            raise ModelError(
+                f"{name} holds {len(points)} points that belong to no solid cell (first: point {points[0]}): name a group "
+                "of the body"
+            )
+
+
+def check_penetration(name: str, pair: Formulation) -> None:
+    """Raise ContactError if the sides of contact pair `name` lie inside each other by more than an element before any load.
+
+    An interference that is meant is smaller, or a clearance.
+    """
+    if pair.terms.tied:
+        return
+    total, geometric = pair.nodal_gap(np.zeros_like(pair.points))[0], pair.nodal_gap(np.zeros_like(pair.points), False)[0]
+    gap = np.where(pair.terms.excluded_nodes(pair.secondary), np.inf, np.maximum(total, geometric))
+    size = np.zeros(len(gap))
+    for block in pair.secondary.blocks:
+        long = np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
+        np.maximum.at(size, block.local, long[:, None])
+    row = int(np.argmin(gap / size))
+    if gap[row] < -size[row]:
+        point = pair.secondary.points[row]
+        raise ContactError(
+            f"contact '{name}' begins with a penetration of {-gap[row]:.4g} at point {point} {pair.points[point]}, more than "
+            f"the element there is long ({size[row]:.4g}): move a body apart, turn a surface that is inside out, or give an "
+            "interference that is meant as clearance"
         )
 
 

@@ -10,7 +10,8 @@ import importlib
 import logging
 import pkgutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import fastcontact
 from fastcontact import cli
@@ -41,7 +42,7 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
             sub.set_defaults(run=module.run)
             loudness = sub.add_mutually_exclusive_group()
             loudness.add_argument("-v", "--verbose", action="store_true", help="say what is being done and why")
-            loudness.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
+            loudness.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors and warnings")
     return top
 
 
@@ -51,18 +52,31 @@ def main(argv: Sequence[str] | None = None) -> int:
         given = sys.argv[1:] if argv is None else list(argv)
         arguments = parser(given[0] if given else None).parse_args(given)
         handler = logging.StreamHandler()
-        handler.setFormatter(logging.Formatter("%(message)s"))
+        # On a terminal a line takes the place of the progress bar.
+        handler.setFormatter(logging.Formatter("\r\x1b[K%(message)s" if sys.stderr.isatty() else "%(message)s"))
         log.handlers[:] = [handler]
         log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
         return int(arguments.run(arguments) or 0)
     except ConvergenceError as error:
-        print(f"no convergence: {error}", file=sys.stderr)
+        print("\n".join([f"no convergence: {error}", *_history(error.history)]), file=sys.stderr)
         return 2
     except FastcontactError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
     except BrokenPipeError:
         return 1
+
+
+def _history(history: Sequence[Mapping[str, Any]], shown: int = 10) -> list[str]:
+    """Return the last iterations of a step that failed as lines: change of the displacement, residual, active set."""
+    if not history:
+        return []
+    first = max(len(history) - shown, 0)
+    lines = [f"  iterations {first + 1} to {len(history)}: change of the displacement, constraints active, residual"]
+    for number, entry in enumerate(history[first:], start=first + 1):
+        residual = f"{entry['residual']:.3e}" if "residual" in entry else "-"
+        lines.append(f"  {number:4d}  {entry['displacement_change']:.3e}  {entry['active']:6d}  {residual}")
+    return lines
 
 
 def entry_point() -> None:

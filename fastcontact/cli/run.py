@@ -8,12 +8,12 @@ import json
 import os
 import sys
 import time
-import warnings
 from pathlib import Path
 from typing import Any
 
 from fastcontact.cli._progress import Progress
-from fastcontact.errors import FastcontactWarning, FileError
+from fastcontact.cli._warnings import told
+from fastcontact.errors import FileError
 
 HELP = "solve a case file and write the results of all steps"
 # Cell field of the estimated error.
@@ -49,8 +49,8 @@ def run(options: argparse.Namespace) -> int:
     output = Path(options.output or f"{case.name}.vtkhdf")
     _check_targets(options.json, options.plot)
     read = time.perf_counter()
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", FastcontactWarning)
+    case.model.check(case.ramp)  # a wrong one must not replace the file of a right one
+    with told() as caught:
         fields = (ERROR,) if options.estimate_error else ()
         with ResultWriter(output, case.model, case_text=case.text, cell_fields=fields, resume=options.resume) as writer:
             done = writer.done
@@ -73,8 +73,7 @@ def run(options: argparse.Namespace) -> int:
                 )
             finally:
                 progress.close()
-    told = [str(entry.message) for entry in caught if issubclass(entry.category, FastcontactWarning)]
-    texts = list(dict.fromkeys([*(text for step in done for text in step.warnings), *told]))
+    texts = list(dict.fromkeys([*(text for step in done for text in step.warnings), *caught]))
     solved = time.perf_counter()
     timings = {"read": read - started, "solve": solved - read, "cpu": time.process_time()}
     numbers = summary.summarise(case, steps, timings, texts)
@@ -85,7 +84,8 @@ def run(options: argparse.Namespace) -> int:
 
         profile_picture(case, steps[-1], options.plot)
     for text in texts:
-        print(f"warning: {text}", file=sys.stderr)
+        if text not in caught:  # of the steps that were there already
+            print(f"warning: {text}", file=sys.stderr)
     if not options.quiet:
         print("\n".join(summary.lines(numbers)))
         print("  " + _written(output, len(done), len(steps), [path for path in (options.json, options.plot) if path]))

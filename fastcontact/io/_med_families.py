@@ -15,6 +15,8 @@ from fastcontact.io._hdf5 import values
 
 GROUP_NAME_SIZE = 80
 FAMILY_NAME_SIZE = 64
+# Folders between that of a mesh and its families: one, for those of points or of cells.
+LEVELS = 2
 
 Families = dict[int, tuple[str, ...]]
 
@@ -44,14 +46,14 @@ def decoded(raw: bytes) -> str:
         return name.decode("latin-1")
 
 
-def read_families(folder: Any) -> Families:
-    """Return the group names of each family number, from all levels below an HDF5 group."""
+def read_families(folder: Any, level: int = 0) -> Families:
+    """Return the group names of each family number, from the levels below an HDF5 group that MED knows."""
     found: Families = {}
     for entry in folder.values():
         if "NUM" in entry.attrs:
             found[int(entry.attrs["NUM"])] = _group_names(entry)
-        elif hasattr(entry, "values"):
-            found.update(read_families(entry))
+        elif hasattr(entry, "values") and level < LEVELS:
+            found.update(read_families(entry, level + 1))
     return found
 
 
@@ -60,7 +62,9 @@ def _group_names(family: Any) -> tuple[str, ...]:
         return ()
     raw = values(family["GRO"], "NOM").tobytes()
     # MED 2 stores one string for all names, later versions a row for each: the same bytes, but for a zero.
-    count = int(family["GRO"].attrs["NBR"]) if "NBR" in family["GRO"].attrs else len(raw) // GROUP_NAME_SIZE
+    count = -(-len(raw) // GROUP_NAME_SIZE)
+    if "NBR" in family["GRO"].attrs:
+        count = min(count, int(family["GRO"].attrs["NBR"]))
     fields = (raw[i * GROUP_NAME_SIZE : (i + 1) * GROUP_NAME_SIZE] for i in range(count))
     return tuple(name for name in map(decoded, fields) if name)
 

@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact import elements
-from fastcontact.errors import FastcontactWarning, FileError, MeshError
+from fastcontact.errors import FastcontactError, FastcontactWarning, FileError, MeshError
 from fastcontact.io import _abaqus
 from fastcontact.io._blocks import VERTEX, Block, build_mesh, merged, without_duplicates
+from fastcontact.io._meshio_guard import bounded
 from fastcontact.mesh import Mesh
 
 logger = logging.getLogger("fastcontact")
@@ -84,6 +85,8 @@ def _contained(action: str, path: Path) -> Iterator[None]:
     try:
         with _STREAMS, contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             yield
+    except FastcontactError:
+        raise
     except (Exception, SystemExit) as error:
         words = said.getvalue() if isinstance(error, SystemExit) else str(error)
         reason = " ".join(words.split()) or type(error).__name__
@@ -128,7 +131,7 @@ def read(path: Path) -> MeshioContent:
     file_format = _format(path, writing=False)
     if file_format == "abaqus":
         _abaqus.check_readable(path)
-    with _contained("read", path):
+    with _contained("read", path), bounded(path, file_format):
         found = meshio.read(path, file_format=file_format)
     try:
         blocks = merged(_blocks(found, NODE_ORDER.get(file_format, {})))

@@ -14,10 +14,10 @@ import os
 import sys
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -59,22 +59,27 @@ def bounded(path: Path, file_format: str) -> Iterator[None]:
     size = os.path.getsize(path)
     limit, most = max(PLAUSIBLE_BYTES, PLAUSIBLE_EXPANSION * size), max(UNPACKED_BYTES, UNPACKED_EXPANSION * size)
     allowed = path.resolve().parent if file_format in SEVERAL_FILES else path.resolve()
+    if path.suffix.lower() == ".gz":
+        _check_packed(path, most)
+    if file_format == "xdmf":
+        _check_references(path)
     stand_ins: dict[str, Any] = {
-        "np": _Bounded(np, _arrays(limit)),
+        "np": _Bounded(np, _arrays(limit, allowed)),
         "zlib": _Bounded(zlib, {"decompress": lambda data: _unpacked(zlib.decompressobj(), data, most)}),
         "lzma": _Bounded(lzma, {"decompress": lambda data: _unpacked(lzma.LZMADecompressor(), data, most)}),
+        "open": _opener(allowed),
     }
-    with ExitStack() as stack:
-        for name, module in list(sys.modules.items()):
-            if name.startswith("meshio.") and module is not None:
-                for attribute, stand_in in stand_ins.items():
-                    if getattr(module, attribute, None) is not None:
-                        stack.enter_context(patch.object(module, attribute, stand_in))
-                stack.enter_context(patch.object(module, "open", _opener(allowed), create=True))
-        stack.enter_context(patch("h5py.File", _checked_hdf5(allowed)) if file_format == "xdmf" else ExitStack())
-        if path.suffix.lower() == ".gz":
-            _check_packed(path, most)
+    before: list[tuple[dict[str, Any], dict[str, Any]]] = []
+    try:
+        for module in [m for name, m in list(sys.modules.items()) if name.startswith("meshio.") and m is not None]:
+            names = vars(module)
+            before.append((names, {name: names[name] for name in stand_ins if name in names}))
+            names.update({name: stand_in for name, stand_in in stand_ins.items() if name in names or name == "open"})
         yield
+    finally:
+        for names, originals in before:
+            names.pop("open", None)
+            names.update(originals)
 
 
 class _Bounded:
@@ -88,7 +93,7 @@ class _Bounded:
         return getattr(self._module, name)
 
 
-def _arrays(limit: int) -> dict[str, Callable[..., Any]]:
+def _arrays(limit: int, allowed: Path) -> dict[str, Callable[..., Any]]:
     """Return numpy's functions that make arrays of a size that comes from a file."""
 
     def check(shape: Any, dtype: Any) -> None:
@@ -117,8 +122,11 @@ def _arrays(limit: int) -> dict[str, Callable[..., Any]]:
         if int(count) < -1:
             raise Implausible(f"it declares {int(count)} numbers")
         check(max(int(count), 0), dtype)
-        if hasattr(file, "count_end"):
-            file.count_end(os.fstat(file.fileno()).st_size)
+        if isinstance(file, str | os.PathLike):
+            _check_place(file, allowed)
+            return np.fromfile(file, dtype, int(count), sep, **kwargs)
+        if isinstance(file, _Ending):
+            file = file.before_numbers()
         return np.fromfile(file, dtype, int(count), sep, **kwargs)
 
     return {
@@ -155,9 +163,10 @@ class _Ending:
                 raise Implausible("it ends where more must come")
         return found
 
-    def count_end(self, size: int) -> None:
-        """Count a read by number that begins at the end."""
-        self._counted(self._file.tell() < size)
+    def before_numbers(self) -> Any:
+        """Return the file itself, for NumPy to read from; counts whether that begins at the end."""
+        self._counted(self._file.tell() < os.fstat(self._file.fileno()).st_size)
+        return self._file
 
     def readline(self, *args: Any) -> Any:
         """Read a line."""
@@ -185,18 +194,16 @@ def _check_place(name: Any, allowed: Path) -> None:
         raise Implausible(f"it refers to the file '{found}', which is not beside it")
 
 
-def _checked_hdf5(allowed: Path) -> Callable[..., Any]:
-    import h5py
-
-    original = h5py.File
-
-    def checked(name: Any, mode: str = "r", *args: Any, **kwargs: Any) -> Any:
-        _check_place(name, allowed)
-        with _hdf5.opened(name):
+def _check_references(path: Path) -> None:
+    """Look through the HDF5 files that an XDMF file refers to, which must stand beside it."""
+    try:
+        items = [item for item in ElementTree.parse(path).iter("DataItem") if item.get("Format") == "HDF"]
+    except ElementTree.ParseError as error:
+        raise Implausible(f"it is no XML: {error}") from error
+    for name in {(item.text or "").strip().partition(":")[0] for item in items}:
+        _check_place(path.parent / name, path.resolve().parent)
+        with _hdf5.opened(path.parent / name):
             pass
-        return original(name, "r", *args, **kwargs)
-
-    return checked
 
 
 def _unpacked(unpacker: Any, data: bytes, most: int) -> bytes:

@@ -27,7 +27,7 @@ def check_shapes(mesh: Mesh, step: StepResult) -> None:
         if found != shape:
             raise FileError(f"step {step.index}: {name} has shape {found}, but the mesh of the file needs {shape}")
     for name, contact in step.contact.items():
-        _check_contact(f"step {step.index}, contact '{name}'", contact, mesh)
+        check_contact(f"step {step.index}, contact '{name}'", contact, mesh)
 
 
 def checked_fields(names: Iterable[str], mesh: Mesh) -> tuple[str, ...]:
@@ -52,7 +52,8 @@ def check_cell_fields(mesh: Mesh, step: StepResult, names: Iterable[str]) -> Non
             )
 
 
-def _check_contact(where: str, contact: ContactResult, mesh: Mesh) -> None:
+def check_contact(where: str, contact: ContactResult, mesh: Mesh) -> None:
+    """Refuse the state of a pair whose arrays do not fit one another or name points that are not in the mesh."""
     row = layout.contact_row(mesh.dim)
     for name in row.names or ():
         found, shape = np.shape(getattr(contact, name)), (len(contact.points), *row[name].shape)

@@ -122,7 +122,7 @@ def _chosen_mesh(file: Any, path: PathLike, mesh_name: str | None) -> str:
             raise FileError(f"'{path}': {unknown('mesh', mesh_name, names)}")
         return mesh_name
     if len(names) > 1:
-        listed = ", ".join(f"'{name}'" for name in names)
+        listed = ", ".join(f"'{name[:NAME_SIZE]}'" for name in names[:12]) + (", ..." if len(names) > 12 else "")
         raise FileError(f"'{path}' holds {len(names)} meshes ({listed}): say which one with mesh_name")
     return str(names[0])
 
@@ -457,14 +457,21 @@ def _field_size(file: Any, group: Any, instants: list[Any]) -> int:
     """Return the number of points of the field's mesh, or of the field where the mesh is in another file."""
     name = decoded(bytes(group.attrs["MAI"]))
     if f"ENS_MAA/{name}" in file:
-        return int(_first_step(file[f"ENS_MAA/{name}"])["NOE/COO"].attrs["NBR"])
-    return max(int(profile.attrs["NBR"]) for entry in instants for profile in entry["NOE"].values())
+        mesh = file[f"ENS_MAA/{name}"]
+        return len(_read_points(_first_step(mesh), mesh.attrs))
+    n_components = int(group.attrs["NCO"])
+    return max(values(profile, "CO").size // n_components for entry in instants for profile in entry["NOE"].values())
 
 
 def _read_instant(file: Any, support: Any, n_points: int, n_components: int) -> Array:
     field = np.full((n_points, n_components), np.nan)
     for name, profile in support.items():
         part = values(profile, "CO").reshape(n_components, -1).T
-        rows = slice(None) if name == NO_PROFILE else values(file["PROFILS"][name], "PFL") - 1
+        if name == NO_PROFILE:
+            field[:] = part
+            continue
+        rows = values(file["PROFILS"][name], "PFL").astype(np.int64) - 1
+        if rows.min(initial=0) < 0 or rows.max(initial=0) >= n_points:
+            raise FileError(f"profile '{name}' names point {rows.max() + 1} of {n_points}: write the file anew")
         field[rows] = part
     return field

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from fastcontact.errors import FileError
 from fastcontact.io import _result_layout as layout
 from fastcontact.io._files import existing_file
+from fastcontact.io._hdf5 import check_contents
 from fastcontact.io._packing import unpacked
+from fastcontact.io._step_checks import check_contact
 from fastcontact.io._targets import PathLike
 from fastcontact.mesh import Mesh
 from fastcontact.results import ContactResult, StepResult
@@ -97,8 +99,10 @@ class Results(Sequence[StepResult]):
         self.case_text: str = _text(own["case"])
         self.versions: dict[str, str] = _text(own["versions"])
         self._rows = own["steps"][: self._n_steps]
-        if len(self._rows) != self._n_steps:
+        if len(self._rows) != self._n_steps or self._rows.ndim != 1:
             raise ValueError(f"only {len(self._rows)} of {self._n_steps} steps")
+        if not isinstance(self.kinematics, str) or not isinstance(self.case_text, str):
+            raise ValueError("its kinematics or its case is no text")
         self.load_factors: NDArray[np.float64] = np.ascontiguousarray(self._rows["load_factor"])
         run = self._run_record(own)
         self.log: Any = (run or {}).get("log")
@@ -232,30 +236,46 @@ class Results(Sequence[StepResult]):
 
     def _cell_fields(self, number: int) -> dict[str, NDArray[np.float64]]:
         data, n = self._file["VTKHDF/CellData"], len(self._file["VTKHDF/Types"])
-        return {name: data[name][number * n : (number + 1) * n] for name in self.cell_field_names}
+        fields = {name: data[name][number * n : (number + 1) * n] for name in self.cell_field_names}
+        wrong = [name for name, values in fields.items() if values.shape != (n,) or values.dtype.kind not in "biuf"]
+        if wrong:
+            raise ValueError(f"{wrong[0]} of step {number} is cut off or of another kind")
+        return fields
 
     def _field(self, name: str, number: int, width: int | None = None) -> NDArray[np.float64]:
         n = self.mesh.n_points
         data, rows = self._file["VTKHDF/PointData"][name], slice(number * n, (number + 1) * n)
         values = data[rows] if width is None else data[rows, :width]
-        if len(values) != n:
-            raise ValueError(f"{name} of step {number} is cut off")
+        if values.shape != ((n,) if width is None else (n, width)) or values.dtype.kind != "f":
+            raise ValueError(f"{name} of step {number} is cut off or of another kind")
         return values
 
     def _contact(self, number: int, formulations: dict[str, str]) -> dict[str, ContactResult]:
         if not formulations:
             return {}
         pairs = {_text(pair["name"]): pair for pair in self._file["fastcontact/contact"].values()}
-        return {name: _read_contact(pairs[name], number, name, kind) for name, kind in formulations.items()}
+        found = {name: _read_contact(pairs[name], number, name, kind) for name, kind in formulations.items()}
+        for name, contact in found.items():
+            if contact.force.shape != (self.mesh.dim,) or contact.points.dtype.kind not in "iu":
+                raise ValueError(f"the contact table of '{name}' is of another kind")
+            check_contact(f"step {number}, contact '{name}'", contact, self.mesh)
+        return found
 
     @contextlib.contextmanager
     def _explained(self) -> Iterator[None]:
         """Turn whatever a broken file makes of HDF5 and of our own reading into one sentence."""
         try:
             yield
-        except (OSError, RuntimeError, KeyError, ValueError, IndexError, TypeError) as error:
-            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise FileError(f"'{self.path}' {_DAMAGED} ({reason}): compute it again or restore a copy") from error
+        except (FileError, Warning):
+            raise
+        except Exception as error:  # what HDF5, and numbers that make no sense, can raise has no end
+            raise FileError(f"'{self.path}' {_DAMAGED} ({_reason(error)}): compute it again or restore a copy") from error
+
+
+def _reason(error: Exception) -> str:
+    """Return the first line of what an error says."""
+    lines = str(error).splitlines()
+    return lines[0][:200] if lines else type(error).__name__
 
 
 def _opened(path: Path) -> tuple[Any, Any]:
@@ -271,20 +291,17 @@ def _opened(path: Path) -> tuple[Any, Any]:
     below = open(path, "rb")  # noqa: SIM115
     try:
         file = h5py.File(below, "r")
-    except OSError as error:
-        below.close()
-        reason = str(error).splitlines()[0]
-        raise FileError(f"'{path}' {_DAMAGED} ({reason}): compute it again or restore a copy") from error
-    try:
-        schema = file["fastcontact"].attrs["schema"] if "fastcontact" in file else None
-    except (OSError, RuntimeError, KeyError) as error:
-        file.close()
-        raise FileError(f"'{path}' {_DAMAGED} ({error}): compute it again or restore a copy") from error
-    if schema is None or schema > layout.SCHEMA:
-        file.close()
+        check_contents(file, path)
+        schema = int(file["fastcontact"].attrs["schema"]) if "fastcontact" in file else None
         if schema is None:
             raise FileError(f"'{path}' holds no fastcontact results: name a file that fastcontact wrote (.vtkhdf)")
-        raise FileError(f"'{path}' has schema {schema}, this fastcontact reads up to {layout.SCHEMA}: update it")
+        if schema > layout.SCHEMA:
+            raise FileError(f"'{path}' has schema {schema}, this fastcontact reads up to {layout.SCHEMA}: update it")
+    except BaseException as error:
+        below.close()
+        if isinstance(error, FileError) or not isinstance(error, Exception):
+            raise
+        raise FileError(f"'{path}' {_DAMAGED} ({_reason(error)}): compute it again or restore a copy") from error
     return file, below
 
 
@@ -310,7 +327,7 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
     step = pair["steps"][number]
     first, count = int(step["first"]), int(step["count"])
     rows = pair["rows"][first : first + count]
-    if len(rows) != count:
+    if len(rows) != count or first < 0:
         raise ValueError(f"the contact table of '{name}' is cut off")
     columns = {column: np.ascontiguousarray(rows[column]) for column in rows.dtype.names}
     for mask in {"active", "sticking"} & set(columns):

@@ -54,6 +54,16 @@ def _continues(start: Indices, rows: Indices, j: int) -> bool:
 
 
 @kernel
+def unit_diagonal(start: Indices, values: Array, d: Array) -> None:
+    """Turn the factor L of ``L L.T``, the diagonal first in every column, into that of ``L D L.T``; fill d (n,)."""
+    for j in range(len(d)):
+        pivot = values[start[j]]
+        d[j] = pivot * pivot
+        for k in range(start[j], start[j + 1]):
+            values[k] /= pivot
+
+
+@kernel
 def forward(start: Indices, values: Array, first: Offsets, begin: Offsets, rows: Indices, x: Array) -> None:
     """Replace x (n,) by ``L^-1 x``."""
     moved = np.empty(len(x))

@@ -12,14 +12,21 @@ from fastcontact.errors import ModelError
 from fastcontact.linear._compliance import ComplianceCache, multipliers, reduced
 from fastcontact.linear._known_loads import KnownLoads
 from fastcontact.linear._solver import Counters, Monitor
+from fastcontact.linear._symmetric import SymmetricFactors
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+# Beyond this many unknowns last, their dense block costs more than the solutions it saves.
+LAST_UP_TO = 4000
 SINGULAR = "the stiffness matrix is singular: support the rigid-body motions of every body"
 
 
 class FactorSolver:
     """A direct solver; sub-classes factorise and solve.
+
+    Where a sub-class gives symmetric factors with the unknowns last that constraints may involve, their compliance then
+    is the inverse of the trailing block, ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, and costs no solution with K at all; what
+    the other unknowns do under contact forces follows from theirs by half a solution.
 
     Parameters
     ----------
@@ -34,6 +41,7 @@ class FactorSolver:
         self.tolerance = 1e-14  # round-off, whatever was asked
         self.counters = Counters()
         self.n = 0
+        self._symmetric: SymmetricFactors | None = None
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({f'{self.n} unknowns' if self.n else 'not prepared'})"
@@ -52,9 +60,15 @@ class FactorSolver:
         """Return ``K^-1 F`` for right-hand sides (n,) or (n, k)."""
         raise NotImplementedError
 
-    def _extended(self, u: Array) -> Array:
-        """Return the displacement (n,) under forces on the unknowns `last` alone, which move by u (m,)."""
-        raise NotImplementedError
+    def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors | None:
+        """Factorise K (n, n) with the unknowns `last` (m,) last; None from solvers that cannot.
+
+        Raises
+        ------
+        ModelError
+            If K is singular.
+        """
+        return None
 
     def prepare(self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None) -> None:
         """Factorise K; see `LinearSolver.prepare`.
@@ -64,18 +78,20 @@ class FactorSolver:
         ModelError
             If K is singular.
         """
-        self.n = K.shape[0]
-        self._factorise(K.tocsc())
+        self.n, self._symmetric, self.last = K.shape[0], None, None
+        if involved is not None and 0 < len(involved) <= LAST_UP_TO:
+            self._symmetric = self._with_last(K, involved)
+        if self._symmetric is None:
+            self._factorise(K.tocsc())
         self.counters.setups += 1
-        self._begin()
-
-    def _begin(self, last: Indices | None = None, inverse: Array | None = None) -> None:
-        """Forget other matrices; take rows and columns `last` (m,) of ``K^-1`` (m, m), where the factors give them."""
-        self.compliance = ComplianceCache(self.n, self._solve)
-        self.last, self._inverse = last, inverse
-        if last is not None and inverse is not None:
-            self.compliance.give(last, inverse)
+        self.compliance = ComplianceCache(self.n, self._solution)
         self.known_loads = KnownLoads()
+        if self._symmetric is not None:
+            self.last, self._inverse = involved, self._symmetric.last_inverse()
+            self.compliance.give(self.last, self._inverse)
+
+    def _solution(self, F: Array) -> Array:
+        return self._solve(F) if self._symmetric is None else self._symmetric.solve(F)
 
     def load(self, f: Array) -> Any:
         """Return the prepared matrix with right-hand side `f`."""
@@ -88,22 +104,22 @@ class FactorSolver:
     def remember(self, memory: dict[str, Any]) -> None:
         """See `LinearSolver.remember`."""
         self.compliance.ask_again(memory["asked"])
-        self.known_loads.remember(memory["loads"], self.n, self._solve)
+        self.known_loads.remember(memory["loads"], self.n, self._solution)
 
     def response(self, force: Array) -> Array:
         """Return what forces on the unknowns `last` (m,) move these by."""
-        assert self._inverse is not None
-        return self._inverse @ force
+        return np.asarray(self._inverse @ force)
 
     def back_substitute(self, f: Array) -> Array:
         """Return ``K^-1 f``."""
         self.counters.iterations += 1
-        return self._solve(f)
+        return self._solution(f)
 
     def extend(self, u: Array) -> Array:
         """Return the displacement (n,) under forces on the unknowns `last` alone, which move by u (m,)."""
+        assert self._symmetric is not None
         self.counters.iterations += 1
-        return self._extended(u)
+        return self._symmetric.extended(u)
 
 
 class LoadedFactor:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import select
 import shutil
 import subprocess
 import sys
@@ -126,6 +125,8 @@ def _one(process: subprocess.Popen, number: int) -> dict:
 
 
 def _answer(process: subprocess.Popen) -> dict | None:
-    ready, _, _ = select.select([process.stdout], [], [], WALL_SECONDS)
-    line = process.stdout.readline() if ready else ""
-    return json.loads(line) if line else None
+    killer = threading.Timer(WALL_SECONDS, process.kill)
+    killer.start()
+    line = process.stdout.readline()
+    killer.cancel()
+    return json.loads(line) if line.endswith("\n") else None

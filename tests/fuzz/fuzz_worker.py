@@ -14,12 +14,17 @@ import time
 import warnings
 from pathlib import Path
 
+import fastcontact
 import fuzz_files
 import fuzz_readers
 
 MEMORY = 1 << 30  # bytes more than a process that has read all formats once
 SECONDS = 10
 _OPENED = 0x20 | 0x2 | 0x100 | 0x200  # IN_OPEN, IN_MODIFY, IN_CREATE, IN_DELETE
+
+
+# Where Python, the libraries and fastcontact itself read from.
+CODE = (sys.prefix, sys.base_prefix, os.path.dirname(fastcontact.__file__), "/proc", "/sys", "/dev", "/usr/lib")
 
 
 class Watch:
@@ -52,7 +57,7 @@ class Opened:
         if not isinstance(name, (str, bytes)):
             return
         full = os.path.realpath(os.fsdecode(name).replace("\0", "?"))
-        known = full.startswith((self._folder, sys.prefix, sys.base_prefix, "/proc", "/sys", "/dev", "/usr/lib"))
+        known = full.startswith((self._folder, *CODE))
         if not known and "__pycache__" not in full and not full.endswith((".py", ".pyc", ".med")):
             self.names.append(f"{event} {full}")
 

@@ -163,14 +163,19 @@ def test_no_convergence_is_exit_code_two_and_keeps_finished_steps(solved, tmp_pa
     case.write_text(text.replace("steps = 3", "instants = [0.001, 1.0]"))
     code = main(["run", str(case), "-o", str(tmp_path / "hard.vtkhdf")])
     assert code == 2
-    told = capsys.readouterr().err
+    cut, told, *history = capsys.readouterr().err.splitlines()
+    assert cut.startswith("step 2 from 0.001 to 1 does not converge, cut in halves: the contact geometry did not settle")
     assert told.startswith("no convergence: ")
     assert "step 2 was cut in halves once, the part from " in told
+    assert [line.split()[0] for line in history] == ["iterations", "1", "2", "3"]
     results = fc.open_results(tmp_path / "hard.vtkhdf")
     assert len(results) == 1
     assert not results.complete
     assert results.error.split(": ", 1) == ["ConvergenceError", told.removeprefix("no convergence: ").strip()]
     assert [entry["displacement_change"] > 0 for entry in results.log["failed_step"]] == [True] * 3
+    (name, nodes), = results.log["failed_step"][-1]["nodes"].items()
+    assert (name, len(nodes)) == ("hertz", 3)
+    assert f"most at points {nodes[0]} [" in told
 
 
 def test_steps_and_pairs_that_do_not_exist(solved, capsys):
@@ -180,11 +185,12 @@ def test_steps_and_pairs_that_do_not_exist(solved, capsys):
     assert "'hertz'" in capsys.readouterr().err
 
 
-def test_nothing_is_printed_when_quiet(solved, tmp_path, capsys):
+def test_nothing_but_warnings_is_printed_when_quiet(solved, tmp_path, capsys):
     assert main(["run", str(solved / "small.toml"), "-q", "-o", str(tmp_path / "q.vtkhdf")]) == 0
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert captured.err == ""
+    assert captured.err.startswith("warning: contact 'hertz' has only 3 elements across its radius")
+    assert captured.err.count("\n") == 1
 
 
 def test_environment_is_shown(capsys):

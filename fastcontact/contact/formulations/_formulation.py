@@ -233,15 +233,16 @@ class Formulation(ABC):
         first = close[np.argmin(np.linalg.norm(positions[close], axis=1))]
         return positions[first], normal[first]
 
-    def nodal_gap(self, displacement: Array) -> tuple[Array, Array]:
+    def nodal_gap(self, displacement: Array, with_clearance: bool = True) -> tuple[Array, Array]:
         """Return the gap (n_nodes,) of the secondary nodes in the displaced configuration, and the normals faced.
 
-        Infinite where a node faces no primary facet.
+        Infinite where a node faces no primary facet. Clearances count unless they are left out.
         """
         nodes = Candidates(self.secondary.points[:, None], np.ones((len(self.secondary.points), 1)))
         deformed = self.points + displacement
         tolerance = max(self.projection_tolerance, ON_SYMMETRY)
         pairing = pair(nodes.positions(deformed), self.primary, deformed, tolerance, self.normals)
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
-        gap0 += self.terms.added_gap(nodes, pairing, self.primary, self.points)
+        if with_clearance:
+            gap0 += self.terms.added_gap(nodes, pairing, self.primary, self.points)
         return np.where(pairing.paired, gap0 + G @ displacement.ravel(), np.inf), pairing.normal

@@ -1,0 +1,470 @@
+"""Result files survive whatever ends their writer, and are written on after it; files of old schemas are read for ever."""
+
+from __future__ import annotations
+
+import gzip
+import importlib.util
+import json
+import os
+import shutil
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_result_files import MESH, assert_same, step_result
+
+import fastcontact as fc
+from fastcontact import ConvergenceError, FileError, ModelError, ResultWriter, open_results
+from fastcontact.io import _commits
+from fastcontact.io._packing import packed, unpacked
+
+RESOURCES = Path(__file__).parent / "resources"
+OLD = sorted(path.name.removesuffix(".vtkhdf.gz") for path in RESOURCES.glob("*.vtkhdf.gz"))
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "run.vtkhdf"
+
+
+def spheres(E: float = 20_000.0, friction: float = 0.0, arc: float = 3.0) -> fc.Model:
+    mesh = fc.generate.half_spheres("quad4", arc_sizes=(arc, 6.0), segments=3)
+    model = fc.Model(mesh, "axisymmetric", case_text="first")
+    model.add_material(fc.LinearElastic(E=E, nu=0.3))
+    model.fix("A1A2", "x")
+    model.prescribe("A2B2", y=-2.0)
+    model.prescribe("A1B1", y=+2.0)
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2", friction=friction)
+    return model
+
+
+def begun(path: Path, instants: tuple[float, ...], model: fc.Model | None = None) -> list[fc.StepResult]:
+    """A file with some steps, complete for a short ramp."""
+    model = model or spheres()
+    with ResultWriter(path, model) as out:
+        return fc.solve(model, fc.Ramp(instants), on_step=out.write)
+
+
+def resumed(path: Path, ramp: fc.Ramp, model: fc.Model | None = None, **options) -> list[fc.StepResult]:
+    model = model or spheres()
+    with ResultWriter(path, model, resume=True) as out:
+        return fc.solve(model, ramp, on_step=out.write, resume=out.done, **options)
+
+
+# ---------------------------------------------------------------------------------------------- old schemas
+
+
+def test_there_are_old_files() -> None:
+    assert OLD == ["schema1-before-friction", "schema1-friction", "schema1-obstacle"]
+
+
+@pytest.fixture(params=OLD)
+def old(request: pytest.FixtureRequest, path: Path) -> tuple[Path, dict]:
+    """A file of an earlier version, and what that version had in memory."""
+    path.write_bytes(gzip.decompress((RESOURCES / f"{request.param}.vtkhdf.gz").read_bytes()))
+    return path, json.loads((RESOURCES / f"{request.param}.json").read_text(encoding="utf-8"))
+
+
+def test_old_files_are_read(old: tuple[Path, dict]) -> None:
+    path, told = old
+    with open_results(path) as results:
+        assert results.schema == 1
+        assert results.complete
+        assert results.mesh.n_points == told["n_points"]
+        assert results.case_text == 'title = "old"\n'
+        assert len(results) == len(told["steps"]) == 2
+        for step, expected in zip(results, told["steps"], strict=True):
+            assert (step.index, step.load_factor) == (expected["index"], expected["load_factor"])
+            assert step.iterations == expected["iterations"]
+            assert step.restart is None
+            for name in ("displacement", "stress", "von_mises", "von_mises_signed", "reaction"):
+                values = getattr(step, name)
+                assert [values.sum(), np.abs(values).max()] == expected[name], name
+            (contact,) = step.contact.values()
+            for name, values in expected["contact"].items():
+                np.testing.assert_array_equal(getattr(contact, name), values, err_msg=name)
+
+
+def test_old_files_cannot_be_resumed_and_stay_as_they_are(old: tuple[Path, dict]) -> None:
+    path, before = old[0], old[0].read_bytes()
+    with pytest.raises(FileError, match="was written by an earlier fastcontact, which kept nothing to go on from: name"):
+        ResultWriter(path, open_results(path).mesh, resume=True)
+    assert path.read_bytes() == before
+
+
+# ------------------------------------------------------------------------------------- any write may be last
+
+
+def recorded(path: Path, n_steps: int, monkeypatch: pytest.MonkeyPatch) -> tuple[list[tuple[int, bytes]], list[int]]:
+    """All writes after the file was begun, and how many of them each step took; the begun file is left in `crashed`."""
+    writes: list[tuple[int, bytes]] = []
+    put = _commits.CommittedFile._put
+
+    def record(self: _commits.CommittedFile, place: int, data: bytes) -> None:
+        writes.append((place, bytes(data)))
+        put(self, place, data)
+
+    monkeypatch.setattr(_commits.CommittedFile, "_put", record)
+    ends = []
+    with ResultWriter(path, MESH) as out:
+        shutil.copy(path, path.with_name("crashed.vtkhdf"))
+        for number in range(n_steps):
+            out.write(step_result(number % 5))
+            ends.append(len(writes))
+    return writes, ends
+
+
+@pytest.mark.parametrize(("n_steps", "from_step"), [(2, 0), (65, 64)])
+def test_every_write_may_be_the_last_one(
+    n_steps: int, from_step: int, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With step 65 the nodes of HDF5's indices are full and fall in two."""
+    writes, ends = recorded(path, n_steps, monkeypatch)
+    begin = ends[from_step - 1] if from_step else 0
+    assert len(writes) > begin + 100
+    crashed = path.with_name("crashed.vtkhdf")
+    with open(crashed, "r+b", buffering=0) as file:
+        file.truncate(path.stat().st_size + 100_000)  # what was reserved
+        for number, (place, data) in enumerate(writes, start=1):
+            file.seek(place)
+            file.write(data)
+            if number < begin:
+                continue
+            finished = sum(end <= number for end in ends)
+            with open_results(crashed) as results:
+                assert finished <= len(results) <= finished + 1
+                several = {0, len(results) // 2, *range(max(len(results) - 8, 0), len(results), 2)} if len(results) else ()
+                for which in several:
+                    assert_same(results[which], step_result(which % 5), f"write {number}, step {which}")
+                expected = [step_result(which % 5).load_factor for which in range(len(results))]
+                assert list(results.load_factors) == expected
+                assert list(results._file["VTKHDF/Steps/Values"][: len(results)]) == expected
+
+
+def test_a_committed_file_is_a_file(tmp_path: Path) -> None:
+    """Random reads and writes against bytes in memory."""
+    random = np.random.default_rng(5)
+    path = tmp_path / "bytes"
+    image = bytearray(random.bytes(300))
+    path.write_bytes(image)
+    file = _commits.CommittedFile(path)
+    for _ in range(2000):
+        place, size = int(random.integers(0, 400)), int(random.integers(1, 60))
+        file.seek(place)
+        action = random.random()
+        if action < 0.5:
+            data = random.bytes(size)
+            image.extend(bytes(max(place + size - len(image), 0)))
+            image[place : place + size] = data
+            file.write(data)
+        elif action < 0.95:
+            assert file.read(size) == bytes(image[place : place + size]).ljust(size, b"\0")
+            assert file.tell() == place + size
+        else:
+            file.flush()
+            assert path.read_bytes() == image
+    assert file.seek(0, os.SEEK_END) == len(image)
+    file.truncate(len(image))
+    file.flush()
+    file.close()
+    file.close()
+    assert path.read_bytes() == image
+
+
+# ------------------------------------------------------------------------------------------- writing on
+
+
+def test_a_run_in_two_parts_is_the_run_in_one(path: Path) -> None:
+    whole = begun(path.with_name("whole.vtkhdf"), (0.25, 0.5, 0.75, 1.0), spheres(friction=0.3))
+    begun(path, (0.25, 0.5), spheres(friction=0.3))
+    assert open_results(path).complete
+    steps = resumed(path, fc.linear_ramp(4), spheres(friction=0.3))
+    assert [step.index for step in steps] == [1, 2, 3, 4]
+    results = open_results(path)
+    assert results.complete
+    assert len(results) == 4
+    for found, again, expected in zip(results, steps, whole, strict=True):
+        size = np.abs(expected.displacement).max()
+        assert np.abs(found.displacement - expected.displacement).max() <= 1e-10 * size
+        np.testing.assert_array_equal(found.displacement, again.displacement)
+        assert found.contact["hertz"].dissipation == pytest.approx(expected.contact["hertz"].dissipation, abs=1e-6)
+        assert found.iterations["history"] == again.iterations["history"]
+    assert [step.restart is None for step in results] == [True, True, True, False]
+
+
+def test_without_a_file_or_without_a_step_a_run_begins(path: Path) -> None:
+    with ResultWriter(path, spheres(arc=2.0), resume=True) as out:
+        assert (out.done, out.n_steps) == ([], 0)
+    assert len(resumed(path, fc.linear_ramp(1))) == 1
+    assert len(open_results(path)) == 1
+
+
+def test_a_finished_file_stays_as_it_is(path: Path) -> None:
+    begun(path, (0.5, 1.0))
+    before = path.read_bytes(), path.stat().st_mtime_ns
+    steps = resumed(path, fc.linear_ramp(2))
+    assert [step.load_factor for step in steps] == [0.5, 1.0]
+    assert (path.read_bytes(), path.stat().st_mtime_ns) == before
+    assert os.listdir(path.parent) == [path.name]
+
+
+def test_a_file_whose_writer_died_before_it_could_say_so_is_finished(path: Path) -> None:
+    model = spheres()
+    out = ResultWriter(path, model)
+    fc.solve(model, fc.linear_ramp(2), on_step=out.write)
+    del out
+    assert not open_results(path).complete
+    resumed(path, fc.linear_ramp(2))
+    assert open_results(path).complete
+
+
+def test_what_a_dead_writer_left_of_a_step_is_written_over(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with ResultWriter(path, MESH, cell_fields=("error",)) as out:
+        steps = [_with_error(step_result(number)) for number in range(3)]
+        out.write(steps[0])
+        with monkeypatch.context() as patch:
+            patch.setattr(out, "_append_step_rows", lambda step: (_ for _ in ()).throw(KeyboardInterrupt))
+            with pytest.raises(KeyboardInterrupt):
+                out.write(steps[2])
+    with ResultWriter(path, MESH, cell_fields=("error",), resume=True) as out:
+        assert_same(out.done[0], steps[0])
+        out.write(steps[1])
+    for found, expected in zip(open_results(path), steps[:2], strict=True):
+        assert_same(found, expected)
+
+
+def _with_error(step: fc.StepResult) -> fc.StepResult:
+    import dataclasses
+
+    count = sum(map(len, MESH.solids.values()))
+    return dataclasses.replace(step, cell_fields={"error": np.full(count, float(step.index))})
+
+
+def test_a_failed_run_is_tried_again_from_its_last_step(path: Path) -> None:
+    few = fc.Criteria(max_geometry_updates=8, max_halvings=0)
+    ramp = fc.Ramp((0.05, 0.1, 1.0))
+    with pytest.raises(ConvergenceError):
+        resumed(path, ramp, spheres(friction=0.3), criteria=few)
+    results = open_results(path)
+    assert not results.complete
+    n_steps = len(results)
+    assert 0 < n_steps < 3
+    assert "did not settle in 8 updates" in results.error
+    with pytest.raises(ConvergenceError):
+        resumed(path, ramp, spheres(friction=0.3), criteria=few)
+    assert "did not settle in 8 updates" in open_results(path).error
+    resumed(path, ramp, spheres(friction=0.3))
+    results = open_results(path)
+    assert results.complete
+    assert results.error == ""
+    assert len(results) == 3
+    (whole,) = fc.solve(spheres(friction=0.3), ramp)[2:]
+    assert np.abs(results[2].displacement - whole.displacement).max() <= 1e-10 * np.abs(whole.displacement).max()
+
+
+def test_the_case_text_of_the_last_steps_counts(path: Path) -> None:
+    begun(path, (0.5,))
+    model = spheres()
+    model.case_text = "second"
+    resumed(path, fc.linear_ramp(2), model)
+    assert open_results(path).case_text == "second"
+
+
+# --------------------------------------------------------------------------------------------- refusals
+
+
+def other_cases() -> dict[str, tuple[fc.Model, fc.Ramp, str]]:
+    ramp = fc.linear_ramp(2)
+    material, support, contact, friction = spheres(E=1e4), spheres(), spheres(), spheres(friction=0.1)
+    support.fix("A1A2", "y")
+    contact.contact[0].options["projection_tolerance"] = 0.4
+    return {
+        "material": (material, ramp, "the materials differs?"),
+        "support": (support, ramp, "the supports differs?"),
+        "contact": (contact, ramp, "contact 'hertz' differs"),
+        "friction": (friction, ramp, "contact 'hertz' differs"),
+        "ramp": (spheres(), fc.Ramp((0.5, 1.0), ((0.0, 0.0), (1.0, 0.9))), "the load history up to 0.5 differs"),
+    }
+
+
+@pytest.mark.parametrize("name", list(other_cases()))
+def test_another_case_is_refused_and_changes_nothing(name: str, path: Path) -> None:
+    begun(path, (0.5,))
+    before = path.read_bytes()
+    model, ramp, message = other_cases()[name]
+    with pytest.raises(ModelError, match=f"the steps so far belong to another case: {message}. Go on with what"):
+        resumed(path, ramp, model)
+    assert path.read_bytes() == before
+    assert os.listdir(path.parent) == [path.name]
+
+
+def test_other_options_that_change_the_answer_are_refused(path: Path) -> None:
+    begun(path, (0.5,))
+    with pytest.raises(ModelError, match="the option geometry_updates, the option keep_pairing differ"):
+        resumed(path, fc.linear_ramp(2), criteria=fc.Criteria(keep_pairing=True, geometry_updates=0))
+
+
+def test_another_mesh_is_refused(path: Path) -> None:
+    begun(path, (0.5,))
+    before = path.read_bytes()
+    with pytest.raises(FileError, match="belongs to another mesh: resume the case it was begun for, or start anew"):
+        ResultWriter(path, spheres(arc=2.0), resume=True)
+    with pytest.raises(FileError, match="belongs to another kinematics"):
+        ResultWriter(path, spheres().mesh, kinematics="plane_strain", resume=True)
+    with pytest.raises(FileError, match=r"hold the cell fields none, not \['error'\]: ask for the same ones"):
+        ResultWriter(path, spheres(), cell_fields=("error",), resume=True)
+    assert path.read_bytes() == before
+    assert os.listdir(path.parent) == [path.name]
+
+
+def test_steps_without_their_state_are_refused(path: Path) -> None:
+    with ResultWriter(path, MESH) as out:
+        out.write(step_result(0))
+    model = fc.Model(spheres().mesh, "axisymmetric")
+    with ResultWriter(path, MESH, resume=True) as out, pytest.raises(ModelError, match="does not hold what it takes"):
+        fc.solve(model, resume=out.done)
+
+
+def test_a_second_writer_cannot_resume_either(path: Path) -> None:
+    begun(path, (0.5,))
+    with ResultWriter(path, spheres(), resume=True):
+        with pytest.raises(FileError, match=f"is being written by process {os.getpid()}"):
+            ResultWriter(path, spheres(), resume=True)
+    assert len(resumed(path, fc.linear_ramp(2))) == 2
+
+
+def test_what_is_no_result_is_not_resumed(path: Path) -> None:
+    path.write_text("mine")
+    with pytest.raises(FileError, match="is no HDF5 file"):
+        ResultWriter(path, MESH, resume=True)
+    assert path.read_text() == "mine"
+    assert os.listdir(path.parent) == [path.name]
+
+
+# ------------------------------------------------------------------------------------------- accidents
+
+
+def test_a_folder_that_vanishes_is_told_at_the_next_step(tmp_path: Path) -> None:
+    folder = tmp_path / "here"
+    folder.mkdir()
+    model = spheres()
+
+    def on_step(step: fc.StepResult) -> None:
+        out.write(step)
+        folder.rename(tmp_path / "there")
+
+    with pytest.raises(FileError, match="is no longer there: .*, moved or replaced after 1 steps. Put it back and resume"):
+        with ResultWriter(folder / "run.vtkhdf", model) as out:
+            fc.solve(model, fc.linear_ramp(3), on_step=on_step)
+    moved = tmp_path / "there" / "run.vtkhdf"
+    results = open_results(moved)
+    assert len(results) == 1
+    assert "no longer there" in results.error
+    assert len(resumed(moved, fc.linear_ramp(3))) == 3
+
+
+FULL = """
+    import sys
+    sys.path.insert(0, sys.argv[1])
+    import test_resume as t
+    t.resumed(t.Path(sys.argv[2]), t.fc.linear_ramp(60))
+"""
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path):
+    """A folder with room for a megabyte."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    if os.name != "posix" or os.geteuid() != 0 or shutil.which("mount") is None:
+        pytest.skip("only root may mount a small file system")
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(folder)], capture_output=True)
+    if mounted.returncode:
+        pytest.skip(f"no small file system here: {mounted.stderr.decode().strip()}")
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_a_full_disk_costs_no_step_and_the_run_goes_on_when_there_is_room(small_disk: Path, path: Path) -> None:
+    full = small_disk / "run.vtkhdf"
+    command = [sys.executable, "-c", textwrap.dedent(FULL), str(Path(__file__).parent), str(full)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    last = done.stderr.strip().splitlines()[-1]
+    assert done.returncode == 1
+    assert f"'{full}' cannot be written at step" in last
+    assert "No space left on device" in last
+    n_steps = len(open_results(full))
+    assert f"{n_steps} steps are complete: see whether the disk is full" in last
+    assert 0 < n_steps < 60
+    shutil.copy(full, path)
+    assert len(resumed(path, fc.linear_ramp(60))) == 60
+    whole = fc.solve(spheres(), fc.linear_ramp(60))[-1]
+    last_step = open_results(path)[-1]
+    assert np.abs(last_step.displacement - whole.displacement).max() <= 1e-12 * np.abs(whole.displacement).max()
+
+
+LIMITED = """
+    import resource, signal, sys
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), int(sys.argv[3])))
+""" + FULL.replace("import sys\n", "\n", 1)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("resource") is None, reason="needs resource limits")
+def test_a_limit_of_file_sizes_costs_no_step_of_a_resumed_run(path: Path) -> None:
+    begun(path, (1 / 60,))
+    limit = path.stat().st_size + 900_000
+    command = [sys.executable, "-c", textwrap.dedent(LIMITED), str(Path(__file__).parent), str(path), str(limit)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    last = done.stderr.strip().splitlines()[-1]
+    assert done.returncode == 1
+    assert f"'{path}' cannot be written at step" in last
+    n_steps = len(open_results(path))
+    assert 1 < n_steps < 60
+    assert len(resumed(path, fc.linear_ramp(60))) == 60
+
+
+# ---------------------------------------------------------------------------------------------- packing
+
+
+def test_packed_data_come_back() -> None:
+    arrays = [np.arange(6.0).reshape(2, 3), np.array([True, False]), np.empty((0, 2)), np.arange(3, dtype=np.int32).T]
+    data = {"a": [1, 2.5, None, True, "é", float("inf")], "b": {"c": arrays, "": {}}, "n": np.float64(0.1)}
+    raw = packed(data)
+    found = unpacked(np.concatenate([raw, np.zeros(9, np.uint8)]))
+    assert found["a"] == data["a"]
+    assert found["n"] == 0.1
+    for one, other in zip(found["b"]["c"], arrays, strict=True):
+        assert one.dtype == other.dtype
+        np.testing.assert_array_equal(one, other)
+
+
+def test_damaged_packed_data_are_noticed() -> None:
+    raw = packed({"a": np.arange(20.0)})
+    random = np.random.default_rng(1)
+    for _ in range(200):
+        changed = raw.copy()
+        changed[random.integers(0, len(raw))] ^= np.uint8(1 << random.integers(0, 8))
+        with pytest.raises((ValueError, LookupError, TypeError)):
+            found = unpacked(changed)
+            if np.array_equal(found["a"], np.arange(20.0)):  # blanks, or names that nobody asks for
+                raise ValueError
+    for size in (0, 10, len(raw) - 1):
+        with pytest.raises((ValueError, LookupError, TypeError)):
+            unpacked(raw[:size])
+    with pytest.raises(ValueError, match="is none of ours"):
+        unpacked(packed({"a": np.array(["text"])}))
+
+
+def test_a_damaged_state_is_no_state(path: Path) -> None:
+    import h5py
+
+    begun(path, (0.5,))
+    with h5py.File(path, "r+") as file:
+        file["fastcontact/restart0"][50] ^= 255
+    assert open_results(path)[-1].restart is None
+    with pytest.raises(ModelError, match="does not hold what it takes to go on from it"):
+        resumed(path, fc.linear_ramp(2))
