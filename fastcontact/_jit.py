@@ -17,12 +17,15 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import numba
 
+from fastcontact.errors import FastcontactError
+
 log = logging.getLogger("fastcontact")
 
 # Contraction to fused multiply-add only: NaN, infinities and the order of sums stay as written.
 FASTMATH = {"contract"}
 
 _cache_reported = False
+_forked_without_threads = False
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -47,6 +50,37 @@ def _compile(function: Callable[..., Any], parallel: bool) -> Any:
             _cache_reported = True
             log.info("no writable folder for compiled kernels (set NUMBA_CACHE_DIR): compiling in every process")
         return numba.njit(cache=False, **options)(function)
+
+
+def _notice_fork() -> None:
+    global _forked_without_threads
+    try:
+        _forked_without_threads = numba.threading_layer() == "omp" and not numba.config.DISABLE_JIT
+    except ValueError:  # no parallel kernel was loaded yet: the child starts threads of its own
+        pass
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_notice_fork)
+
+
+def check_threads() -> None:
+    """Refuse parallel kernels where they would end the process: in a child forked after their threads had started.
+
+    The threads of GNU's OpenMP do not survive a fork; its library ends such a child without an exception, and a process
+    pool then waits for ever.
+
+    Raises
+    ------
+    FastcontactError
+        If this process was forked from one that had started the threads.
+    """
+    if _forked_without_threads:
+        raise FastcontactError(
+            "this process was forked after its parent had started the threads of the compiled kernels, and those do not "
+            "survive a fork: start processes by multiprocessing's 'spawn' or 'forkserver', or set "
+            "NUMBA_THREADING_LAYER=workqueue"
+        )
 
 
 def set_threads(count: int) -> None:

@@ -382,8 +382,8 @@ class Analysis:
             raise ConvergenceError(
                 f"the contact geometry did not settle in {limit} updates: the displacement still changes by "
                 f"{history[-1]['displacement_change']:.1e} of its largest component, most at "
-                f"{self._named_nodes(history[-1]['nodes'])}, {history[-1]['active']} constraints are active. Use more load steps, a finer mesh on the primary side, {self._smoother()}or a "
-                "fixed number of updates",
+                f"{self._named_nodes(history[-1]['nodes'])}, {history[-1]['active']} constraints are active. Use more "
+                f"load steps, a finer mesh on the primary side, {self._smoother()}or a fixed number of updates",
                 history,
             )
         self.unsettled = (limit, history[-1]["displacement_change"]) if limit and not criteria.keep_pairing else None
@@ -615,11 +615,16 @@ class Analysis:
             tuple(self._warn(index, instant, stress, contact, last)),
         )  # fmt: skip
 
-    def _warn(self, index: int, instant: float, stress: Array, contact: dict[str, ContactResult], last: bool) -> list[str]:
+    def _warn(
+        self, index: int, instant: float, stress: Array, contact: dict[str, ContactResult], last: bool
+    ) -> list[str]:
         """Warn of what is doubtful: of the model at the first step, of the state at the last one."""
-        found = doubts.at_the_end(self, instant, stress, contact) if last else []
-        if last and self.unsettled:
-            found += doubts.unsettled(*self.unsettled)
+        found = []
+        if last:
+            loaded = bool(self.external.any() or self._lift(instant).any())
+            found = doubts.at_the_end(self, stress, contact, loaded)
+            if self.unsettled:
+                found += doubts.unsettled(*self.unsettled)
         for text in found:
             warnings.warn(text, FastcontactWarning, stacklevel=4)
         return self.doubts * (index == 1) + found

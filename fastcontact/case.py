@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from reprlib import repr
 from typing import Any
 
 from fastcontact import analytic, generate
@@ -147,12 +148,16 @@ def read_case(path: str | Path) -> Case:
         raise CaseError(f"cannot read the case file '{path}': {_unreadable(path, error)}") from error
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # tomllib's own error, and those of numbers too long, tables too deep
         raise CaseError(f"the case file '{path}' is not valid TOML: {error}") from error
     try:
         return build_case(data, name=path.stem, folder=path.parent, text=text)
     except CaseError as error:
         raise CaseError(f"{path}: {error}") from error
+    except (ArithmeticError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError) as error:
+        # A value that passed all checks by key; what Python says of it is the best there is to tell.
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        raise CaseError(f"{path}: a value is of the wrong kind or size ({reason}): see the ready cases") from error
 
 
 def _unreadable(path: Path, error: Exception) -> str:
@@ -233,7 +238,7 @@ def build_case(
 def _check_keys(where: str, data: Any, known: Mapping[str, Any]) -> None:
     """Raise CaseError for a key that is not in `known`, or a value not of the type there (None: any)."""
     if not isinstance(data, dict):
-        raise CaseError(f"'{where}' must be a table of keys, not {data!r}")
+        raise CaseError(f"'{where}' must be a table of keys, not {repr(data)}")
     for key, value in data.items():
         label = f"{where}.{key}" if where else key
         if key not in known:
@@ -241,7 +246,7 @@ def _check_keys(where: str, data: Any, known: Mapping[str, Any]) -> None:
         kind = known[key]
         if kind is not None and (not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool)):
             names = " or ".join(k.__name__ for k in (kind if isinstance(kind, tuple) else (kind,)))
-            raise CaseError(f"the value of '{label}' must be of type {names}, not {value!r}")
+            raise CaseError(f"the value of '{label}' must be of type {names}, not {repr(value)}")
 
 
 def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) -> Any:
@@ -260,11 +265,11 @@ def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) 
     for key, value in arguments.items():
         wanted = str(parameters[key].annotation)
         if "float" in wanted and isinstance(value, str) and "str" not in wanted:
-            raise CaseError(f"the value of '{where}.{key}' must be a number, not {value!r}")
+            raise CaseError(f"the value of '{where}.{key}' must be a number, not {repr(value)}")
     try:
         return function(**arguments)
     except (TypeError, ValueError) as error:
-        given = ", ".join(f"{key} = {value!r}" for key, value in arguments.items())
+        given = ", ".join(f"{key} = {repr(value)}" for key, value in arguments.items())
         raise CaseError(f"'{where}': {given} are not of the kinds that it takes ({error})") from error
     except FastcontactError as error:
         raise CaseError(f"'{where}': {error}") from error
@@ -278,6 +283,8 @@ def _at(where: str) -> Iterator[None]:
     except CaseError:
         raise
     except FastcontactError as error:
+        if where.replace(".", " '", 1) + "'" in str(error):  # it says so itself
+            raise
         raise type(error)(f"{where}: {error}") from error
 
 
@@ -294,7 +301,7 @@ def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:
     if "generator" not in data:
         raise CaseError("'mesh' needs either the key 'file' or the key 'generator'")
     name = data["generator"]
-    if name not in generate.GENERATORS:
+    if not isinstance(name, str) or name not in generate.GENERATORS:
         raise CaseError(unknown("mesh.generator", str(name), generate.GENERATORS))
     arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in data.items() if key != "generator"}
     return called("mesh", generate.GENERATORS[name], arguments)
@@ -384,7 +391,9 @@ def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
     for term in entry.get("terms", []):
         kinds: list[Any] = [(str, int), str, _NUMBER]
         if not isinstance(term, list) or len(term) != 3 or not all(isinstance(v, k) for v, k in zip(term, kinds)):
-            raise CaseError(f"'{where}.terms' must be a list of [group or point, component, coefficient], not {term!r}")
+            raise CaseError(
+                f"'{where}.terms' must be a list of [group or point, component, coefficient], not {repr(term)}"
+            )
     return arguments
 
 
@@ -444,7 +453,7 @@ def _share(where: str, data: dict[str, Any]) -> float:
 def _theory(where: str, data: dict[str, Any]) -> Any:
     if not isinstance(data, dict) or "kind" not in data:
         raise CaseError(f"'{where}' needs the key 'kind', one of {', '.join(analytic.THEORIES)}")
-    if data["kind"] not in analytic.THEORIES:
+    if not isinstance(data["kind"], str) or data["kind"] not in analytic.THEORIES:
         raise CaseError(unknown(f"{where}.kind", str(data["kind"]), analytic.THEORIES))
     return called(where, analytic.THEORIES[data["kind"]], {key: v for key, v in data.items() if key != "kind"})
 

@@ -32,11 +32,13 @@ ACROSS = 4
 UNSETTLED = 1e-2
 
 
-def at_the_end(analysis: Analysis, instant: float, stress: Array, contact: Mapping[str, ContactResult]) -> list[str]:
-    """Return the doubts about the last step of an analysis, whose nodal `stress` and `contact` are known."""
+def at_the_end(analysis: Analysis, stress: Array, contact: Mapping[str, ContactResult], loaded: bool) -> list[str]:
+    """Return the doubts about the last step of an analysis, whose nodal `stress` and `contact` are known.
+
+    `loaded` says whether loads or prescribed displacements are left.
+    """
     found = _interpenetration(analysis) + _large_strain(analysis, stress) + _large_rotation(analysis)
     found += _carrying_springs(analysis)
-    loaded = bool(analysis.external.any() or analysis.ramp.value(instant))
     for name, pair in analysis.pairs.items():
         found += deep(pair, contact[name], analysis.u) + _lost(name, contact[name], name in analysis.touched, loaded)
         found += _unresolved(name, pair, contact[name])

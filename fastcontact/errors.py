@@ -8,7 +8,11 @@ from typing import Any
 
 
 class FastcontactError(Exception):
-    """Base class of every error that fastcontact raises on purpose."""
+    """Base class of every error that fastcontact raises on purpose; its message is one line."""
+
+    def __str__(self) -> str:
+        # Names from files may hold anything, line ends too.
+        return " ".join(super().__str__().splitlines())
 
 
 class MeshError(FastcontactError):
@@ -54,9 +58,14 @@ class FastcontactWarning(UserWarning):
     """Something a user should know, with the number that says how much."""
 
 
+# What is shown of a name that nobody can have meant.
+LONGEST_NAME = 120
+
+
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     """Return the message for an unknown name: the culprit, the nearest known names, all of them if few."""
     names = sorted(known)
+    name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     if not names:
         return f"unknown {kind} '{name}': there is none here"
     near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)

@@ -537,13 +537,13 @@ class Model:
     def _add_pair(self, pair: ContactPair) -> None:
         if pair.name in {other.name for other in self.contact}:
             raise ContactError(f"there is already a contact pair '{pair.name}': names must differ")
+        self.bind(pair)
         for other in self.contact:
             if pair.primary and {pair.secondary, pair.primary} == {other.secondary, other.primary}:
                 raise ContactError(
                     f"contact '{pair.name}' joins '{pair.secondary}' and '{pair.primary}', which contact '{other.name}' "
                     "joins already: leave out one of the two"
                 )
-        self.bind(pair)
         self.contact.append(pair)
 
     def bind(self, pair: ContactPair) -> Formulation:

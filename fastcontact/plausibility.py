@@ -28,7 +28,16 @@ MODULI = 3e5
 DISPLACED, STRAINED, UNSTRAINED = 1.0, 1.0, 1e-12
 # Solids: aerogel to diamond [Pa]. Only here do units of the user matter, and only where a case names them.
 SOLIDS = (1e2, 2e12)
-PASCALS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm2": 1e6, "N/mm^2": 1e6, "psi": 6894.757, "ksi": 6894757.0}
+PASCALS = {
+    "Pa": 1.0,
+    "kPa": 1e3,
+    "MPa": 1e6,
+    "GPa": 1e9,
+    "N/mm2": 1e6,
+    "N/mm^2": 1e6,
+    "psi": 6894.757,
+    "ksi": 6894757.0,
+}
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
 NEWTONS = {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "lbf": 4.448222}
 # So many cells are looked at to judge integrals.
@@ -129,7 +138,7 @@ def _coincident(model: Model) -> str:
     place = ", ".join(f"{x:.6g}" for x in mesh.points[first[0]])
     return (
         f"{len(same)} nodes lie where another one is, and no contact joins them (first: points {first[0]} and {first[1]} "
-        f"at ({place})): merge them in the mesher or with generate.transform.weld, or define the contact"
+        f"at ({place})): merge them in the mesher or with generate.transform.merge_points, or define the contact"
     )
 
 
@@ -199,9 +208,7 @@ def _loaded(model: Model, load: Load) -> Iterator[tuple[str, NDArray[np.int32]]]
         yield from facets_of(model.mesh, load.group).items()
 
 
-def _integrals(
-    mesh: Mesh, element: str, cells: NDArray[np.int32], value: Value, name: str, finer: bool
-) -> Array:
+def _integrals(mesh: Mesh, element: str, cells: NDArray[np.int32], value: Value, name: str, finer: bool) -> Array:
     """Return the integral (n_cells,) of a load over each cell, by about the rule of loads or by a finer one."""
     reference = elements.get(element)
     n = 9 if finer else 5

@@ -79,7 +79,10 @@ def check_penetration(name: str, pair: Formulation) -> None:
     """
     if pair.terms.tied:
         return
-    total, geometric = pair.nodal_gap(np.zeros_like(pair.points))[0], pair.nodal_gap(np.zeros_like(pair.points), False)[0]
+    total, geometric = (
+        pair.nodal_gap(np.zeros_like(pair.points))[0],
+        pair.nodal_gap(np.zeros_like(pair.points), False)[0],
+    )
     gap = np.where(pair.terms.excluded_nodes(pair.secondary), np.inf, np.maximum(total, geometric))
     size = np.zeros(len(gap))
     for block in pair.secondary.blocks:

@@ -25,6 +25,8 @@ def existing_file(path: PathLike) -> Path:
         raise FileError(f"'{path}' is a folder: name a file in it")
     if not found.exists():
         raise FileError(f"there is no file '{path}': check its name and the folder you are in")
+    if not found.is_file():
+        raise FileError(f"'{path}' is a device or a pipe: name a plain file")
     return found
 
 

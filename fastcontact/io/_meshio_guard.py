@@ -15,6 +15,7 @@ import sys
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from ctypes import c_size_t
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -127,7 +128,11 @@ def _arrays(limit: int, allowed: Path) -> dict[str, Callable[..., Any]]:
             return np.fromfile(file, dtype, int(count), sep, **kwargs)
         if isinstance(file, _Ending):
             file = file.before_numbers()
-        return np.fromfile(file, dtype, int(count), sep, **kwargs)
+        found = np.fromfile(file, dtype, int(count), sep, **kwargs)
+        # The head of a section of Gmsh 4: how many blocks follow, with how many entries in all.
+        if dtype is c_size_t and int(count) == 4 and found[:2].max(initial=0) > limit:
+            raise Implausible(f"it declares {found[:2].max()} blocks or entries")
+        return found
 
     return {
         "empty": made(np.empty), "zeros": made(np.zeros), "ones": made(np.ones), "full": full,

@@ -269,7 +269,9 @@ class Results(Sequence[StepResult]):
         except (FileError, Warning):
             raise
         except Exception as error:  # what HDF5, and numbers that make no sense, can raise has no end
-            raise FileError(f"'{self.path}' {_DAMAGED} ({_reason(error)}): compute it again or restore a copy") from error
+            raise FileError(
+                f"'{self.path}' {_DAMAGED} ({_reason(error)}): compute it again or restore a copy"
+            ) from error
 
 
 def _reason(error: Exception) -> str:

@@ -86,7 +86,7 @@ class FactorSolver:
         self.counters.setups += 1
         self.compliance = ComplianceCache(self.n, self._solution)
         self.known_loads = KnownLoads()
-        if self._symmetric is not None:
+        if self._symmetric is not None and involved is not None:
             self.last, self._inverse = involved, self._symmetric.last_inverse()
             self.compliance.give(self.last, self._inverse)
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
+from fastcontact._jit import check_threads
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.kernels import krylov, ties
 from fastcontact.linear._compliance import ComplianceCache, multipliers, reduced
@@ -72,6 +73,7 @@ class Amg:
 
     def prepare(self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None) -> None:
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
+        check_threads()
         size = K.blocksize[0]
         self._given = K, rigid_modes
         self.K = Matrix(K.indptr, K.indices, K.data.reshape(-1), (0,) * size, (0,) * size)

@@ -21,7 +21,10 @@ def _positive(**values: float) -> None:
 
 
 def _vector(name: str, values: ArrayLike, dim: int) -> Array:
-    vector = np.asarray(values, float)
+    try:
+        vector = np.asarray(values, float)
+    except (TypeError, ValueError):
+        vector = np.empty(0)
     if vector.shape != (dim,) or not np.isfinite(vector).all():
         raise ContactError(f"{name} = {values!r} of a rigid obstacle must be {dim} finite numbers, one a coordinate")
     return vector

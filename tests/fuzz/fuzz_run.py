@@ -98,7 +98,12 @@ def run(numbers: list[int], seed: int, folder: Path, failures: Path | None = Non
 
 def _start(seed: int, folder: Path, place: Path) -> subprocess.Popen:
     here = Path(__file__).resolve().parent
-    command = [sys.executable, str(here / "fuzz_worker.py"), str(seed), *map(str, (folder / "seeds", place, folder / "outside"))]
+    command = [
+        sys.executable,
+        str(here / "fuzz_worker.py"),
+        str(seed),
+        *map(str, (folder / "seeds", place, folder / "outside")),
+    ]
     process = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=place,
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"},

@@ -13,7 +13,23 @@ WILD = [
     "/etc/hostname", "\x00", "é" * 50, "a" * 5000, "../outside/bait.h5", [], [1], [[]], [[1, 2], [3]], ["x", 2], {}, {"x": 1},
     {"kind": "sphere"}, [{"group": "CONT1"}], 1000, "CONT1", "mortar", "amg", [0.0] * 300,
 ]  # fmt: skip
-KEYS = ["x", "y", "group", "kind", "", "é", "ramp", "formulation", "friction", "penalty", "self", "model", "mesh", "shape", "__class__"]
+KEYS = [
+    "x",
+    "y",
+    "group",
+    "kind",
+    "",
+    "é",
+    "ramp",
+    "formulation",
+    "friction",
+    "penalty",
+    "self",
+    "model",
+    "mesh",
+    "shape",
+    "__class__",
+]
 
 
 def damaged(text: str, random: np.random.Generator) -> str:

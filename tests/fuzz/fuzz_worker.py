@@ -14,9 +14,10 @@ import time
 import warnings
 from pathlib import Path
 
-import fastcontact
 import fuzz_files
 import fuzz_readers
+
+import fastcontact
 
 MEMORY = 1 << 30  # bytes more than a process that has read all formats once
 SECONDS = 10

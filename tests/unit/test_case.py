@@ -242,7 +242,7 @@ def test_a_rigid_obstacle_is_read(write):
         ('secondary = "CONT1"\n', "", r"obstacle.plane needs 'secondary'"),
         ("half_space", "half_spaces", r"did you mean 'half_space'"),
         ("normal =", "normals =", r"'obstacle.plane.shape.normals'"),
-        (", normal = [0.0, -1.0]", "", r"'obstacle.plane.shape': .*normal"),
+        (", normal = [0.0, -1.0]", "", r"'obstacle.plane.shape' needs 'normal'"),
         ("y = -2.0 }", 'y = "down" }', r"'obstacle.plane.motion.y' must be of type"),
     ],
 )

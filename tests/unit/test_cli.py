@@ -164,7 +164,9 @@ def test_no_convergence_is_exit_code_two_and_keeps_finished_steps(solved, tmp_pa
     code = main(["run", str(case), "-o", str(tmp_path / "hard.vtkhdf")])
     assert code == 2
     cut, told, *history = capsys.readouterr().err.splitlines()
-    assert cut.startswith("step 2 from 0.001 to 1 does not converge, cut in halves: the contact geometry did not settle")
+    assert cut.startswith(
+        "step 2 from 0.001 to 1 does not converge, cut in halves: the contact geometry did not settle"
+    )
     assert told.startswith("no convergence: ")
     assert "step 2 was cut in halves once, the part from " in told
     assert [line.split()[0] for line in history] == ["iterations", "1", "2", "3"]
@@ -173,7 +175,7 @@ def test_no_convergence_is_exit_code_two_and_keeps_finished_steps(solved, tmp_pa
     assert not results.complete
     assert results.error.split(": ", 1) == ["ConvergenceError", told.removeprefix("no convergence: ").strip()]
     assert [entry["displacement_change"] > 0 for entry in results.log["failed_step"]] == [True] * 3
-    (name, nodes), = results.log["failed_step"][-1]["nodes"].items()
+    ((name, nodes),) = results.log["failed_step"][-1]["nodes"].items()
     assert (name, len(nodes)) == ("hertz", 3)
     assert f"most at points {nodes[0]} [" in told
 

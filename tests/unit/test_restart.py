@@ -14,7 +14,7 @@ FRICTIONLESS, FRICTION = 1e-12, 1e-10
 UP_AND_DOWN = fc.Ramp((1.0, 2.0, 3.0, 4.0, 5.0), ((0.0, 0.0), (3.0, 1.0), (5.0, 0.3)))
 
 
-class Stopped(Exception):
+class StoppedError(Exception):
     """What ends an analysis in the middle."""
 
 
@@ -25,9 +25,9 @@ def stopped_after(count, model, ramp, **options):
     def on_step(step):
         steps.append(step)
         if len(steps) == count:
-            raise Stopped
+            raise StoppedError
 
-    with pytest.raises(Stopped):
+    with pytest.raises(StoppedError):
         fc.solve(model, ramp, on_step=on_step, **options)
     return steps
 
@@ -49,7 +49,17 @@ def assert_same(found, expected, relative):
     assert list(found.contact) == list(expected.contact)
     for pair, other in expected.contact.items():
         one = found.contact[pair]
-        for name in ("gap", "pressure", "multiplier", "force_vectors", "normal", "force", "radius", "shear", "abscissa"):
+        for name in (
+            "gap",
+            "pressure",
+            "multiplier",
+            "force_vectors",
+            "normal",
+            "force",
+            "radius",
+            "shear",
+            "abscissa",
+        ):
             close(f"{pair}.{name}", getattr(one, name), getattr(other, name))
         for name in ("points", "active", "sticking"):
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
@@ -247,18 +257,22 @@ def test_solver_tolerances_and_limits_may_change():
 
 def test_a_step_without_its_state_is_refused():
     steps = fc.solve(spheres(), fc.linear_ramp(2))
-    with pytest.raises(fc.ModelError, match="step 1 does not hold what it takes to go on from it: resume from the last"):
+    with pytest.raises(
+        fc.ModelError, match="step 1 does not hold what it takes to go on from it: resume from the last"
+    ):
         fc.solve(spheres(), fc.linear_ramp(2), resume=steps[:1])
 
 
 def test_all_that_a_step_changes_is_kept_or_set_anew():
     """A name that `step_control` learns must be looked at here."""
-    anew = {"before", "external", "expected", "parts", "settled", "rubbing"}  # as a step begins
+    anew = {"before", "external", "expected", "parts", "settled", "rubbing", "unsettled"}  # as a step begins
     kept = {"u", "active", "pressure", *restart.NUMBERS}
-    assert set(step_control._ANALYSIS) == anew | kept
+    told = {"touched"}  # by the steps so far
+    assert set(step_control._ANALYSIS) == anew | kept | told
     assert set(step_control._PAIR) == {"before", "_closed"}
     assert set(step_control._SIDE) == {"now", "before"}
     assert set(step_control._EXTRAPOLATION) == {"ratio", "_loads", "_states"}
+    assert set(step_control._LOADS) == {"_loads", "_solutions"}  # the solver's memory
 
 
 def test_a_strengthened_multigrid_cycle_is_remembered():

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from aster_contact import add_zone, criteria_of, missing_in_contact
 from aster_loads import add_loads, supports_of
 from aster_mesh import Entry, MissingError, listed, mesh_of
@@ -89,7 +90,10 @@ def problem(path: Path, number: int) -> Problem:
     for entry in run.get("materials") or spec["materials"]:
         groups = None if entry["groups"] == "ALL" else entry["groups"]
         model.add_material(_material(entry), groups)
+    solid = np.unique(np.concatenate([block.ravel() for block in mesh.solids.values()]))
     for support in supports:
+        if not np.isin(support.nodes, solid).any():  # of an obstacle: a half space that stands still
+            continue
         model.prescribe(support.group, ramp=support.history, **{support.component: support.value})
     for load in run["loads"]:
         add_loads(model, spec, load, times)

@@ -295,6 +295,7 @@ def test_what_was_regularised_is_kept_in_result_files(tmp_path):
     assert set(kept) == {"motions", "springs", "spring_stiffness", "force_left", "relative_to_load", "positions"}
 
 
+@pytest.mark.filterwarnings("ignore:the loads strain the model by about 3e-15")
 def test_a_load_lost_in_round_off_is_told_in_numbers():
     """A millionth of a newton over a gap of 30 mm: the deformations are below the accuracy of the coordinates."""
     mesh = fc.generate.half_spheres("tri3", size=8.0)
@@ -313,6 +314,7 @@ def test_a_body_pulled_away_is_told_clearly():
     assert [step.load_factor for step in done] == [0.25, 0.5, 0.75]
 
 
+@pytest.mark.filterwarnings("ignore:contact .* is lost at the end")
 def test_a_force_goes_and_the_contact_force_with_it():
     mesh = fc.generate.half_spheres("tri3", size=5.0)
     model = driven_by_force(mesh, "node_to_segment", 2e5, ramp=[(0, 0), (0.5, 1), (1, 0)])

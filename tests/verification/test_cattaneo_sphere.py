@@ -4,6 +4,7 @@ Poisson's ratio is 0, where slip goes along the force exactly, and like bodies d
 is the half z >= 0, forces below are those of the whole. Theory is taken at the forces found.
 """
 
+import warnings
 from functools import cache
 
 import numpy as np
@@ -113,7 +114,9 @@ def excess_compliance():
     model.fix("FAR_UPPER", "xyz")
     model.add_traction("CONT_UPPER", x=lambda X: np.sqrt(np.maximum(1 - (X[:, 0] ** 2 + X[:, 2] ** 2) / RADIUS**2, 0)))
     points = mesh.points_of("CONT_UPPER")
-    found = fc.solve(model, fc.linear_ramp(1), linear_solver="direct")[-1].displacement[points, 0]
+    with warnings.catch_warnings():  # the root of the traction at the edge is no polynomial
+        warnings.filterwarnings("ignore", "the traction on 'CONT_UPPER' varies within", fc.FastcontactWarning)
+        found = fc.solve(model, fc.linear_ramp(1), linear_solver="direct")[-1].displacement[points, 0]
     x, _, z = mesh.points[points].T
     beyond = np.hypot(x, z) > 1.15 * RADIUS
     expected, force = on_half_space(x[beyond], z[beyond])

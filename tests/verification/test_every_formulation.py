@@ -37,6 +37,7 @@ def test_a_uniform_pressure_passes_between_matching_meshes(formulation, swap):
 
 
 @EVERY
+@pytest.mark.filterwarnings("ignore:contact .* never closed")
 def test_bodies_drawn_apart_carry_nothing(formulation):
     last = pressed(formulation, push=-0.02)
     contact = last.contact["pair"]

@@ -64,9 +64,10 @@ def test_the_choice_is_seen_in_the_model_and_in_the_log(caplog):
     model = fc.Model(fc.generate.block_on_block("quad4"), "plane_strain")
     with caplog.at_level(logging.INFO, "fastcontact"):
         model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER")
-        model.add_contact("other", secondary="CONT_UPPER", primary="CONT_LOWER", formulation="node_to_segment")
+        asked = fc.Model(model.mesh, "plane_strain")
+        asked.add_contact("other", secondary="CONT_UPPER", primary="CONT_LOWER", formulation="node_to_segment")
     assert "pair: CONT_UPPER on CONT_LOWER, mortar" in repr(model)
-    assert "other: CONT_UPPER on CONT_LOWER, node_to_segment" in repr(model)
+    assert "other: CONT_UPPER on CONT_LOWER, node_to_segment" in repr(asked)
     assert caplog.messages == [
         "contact 'pair': formulation mortar, since the nodes of the two sides do not lie opposite to each other"
     ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
 import gzip
 import importlib.util
 import json
@@ -90,7 +92,9 @@ def test_old_files_are_read(old: tuple[Path, dict]) -> None:
 
 def test_old_files_cannot_be_resumed_and_stay_as_they_are(old: tuple[Path, dict]) -> None:
     path, before = old[0], old[0].read_bytes()
-    with pytest.raises(FileError, match="was written by an earlier fastcontact, which kept nothing to go on from: name"):
+    with pytest.raises(
+        FileError, match="was written by an earlier fastcontact, which kept nothing to go on from: name"
+    ):
         ResultWriter(path, open_results(path).mesh, resume=True)
     assert path.read_bytes() == before
 
@@ -124,7 +128,7 @@ def test_every_write_may_be_the_last_one(
     """With step 65 the nodes of HDF5's indices are full and fall in two."""
     writes, ends = recorded(path, n_steps, monkeypatch)
     begin = ends[from_step - 1] if from_step else 0
-    assert len(writes) > begin + 100
+    assert len(writes) > begin + 50
     crashed = path.with_name("crashed.vtkhdf")
     with open(crashed, "r+b", buffering=0) as file:
         file.truncate(path.stat().st_size + 100_000)  # what was reserved
@@ -136,7 +140,9 @@ def test_every_write_may_be_the_last_one(
             finished = sum(end <= number for end in ends)
             with open_results(crashed) as results:
                 assert finished <= len(results) <= finished + 1
-                several = {0, len(results) // 2, *range(max(len(results) - 8, 0), len(results), 2)} if len(results) else ()
+                several = (
+                    {0, len(results) // 2, *range(max(len(results) - 8, 0), len(results), 2)} if len(results) else ()
+                )
                 for which in several:
                     assert_same(results[which], step_result(which % 5), f"write {number}, step {which}")
                 expected = [step_result(which % 5).load_factor for which in range(len(results))]
@@ -230,15 +236,14 @@ def test_what_a_dead_writer_left_of_a_step_is_written_over(path: Path, monkeypat
             with pytest.raises(KeyboardInterrupt):
                 out.write(steps[2])
     with ResultWriter(path, MESH, cell_fields=("error",), resume=True) as out:
-        assert_same(out.done[0], steps[0])
+        assert out.n_steps == len(out.done) == 1
         out.write(steps[1])
-    for found, expected in zip(open_results(path), steps[:2], strict=True):
-        assert_same(found, expected)
+    for number, found in enumerate(open_results(path)):
+        np.testing.assert_array_equal(found.cell_fields["error"], steps[number].cell_fields["error"])
+        assert_same(dataclasses.replace(found, cell_fields={}), step_result(number))
 
 
 def _with_error(step: fc.StepResult) -> fc.StepResult:
-    import dataclasses
-
     count = sum(map(len, MESH.solids.values()))
     return dataclasses.replace(step, cell_fields={"error": np.full(count, float(step.index))})
 
@@ -330,9 +335,9 @@ def test_steps_without_their_state_are_refused(path: Path) -> None:
 
 def test_a_second_writer_cannot_resume_either(path: Path) -> None:
     begun(path, (0.5,))
-    with ResultWriter(path, spheres(), resume=True):
-        with pytest.raises(FileError, match=f"is being written by process {os.getpid()}"):
-            ResultWriter(path, spheres(), resume=True)
+    refused = pytest.raises(FileError, match=f"is being written by process {os.getpid()}")
+    with ResultWriter(path, spheres(), resume=True), refused:
+        ResultWriter(path, spheres(), resume=True)
     assert len(resumed(path, fc.linear_ramp(2))) == 2
 
 
@@ -356,9 +361,10 @@ def test_a_folder_that_vanishes_is_told_at_the_next_step(tmp_path: Path) -> None
         out.write(step)
         folder.rename(tmp_path / "there")
 
-    with pytest.raises(FileError, match="is no longer there: .*, moved or replaced after 1 steps. Put it back and resume"):
-        with ResultWriter(folder / "run.vtkhdf", model) as out:
-            fc.solve(model, fc.linear_ramp(3), on_step=on_step)
+    with pytest.raises(
+        FileError, match="is no longer there: .*, moved or replaced after 1 steps. Put it back and resume"
+    ), ResultWriter(folder / "run.vtkhdf", model) as out:
+        fc.solve(model, fc.linear_ramp(3), on_step=on_step)
     moved = tmp_path / "there" / "run.vtkhdf"
     results = open_results(moved)
     assert len(results) == 1
@@ -443,15 +449,16 @@ def test_packed_data_come_back() -> None:
 
 
 def test_damaged_packed_data_are_noticed() -> None:
-    raw = packed({"a": np.arange(20.0)})
+    raw, harmless = packed({"a": np.arange(20.0)}), 0
     random = np.random.default_rng(1)
     for _ in range(200):
         changed = raw.copy()
         changed[random.integers(0, len(raw))] ^= np.uint8(1 << random.integers(0, 8))
-        with pytest.raises((ValueError, LookupError, TypeError)):
-            found = unpacked(changed)
-            if np.array_equal(found["a"], np.arange(20.0)):  # blanks, or names that nobody asks for
-                raise ValueError
+        with contextlib.suppress(ValueError, LookupError, TypeError):
+            found = unpacked(changed)  # blanks, or the number of a name that nobody asks for
+            np.testing.assert_array_equal(found["a"], np.arange(20.0))
+            harmless += 1
+    assert harmless < 20
     for size in (0, 10, len(raw) - 1):
         with pytest.raises((ValueError, LookupError, TypeError)):
             unpacked(raw[:size])
