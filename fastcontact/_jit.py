@@ -38,8 +38,16 @@ def parallel_kernel(function: Callable[..., Any]) -> Any:
     return _compile(function, parallel=True)
 
 
-def _compile(function: Callable[..., Any], parallel: bool) -> Any:
-    options: dict[str, Any] = {"fastmath": FASTMATH, "parallel": parallel, "nogil": True, "error_model": "numpy"}
+def summing_kernel(function: Callable[..., Any]) -> Any:
+    """Like `kernel`, for long sums of products, which vectors take in an order of their own: the same in every run.
+
+    Only where the last bits may differ between processors, as they do in BLAS.
+    """
+    return _compile(function, parallel=False, fastmath=FASTMATH | {"reassoc"})
+
+
+def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = FASTMATH) -> Any:
+    options: dict[str, Any] = {"fastmath": fastmath, "parallel": parallel, "nogil": True, "error_model": "numpy"}
     try:
         return numba.njit(cache=True, **options)(function)
     except RuntimeError as error:  # numba: "cannot cache function ...: no locator available for file ..."

@@ -24,10 +24,13 @@ class Anderson:
         Earlier iterates in the mixture.
     where : ndarray of int
         Components of x (n,) that G looks at.
+    all_mixed : bool
+        Whether the others are mixed, too; they need not be where G finds them without a first guess.
     """
 
-    def __init__(self, depth: int, where: NDArray[np.intp]) -> None:
+    def __init__(self, depth: int, where: NDArray[np.intp], all_mixed: bool = True) -> None:
         self.depth, self.where = depth, where
+        self.mixes: slice | NDArray[np.intp] = slice(None) if all_mixed else where
         self._residuals: list[Array] = []
         self._images: list[Array] = []
 
@@ -39,12 +42,14 @@ class Anderson:
     def mixed(self, x: Array, image: Array) -> Array:
         """Return the next iterate (n,) from the last one `x` and its image ``G(x)``, both (n,)."""
         self._residuals.append((image - x)[self.where])
-        self._images.append(image)
+        self._images.append(image[self.mixes])
         del self._residuals[: -self.depth - 1], self._images[: -self.depth - 1]
         if len(self._residuals) < 2:
             return image
         last = self._residuals[-1]
         differences = np.column_stack([last - earlier for earlier in self._residuals[:-1]])
         weights = np.linalg.lstsq(differences, last, rcond=DEPENDENT)[0]
-        moves = [weight * (image - earlier) for weight, earlier in zip(weights, self._images[:-1], strict=True)]
-        return image - np.sum(moves, axis=0)
+        mixture, newest = image.copy(), self._images[-1]
+        for weight, earlier in zip(weights, self._images[:-1], strict=True):
+            mixture[self.mixes] -= weight * (newest - earlier)
+        return mixture

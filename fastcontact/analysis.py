@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fastcontact import active_set, doubts, friction, linear, plausibility, recovery, restart, step_control
+from fastcontact import active_set, doubts, friction, linear, parallel, plausibility, recovery, restart, step_control
 from fastcontact.acceleration import Anderson
 from fastcontact.assembly import rigid_modes, stiffness
 from fastcontact.contact.constraints import Constraints, stacked
@@ -22,6 +22,7 @@ from fastcontact.errors import ConvergenceError, FastcontactWarning, ModelError
 from fastcontact.extrapolation import Extrapolation
 from fastcontact.floating import SLACK, Floating, Settled
 from fastcontact.kernels.multigrid import largest_row_sum
+from fastcontact.kernels.norms import largest_difference
 from fastcontact.model import Model, combined, multiplier
 from fastcontact.ramp import Ramp, linear_ramp
 from fastcontact.results import ContactResult, StepResult
@@ -249,6 +250,10 @@ class Analysis:
 
     def step(self, index: int, instant: float, last: bool = False) -> StepResult:
         """Solve for the loads at `instant` and return the state; see `solve`."""
+        with parallel.one_blas_thread():
+            return self._step(index, instant, last)
+
+    def _step(self, index: int, instant: float, last: bool) -> StepResult:
         lift = self._lift(instant)
         self.external = combined(self.forces, self.ramp, instant, self.shape).ravel()
         self.largest_force = max(self.largest_force, np.abs(self.external).max(initial=0.0))
@@ -324,16 +329,17 @@ class Analysis:
         in_loop = fixed_updates is None and any(pair.geometry_in_loop for pair in self.pairs.values())
         in_loop = in_loop and self.floating is None
         limit = criteria.max_geometry_updates if fixed_updates is None else fixed_updates
-        accelerated, known = Anderson(MIXED, self.surface_dofs), None
+        accelerated, known = Anderson(MIXED, self.surface_dofs, self.solver.iterative), None
         tolerance = self.solver.tolerance
         start, last_active = self.u, dict(self.active)
+        moved_by_lift = np.abs(lift).max(initial=0.0)
         extended = fixed_updates is None and self.floating is None and self.solver.iterative
         if extended:
             self.u = self.extrapolation.displacement(self.u)
             tolerance = max(tolerance, FIRST_RESIDUAL)
         for update in range(limit + 1):
             displacement = self.displacement
-            positions = self._place_obstacles(np.where(self.system.fixed, lift, self.u))
+            positions = self._place_obstacles(np.where(self.system.fixed, lift, self.u) if self.driven.pairs else self.u)
             paired_at = np.zeros_like(displacement) if criteria.keep_pairing else displacement
             parts = {name: pair.conditions(paired_at) for name, pair in self.pairs.items()}
             self.parts = parts
@@ -345,9 +351,9 @@ class Analysis:
                 state, u = self._inequalities(loaded, constraints, lift, active, limit_now, tolerance)
             else:
                 state, u = self._floating(loaded, constraints, lift, active, history)
-            change = np.abs(u - self.u).max(initial=0.0)
+            change = largest_difference(u, self.u)
             # Rigid motions of bodies that only contact holds do not count.
-            size = max(np.abs(state.u).max(initial=0.0), np.abs(lift).max(initial=0.0))
+            size = max(np.abs(state.u).max(initial=0.0), moved_by_lift)
             before, self.u = self.u, u
             self._remember(state)
             history.append(

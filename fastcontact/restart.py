@@ -54,8 +54,8 @@ def check(step: StepResult, case: dict[str, Any]) -> None:
         parts.append(f"the load history up to {end:g}")
     if parts:
         raise ModelError(
-            f"the steps so far belong to another case: {', '.join(parts)} differ{'s' if len(parts) == 1 else ''}. Go on "
-            "with what they were computed for, or start anew without resuming"
+            f"the steps so far belong to another case; changed since: {', '.join(parts)}. Go on with what they "
+            "were computed for, or start anew without resuming"
         )
 
 

@@ -57,7 +57,10 @@ def summarise(
 
 def _step(step: StepResult) -> dict[str, Any]:
     counts = ("geometry_updates", "active_set_iterations", "linear_iterations")
-    return {"load_factor": step.load_factor, **{name: step.iterations[name] for name in counts}}
+    found = {"load_factor": step.load_factor, **{name: step.iterations[name] for name in counts}}
+    if "substeps" in step.iterations:
+        found["substeps"] = step.iterations["substeps"]
+    return found
 
 
 def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
@@ -131,6 +134,9 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
         f"{sum(s['active_set_iterations'] for s in steps)} active-set iterations, "
         f"{sum(s['geometry_updates'] for s in steps)} geometry updates",
     ]
+    if parts := [len(s["substeps"]) for s in steps if "substeps" in s]:
+        many = "1 load step" if len(parts) == 1 else f"{len(parts)} load steps"
+        found.append(f"  {many} did not converge as a whole and went in {sum(parts)} parts")
     for name, contact in summary["contact"].items():
         inside, outside = contact["radius"]
         edge = _edge(inside, outside, unit["length"])

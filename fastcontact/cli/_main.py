@@ -1,6 +1,7 @@
 """Dispatch to the sub-commands, and turn errors into exit codes.
 
-0: done; 1: wrong input, one clear line; 2: no convergence, the result file keeps all converged steps.
+0: done; 1: wrong input, one clear line; 2: no convergence, the result file keeps all converged steps; 130: interrupted
+from the keyboard, likewise.
 """
 
 from __future__ import annotations
@@ -58,13 +59,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
         return int(arguments.run(arguments) or 0)
     except ConvergenceError as error:
-        print("\n".join([f"no convergence: {error}", *_history(error.history)]), file=sys.stderr)
+        print("\n".join([f"no convergence: {error}", *_history(error.history), *_notes(error)]), file=sys.stderr)
         return 2
     except FastcontactError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
     except BrokenPipeError:
         return 1
+    except KeyboardInterrupt as error:
+        print("\n".join(["interrupted", *_notes(error)]), file=sys.stderr)
+        return 130  # as shells have it
+
+
+def _notes(error: BaseException) -> list[str]:
+    """Return what a command has to say about an error, as lines."""
+    return [f"  {note}" for note in getattr(error, "__notes__", ())]
 
 
 def _history(history: Sequence[Mapping[str, Any]], shown: int = 10) -> list[str]:

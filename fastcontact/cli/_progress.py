@@ -13,8 +13,8 @@ WIDTH = 30
 class Progress:
     """Steps done, active nodes, time left; nothing at all unless `show`."""
 
-    def __init__(self, total: int, show: bool) -> None:
-        self._total, self._show = total, show
+    def __init__(self, total: int, show: bool, done: int = 0) -> None:
+        self._total, self._show, self._before = total, show, done
         self._started = time.perf_counter()
 
     def step(self, step: StepResult) -> None:
@@ -22,7 +22,8 @@ class Progress:
         if not self._show:
             return
         done = step.index / self._total
-        left = (time.perf_counter() - self._started) * (1.0 / done - 1.0)
+        each = (time.perf_counter() - self._started) / max(step.index - self._before, 1)
+        left = each * (self._total - step.index)
         bar = "#" * round(WIDTH * done)
         closed = sum(int(contact.active.sum()) for contact in step.contact.values())
         text = f"step {step.index}/{self._total}, {closed} nodes in contact, {left:.0f} s left"

@@ -41,6 +41,10 @@ def _mesh_lines(mesh: Any) -> list[str]:
 def _result_lines(results: Any) -> list[str]:
     found = [f"{len(results)} steps, {results.kinematics}; versions: "]
     found[0] += ", ".join(f"{name} {version}" for name, version in results.versions.items())
+    if results.error:
+        found.append(f"  stopped: {results.error}")
+    elif not results.complete:
+        found.append("  incomplete: the run was killed, or goes on")
     for step in results:
         closed = ", ".join(f"{name}: {int(c.active.sum())} nodes closed" for name, c in step.contact.items())
         counts = step.iterations
@@ -49,5 +53,8 @@ def _result_lines(results: Any) -> list[str]:
             f"{counts.get('geometry_updates', 0):>3}  active-set iterations "
             f"{counts.get('active_set_iterations', 0):>3}  linear {counts.get('linear_iterations', 0):>4}  {closed}"
         )
+        if "substeps" in counts:
+            ends = ", ".join(f"{end:.6g}" for end in counts["substeps"])
+            found.append(f"    did not converge whole, went in parts up to {ends}")
         found += [f"    warning: {text}" for text in step.warnings]
     return found

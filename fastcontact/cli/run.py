@@ -13,7 +13,7 @@ from typing import Any
 
 from fastcontact.cli._progress import Progress
 from fastcontact.cli._warnings import told
-from fastcontact.errors import FileError
+from fastcontact.errors import ConvergenceError, FileError, ModelError
 
 HELP = "solve a case file and write the results of all steps"
 # Cell field of the estimated error.
@@ -54,8 +54,9 @@ def run(options: argparse.Namespace) -> int:
         fields = (ERROR,) if options.estimate_error else ()
         with ResultWriter(output, case.model, case_text=case.text, cell_fields=fields, resume=options.resume) as writer:
             done = writer.done
+            _check_same(case, done, output)
             total = len(done) + len(remaining(case.ramp, done))
-            progress = Progress(total, show=sys.stderr.isatty() and not options.quiet)
+            progress = Progress(total, show=sys.stderr.isatty() and not options.quiet, done=len(done))
 
             def on_step(step: Any) -> None:
                 writer.write(_estimated(case.model, step) if fields else step)
@@ -71,6 +72,9 @@ def run(options: argparse.Namespace) -> int:
                     on_step=on_step,
                     resume=done,
                 )
+            except (ConvergenceError, KeyboardInterrupt) as error:
+                error.add_note(_kept(output, writer.n_steps))
+                raise
             finally:
                 progress.close()
     texts = list(dict.fromkeys([*(text for step in done for text in step.warnings), *caught]))
@@ -90,6 +94,25 @@ def run(options: argparse.Namespace) -> int:
         print("\n".join(summary.lines(numbers)))
         print("  " + _written(output, len(done), len(steps), [path for path in (options.json, options.plot) if path]))
     return 0
+
+
+def _check_same(case: Any, done: list[Any], output: Path) -> None:
+    """Refuse to go on with the steps of another case."""
+    from fastcontact import restart
+
+    if done:
+        try:
+            restart.check(done[-1], restart.identity(case.model, case.ramp, case.criteria))
+        except ModelError as error:
+            raise ModelError(f"'{output}' cannot be resumed: {error}") from error
+
+
+def _kept(output: Path, steps: int) -> str:
+    """Return what a run that stops leaves."""
+    if not steps:
+        return f"'{output}' holds no complete step"
+    many = "one complete step" if steps == 1 else f"all {steps} complete steps"
+    return f"'{output}' keeps {many}: 'fastcontact run --resume' goes on from there"
 
 
 def _written(output: Path, done: int, total: int, others: list[str]) -> str:

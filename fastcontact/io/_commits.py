@@ -30,21 +30,33 @@ class CommittedFile:
     ----------
     end : int
         Where the contents end, as HDF5 last told; the file may take more room.
+    ours : bool
+        Whether nobody else has written to the file, as `intact` last saw; if somebody has, nothing more is written.
     """
 
     def __init__(self, path: Path) -> None:
         self._file = open(path, "r+b", buffering=0)  # noqa: SIM115
         self._position = 0
         self._pending: dict[int, bytes] = {}
+        self.ours = True
+        self._head = self._read_head()
         self.end = self._contents()
         self._starts, self._ends = [0], [self.end]  # of what has been written, in order and apart
 
     def _contents(self) -> int:
         """Return where the contents of the file end, whatever room it takes."""
-        head = self._file.read(48)
-        size = self._file.seek(0, os.SEEK_END)
+        head, size = self._head, self._file.seek(0, os.SEEK_END)
         known = head.startswith(SUPERBLOCK) and head[8] == 0 and head[13] == 8  # version 0, addresses of eight bytes
         return min(int.from_bytes(head[40:48], "little"), size) if known else size
+
+    def _read_head(self) -> bytes:
+        self._file.seek(0)
+        return self._file.read(48)
+
+    def intact(self) -> bool:
+        """Return whether the superblock, which changes with every flush, is still as it was written."""
+        self.ours = self.ours and self._read_head() == self._head
+        return self.ours
 
     def fileno(self) -> int:
         """Return the descriptor of the file."""
@@ -108,9 +120,12 @@ class CommittedFile:
 
     def flush(self) -> None:
         """Write what waits, in an order in which every write may be the last one."""
+        if not self.ours:
+            return
         waiting = sorted(self._pending.items(), key=lambda entry: self._turn(*entry))
         for place, data in waiting:
             self._put(place, data)
+        self._head = self._read_head()
         for place, data in waiting:
             self._note(place, place + len(data))
         self._pending.clear()
@@ -147,7 +162,8 @@ class CommittedFile:
         if self._file.closed:
             return
         try:
-            self._file.truncate(self.end)
-            os.fsync(self.fileno())
+            if self.ours:
+                self._file.truncate(self.end)
+                os.fsync(self.fileno())
         finally:
             self._file.close()

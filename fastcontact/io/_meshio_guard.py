@@ -38,7 +38,7 @@ HDF5_FORMATS = ("cgns", "h5m", "hmf", "exodus")
 SEVERAL_FILES = ("tetgen", "xdmf", "dolfin-xml")
 
 
-class Implausible(Exception):
+class ImplausibleError(Exception):
     """What a file declares cannot be meant."""
 
 
@@ -50,7 +50,7 @@ def bounded(path: Path, file_format: str) -> Iterator[None]:
     ------
     FileError
         If the file is an HDF5 file that leads elsewhere or declares what it cannot hold.
-    Implausible
+    ImplausibleError
         Inside the block, if meshio is made to read another file, to take more memory than the file can mean, or to
         wait beyond its end.
     """
@@ -101,7 +101,7 @@ def _arrays(limit: int, allowed: Path) -> dict[str, Callable[..., Any]]:
         counts = [int(n) for n in np.atleast_1d(shape).tolist()] if np.size(shape) else []
         size = int(np.prod(counts, dtype=object)) * np.dtype(dtype).itemsize
         if min(counts, default=0) < 0 or size > limit:
-            raise Implausible(f"it declares an array of {size:.3g} bytes, which a file of its size cannot hold")
+            raise ImplausibleError(f"it declares an array of {size:.3g} bytes, which a file of its size cannot hold")
 
     def made(function: Callable[..., Any]) -> Callable[..., Any]:
         def make(shape: Any, dtype: Any = float, *args: Any, **kwargs: Any) -> Any:
@@ -121,7 +121,7 @@ def _arrays(limit: int, allowed: Path) -> dict[str, Callable[..., Any]]:
     def fromfile(file: Any, dtype: Any = float, count: Any = -1, sep: str = "", **kwargs: Any) -> Any:
         # In NumPy -1 means everything, and other negative counts are no error everywhere.
         if int(count) < -1:
-            raise Implausible(f"it declares {int(count)} numbers")
+            raise ImplausibleError(f"it declares {int(count)} numbers")
         check(max(int(count), 0), dtype)
         if isinstance(file, str | os.PathLike):
             _check_place(file, allowed)
@@ -131,7 +131,7 @@ def _arrays(limit: int, allowed: Path) -> dict[str, Callable[..., Any]]:
         found = np.fromfile(file, dtype, int(count), sep, **kwargs)
         # The head of a section of Gmsh 4: how many blocks follow, with how many entries in all.
         if dtype is c_size_t and int(count) == 4 and found[:2].max(initial=0) > limit:
-            raise Implausible(f"it declares {found[:2].max()} blocks or entries")
+            raise ImplausibleError(f"it declares {found[:2].max()} blocks or entries")
         return found
 
     return {
@@ -165,7 +165,7 @@ class _Ending:
         if not found:
             self._ends += 1
             if self._ends > ENDS:
-                raise Implausible("it ends where more must come")
+                raise ImplausibleError("it ends where more must come")
         return found
 
     def before_numbers(self) -> Any:
@@ -186,7 +186,7 @@ def _opener(allowed: Path) -> Callable[..., Any]:
     def guarded_open(name: Any, mode: str = "r", *args: Any, **kwargs: Any) -> Any:
         _check_place(name, allowed)
         if set(mode) & set("wax+"):
-            raise Implausible("reading it would write a file")
+            raise ImplausibleError("reading it would write a file")
         return _Ending(builtins.open(name, mode, *args, **kwargs))
 
     return guarded_open
@@ -196,7 +196,7 @@ def _check_place(name: Any, allowed: Path) -> None:
     """Refuse a file that is neither the one allowed nor, where that is a folder, in it."""
     found = Path(os.fspath(name)).resolve()
     if allowed not in (found, found.parent):
-        raise Implausible(f"it refers to the file '{found}', which is not beside it")
+        raise ImplausibleError(f"it refers to the file '{found}', which is not beside it")
 
 
 def _check_references(path: Path) -> None:
@@ -204,7 +204,7 @@ def _check_references(path: Path) -> None:
     try:
         items = [item for item in ElementTree.parse(path).iter("DataItem") if item.get("Format") == "HDF"]
     except ElementTree.ParseError as error:
-        raise Implausible(f"it is no XML: {error}") from error
+        raise ImplausibleError(f"it is no XML: {error}") from error
     for name in {(item.text or "").strip().partition(":")[0] for item in items}:
         _check_place(path.parent / name, path.resolve().parent)
         with _hdf5.opened(path.parent / name):
@@ -214,9 +214,9 @@ def _check_references(path: Path) -> None:
 def _unpacked(unpacker: Any, data: bytes, most: int) -> bytes:
     found = bytes(unpacker.decompress(data, most))
     if len(found) >= most:
-        raise Implausible(f"it unpacks to more than {most} bytes")
+        raise ImplausibleError(f"it unpacks to more than {most} bytes")
     if not unpacker.eof:
-        raise Implausible("a packed part of it is cut off")
+        raise ImplausibleError("a packed part of it is cut off")
     return found
 
 
@@ -226,4 +226,4 @@ def _check_packed(path: Path, most: int) -> None:
         while piece := file.read(1 << 20):
             total += len(piece)
             if total > most:
-                raise Implausible(f"it unpacks to more than {most} bytes: unpack it first")
+                raise ImplausibleError(f"it unpacks to more than {most} bytes: unpack it first")

@@ -57,6 +57,15 @@ def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
+def left_at(path: Path) -> tuple[int, ...] | None:
+    """Return what tells a file from others at the same path, and from itself once it is changed; None without one."""
+    try:
+        found = os.stat(path)
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
+
+
 class PathLock:
     """Exclusive right to write one path, held through a file beside it.
 

@@ -16,18 +16,17 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.errors import ConvergenceError, FileError, ModelError
-from fastcontact.io import _result_layout as layout
+from fastcontact.io import _appending as appending
 from fastcontact.io._commits import CommittedFile
 from fastcontact.io._packing import packed
-from fastcontact.io._result_header import BYTES, ROWS, as_json, growing_table, write_geometry, write_own
+from fastcontact.io._result_header import as_json, write_geometry, write_own
 from fastcontact.io._resuming import taken_up
 from fastcontact.io._step_checks import check_cell_fields, check_shapes, checked_fields
-from fastcontact.io._targets import PathLike, PathLock, checked_target, reserve
+from fastcontact.io._targets import PathLike, PathLock, checked_target, left_at, reserve
 from fastcontact.mesh import Mesh
-from fastcontact.results import ContactResult, StepResult
+from fastcontact.results import StepResult
 
 # Room for HDF5's own records [bytes].
 MARGIN = 1 << 19
@@ -106,6 +105,7 @@ class ResultWriter:
         self._file: Any = None
         self._closed = self._ended = False
         self._new_case: str | None = None
+        self._left: tuple[int, ...] | None = None
         with self._explained("begun"):
             self._lock = PathLock(self.path)
             try:
@@ -120,9 +120,10 @@ class ResultWriter:
 
     def _take_up(self, kinematics: str, case_text: str) -> None:
         """Look whether the file holds steps to write after."""
+        left = left_at(self.path)
         found = taken_up(self.path, self._mesh, kinematics, self._cell_fields)
         if found is not None:
-            self.done, self._ended = found.steps, found.complete
+            self.done, self._ended, self._left = found.steps, found.complete, left
             self.n_steps = len(self.done)
             self._new_case = case_text if case_text and case_text != found.case_text else None
 
@@ -160,10 +161,11 @@ class ResultWriter:
             self._open()
             self._check_in_place()
             restart = packed({"step": self.n_steps, "restart": step.restart})
-            self._reserve(_step_size(self._mesh, step) + restart.nbytes)
-            self._append_fields(step)
-            self._append_tables(step)
-            _set_start(self._file["fastcontact"][layout.restart_table(self.n_steps)], restart)
+            self._reserve(appending.step_size(self._mesh, step) + restart.nbytes)
+            appending.append_fields(self._file, self._mesh, self.n_steps, step, self._cell_fields)
+            notes = {} if self._new_case is None else {"case": self._new_case}
+            appending.append_tables(self._file, self._mesh, self.n_steps, step, self._pairs, notes)
+            appending.set_restart(self._file, self.n_steps, restart)
             self._file.flush()
             self._append_step_rows(step)
             self._file.flush()
@@ -194,13 +196,13 @@ class ResultWriter:
         if self._file is None and self._ended and "error" not in run:
             self._give_up()  # a complete file stays as it is
             return
-        text = as_json(run)
         try:
             with self._explained("closed"):
                 self._open()
                 try:
-                    self._reserve(len(text))
-                    self._append_run(np.frombuffer(text.encode("ascii"), np.uint8))
+                    if self._below.ours:
+                        self._reserve(len(as_json(run)))
+                        appending.append_run(self._file, self.n_steps, run)
                 finally:
                     try:
                         self._file.close()
@@ -219,16 +221,26 @@ class ResultWriter:
         import h5py
 
         if self._file is None:
+            if self._left is not None and self._left != left_at(self.path):
+                raise FileError(self._gone())
             self._below = CommittedFile(self.path)
             self._file = h5py.File(self._below, "r+")
             self._pairs = {json.loads(pair["name"][()]): pair for pair in self._file["fastcontact/contact"].values()}
 
     def _check_in_place(self) -> None:
         """Refuse to go on writing to a file that nobody would find."""
+        if not self._below.intact():
+            raise FileError(
+                f"'{self.path}' was changed by another program after {self.n_steps} steps, what it holds now is left "
+                "alone: let no other program write to it, name another file and start again"
+            )
         with contextlib.suppress(OSError):
             if os.path.samestat(os.fstat(self._below.fileno()), os.stat(self.path)):
                 return
-        raise FileError(
+        raise FileError(self._gone())
+
+    def _gone(self) -> str:
+        return (
             f"'{self.path}' is no longer there: the file or its folder was removed, moved or replaced after "
             f"{self.n_steps} steps. Put it back and resume, or start again"
         )
@@ -255,7 +267,7 @@ class ResultWriter:
         temporary = self.path.with_name(f".{self.path.name}.tmp")
         try:
             with open(temporary, "wb") as probe:
-                size = _header_size(self._mesh) + len(case_text) + MARGIN
+                size = appending.header_size(self._mesh) + len(case_text) + MARGIN
                 reserve(probe.fileno(), temporary.parent, 0, size)
             with h5py.File(temporary, "w", locking=False) as file:
                 write_geometry(file, self._mesh, self._cell_fields)
@@ -267,53 +279,9 @@ class ResultWriter:
         # Closed in between because Windows renames no open file; without locks viewers may follow.
         self._open()
 
-    def _append_fields(self, step: StepResult) -> None:
-        first = self.n_steps * self._mesh.n_points
-        data = self._file["VTKHDF/PointData"]
-        for name, values in layout.point_fields(self._mesh, step).items():
-            data[name].resize(first + len(values), axis=0)
-            data[name][first:] = values
-        for name in self._cell_fields:
-            field, values = self._file["VTKHDF/CellData"][name], step.cell_fields[name]
-            field.resize((self.n_steps + 1) * len(values), axis=0)
-            field[self.n_steps * len(values) :] = values
-
-    def _append_tables(self, step: StepResult) -> None:
-        own = self._file["fastcontact"]
-        for name in step.contact:
-            if name not in self._pairs:
-                self._pairs[name] = _new_pair(own["contact"], name, self._mesh.dim)
-        for name, pair in self._pairs.items():
-            _append_contact(pair, self.n_steps, step.contact.get(name))
-        notes: dict[str, Any] = {} if self._new_case is None else {"case": self._new_case}
-        notes |= {
-            "contact": [[name, contact.formulation] for name, contact in step.contact.items()],
-            "iterations": step.iterations,
-            "warnings": list(step.warnings),
-        }
-        text = np.frombuffer(as_json(notes).encode("ascii"), np.uint8)
-        row = (step.index, step.load_factor, len(own["notes"]), len(text))
-        _extend(own["notes"], text)
-        _set_row(own["steps"], self.n_steps, np.array(row, layout.STEP_ROW))
-
-    def _append_run(self, text: NDArray[np.uint8]) -> None:
-        own = self._file["fastcontact"]
-        row = np.array((self.n_steps, len(own["notes"]), len(text)), layout.RUN_ROW)
-        _extend(own["notes"], text)
-        self._file.flush()
-        _set_row(own["runs"], len(own["runs"]), row)
-        self._file.flush()
-
     def _append_step_rows(self, step: StepResult) -> None:
-        steps = self._file["VTKHDF/Steps"]
-        _set_row(steps["Values"], self.n_steps, step.load_factor)
-        _set_row(steps["NumberOfParts"], self.n_steps, 1)
-        _set_row(steps["PartOffsets"], self.n_steps, 0)
-        _set_row(steps["CellOffsets"], self.n_steps, 0)
-        _set_row(steps["PointDataOffsets/displacement"], self.n_steps, self.n_steps * self._mesh.n_points)
-        for name in self._cell_fields:
-            first = self.n_steps * len(self._file["VTKHDF/Types"])
-            _set_row(steps["CellDataOffsets"][name], self.n_steps, first)
+        """Write the rows that make the step one that viewers see, all but the number of steps."""
+        appending.append_rows(self._file, self._mesh, self.n_steps, step, self._cell_fields)
 
 
 def _check_replaceable(path: Any, overwrite: bool) -> None:
@@ -330,64 +298,3 @@ def _check_replaceable(path: Any, overwrite: bool) -> None:
             is_result = "VTKHDF" in file
     if not is_result:
         raise FileError(f"'{path}' exists and is no result file: name another file or remove it first")
-
-
-def _header_size(mesh: Mesh) -> int:
-    """Return an upper bound for what a file without steps takes [bytes]."""
-    n_groups = len(mesh.cell_groups) + len(mesh.point_groups)
-    arrays: list[NDArray[Any]] = [mesh.points]
-    for named in (mesh.cells, mesh.cell_groups, mesh.point_groups):
-        arrays.extend(named.values())
-    return 6 * sum(array.nbytes for array in arrays) + n_groups * (mesh.n_cells + mesh.n_points + BYTES)
-
-
-def _step_size(mesh: Mesh, step: StepResult) -> int:
-    """Return an upper bound for what a step takes in the file [bytes]."""
-    fields = 8 * sum(layout.POINT_FIELDS.values()) * mesh.n_points
-    row = layout.contact_row(mesh.dim).itemsize
-    fields += 8 * sum(map(np.size, step.cell_fields.values()))
-    contact = sum((len(pair.points) + 2 * ROWS) * row + BYTES for pair in step.contact.values())
-    return int(1.01 * fields) + contact + len(as_json([step.iterations, step.warnings]))
-
-
-def _new_pair(parent: Any, name: str, dim: int) -> Any:
-    pair = parent.create_group(str(len(parent)))
-    pair["name"] = as_json(name)
-    growing_table(pair, "rows", layout.contact_row(dim))
-    growing_table(pair, "steps", layout.contact_step(dim))
-    return pair
-
-
-def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> None:
-    """Append a pair's state; a step without it gets a row of zeros."""
-    row = np.zeros((), pair["steps"].dtype)
-    if contact is not None:
-        table = np.zeros(len(contact.points), pair["rows"].dtype)
-        for name in table.dtype.names or ():
-            table[name] = getattr(contact, name)
-        row["first"], row["count"] = len(pair["rows"]), len(table)
-        row["force"], row["radius"] = contact.force, contact.radius
-        row["dissipation"] = contact.dissipation
-        row["obstacle_displacement"] = (
-            np.nan if contact.obstacle_displacement is None else contact.obstacle_displacement
-        )
-        _extend(pair["rows"], table)
-    _set_row(pair["steps"], number, row)
-
-
-def _extend(table: Any, values: NDArray[Any]) -> None:
-    first = len(table)
-    table.resize(first + len(values), axis=0)
-    table[first:] = values
-
-
-def _set_row(table: Any, number: int, value: Any) -> None:
-    table.resize(number + 1, axis=0)
-    table[number] = value
-
-
-def _set_start(table: Any, values: NDArray[Any]) -> None:
-    """Overwrite a table from its start; it never shrinks, because HDF5 would give the room to something else."""
-    if len(table) < len(values):
-        table.resize(len(values), axis=0)
-    table[: len(values)] = values

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact._jit import kernel
+from fastcontact._jit import kernel, summing_kernel
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -83,7 +83,7 @@ def forward(start: Indices, values: Array, first: Offsets, begin: Offsets, rows:
             x[rows[begin[s] + k]] -= moved[k]
 
 
-@kernel
+@summing_kernel
 def backward(
     start: Indices, values: Array, first: Offsets, begin: Offsets, rows: Indices, given: NDArray[np.bool_], x: Array
 ) -> None:
@@ -100,19 +100,11 @@ def backward(
         for j in range(high - 1, low - 1, -1):
             if given[j]:
                 continue
-            at = start[j] + 1
+            # Slices, since the compiler sees of those that their entries lie side by side.
+            beside, under = values[start[j] + 1 : start[j] + high - j], values[start[j] + high - j : start[j + 1]]
             total = 0.0
-            for k in range(j + 1, high):
-                total += values[at] * x[k]
-                at += 1
-            # Four sums at a time: one alone waits for each of its additions.
-            a, b, c, d = 0.0, 0.0, 0.0, 0.0
-            whole = below - below % 4
-            for k in range(0, whole, 4):
-                a += values[at + k] * gathered[k]
-                b += values[at + k + 1] * gathered[k + 1]
-                c += values[at + k + 2] * gathered[k + 2]
-                d += values[at + k + 3] * gathered[k + 3]
-            for k in range(whole, below):
-                a += values[at + k] * gathered[k]
-            x[j] -= total + ((a + b) + (c + d))
+            for k in range(high - j - 1):
+                total += beside[k] * x[j + 1 + k]
+            for k in range(below):
+                total += under[k] * gathered[k]
+            x[j] -= total

@@ -27,15 +27,23 @@ class KnownLoads:
         size = float(np.linalg.norm(f))
         if size == 0.0:
             return np.zeros_like(f)
-        if self._loads:
-            known = np.column_stack(self._loads)
-            weights = np.linalg.lstsq(known, f, rcond=None)[0]
-            if np.linalg.norm(f - known @ weights) <= MISSED * size:
-                return np.asarray(np.column_stack(self._solutions) @ weights)
+        weights, left = self._projected(f)
+        if len(weights) and np.linalg.norm(left) <= MISSED * size:
+            return sum((w * u for w, u in zip(weights, self._solutions, strict=True)), np.zeros_like(f))
         f = f / size
         u = solve(f)
         self._keep(f, u)
         return size * u
+
+    def _projected(self, f: Array) -> tuple[Array, Array]:
+        """Return the weights of the loads kept that come closest to f, and what they leave of it (n,)."""
+        weights, left = np.zeros(len(self._loads)), f
+        if self._loads:
+            gram = np.array([[one @ other for other in self._loads] for one in self._loads])
+            for _ in range(2):  # once more for what the squared condition of the normal equations takes away
+                weights = weights + np.linalg.lstsq(gram, [load @ left for load in self._loads], rcond=None)[0]
+                left = f - sum((w * load for w, load in zip(weights, self._loads, strict=True)), np.zeros_like(f))
+        return weights, left
 
     def _keep(self, f: Array, u: Array) -> None:
         self._loads, self._solutions = [*self._loads[1 - KEPT :], f], [*self._solutions[1 - KEPT :], u]

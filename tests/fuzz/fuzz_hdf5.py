@@ -40,7 +40,8 @@ def _replace(dataset: Any, **created: Any) -> None:
 
 
 def _shape(file: Any, groups: list[Any], datasets: list[Any], outside: Path, random: np.random.Generator) -> None:
-    shapes = [(), (0,), (1,), (3,), (2, 3), (7, 1, 2), (1000,), (dataset := _any(datasets, random)).shape + (1,)]
+    dataset = _any(datasets, random)
+    shapes = [(), (0,), (1,), (3,), (2, 3), (7, 1, 2), (1000,), (*dataset.shape, 1)]
     _replace(dataset, shape=_any(shapes, random), dtype=dataset.dtype)
 
 

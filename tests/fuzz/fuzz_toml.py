@@ -9,27 +9,14 @@ from typing import Any
 import numpy as np
 
 WILD = [
-    0, -1, 2**31, 2**63 - 1, 10**18, True, False, float("nan"), float("inf"), 1e308, 5e-324, -0.0, 1e-12, 1.5, "", "x", "../..",
-    "/etc/hostname", "\x00", "é" * 50, "a" * 5000, "../outside/bait.h5", [], [1], [[]], [[1, 2], [3]], ["x", 2], {}, {"x": 1},
-    {"kind": "sphere"}, [{"group": "CONT1"}], 1000, "CONT1", "mortar", "amg", [0.0] * 300,
+    0, -1, 2**31, 2**63 - 1, 10**18, True, False, float("nan"), float("inf"), 1e308, 5e-324, -0.0, 1e-12, 1.5,
+    "", "x", "../..", "/etc/hostname", "\x00", "é" * 50, "a" * 5000, "../outside/bait.h5", [], [1], [[]], [[1, 2], [3]],
+    ["x", 2], {}, {"x": 1}, {"kind": "sphere"}, [{"group": "CONT1"}], 1000, "CONT1", "mortar", "amg", [0.0] * 300,
 ]  # fmt: skip
 KEYS = [
-    "x",
-    "y",
-    "group",
-    "kind",
-    "",
-    "é",
-    "ramp",
-    "formulation",
-    "friction",
-    "penalty",
-    "self",
-    "model",
-    "mesh",
-    "shape",
+    "x", "y", "group", "kind", "", "é", "ramp", "formulation", "friction", "penalty", "self", "model", "mesh", "shape",
     "__class__",
-]
+]  # fmt: skip
 
 
 def damaged(text: str, random: np.random.Generator) -> str:

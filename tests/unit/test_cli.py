@@ -163,14 +163,16 @@ def test_no_convergence_is_exit_code_two_and_keeps_finished_steps(solved, tmp_pa
     case.write_text(text.replace("steps = 3", "instants = [0.001, 1.0]"))
     code = main(["run", str(case), "-o", str(tmp_path / "hard.vtkhdf")])
     assert code == 2
-    cut, told, *history = capsys.readouterr().err.splitlines()
+    cut, told, *history, kept = capsys.readouterr().err.splitlines()
     assert cut.startswith(
         "step 2 from 0.001 to 1 does not converge, cut in halves: the contact geometry did not settle"
     )
     assert told.startswith("no convergence: ")
     assert "step 2 was cut in halves once, the part from " in told
     assert [line.split()[0] for line in history] == ["iterations", "1", "2", "3"]
-    results = fc.open_results(tmp_path / "hard.vtkhdf")
+    path = tmp_path / "hard.vtkhdf"
+    assert kept == f"  '{path}' keeps one complete step: 'fastcontact run --resume' goes on from there"
+    results = fc.open_results(path)
     assert len(results) == 1
     assert not results.complete
     assert results.error.split(": ", 1) == ["ConvergenceError", told.removeprefix("no convergence: ").strip()]
@@ -178,6 +180,54 @@ def test_no_convergence_is_exit_code_two_and_keeps_finished_steps(solved, tmp_pa
     ((name, nodes),) = results.log["failed_step"][-1]["nodes"].items()
     assert (name, len(nodes)) == ("hertz", 3)
     assert f"most at points {nodes[0]} [" in told
+    assert main(["info", str(path)]) == 0
+    assert f"  stopped: {results.error}" in capsys.readouterr().out.splitlines()
+
+
+def test_steps_that_went_in_parts_are_told(solved, tmp_path, capsys):
+    case, path, summary = (tmp_path / f"cut{suffix}" for suffix in (".toml", ".vtkhdf", ".json"))
+    limits = "[solve]\nmax_active_set_iterations = 2\ngeometry_updates = 0\n[probes]"
+    case.write_text(
+        CASE.replace("steps = 3", "steps = 1").replace("size = 6.0", "size = 3.0").replace("[probes]", limits)
+    )
+    assert main(["run", str(case), "-o", str(path), "--json", str(summary)]) == 0
+    captured = capsys.readouterr()
+    assert "step 1 from 0 to 1 does not converge, cut in halves: " in captured.err
+    (step,) = json.loads(summary.read_text())["steps"]
+    ends = step["substeps"]
+    assert len(ends) > 1
+    assert f"  1 load step did not converge as a whole and went in {len(ends)} parts" in captured.out.splitlines()
+    assert main(["info", str(path)]) == 0
+    assert f"went in parts up to {ends[0]:.6g}, " in capsys.readouterr().out
+
+
+def test_a_run_that_was_killed_is_incomplete(solved, tmp_path, capsys):
+    with fc.open_results(solved / "small.vtkhdf") as results:
+        out = fc.ResultWriter(tmp_path / "killed.vtkhdf", results.mesh)
+        out.write(results[0])
+        assert main(["info", str(out.path)]) == 0
+    assert "  incomplete: the run was killed, or goes on" in capsys.readouterr().out.splitlines()
+
+
+def test_a_run_interrupted_from_the_keyboard_says_what_it_keeps(solved, tmp_path, capsys, monkeypatch):
+    path, write = tmp_path / "stopped.vtkhdf", fc.ResultWriter.write
+
+    def stop(self, step):
+        if step.index == 3:
+            raise KeyboardInterrupt
+        write(self, step)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(fc.ResultWriter, "write", stop)
+        assert main(["run", str(solved / "small.toml"), "-o", str(path)]) == 130
+    told = capsys.readouterr().err.splitlines()
+    assert told[-2:] == [
+        "interrupted",
+        f"  '{path}' keeps all 2 complete steps: 'fastcontact run --resume' goes on from there",
+    ]
+    assert main(["run", str(solved / "small.toml"), "-o", str(path), "--resume", "-q"]) == 0
+    expected = fc.open_results(solved / "small.vtkhdf")[-1]
+    np.testing.assert_array_equal(fc.open_results(path)[-1].displacement, expected.displacement)
 
 
 def test_steps_and_pairs_that_do_not_exist(solved, capsys):

@@ -572,7 +572,7 @@ def test_a_file_put_in_the_place_of_the_running_one_is_not_touched(path: Path) -
         out.write(step_result(0))
         path.unlink()
         path.write_text("mine")
-        with pytest.raises(FileError, match="is no longer there: .* after 1 steps. Put it back and resume"):
+        with pytest.raises(FileError, match=r"is no longer there: .* after 1 steps\. Put it back and resume"):
             out.write(step_result(1))
     assert path.read_text() == "mine"
 

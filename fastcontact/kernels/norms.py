@@ -1,0 +1,22 @@
+"""Norms of long vectors, without the copies that NumPy makes of them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact._jit import kernel
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def largest_difference(x: Array, y: Array) -> float:
+    """Return the largest of ``|x - y|`` (n,), 0 if there is none; NaN if there is one."""
+    found = 0.0
+    for k in range(len(x)):
+        value = x[k] - y[k]
+        found = max(found, abs(value))
+        if value != value:
+            return value
+    return found
