@@ -275,7 +275,11 @@ class Analysis:
             self.round_off = max(self.round_off, 16 * np.finfo(float).eps * alone)
         history: list[dict[str, Any]] = []
         if self.pairs:
-            constraints, state = self._contact(loaded, lift, history)
+            try:
+                constraints, state = self._contact(loaded, lift, history)
+            except ConvergenceError as error:
+                error.history = error.history or history  # what failed inside knows of no pairings
+                raise
             force = constraints.force(state)
             self._move_everything(loaded, state, force, lift)
         else:
@@ -339,7 +343,9 @@ class Analysis:
             tolerance = max(tolerance, FIRST_RESIDUAL)
         for update in range(limit + 1):
             displacement = self.displacement
-            positions = self._place_obstacles(np.where(self.system.fixed, lift, self.u) if self.driven.pairs else self.u)
+            positions = self._place_obstacles(
+                np.where(self.system.fixed, lift, self.u) if self.driven.pairs else self.u
+            )
             paired_at = np.zeros_like(displacement) if criteria.keep_pairing else displacement
             parts = {name: pair.conditions(paired_at) for name, pair in self.pairs.items()}
             self.parts = parts
@@ -388,8 +394,9 @@ class Analysis:
             raise ConvergenceError(
                 f"the contact geometry did not settle in {limit} updates: the displacement still changes by "
                 f"{history[-1]['displacement_change']:.1e} of its largest component, most at "
-                f"{self._named_nodes(history[-1]['nodes'])}, {history[-1]['active']} constraints are active. Use more "
-                f"load steps, a finer mesh on the primary side, {self._smoother()}or a fixed number of updates",
+                f"{self._named_nodes(history[-1]['nodes'])}, {history[-1]['active']} constraints are active. Allow more "
+                f"(max_geometry_updates), use more load steps, a finer mesh on the primary side, {self._smoother()}or a "
+                "fixed number of updates",
                 history,
             )
         self.unsettled = (limit, history[-1]["displacement_change"]) if limit and not criteria.keep_pairing else None
@@ -565,10 +572,12 @@ class Analysis:
                 f"{constraints.friction.max():g} there may be no solution to find: use more load steps or less friction"
             )
         count = int((state.active != state.wanted).sum())
-        what = f"{count} constraints still change, at {self._named_nodes(nodes)}" if count else ""
+        many = "1 constraint still changes" if count == 1 else f"{count} constraints still change"
+        what = f"{many}, at {self._named_nodes(nodes)}" if count else "sliding constraints still turn"
+        other = ", the direct linear solver" if self.solver.iterative else ""
         return (
-            f"the active set did not settle in {state.iterations} iterations: "
-            f"{what or 'sliding constraints still turn'}. Use more load steps or the direct linear solver"
+            f"the active set did not settle in {state.iterations} iterations: {what}. Use more load steps{other} or more "
+            "iterations (max_active_set_iterations)"
         )
 
     def _balance(self, contact_force: Array, index: int, history: list[dict[str, Any]]) -> Array:

@@ -83,6 +83,10 @@ def solve(
 ) -> FrictionalEquilibrium:
     """Find displacement and contact forces under contact and friction.
 
+    Constraints that nothing presses together are left out, for each costs columns of the compliance: the problem begins
+    with those that were closed, and takes up others as they are found to penetrate. What is left out in the end is open
+    and free of forces, so nothing is lost. Constraints that a compliance of their own couples are taken all at once.
+
     Parameters
     ----------
     loaded : Loaded
@@ -113,7 +117,29 @@ def solve(
     elsewhere : ndarray (n,), optional
         Displacement to keep where no constraint acts, see `Loaded.near`.
     """
-    rows = np.flatnonzero(usable)
+    together = compliance is not None or loose is not None
+    chosen = usable if together else usable & (closed if held is None else closed | held)
+    iterations = 0
+    while True:
+        found = _among(
+            chosen, loaded, B, tangents, gap0, slip0, friction, compliance, directions, closed, held, softness, loose, guess,
+            elsewhere,
+        )  # fmt: skip
+        found.gap[~usable], found.slip[~usable] = np.inf, 0.0
+        iterations += found.iterations
+        missing = usable & ~chosen & (found.gap < 0.0)
+        if not missing.any():
+            return dataclasses.replace(found, iterations=iterations)
+        chosen = chosen | missing
+
+
+def _among(
+    chosen: Mask, loaded: Loaded, B: csr_array, tangents: tuple[csr_array, ...], gap0: Array, slip0: Array,
+    friction: Array, compliance: Compliance | None, directions: tuple[Array, ...], closed: Mask, held: Mask | None,
+    softness: Array | None, loose: Array | None, guess: FrictionalEquilibrium | None, elsewhere: Array | None,
+) -> FrictionalEquilibrium:  # fmt: skip
+    """Solve with the `chosen` constraints (m,) alone; gaps and slips of the others are what the displacement leaves."""
+    rows = np.flatnonzero(chosen)
     k, m = len(tangents), len(gap0)
     R = csr_array(vstack([matrix[rows] for matrix in (B, *tangents)], format="csr"))
     free, F = loaded.reduce(R)
@@ -141,12 +167,11 @@ def solve(
     y, relative = found.y, found.gaps
     if Q is not None:
         y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)
-    full, gaps = np.zeros((1 + k, m)), np.full((1 + k, m), np.inf)
+    u = loaded.near(R.T @ y.ravel(), elsewhere)
+    full, gaps = np.zeros((1 + k, m)), np.vstack([gap0 + B @ u, *(own + T @ u for own, T in zip(slip0, tangents))])
     full[:, rows], gaps[:, rows] = y, relative
-    gaps[1:, ~usable] = 0.0
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)
     active[rows], sticking[rows] = found.closed, found.sticking
-    u = loaded.near(R.T @ y.ravel(), elsewhere)
     return FrictionalEquilibrium(
         u, full[0], gaps[0], full[1:].T, gaps[1:].T, active, sticking, found.settled, found.residual, found.iterations
     )

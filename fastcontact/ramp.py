@@ -11,6 +11,8 @@ from fastcontact.errors import ModelError
 
 # Points (instant, multiplier of the loads) of a piecewise linear function.
 Table = tuple[tuple[float, float], ...]
+# Equal steps that a ramp may be made of: beyond that a digit has slipped.
+MOST_STEPS = 1_000_000
 
 
 def checked_table(rows: Iterable[Iterable[float]], what: str = "the ramp") -> Table:
@@ -89,10 +91,12 @@ def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:
     Raises
     ------
     ModelError
-        If `steps` is not a positive whole number or `end` is not positive.
+        If `steps` is not a whole number from 1 to a million or `end` is not positive.
     """
     if int(steps) != steps or steps < 1:
         raise ModelError(f"the number of load steps must be a positive whole number, not {steps}")
+    if steps > MOST_STEPS:
+        raise ModelError(f"{steps} load steps are more than {MOST_STEPS}, which nobody waits for: ask for fewer steps")
     if not end > 0:
         raise ModelError(f"the ramp must end at a positive load factor, not {end}")
     return Ramp(tuple(end * (i + 1) / int(steps) for i in range(int(steps))), ((0.0, 0.0), (end, 1.0)))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import ContactError
-from fastcontact.kernels import box_tree, search2d, search3d
+from fastcontact.kernels import box_tree, packed_tree, search2d, search3d
 
 Array = NDArray[np.float64]
 
@@ -21,6 +21,10 @@ _TRIANGLE_SIDES = np.array([[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [1.0, 1.0, 1.0]]
 _SQUARE_SIDES = np.array([[-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, -1.0, 1.0], [0.0, 1.0, 1.0]])
 # Powers of s and t, in the order of `kernels.search3d`.
 _POWERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1], [2, 0], [0, 2], [2, 1], [1, 2], [2, 2]])
+# The largest change of the gradient of each power from that at (0, 0), and the largest second derivative (its spectral
+# norm), for s and t up to 1.
+_TURN = np.sqrt([0, 0, 0, 2, 4, 4, 5, 5, 8])
+_SECOND = np.array([0, 0, 0, 1, 2, 2, 1 + 5**0.5, 1 + 5**0.5, 6])
 # Flat triangles between the nodes, by number of nodes.
 _FLAT = {
     3: [[0, 1, 2]],
@@ -116,29 +120,30 @@ def _on_lines(points: Array, corners: Array) -> Closest:
 
 
 def _on_faces(points: Array, corners: Array) -> Closest:
-    nodes, sides, to_terms, to_hull, to_bend = _tables(corners.shape[1])
+    reference, sides, to_terms, to_hull, weights = _tables(corners.shape[1])
+    bounds = search3d.bounds(corners)
     # Seen from their midst: far from the origin, rounding would be coarser than the steps of a converged projection.
-    midst = 0.5 * (corners.min(axis=(0, 1)) + corners.max(axis=(0, 1)))
-    points, corners = points - midst, corners - midst
-    terms, hull = to_terms @ corners, to_hull @ corners
-    low, high = hull.min(axis=1), hull.max(axis=1)
-    bend = np.linalg.norm(terms, axis=2) @ to_bend
-    bend[bend < 1e-9 * (high - low).max(axis=1)] = 0.0
+    midst = 0.5 * (bounds[0] + bounds[1])
+    order = packed_tree.curve_order(np.ascontiguousarray(corners[:, 0]), *bounds)
+    terms, nodes = np.empty(corners.shape), np.empty(corners.shape)
+    low, high = np.empty((len(corners), 3)), np.empty((len(corners), 3))
+    bend, convex = np.empty(len(corners)), np.empty(len(corners))
+    search3d.prepare(
+        corners, order, 0, len(corners), midst, to_terms, to_hull, weights, terms, nodes, low, high, bend, convex
+    )
+    tree = packed_tree.pack(low, high)
+    along = packed_tree.curve_order(points, *bounds)
     n = len(points)
     facet, xi, normal, overhang = np.empty(n, np.intp), np.empty((n, 2)), np.empty((n, 3)), np.empty(n)
-    position, status = np.empty((n, 3)), np.empty(n, np.int8)
-    # Neighbours one after the other: each finds the facets of the last one in the cache, and a good first guess.
-    order = box_tree.build(points, points)[4] if n else np.empty(0, np.intp)
+    position, distance, status = np.empty((n, 3)), np.empty(n), np.empty(n, np.int8)
     search3d.closest_facets(
-        points[order], terms, corners, bend, nodes, flat_triangles(len(nodes)), sides, low, high,
-        *box_tree.build(low, high), facet, xi, normal, overhang, position, status,
+        points, along, 0, n, midst, terms, nodes, bend, convex, reference, flat_triangles(len(reference)), sides,
+        *tree, order, facet, xi, normal, overhang, position, distance, status,
     )  # fmt: skip
     wrong = np.flatnonzero(status != search3d.CONVERGED)
     if len(wrong):
-        _refuse(points[order[wrong]] + midst, facet[wrong], corners + midst)
-    distance = np.linalg.norm(points[order] - position, axis=1)
-    back = np.argsort(order)
-    return Closest(facet[back], xi[back], normal[back], overhang[back], position[back] + midst, distance[back])
+        _refuse(points[wrong], facet[wrong], corners)
+    return Closest(facet, xi, normal, overhang, position, distance)
 
 
 def _refuse(points: Array, facet: NDArray[np.intp], corners: Array) -> None:
@@ -155,14 +160,18 @@ def _refuse(points: Array, facet: NDArray[np.intp], corners: Array) -> None:
 
 @cache
 def _tables(n_nodes: int) -> tuple[Array, Array, Array, Array, Array]:
-    """Return the reference nodes and sides of a facet in 3D, matrices from nodes to terms and to a hull, and its bend."""
+    """Return the reference nodes and sides of a facet in 3D, matrices from nodes to terms and to a hull, and weights.
+
+    The weights (3, n_nodes) of the terms are those of `kernels.search3d.prepare`.
+    """
     if n_nodes not in _FLAT:
         raise ContactError(f"there are no facets of {n_nodes} nodes in three dimensions: known are {sorted(_FLAT)}")
     triangle = n_nodes in (3, 6)
     nodes = (_TRIANGLE if triangle else _SQUARE)[:n_nodes]
     to_terms = np.asarray(np.linalg.inv(_terms(nodes, n_nodes)), float)
     sides = _TRIANGLE_SIDES if triangle else _SQUARE_SIDES
-    return nodes, sides, to_terms, _hull(n_nodes, to_terms), _bend(nodes)
+    weights = np.stack([_bend(nodes), _TURN[:n_nodes], _SECOND[:n_nodes]])
+    return nodes, sides, to_terms, _hull(n_nodes, to_terms), weights
 
 
 def _terms(places: Array, n_nodes: int) -> Array:

@@ -84,10 +84,11 @@ def _parts(
         return [analysis.step(index, end, last=last)]
     except ConvergenceError as error:
         if halved == limit or not begin < middle < end or not error.smaller_steps_help:
-            if not halved:
-                raise
+            where = f"from {begin:.6g} to {end:.6g}"
             often = "once" if halved == 1 else f"{halved} times"
-            part = f"step {index} was cut in halves {often}, the part from {begin:.6g} to {end:.6g} fails"
+            part = (
+                f"step {index} was cut in halves {often}, the part {where} fails" if halved else f"step {index} {where}"
+            )
             raise ConvergenceError(f"{error} ({part})", error.history, smaller_steps_help=False) from error
         reason = str(error).split(". ")[0]
         log.warning("step %d from %.6g to %.6g does not converge, cut in halves: %s", index, begin, end, reason)

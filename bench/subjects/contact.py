@@ -3,7 +3,8 @@
 All three include the preparation of the linear solver (hierarchy or factors) and leave out mesh and assembly. For L
 the contact is dropped: supports and prescribed displacements alone hold both bodies. ``sphere-on-block`` is solved by
 multigrid, ``forma04c`` by what "auto" chooses, both node-to-segment with converged geometry; the latter is compared with
-one plain factorisation by SuperLU (minimum degree of A + A.T, symmetric mode) of the same matrix, too.
+one plain factorisation of the same matrix, too: by SuperLU (minimum degree of A + A.T, symmetric mode), or by CHOLMOD where
+that solves it.
 """
 
 import time
@@ -66,11 +67,12 @@ def prepared(analysis, solver):
 
 
 def fresh(analysis, name):
-    return linear.make(name, dim=analysis.model.mesh.dim, n_dofs=analysis.model.n_dofs, tolerance=TOLERANCE)
+    tolerance = analysis.criteria.geometry
+    return linear.make(name, dim=analysis.model.mesh.dim, n_dofs=analysis.model.n_dofs, tolerance=tolerance)
 
 
-def started(model, name, count):
-    return Analysis(model, name, TOLERANCE, Criteria(geometry=TOLERANCE), fc.linear_ramp(count))
+def started(model, name, count, tolerance=TOLERANCE):
+    return Analysis(model, name, tolerance, Criteria(geometry=tolerance), fc.linear_ramp(count))
 
 
 def linear_solution(analysis, solver):
@@ -92,13 +94,15 @@ def steps(analysis):
         analysis.step(index, instant)
 
 
-def detailed(problem, dofs):
+def detailed(problem, dofs, solver=None, tolerance=TOLERANCE):
     """Return the figures of one problem, warm: a small one runs first and compiles."""
     if problem not in PROBLEMS:
         raise FastcontactError(unknown("problem", problem, list(PROBLEMS)))
     make, name = PROBLEMS[problem]
-    figures(make(min(dofs, 1_500)), name)
-    return {"problem": problem, **figures(make(dofs), name), "peak_bytes": peak_bytes(), "threads": _jit.threads()}
+    name = solver or name
+    figures(make(min(dofs, 1_500)), name, tolerance)
+    found = figures(make(dofs), name, tolerance)
+    return {"problem": problem, **found, "peak_bytes": peak_bytes(), "threads": _jit.threads()}
 
 
 def measured_linear(analysis, name):
@@ -108,13 +112,13 @@ def measured_linear(analysis, name):
     return iterations, setup, solution
 
 
-def figures(model, name):
-    analysis = started(model, name, 1)
+def figures(model, name, tolerance):
+    analysis = started(model, name, 1, tolerance)
     iterations, setup, solution = measured_linear(analysis, name)
     L = setup + solution
     _, cold = cpu(lambda: steps(analysis))
     del analysis
-    analysis = started(model, name, 20)
+    analysis = started(model, name, 20, tolerance)
     counters = analysis.solver.counters
     before = counters.iterations
     _, twenty = cpu(lambda: steps(analysis))
@@ -131,13 +135,32 @@ def figures(model, name):
 
 
 def against_factorisation(analysis, cold, twenty):
-    """Return what SuperLU takes for the matrix, in two dimensions, and both times in units of it."""
+    """Return what one factorisation takes, in two dimensions, and both times in units of it."""
     if analysis.model.mesh.dim != 2:
         return {}
-    matrix = analysis.system.matrix.tocsc()
+    name, factorise = ("cholmod", by_cholmod) if analysis.solver.name == "cholmod" else ("superlu", by_superlu)
+    one = factorise(analysis.system.matrix.tocsc())
+    return {name: {"cpu_s": one, "cold_step": cold / one, "twenty_steps": twenty / one}}
+
+
+def by_superlu(matrix):
     options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-    _, one = cpu(lambda: splu(matrix, **options))
-    return {"superlu": {"cpu_s": one, "cold_step": cold / one, "twenty_steps": twenty / one}}
+    return cpu(lambda: splu(matrix, **options))[1]
+
+
+def by_cholmod(matrix):
+    """Order and factors in CHOLMOD's own order, without turning SciPy's matrix into one of its own."""
+    from kvxopt import cholmod
+
+    from fastcontact.linear.cholmod import _matrix
+
+    A, _ = _matrix(matrix)
+
+    def factors():
+        factor = cholmod.symbolic(A)
+        cholmod.numeric(A, factor)
+
+    return cpu(factors)[1]
 
 
 def works(size):

@@ -23,6 +23,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--compare", metavar="FILE", help="compare with a run stored by --json")
     parser.add_argument("--problem", metavar="NAME", help="with contact: sphere-on-block or forma04c, in detail")
     parser.add_argument("--dofs", type=int, metavar="N", help="with --problem: about how many unknowns")
+    parser.add_argument("--linear", metavar="SOLVER", help="with --problem: linear solver (default: the problem's)")
+    parser.add_argument("--tolerance", type=float, metavar="T", help="with --problem: of solver and geometry (1e-8)")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -58,7 +60,9 @@ def _contact(options: argparse.Namespace) -> int:
         raise FastcontactError("--problem and --dofs go together, with the benchmark 'contact' alone")
     from fastcontact import benchmark
 
-    found = benchmark.load("contact").detailed(options.problem, options.dofs)
+    given = {"solver": options.linear, "tolerance": options.tolerance}
+    chosen = {key: value for key, value in given.items() if value is not None}
+    found = benchmark.load("contact").detailed(options.problem, options.dofs, **chosen)
     if not options.quiet:
         print(json.dumps(found, indent=1))
     if options.json:

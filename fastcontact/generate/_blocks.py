@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.generate._check import affordable
 from fastcontact.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -16,6 +17,7 @@ SIDES = ("BOTTOM", "RIGHT", "TOP", "LEFT")
 
 def rectangular(x: Array, y: Array) -> Array:
     """Grid (n + 1, m + 1, 2) of the coordinates x (n + 1,) and y (m + 1,) [length]."""
+    affordable(len(x) * len(y))
     return np.stack(np.meshgrid(x, y, indexing="ij"), axis=2)
 
 
@@ -38,6 +40,7 @@ def transfinite(bottom: Array, right: Array, top: Array, left: Array, u: Array, 
     ndarray (n + 1, m + 1, 2)
         The sides are met exactly.
     """
+    affordable(len(u) * len(v))
     U, V = u[:, None, None], v[None, :, None]
     between_rows = (1 - V) * bottom[:, None] + V * top[:, None]
     between_columns = (1 - U) * left[None] + U * right[None]

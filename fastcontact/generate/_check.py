@@ -11,6 +11,11 @@ from fastcontact.errors import MeshError, unknown
 TRIANGLES = ("tri3", "tri6")
 QUADRANGLES = ("quad4", "quad8", "quad9")
 FACES = TRIANGLES + QUADRANGLES
+# Numbers whose squares and cubes are still numbers. What is made at most: beyond that a unit or a decimal point has
+# slipped, and the machine would be short of memory.
+LARGEST = 1e100
+MOST_ALONG = 1_000_000
+MOST_CELLS = 5_000_000
 
 
 def number(name: str, value: Any) -> float:
@@ -21,12 +26,16 @@ def number(name: str, value: Any) -> float:
         raise MeshError(f"{name} must be a number, not {value!r}") from None
     if not math.isfinite(result):
         raise MeshError(f"{name} must be a finite number, not {value!r}")
+    if abs(result) > LARGEST:
+        raise MeshError(f"{name} = {result:g} is out of range: its size must be at most {LARGEST:g}")
     return result
 
 
 def positive(name: str, value: Any, at_most: float = math.inf, limit: str = "") -> float:
     """Return `value` as a float; MeshError unless 0 < value <= at_most (called `limit` in the message)."""
     result = number(name, value)
+    if 0.0 < result < 1.0 / LARGEST:
+        raise MeshError(f"{name} = {result:g} is out of range: it must be at least {1.0 / LARGEST:g}")
     if not 0.0 < result <= at_most * (1 + 1e-12):
         upper = "" if at_most == math.inf else f" and at most {limit + ' = ' if limit else ''}{at_most:g}"
         raise MeshError(f"{name} = {result:g} is out of range: it must be greater than 0{upper}")
@@ -42,11 +51,32 @@ def within(name: str, value: Any, low: float, high: float) -> float:
 
 
 def count(name: str, value: Any) -> int:
-    """Return `value` as an int; MeshError unless it is a whole number >= 1."""
+    """Return `value` as an int; MeshError unless it is a whole number from 1 to MOST_ALONG."""
     result = number(name, value)
     if result != int(result) or result < 1:
         raise MeshError(f"{name} = {value!r} is out of range: it must be a whole number, at least 1")
+    if result > MOST_ALONG:
+        raise MeshError(f"{name} = {value!r} is out of range: it must be at most {MOST_ALONG}")
     return int(result)
+
+
+def segments(wanted: float) -> int:
+    """Return the whole number next above `wanted`, at least 1; MeshError if it is more than MOST_ALONG."""
+    if not wanted <= MOST_ALONG:
+        raise MeshError(
+            f"a line of the mesh would be divided into {wanted:.3g} segments, more than {MOST_ALONG}: check the units of "
+            "the element sizes, or ask for larger elements"
+        )
+    return max(1, math.ceil(wanted - 1e-9))
+
+
+def affordable(n_cells: float) -> None:
+    """Raise MeshError if a mesh of about `n_cells` cells is more than anyone can mean."""
+    if not n_cells <= MOST_CELLS:
+        raise MeshError(
+            f"the mesh would have about {n_cells:.3g} cells, more than {MOST_CELLS}: check the units of the element sizes, "
+            "or ask for larger elements or fewer divisions"
+        )
 
 
 def pair(name: str, value: Any) -> tuple[Any, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.generate._check import affordable
 from fastcontact.generate._spacing import Spacing
 
 Array = NDArray[np.float64]
@@ -67,6 +68,7 @@ def _lattice(spacing: Spacing, density: float, low: Array, high: Array) -> Array
     pole = np.asarray(spacing.pole)
     rows = np.arange(np.floor((low[1] - pole[1]) / (_ROW * size)), np.ceil((high[1] - pole[1]) / (_ROW * size)) + 1)
     columns = np.arange(np.floor((low[0] - pole[0]) / size) - 1, np.ceil((high[0] - pole[0]) / size) + 1)
+    affordable(2.0 * len(rows) * len(columns))
     row, column = np.meshgrid(rows, columns, indexing="ij")
     x = pole[0] + size * (column + 0.5 * (row % 2))
     return np.column_stack([x.ravel(), (pole[1] + _ROW * size * row).ravel()])
@@ -81,11 +83,13 @@ def _rings(spacing: Spacing, density: float, low: Array, high: Array) -> Array:
     pole = np.asarray(spacing.pole)
     corners = np.array([[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])]) - pole
     farthest = np.hypot(corners[:, 0], corners[:, 1]).max()
-    rings, radius, shift = [], 0.0, 0.0
+    rings, radius, shift, total = [], 0.0, 0.0, 0
     while radius < farthest:
         size = density * float(spacing.at_distance(radius))
         radius += _ROW * size
         n = max(6, round(2 * np.pi * radius / size))
+        total += n
+        affordable(2.0 * total)
         angle = 2 * np.pi * (np.arange(n) + shift) / n - 0.5 * np.pi
         rings.append(radius * np.column_stack([np.cos(angle), np.sin(angle)]))
         shift = 0.5 - shift

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.generate._check import segments
+
 Array = NDArray[np.float64]
 Curve = Callable[[Array], Array]
 
@@ -52,7 +54,7 @@ class Spacing:
 
 def segments_for(length: float, size: float) -> int:
     """Smallest number of equal segments not longer than `size`."""
-    return max(1, math.ceil(length / size - 1e-9))
+    return segments(length / size)
 
 
 def geometric(length: float, first: float, last: float) -> Array:
@@ -70,7 +72,7 @@ def geometric(length: float, first: float, last: float) -> Array:
     if length * (1 - 1e-12) > max(first, last):  # otherwise a segment and a rest of rounding: two do
         # log(last / first) / log(q), without cancellation where the sizes are nearly the same.
         ratios = math.log1p((last - first) / first) / math.log1p((last - first) / (length - last))
-        n = 1 + math.ceil(ratios - 1e-9)
+        n = 1 + segments(ratios)
     abscissa = np.concatenate([[0.0], np.cumsum(np.geomspace(first, last, n))])
     return abscissa / abscissa[-1]
 
@@ -83,7 +85,7 @@ def divided(curve: Curve, length: float, spacing: Spacing) -> Array:
     fine = np.linspace(0.0, 1.0, 16 * segments_for(length, min(spacing.near, spacing.far)) + 1)
     density = length / spacing(curve(0.5 * (fine[:-1] + fine[1:])))
     number = np.concatenate([[0.0], np.cumsum(density * np.diff(fine))])
-    n = max(1, math.ceil(number[-1] - 1e-9))
+    n = segments(number[-1])
     parameter = np.interp(np.linspace(0.0, number[-1], n + 1), number, fine)
     parameter[0], parameter[-1] = 0.0, 1.0
     return curve(parameter)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fastcontact import elements
 from fastcontact.elements import Element
 from fastcontact.errors import MeshError
-from fastcontact.generate._check import count, number, one_of, positive
+from fastcontact.generate._check import affordable, count, number, one_of, positive
 from fastcontact.mesh import Mesh
 
 Indices = NDArray[np.int64]
@@ -90,6 +90,7 @@ def _triple(name: str, value: Any) -> tuple[Any, Any, Any]:
 
 def _solids(solid: Element, shape: Indices) -> tuple[Indices, Indices]:
     """Return the connectivity of the cells, and the points (n_points, 3) in steps of the lattice."""
+    affordable(float(np.prod(shape, dtype=float)) * len(_CUTS[solid.linear]))
     corners = np.vstack([_CORNERS, _CORNERS.mean(axis=0, keepdims=True).astype(np.int64)])
     local = solid.corner_shape(solid.nodes) @ corners[_CUTS[solid.linear]]
     # One number for each place of the lattice; they add up.

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import MeshError
-from fastcontact.generate._check import QUADRANGLES, one_of, positive
+from fastcontact.generate._check import QUADRANGLES, one_of, positive, segments
 from fastcontact.generate._places import with_points_at
 from fastcontact.generate.blocks import block
 from fastcontact.generate.transform import mirrored, renamed, union
@@ -78,8 +78,8 @@ def crowned_blocks(
 
 def _lines(size: float, fine: float, length: float, growth: float) -> Array:
     """Return places from 0 to `length`: edges of about `size` up to `fine`, then each `growth` times the last."""
-    equal = np.linspace(0.0, fine, max(1, round(fine / size)) + 1)
-    n = max(1, int(np.ceil(np.log1p((length - fine) * (growth - 1.0) / (size * growth)) / np.log(growth) - 1e-9)))
+    equal = np.linspace(0.0, fine, segments(round(fine / size)) + 1)
+    n = segments(np.log1p((length - fine) * (growth - 1.0) / (size * growth)) / np.log(growth))
     beyond = np.cumsum(growth ** np.arange(n))
     return np.concatenate([equal, fine + (length - fine) * beyond / beyond[-1]])
 

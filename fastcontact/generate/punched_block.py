@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import MeshError
-from fastcontact.generate._check import QUADRANGLES, one_of, positive
+from fastcontact.generate._check import QUADRANGLES, one_of, positive, segments
 from fastcontact.generate._places import with_points_at
 from fastcontact.generate.blocks import block
 from fastcontact.generate.transform import renamed
@@ -77,6 +77,6 @@ def punched_block(
 
 def _growing(length: float, first: float, growth: float) -> Array:
     """Return places (n + 1,) from 0 to `length`: a segment of about `first`, each next one `growth` times as long."""
-    n = max(1, int(np.ceil(np.log1p(length * (growth - 1.0) / first) / np.log(growth) - 1e-9)))
+    n = segments(np.log1p(length * (growth - 1.0) / first) / np.log(growth))
     places = np.concatenate([[0.0], np.cumsum(growth ** np.arange(n))])
     return np.asarray(length * places / places[-1])

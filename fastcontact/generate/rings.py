@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import MeshError
 from fastcontact.generate._blocks import structured
-from fastcontact.generate._check import FACES, TRIANGLES, count, one_of, pair, positive
+from fastcontact.generate._check import FACES, TRIANGLES, affordable, count, one_of, pair, positive
 from fastcontact.generate.quadratic import Circle, to_quadratic
 from fastcontact.generate.transform import union
 from fastcontact.mesh import Mesh
@@ -70,6 +70,7 @@ def _ring(
     r, angle = np.linspace(*radii, n + 1), np.linspace(0.0, math.pi / 2, m + 1)
     cosine, sine = np.cos(angle), np.sin(angle)
     cosine[-1] = 0.0
+    affordable(n * m)
     grid = r[:, None, None] * np.column_stack([cosine, sine])[None]
     groups = {"LEFT": sides[0], "RIGHT": sides[1], "BOTTOM": "SYMMETRY_Y", "TOP": "SYMMETRY_X"}
     mesh = structured(grid, name, groups, triangles=element in TRIANGLES)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -61,14 +61,14 @@ def append_rows(file: Any, mesh: Mesh, number: int, step: StepResult, cell_field
         _set_row(steps["CellDataOffsets"][name], number, number * len(file["VTKHDF/Types"]))
 
 
-def append_run(file: Any, n_steps: int, run: Any) -> None:
-    """Write how a run ended after `n_steps` steps: whatever JSON can hold."""
+def append_run(file: Any, n_steps: int, run: Any, flush: Callable[[], None]) -> None:
+    """Write how a run ended after `n_steps` steps: whatever JSON can hold; `flush` sees it to the file."""
     own, text = file["fastcontact"], np.frombuffer(as_json(run).encode("ascii"), np.uint8)
     row = np.array((n_steps, len(own["notes"]), len(text)), layout.RUN_ROW)
     _extend(own["notes"], text)
-    file.flush()
+    flush()
     _set_row(own["runs"], len(own["runs"]), row)
-    file.flush()
+    flush()
 
 
 def set_restart(file: Any, number: int, state: NDArray[np.uint8]) -> None:

@@ -15,6 +15,8 @@ from fastcontact.errors import FastcontactWarning, MeshError
 from fastcontact.mesh import Mesh
 
 VERTEX = "vertex"
+# How many unknown kinds of cells a message names, and how much of each name.
+SHOWN = 12
 
 Rows = NDArray[np.intp]
 Groups = dict[str, NDArray[Any]]
@@ -46,8 +48,12 @@ def build_mesh(
     Raises
     ------
     MeshError
-        If there is no cell, or if the Mesh is not valid.
+        If there is no cell, the points are no numbers, or the Mesh is not valid.
     """
+    try:
+        places = np.asarray(points, np.float64)
+    except (TypeError, ValueError):
+        raise MeshError("its coordinates are no numbers: check that the file is complete") from None
     joined = merged(blocks)
     solid = [block for block in joined if block.kind != VERTEX and len(block.nodes)]
     vertices = [block for block in joined if block.kind == VERTEX]
@@ -60,7 +66,17 @@ def build_mesh(
             cell_groups.pop(name, None)
     dim = max(elements.get(block.kind).dim for block in solid)
     cells = {block.kind: block.nodes for block in solid}
-    return Mesh(_without_flat_z(np.asarray(points), dim), cells, cell_groups, all_point_groups)
+    return Mesh(_without_flat_z(places, dim), cells, cell_groups, all_point_groups)
+
+
+def check_known(foreign: Mapping[str, int], known: Iterable[str]) -> None:
+    """Raise MeshError if there is any kind of cells in `foreign`, given with their numbers."""
+    if foreign:
+        listed = [f"{count} cells of kind {kind[:SHOWN]}" for kind, count in list(foreign.items())[:SHOWN]]
+        more = [f"{len(foreign) - SHOWN} kinds more"] if len(foreign) > SHOWN else []
+        raise MeshError(
+            f"it has {', '.join([*listed, *more])}, which fastcontact does not know: use only {', '.join(sorted(known))}"
+        )
 
 
 def merged(blocks: Iterable[Block]) -> list[Block]:
@@ -131,7 +147,7 @@ def _add_vertices(point_groups: Groups, block: Block, solid: list[Block]) -> lis
 
 def _without_flat_z(points: NDArray[Any], dim: int) -> NDArray[Any]:
     """Drop the third coordinate where it only says that the mesh is flat."""
-    if points.shape[1] != 3 or dim == 3 or not len(points):
+    if points.ndim != 2 or points.shape[1] != 3 or dim == 3 or not len(points):
         return points
     size = np.ptp(points[:, :2], axis=0).max()
     return points[:, :2] if np.ptp(points[:, 2]) <= 1e-12 * size else points

@@ -21,6 +21,9 @@ SUPERBLOCK, NODE, NAMES = b"\x89HDF\r\n\x1a\n", b"TREE", b"SNOD"
 class CommittedFile:
     """What `h5py.File` asks of a file that it is given in place of a name; writes wait for `flush`.
 
+    HDF5 cannot be stopped half way by an exception. What goes wrong when it reads or flushes is kept for `check`, and from
+    then on nothing is written any more: the file stays as the last write that went well has left it.
+
     Parameters
     ----------
     path : pathlib.Path
@@ -39,6 +42,7 @@ class CommittedFile:
         self._position = 0
         self._pending: dict[int, bytes] = {}
         self.ours = True
+        self._failure: BaseException | None = None
         self._head = self._read_head()
         self.end = self._contents()
         self._starts, self._ends = [0], [self.end]  # of what has been written, in order and apart
@@ -57,6 +61,16 @@ class CommittedFile:
         """Return whether the superblock, which changes with every flush, is still as it was written."""
         self.ours = self.ours and self._read_head() == self._head
         return self.ours
+
+    def check(self) -> None:
+        """Raise what has gone wrong so far, if anything has."""
+        if self._failure is not None:
+            raise self._failure
+
+    @property
+    def writable(self) -> bool:
+        """Whether nothing has gone wrong and nobody else has written to the file."""
+        return self.ours and self._failure is None
 
     def fileno(self) -> int:
         """Return the descriptor of the file."""
@@ -80,11 +94,10 @@ class CommittedFile:
         """Fill a buffer from the position on, with what waits where something does; zeros beyond the end."""
         size, start = len(buffer), self._position
         data = bytearray(size)
-        self._file.seek(start)
-        count = 0
-        while count < size and (part := self._file.read(size - count)):
-            data[count : count + len(part)] = part
-            count += len(part)
+        try:
+            self._get(start, data)
+        except BaseException as error:
+            self._failure = self._failure or error
         for place, waiting in self._pending.items():
             first, last = max(place, start), min(place + len(waiting), start + size)
             if first < last:
@@ -92,6 +105,12 @@ class CommittedFile:
         buffer[:] = data
         self._position += size
         return size
+
+    def _get(self, start: int, data: bytearray) -> None:
+        self._file.seek(start)
+        view = memoryview(data)
+        while view and (count := self._file.readinto(view)):
+            view = view[count:]
 
     def read(self, size: int) -> bytes:
         """Return `size` bytes; see `readinto`."""
@@ -120,8 +139,13 @@ class CommittedFile:
 
     def flush(self) -> None:
         """Write what waits, in an order in which every write may be the last one."""
-        if not self.ours:
-            return
+        try:
+            if self.writable:
+                self._commit()
+        except BaseException as error:
+            self._failure = error
+
+    def _commit(self) -> None:
         waiting = sorted(self._pending.items(), key=lambda entry: self._turn(*entry))
         for place, data in waiting:
             self._put(place, data)
@@ -162,7 +186,7 @@ class CommittedFile:
         if self._file.closed:
             return
         try:
-            if self.ours:
+            if self.writable:
                 self._file.truncate(self.end)
                 os.fsync(self.fileno())
         finally:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import FastcontactError, FileError
+from fastcontact.io import _heaps
 from fastcontact.io._files import existing_file
 from fastcontact.io._targets import PathLike
 
@@ -17,6 +18,7 @@ from fastcontact.io._targets import PathLike
 # Zeros compress a thousandfold, but no whole file does that holds a mesh or results.
 PLAUSIBLE_BYTES = 1 << 28
 PLAUSIBLE_EXPANSION = 20
+FEW_OBJECTS = 1000
 # Groups in groups; HDF5 itself follows them by recursion, and deep ones overrun its stack.
 DEEPEST = 64
 # Kinds of numbers, and strings of fixed length: no references, no variable lengths, no records.
@@ -39,6 +41,7 @@ def opened(path: PathLike) -> Iterator[Any]:
         if not h5py.is_hdf5(found):
             raise FileError(f"'{path}' is not an HDF5 file: check that it is complete and has the right suffix")
         with h5py.File(found, "r") as file:
+            _heaps.check_all(found, file.id.get_create_plist().get_sizes()[1])
             check_contents(file, path)
             yield file
     except (FastcontactError, Warning):
@@ -47,8 +50,8 @@ def opened(path: PathLike) -> Iterator[Any]:
         raise FileError(f"cannot read '{path}', it is damaged or incomplete: write it anew") from error
 
 
-def check_contents(file: Any, path: PathLike) -> None:
-    """Look through an open HDF5 file before anything in it is read.
+def check_contents(file: Any, path: PathLike, below: _heaps.Bytes | None = None) -> None:
+    """Look through an open HDF5 file before anything in it is read; with the file `below` it, also where it keeps its texts.
 
     Raises
     ------
@@ -74,7 +77,9 @@ def check_contents(file: Any, path: PathLike) -> None:
                 raise FileError(f"'{path}' refers to another file at '{name}': copy the data into one file")
             item = h5o.open(group, raw)
             if isinstance(item, h5d.DatasetID):
-                _check_dataset(item, f"'{name}' of '{path}'", limit)
+                _check_dataset(item, f"'{name}' of '{path}'", limit, file.id.get_filesize())
+                if below is not None and item.dtype.hasobject and item.get_offset() is not None:
+                    _heaps.check_texts(below, item.get_offset(), item.get_space().get_simple_extent_npoints(), path)
             elif isinstance(item, h5g.GroupID):
                 address = h5o.get_info(item).addr
                 if address in seen or depth >= DEEPEST:
@@ -83,7 +88,7 @@ def check_contents(file: Any, path: PathLike) -> None:
                 waiting.append((item, name, depth + 1))
 
 
-def _check_dataset(dataset: Any, where: str, limit: int) -> None:
+def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> None:
     """Refuse a data set whose values stand elsewhere, or whose size cannot be meant."""
     from h5py import h5d, h5z
 
@@ -91,8 +96,11 @@ def _check_dataset(dataset: Any, where: str, limit: int) -> None:
     layout = settings.get_layout()
     if layout == h5d.VIRTUAL or settings.get_external_count():
         raise FileError(f"{where} stores its values in another file: copy the data into one file")
-    item = dataset.get_type().get_size()
-    size = dataset.get_space().get_simple_extent_npoints() * item
+    item, count = dataset.get_type().get_size(), dataset.get_space().get_simple_extent_npoints()
+    size = count * item
+    # Texts and references become objects one by one, and take their room in the file.
+    if count > max(FEW_OBJECTS, file_size // 8) and dataset.dtype.hasobject:
+        raise FileError(f"{where} declares {count} texts or references, which its file cannot hold: write it anew")
     if layout == h5d.CHUNKED:
         chunk = int(np.prod([int(n) for n in settings.get_chunk()], dtype=object)) * item
         own = (h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32, h5z.FILTER_SZIP,

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from fastcontact import elements
 from fastcontact.errors import FastcontactError, FastcontactWarning, FileError, MeshError
 from fastcontact.io import _abaqus
-from fastcontact.io._blocks import VERTEX, Block, build_mesh, merged, without_duplicates
+from fastcontact.io._blocks import VERTEX, Block, build_mesh, check_known, merged, without_duplicates
 from fastcontact.io._meshio_guard import bounded
 from fastcontact.mesh import Mesh
 
@@ -144,6 +144,9 @@ def read(path: Path) -> MeshioContent:
         mesh = build_mesh(found.points, blocks, _point_groups(found), _cell_group_names(found, file_format))
     except MeshError as error:
         raise MeshError(f"'{path}': {error}") from None
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        # meshio has taken what stands in the file as it is: arrays of any shape and kind.
+        raise FileError(f"the parts of '{path}' do not fit together: check the file, or convert it to .med") from error
     n_vertices = sum(len(block.nodes) for block in blocks if block.kind == VERTEX)
     return MeshioContent(mesh, file_format, n_vertices, n_duplicates)
 
@@ -162,10 +165,7 @@ def _blocks(found: Any, order: Orders) -> list[Block]:
     for block in found.cells:
         if block.type not in elements.BY_MESHIO and block.type != VERTEX:
             foreign[block.type] = foreign.get(block.type, 0) + len(block.data)
-    if foreign:
-        listed = ", ".join(f"{count} cells of kind {kind}" for kind, count in foreign.items())
-        known = ", ".join(sorted(elements.BY_MESHIO))
-        raise MeshError(f"it has {listed}, which fastcontact does not know: use only {known}")
+    check_known(foreign, elements.BY_MESHIO)
     return [_block(found, index, cells, order) for index, cells in enumerate(found.cells)]
 
 

@@ -15,7 +15,6 @@ import sys
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from ctypes import c_size_t
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -54,7 +53,9 @@ def bounded(path: Path, file_format: str) -> Iterator[None]:
         Inside the block, if meshio is made to read another file, to take more memory than the file can mean, or to
         wait beyond its end.
     """
-    if file_format in HDF5_FORMATS:
+    import h5py
+
+    if file_format in HDF5_FORMATS and (file_format != "exodus" or h5py.is_hdf5(path)):  # or an older kind of netCDF
         with _hdf5.opened(path):
             pass
     size = os.path.getsize(path)
@@ -65,7 +66,7 @@ def bounded(path: Path, file_format: str) -> Iterator[None]:
     if file_format == "xdmf":
         _check_references(path)
     stand_ins: dict[str, Any] = {
-        "np": _Bounded(np, _arrays(limit, allowed)),
+        "np": _Bounded(np, _arrays(limit, size, allowed)),
         "zlib": _Bounded(zlib, {"decompress": lambda data: _unpacked(zlib.decompressobj(), data, most)}),
         "lzma": _Bounded(lzma, {"decompress": lambda data: _unpacked(lzma.LZMADecompressor(), data, most)}),
         "open": _opener(allowed),
@@ -94,14 +95,14 @@ class _Bounded:
         return getattr(self._module, name)
 
 
-def _arrays(limit: int, allowed: Path) -> dict[str, Callable[..., Any]]:
-    """Return numpy's functions that make arrays of a size that comes from a file."""
+def _arrays(limit: int, size: int, allowed: Path) -> dict[str, Callable[..., Any]]:
+    """Return numpy's functions that make arrays of a size that comes from a file; `size` is that of the file itself."""
 
     def check(shape: Any, dtype: Any) -> None:
         counts = [int(n) for n in np.atleast_1d(shape).tolist()] if np.size(shape) else []
-        size = int(np.prod(counts, dtype=object)) * np.dtype(dtype).itemsize
-        if min(counts, default=0) < 0 or size > limit:
-            raise ImplausibleError(f"it declares an array of {size:.3g} bytes, which a file of its size cannot hold")
+        wanted = int(np.prod(counts, dtype=object)) * np.dtype(dtype).itemsize
+        if min(counts, default=0) < 0 or wanted > limit:
+            raise ImplausibleError(f"it declares an array of {wanted:.3g} bytes, which a file of its size cannot hold")
 
     def made(function: Callable[..., Any]) -> Callable[..., Any]:
         def make(shape: Any, dtype: Any = float, *args: Any, **kwargs: Any) -> Any:
@@ -129,8 +130,8 @@ def _arrays(limit: int, allowed: Path) -> dict[str, Callable[..., Any]]:
         if isinstance(file, _Ending):
             file = file.before_numbers()
         found = np.fromfile(file, dtype, int(count), sep, **kwargs)
-        # The head of a section of Gmsh 4: how many blocks follow, with how many entries in all.
-        if dtype is c_size_t and int(count) == 4 and found[:2].max(initial=0) > limit:
+        # The head of a section of Gmsh 4: how many blocks follow, with how many entries in all, none without a byte.
+        if np.dtype(dtype).kind == "u" and int(count) in (2, 4) and found[:2].max(initial=0) > size:
             raise ImplausibleError(f"it declares {found[:2].max()} blocks or entries")
         return found
 

@@ -81,21 +81,21 @@ class PathLock:
     def __init__(self, target: Path) -> None:
         self.path = target.with_name(f".{target.name}.lock")
         while True:
-            file = open(self.path, "a+")  # noqa: SIM115
+            file = open(self.path, "a+b", buffering=0)  # noqa: SIM115
             if not _lock(file):
                 file.seek(0)
-                holder = file.read().strip() or "unknown"
+                holder = file.read().decode("ascii", "replace").strip() or "unknown"
                 file.close()
                 raise FileError(f"'{target}' is being written by process {holder}: let it end or name another file")
             if self._is_current(file):
                 break
             file.close()  # its holder removed it between our open and our lock
-        file.truncate(0)
-        file.write(str(os.getpid()))
-        file.flush()
+        with contextlib.suppress(OSError):  # for others to read, if the disk has room for it
+            file.truncate(0)
+            file.write(str(os.getpid()).encode("ascii"))
         self._file = file
 
-    def _is_current(self, file: IO[str]) -> bool:
+    def _is_current(self, file: IO[Any]) -> bool:
         try:
             return os.path.samestat(os.fstat(file.fileno()), os.stat(self.path))
         except FileNotFoundError:

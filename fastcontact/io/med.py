@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fastcontact import elements
 from fastcontact.errors import FileError, MeshError, unknown
-from fastcontact.io._blocks import VERTEX, Block, build_mesh
+from fastcontact.io._blocks import VERTEX, Block, build_mesh, check_known
 from fastcontact.io._files import replacing
 from fastcontact.io._hdf5 import opened, values
 from fastcontact.io._med_families import (
@@ -183,10 +183,7 @@ def _read_blocks(step: Any, families: Families) -> Iterator[Block]:
     folders = [step[name] for name in ("MAI", "FAC", "ARE") if name in step]
     entries = [entry for folder in folders for entry in folder.items()]
     foreign = {code: _cell_count(entry) for code, entry in entries if code not in elements.BY_MED and code != "PO1"}
-    if foreign:
-        listed = ", ".join(f"{count} cells of kind {code}" for code, count in foreign.items())
-        known = ", ".join(sorted(elements.BY_MED))
-        raise MeshError(f"it has {listed}, which fastcontact does not know: use only {known}")
+    check_known(foreign, elements.BY_MED)
     for code, entry in entries:
         if "NOD" not in entry:
             raise MeshError(f"its {code} cells have no nodal connectivity: write the mesh with nodal connectivity")

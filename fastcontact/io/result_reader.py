@@ -92,8 +92,8 @@ class Results(Sequence[StepResult]):
             raise
 
     def _read_header(self, own: Any) -> None:
-        self.schema = int(own.attrs["schema"])
-        self._n_steps = int(self._file["VTKHDF/Steps"].attrs["NSteps"])
+        self.schema = _integer(own, "schema")
+        self._n_steps = _integer(self._file["VTKHDF/Steps"], "NSteps")
         self.mesh = _read_mesh(own["mesh"])
         self.kinematics: str = _text(own["kinematics"])
         self.case_text: str = _text(own["case"])
@@ -293,8 +293,10 @@ def _opened(path: Path) -> tuple[Any, Any]:
     below = open(path, "rb")  # noqa: SIM115
     try:
         file = h5py.File(below, "r")
-        check_contents(file, path)
-        schema = int(file["fastcontact"].attrs["schema"]) if "fastcontact" in file else None
+        if file.userblock_size or file.id.get_create_plist().get_sizes() != (8, 8):
+            raise ValueError("its addresses are none of ours")
+        check_contents(file, path, below)
+        schema = _integer(file["fastcontact"], "schema") if "fastcontact" in file else None
         if schema is None:
             raise FileError(f"'{path}' holds no fastcontact results: name a file that fastcontact wrote (.vtkhdf)")
         if schema > layout.SCHEMA:
@@ -307,13 +309,22 @@ def _opened(path: Path) -> tuple[Any, Any]:
     return file, below
 
 
+def _integer(group: Any, name: str) -> int:
+    if group.attrs.get_id(name).dtype.kind not in "iu":
+        raise ValueError(f"'{name}' of '{group.name}' is no whole number")
+    return int(group.attrs[name])
+
+
 def _text(dataset: Any) -> Any:
+    # One text where `check_contents` has seen it, and not in the pieces of a table.
+    if dataset.shape != () or dataset.id.get_offset() is None:
+        raise ValueError(f"'{dataset.name}' is no text")
     return json.loads(dataset[()])
 
 
 def _read_mesh(stored: Any) -> Mesh:
     return Mesh(
-        points=stored["points"][:, : int(stored.attrs["dim"])],
+        points=stored["points"][:, : _integer(stored, "dim")],
         cells={name: stored["cells"][name][()] for name in _text(stored["elements"])},
         cell_groups=_read_groups(stored["cell_groups"]),
         point_groups=_read_groups(stored["point_groups"]),
@@ -321,8 +332,11 @@ def _read_mesh(stored: Any) -> Mesh:
 
 
 def _read_groups(group: Any) -> dict[str, NDArray[np.int32]]:
+    names = _text(group["names"])
+    if group["sizes"].shape != (len(names),):
+        raise ValueError(f"'{group.name}' has {len(names)} names for sizes of shape {group['sizes'].shape}")
     members = np.split(group["members"][()], np.cumsum(group["sizes"][()])[:-1])
-    return dict(zip(_text(group["names"]), members))
+    return dict(zip(names, members))
 
 
 def _read_contact(pair: Any, number: int, name: str, formulation: str) -> ContactResult:

@@ -25,6 +25,7 @@ from fastcontact.io._result_header import as_json, write_geometry, write_own
 from fastcontact.io._resuming import taken_up
 from fastcontact.io._step_checks import check_cell_fields, check_shapes, checked_fields
 from fastcontact.io._targets import PathLike, PathLock, checked_target, left_at, reserve
+from fastcontact.io._uninterrupted import uninterrupted
 from fastcontact.mesh import Mesh
 from fastcontact.results import StepResult
 
@@ -166,11 +167,11 @@ class ResultWriter:
             notes = {} if self._new_case is None else {"case": self._new_case}
             appending.append_tables(self._file, self._mesh, self.n_steps, step, self._pairs, notes)
             appending.set_restart(self._file, self.n_steps, restart)
-            self._file.flush()
+            self._flush()
             self._append_step_rows(step)
-            self._file.flush()
+            self._flush()
             self._file["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(self.n_steps + 1))
-            self._file.flush()
+            self._flush()
         self.n_steps += 1
 
     def close(self, log: Any = None, warnings: Iterable[str] = ()) -> None:
@@ -200,9 +201,9 @@ class ResultWriter:
             with self._explained("closed"):
                 self._open()
                 try:
-                    if self._below.ours:
+                    if self._below.writable:
                         self._reserve(len(as_json(run)))
-                        appending.append_run(self._file, self.n_steps, run)
+                        appending.append_run(self._file, self.n_steps, run, self._flush)
                 finally:
                     try:
                         self._file.close()
@@ -228,7 +229,8 @@ class ResultWriter:
             self._pairs = {json.loads(pair["name"][()]): pair for pair in self._file["fastcontact/contact"].values()}
 
     def _check_in_place(self) -> None:
-        """Refuse to go on writing to a file that nobody would find."""
+        """Refuse to go on writing to a file that nobody would find, or that cannot be written any more."""
+        self._below.check()
         if not self._below.intact():
             raise FileError(
                 f"'{self.path}' was changed by another program after {self.n_steps} steps, what it holds now is left "
@@ -245,14 +247,19 @@ class ResultWriter:
             f"{self.n_steps} steps. Put it back and resume, or start again"
         )
 
+    def _flush(self) -> None:
+        self._file.flush()
+        self._below.check()
+
     def _reserve(self, size: int) -> None:
         reserve(self._below.fileno(), self.path.parent, self._below.end, size + MARGIN)
 
     @contextlib.contextmanager
     def _explained(self, what: str) -> Iterator[None]:
-        """Turn what HDF5 or the system says into one sentence with a remedy."""
+        """Turn what HDF5 or the system says into one sentence with a remedy; meanwhile signals wait."""
         try:
-            yield
+            with uninterrupted():
+                yield
         except (OSError, RuntimeError) as error:
             reason = getattr(error, "strerror", None) or next(iter(str(error).splitlines()), type(error).__name__)
             raise FileError(
@@ -295,6 +302,7 @@ def _check_replaceable(path: Any, overwrite: bool) -> None:
     is_result = h5py.is_hdf5(path)
     if is_result:
         with contextlib.suppress(OSError), h5py.File(path, "r", locking=False) as file:
-            is_result = "VTKHDF" in file
+            # Not `in`, which follows links, also to other files.
+            is_result = isinstance(file.get("VTKHDF", getlink=True), h5py.HardLink)
     if not is_result:
         raise FileError(f"'{path}' exists and is no result file: name another file or remove it first")

@@ -266,7 +266,8 @@ def read_csv(path: PathLike) -> tuple[Table, dict[str, str]]:
     Raises
     ------
     FileError
-        If the file cannot be read, is empty, or a line has not as many values as the header.
+        If the file cannot be read, is empty, two columns have one name or one has none, or a line has not as many values
+        as the header.
     """
     try:
         with open(Path(path), encoding="utf-8", newline="") as file:
@@ -283,6 +284,8 @@ def read_csv(path: PathLike) -> tuple[Table, dict[str, str]]:
     for position, title in enumerate(header):
         named = re.fullmatch(r"(.*) \[(.*)\]", title, flags=re.DOTALL)
         name = named[1] if named else title
+        if not name or name in columns:
+            raise FileError(f"'{path}': column {position + 1} has {f'the name {name!r} again' if name else 'no name'}")
         if named:
             units[name] = named[2]
         texts = [row[position] for row in rows]

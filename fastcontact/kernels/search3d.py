@@ -2,7 +2,7 @@
 
 A facet of m nodes is the polynomial of the first m terms of 1, s, t, st, s^2, t^2, s^2 t, s t^2, s^2 t^2 in its
 reference coordinates, ``terms`` (n_facets, m, 3): tri3, quad4, tri6, quad8 and quad9 have 3, 4, 6, 8 and 9. Its domain is
-a polygon of ``sides`` (n_sides, 3), rows (a, b, c) for a s + b t <= c. The tree is that of `box_tree`.
+a polygon of ``sides`` (n_sides, 3), rows (a, b, c) for a s + b t <= c. The tree is that of `packed_tree`.
 """
 
 import numpy as np
@@ -16,14 +16,21 @@ STEP = 1e-13
 ON_SIDE = 1e-12
 MAX_ITERATIONS = 100
 CONVERGED, NOT_CONVERGED, NOT_FINITE = 0, 1, 2
+# Steps of Newton's method shrink quadratically: after one like this the next would be lost in rounding.
+FINAL = 1e-8
+# Points in a run, at whose start the last facet is forgotten; and a squared distance beyond all.
+RUN, FRONT, SORTED = 32, 64, 96
+FAR = 1e300
 
 
 @kernel
-def _distance_to_box(x, y, z, low, high, box):
-    dx = max(low[box, 0] - x, 0.0, x - high[box, 0])
-    dy = max(low[box, 1] - y, 0.0, y - high[box, 1])
-    dz = max(low[box, 2] - z, 0.0, z - high[box, 2])
-    return dx * dx + dy * dy + dz * dz
+def _distances(boxes, node, x, y, z, out):
+    """Fill the squared distances (WIDTH,) from a point to the boxes in a node of a packed tree."""
+    for k in range(out.shape[0]):
+        dx = max(boxes[node, 0, k] - x, x - boxes[node, 3, k], 0.0)
+        dy = max(boxes[node, 1, k] - y, y - boxes[node, 4, k], 0.0)
+        dz = max(boxes[node, 2, k] - z, z - boxes[node, 5, k], 0.0)
+        out[k] = dx * dx + dy * dy + dz * dz
 
 
 @kernel
@@ -231,12 +238,121 @@ def _descend(terms, f, s, t, sides, point):
 
 
 @kernel
-def _project(terms, corners, f, bend, nodes, triangles, sides, point, reach):
+def _on_bilinear(rx, ry, rz, ax, ay, az, bx, by, bz, cx, cy, cz, reach):
+    """Return (s, t) of the point ``a s + b t + c s t`` of a bilinear facet closest to r, and the squared distance.
+
+    Right wherever the squared distance has only one minimum on the facet, else NaN or a stationary point. It is infinite
+    where the distance clearly exceeds `reach`. Newton's method from the closest point on the plane of a and b, on products of
+    vectors formed once; from where that leaves the facet, to the closest point of its straight sides.
+    Numbers go in, no arrays: those would be counted as used and unused in every call, which took a third of the time.
+    """
+    aa, ab, bb = ax * ax + ay * ay + az * az, ax * bx + ay * by + az * bz, bx * bx + by * by + bz * bz
+    ac, bc, cc = ax * cx + ay * cy + az * cz, bx * cx + by * cy + bz * cz, cx * cx + cy * cy + cz * cz
+    ar, br, cr = ax * rx + ay * ry + az * rz, bx * rx + by * ry + bz * rz, cx * rx + cy * ry + cz * rz
+    determinant = aa * bb - ab * ab
+    if not determinant > 1e-12 * aa * bb:
+        return 0.0, 0.0, np.nan
+    s, t = (bb * ar - ab * br) / determinant, (aa * br - ab * ar) / determinant
+    # Beyond a parallelogram by so much in its plane, and the facet strays from it by |c| at most.
+    beyond = max((abs(s) - 1.0) * np.sqrt(determinant / bb), (abs(t) - 1.0) * np.sqrt(determinant / aa))
+    if beyond > reach + np.sqrt(cc):
+        return s, t, np.inf
+    # The second time from inside, where the first step left the facet for good although the minimum lies in it.
+    for _attempt in range(2):
+        for _ in range(8):
+            if not (abs(s) < 1.0 - ON_SIDE and abs(t) < 1.0 - ON_SIDE):
+                break
+            w = cr - s * ac - t * bc - s * t * cc
+            gs = ar - s * aa - t * ab - s * t * ac + t * w
+            gt = br - s * ab - t * bb - s * t * bc + s * w
+            hss, htt = aa + t * (2.0 * ac + t * cc), bb + s * (2.0 * bc + s * cc)
+            hst = ab + s * ac + t * bc + s * t * cc - w
+            determinant = hss * htt - hst * hst
+            ps, pt = (htt * gs - hst * gt) / determinant, (hss * gt - hst * gs) / determinant
+            s, t = s + ps, t + pt
+            if abs(ps) < FINAL and abs(pt) < FINAL:
+                if not (abs(s) < 1.0 - ON_SIDE and abs(t) < 1.0 - ON_SIDE):
+                    break
+                dx, dy, dz = rx - s * ax - t * bx, ry - s * ay - t * by, rz - s * az - t * bz
+                return s, t, (dx - s * t * cx) ** 2 + (dy - s * t * cy) ** 2 + (dz - s * t * cz) ** 2
+        best, s, t = np.inf, 0.0, 0.0
+        for side in range(4):
+            sign = 1.0 if side < 2 else -1.0
+            if side % 2 == 0:  # along t at s = sign
+                along, square = br - sign * (ab - cr) - ac, bb + sign * 2.0 * bc + cc
+                place = min(max(along / square, -1.0), 1.0)
+                u, v = sign, place
+            else:
+                along, square = ar - sign * (ab - cr) - bc, aa + sign * 2.0 * ac + cc
+                place = min(max(along / square, -1.0), 1.0)
+                u, v = place, sign
+            dx = rx - u * ax - v * bx - u * v * cx
+            dy = ry - u * ay - v * by - u * v * cy
+            dz = rz - u * az - v * bz - u * v * cz
+            d = dx * dx + dy * dy + dz * dz
+            if d < best:
+                best, s, t = d, u, v
+                gs = dx * (ax + v * cx) + dy * (ay + v * cy) + dz * (az + v * cz)
+                gt = dx * (bx + u * cx) + dy * (by + u * cy) + dz * (bz + u * cz)
+        # The least on the sides is the least of all where the facet comes no closer further in.
+        if not ((abs(s) == 1.0 and s * gs < 0.0) or (abs(t) == 1.0 and t * gt < 0.0)):
+            return s, t, best
+        s, t = 0.9 * s, 0.9 * t
+    return s, t, np.nan
+
+
+@kernel
+def _on_flat(rx, ry, rz, ax, ay, az, bx, by, bz):
+    """Return (s, t) of the point ``a s + b t`` closest to r of a flat triangle, as `_on_triangle` does."""
+    d1, d2 = ax * rx + ay * ry + az * rz, bx * rx + by * ry + bz * rz
+    aa, ab, bb = ax * ax + ay * ay + az * az, ax * bx + ay * by + az * bz, bx * bx + by * by + bz * bz
+    d3, d4, d5, d6 = d1 - aa, d2 - ab, d1 - ab, d2 - bb
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    if d1 <= 0.0 and d2 <= 0.0:
+        return 0.0, 0.0
+    if d3 >= 0.0 and d4 <= d3:
+        return 1.0, 0.0
+    if d6 >= 0.0 and d5 <= d6:
+        return 0.0, 1.0
+    if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        return d1 / (d1 - d3), 0.0
+    if vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        return 0.0, d2 / (d2 - d6)
+    if va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
+        t = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        return 1.0 - t, t
+    area = va + vb + vc
+    return vb / area, vc / area
+
+
+@kernel
+def _above(rx, ry, rz, ax, ay, az, bx, by, bz, cx, cy, cz, triangle):
+    """Return the squared distance to some point of a facet, often the closest; arguments as those of `_inside`."""
+    aa, ab, bb = ax * ax + ay * ay + az * az, ax * bx + ay * by + az * bz, bx * bx + by * by + bz * bz
+    ar, br = ax * rx + ay * ry + az * rz, bx * rx + by * ry + bz * rz
+    determinant = aa * bb - ab * ab
+    s, t = 0.0, 0.0
+    if determinant > 1e-12 * aa * bb:
+        s, t = (bb * ar - ab * br) / determinant, (aa * br - ab * ar) / determinant
+    if triangle:
+        s, t = max(s, 0.0), max(t, 0.0)
+        s, t = s / max(s + t, 1.0), t / max(s + t, 1.0)
+    else:
+        s, t = min(max(s, -1.0), 1.0), min(max(t, -1.0), 1.0)
+    return (
+        (rx - s * ax - t * bx - s * t * cx) ** 2
+        + (ry - s * ay - t * by - s * t * cy) ** 2
+        + (rz - s * az - t * bz - s * t * cz) ** 2
+    )
+
+
+@kernel
+def _project(terms, corners, f, bend, convex, nodes, triangles, sides, point, reach):
     """Return (s, t) of the point of facet `f` closest to `point`, half the squared distance, and whether it converged.
 
-    The facet strays from the flat `triangles` between its nodes by at most `bend`: the descent starts from the closest
-    one, and then from every other that might hide a closer point. The distance is infinite where even a squared
-    distance of `reach` is out of reach.
+    Where the distance is below `convex`, a minimum is the only one. Else the facet strays from the flat `triangles` between
+    its nodes by at most `bend`: the descent starts from the closest one, and then from every other that might hide a closer
+    point. The distance is infinite where even a squared distance of `reach` is out of reach.
     """
     s, t, best = 0.0, 0.0, np.inf
     for k in range(triangles.shape[0]):
@@ -251,6 +367,8 @@ def _project(terms, corners, f, bend, nodes, triangles, sides, point, reach):
     tried_s, tried_t = s, t
     s, t, converged = _descend(terms, f, s, t, sides, point)
     best = _half_square(terms, f, s, t, point)
+    if converged and terms.shape[1] > 4 and 2.0 * best < convex:
+        return s, t, best, True
     for k in range(triangles.shape[0] if bend > 0.0 else 0):
         v, w, square = _on_triangle(corners, f, triangles[k, 0], triangles[k, 1], triangles[k, 2], point)
         if square > (np.sqrt(2.0 * best) + bend) ** 2:
@@ -297,92 +415,337 @@ def _onto_sides(sides, s, t):
 
 
 @kernel
-def closest_facets(
-    points, terms, corners, bend, nodes, triangles, sides, box_low, box_high,
-    low, high, child, span, order, facet, xi, normal, overhang, position, status,
-):  # fmt: skip
-    """Project every point on its closest facet; of facets that meet in the closest point the one with the lowest number.
+def bounds(corners):
+    """Return the corners (3,) of the box around all nodes (n_facets, m, 3)."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for f in range(corners.shape[0]):
+        for a in range(corners.shape[1]):
+            for d in range(3):
+                low[d], high[d] = min(low[d], corners[f, a, d]), max(high[d], corners[f, a, d])
+    return low, high
+
+
+@kernel
+def _room(ax, ay, az, bx, by, bz, cx, cy, cz):
+    """Return how large |(r - X) . c| may be for a local minimum X of the distance to r to be the only one on the facet.
+
+    From X, with r - X = v, to another point X + ds p + dt q, where p and q are the tangents along s and t at the other and at
+    this t and s, the squared distance changes by ``|ds p + dt q|^2 - 2 v . (ds p + dt q)``. At a minimum that is at least
+    ``2 |ds dt| (|p| |q| - |p . q| - |v . c|)``, and ``|p| |q| - |p . q| = |p x q|^2 / (|p| |q| + |p . q|)``.
+    """
+    nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    size = np.sqrt(nx * nx + ny * ny + nz * nz)
+    area, product, first, second = np.inf, 0.0, 0.0, 0.0
+    for corner in range(4):
+        s, t = (1.0 if corner < 2 else -1.0), (1.0 if corner % 2 == 0 else -1.0)
+        px, py, pz = ax + t * cx, ay + t * cy, az + t * cz
+        qx, qy, qz = bx + s * cx, by + s * cy, bz + s * cz
+        along = (py * qz - pz * qy) * nx + (pz * qx - px * qz) * ny + (px * qy - py * qx) * nz
+        area, product = min(area, along), max(product, abs(px * qx + py * qy + pz * qz))
+        first, second = max(first, px * px + py * py + pz * pz), max(second, qx * qx + qy * qy + qz * qz)
+    if not area > 0.0:
+        return 0.0
+    return (area / size) ** 2 / (np.sqrt(first * second) + product)
+
+
+@kernel
+def prepare(corners, order, begin, end, midst, to_terms, to_hull, weights, terms, nodes, low, high, bend, convex):
+    """Fill what the search wants to know of the facets ``order[begin:end]``, in that order.
 
     Parameters
     ----------
-    points : (n, 3)
-    terms, corners : (n_facets, m, 3)
-        Polynomials and nodes of the facets.
-    bend : (n_facets,)
-        How far each strays at most from the flat triangles between its nodes.
+    corners : (n_facets, m, 3), order : (n_facets,)
+        Nodes of the facets, and the order to put them in.
+    midst : (3,)
+        New origin: far from it, rounding would be coarser than the steps of a converged projection.
+    to_terms : (m, m), to_hull : (k, m)
+        From nodes to terms, and to points whose convex hull holds the facet.
+    weights : (3, m)
+        For each term of unit size: how far it strays from flat triangles, how much it changes the tangents over the
+        domain, and its second derivative, all at most.
+    terms, nodes : (n_facets, m, 3), low, high : (n_facets, 3), bend, convex : (n_facets,)
+        Filled in place: polynomials, nodes, boxes, how far each facet strays at most from the flat triangles between its
+        nodes, and the distance below which the squared distance to a point is a convex function on the domain.
+    """
+    m = corners.shape[1]
+    for i in range(begin, end):
+        f = order[i]
+        for a in range(m):
+            for d in range(3):
+                nodes[i, a, d] = corners[f, a, d] - midst[d]
+        for d in range(3):
+            if m == 3:
+                p, q, r = nodes[i, 0, d], nodes[i, 1, d], nodes[i, 2, d]
+                terms[i, 0, d], terms[i, 1, d], terms[i, 2, d] = p, q - p, r - p
+                low[i, d], high[i, d] = min(p, q, r), max(p, q, r)
+            elif m == 4:
+                p, q, r, s = nodes[i, 0, d], nodes[i, 1, d], nodes[i, 2, d], nodes[i, 3, d]
+                terms[i, 0, d], terms[i, 1, d] = 0.25 * ((p + r) + (q + s)), 0.25 * ((q - p) + (r - s))
+                terms[i, 2, d], terms[i, 3, d] = 0.25 * ((r - q) + (s - p)), 0.25 * ((p - q) + (r - s))
+                low[i, d], high[i, d] = min(p, q, r, s), max(p, q, r, s)
+            else:
+                for k in range(m):
+                    terms[i, k, d] = 0.0
+                    for a in range(m):
+                        terms[i, k, d] += to_terms[k, a] * nodes[i, a, d]
+                low[i, d], high[i, d] = np.inf, -np.inf
+                for k in range(to_hull.shape[0]):
+                    value = 0.0
+                    for a in range(m):
+                        value += to_hull[k, a] * nodes[i, a, d]
+                    low[i, d], high[i, d] = min(low[i, d], value), max(high[i, d], value)
+        bend[i], convex[i] = 0.0, np.inf
+        if m == 3:
+            continue
+        size, diagonal, ss, st, tt, stray, turn, second = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for d in range(3):
+            extent = high[i, d] - low[i, d]
+            size, diagonal = max(size, extent), diagonal + extent * extent
+            s, t = terms[i, 1, d], terms[i, 2, d]
+            ss, st, tt = ss + s * s, st + s * t, tt + t * t
+        for k in range(3, m):
+            length = np.sqrt(terms[i, k, 0] ** 2 + terms[i, k, 1] ** 2 + terms[i, k, 2] ** 2)
+            stray += length * weights[0, k]
+            turn += length * weights[1, k]
+            second += length * weights[2, k]
+        bend[i] = stray if stray >= 1e-9 * size else 0.0
+        if m == 4:
+            convex[i] = _room(terms[i, 1, 0], terms[i, 1, 1], terms[i, 1, 2], terms[i, 2, 0], terms[i, 2, 1],
+                              terms[i, 2, 2], terms[i, 3, 0], terms[i, 3, 1], terms[i, 3, 2])  # fmt: skip
+            continue
+        # The Hessian of half the squared distance r^2 / 2 is J^T J - r . X'' with the tangents J: positive definite where the
+        # smallest singular value of J, squared, exceeds r |X''|, with r the distance to the farthest point of the facet.
+        least = np.sqrt(max(0.5 * (ss + tt) - np.sqrt(0.25 * (ss - tt) ** 2 + st * st), 0.0)) - turn
+        if second > 0.0 or not least > 0.0:
+            room = max(least, 0.0) ** 2 / second - np.sqrt(diagonal)
+            convex[i] = room * room if room > 0.0 else 0.0
+
+
+@kernel
+def closest_facets(
+    points, points_order, begin, end, midst, terms, corners, bend, convex, nodes, triangles, sides,
+    boxes, first, order, facet, xi, normal, overhang, position, distance, status,
+):  # fmt: skip
+    """Project points on their closest facets; of facets that meet in the closest point the one with the lowest number.
+
+    Parameters
+    ----------
+    points : (n, 3), points_order : (n,)
+        Points, and the order to go through them, along a curve: the facet of the last one is near the next.
+    begin, end : int
+        Which of that order; multiples of `RUN` make results independent of how the work is shared.
+    midst : (3,)
+        Origin of the facets.
+    terms, corners : (n_facets, m, 3), bend, convex : (n_facets,)
+        Facets in the order of the tree, see `prepare`.
     nodes : (m, 2), triangles : (n_triangles, 3), sides : (n_sides, 3)
         Reference nodes, the flat triangles between them, sides of the domain.
-    box_low, box_high : (n_facets, 3)
-        Boxes of the facets.
-    low, high, child, span, order
-        Tree over them.
-    facet : (n,), xi : (n, 2), normal : (n, 3), overhang : (n,), position : (n, 3), status : (n,)
-        Filled in place: facet number, reference coordinates, unit normal, how far the point stands out beyond the
-        sides of its facet as extended along its tangents, in facet lengths (0 within), projection; CONVERGED,
+    boxes, first
+        Tree over the facets, see `packed_tree`.
+    order : (n_facets,)
+        Numbers of the facets.
+    facet : (n,), xi : (n, 2), normal, position : (n, 3), overhang, distance : (n,), status : (n,)
+        Filled in place: facet number, reference coordinates, unit normal, projection, how far the point stands out
+        beyond the sides of its facet as extended along its tangents, in facet lengths (0 within), distance; CONVERGED,
         NOT_CONVERGED or NOT_FINITE.
     """
-    stack = np.empty(128, np.int64)
-    span_s = 0.0
+    width, root, m, n = boxes.shape[2], boxes.shape[0] - 1, terms.shape[1], points.shape[0]
+    n_leaves = (order.shape[0] + width - 1) // width
+    stack, bound = np.empty(20 * width + SORTED, np.int64), np.empty(20 * width + SORTED)
+    away = np.empty(width)
+    front, front_boxes, front_away = np.empty(FRONT, np.int64), np.empty((6, FRONT)), np.empty(FRONT)
+    point, unit = np.empty(3), np.empty(3)
+    span = 0.0
     for k in range(nodes.shape[0]):
-        span_s = max(span_s, nodes[k, 0] - nodes[0, 0])
-    best_facet = 0
-    for i in range(points.shape[0]):
-        point = points[i]
-        x, y, z = point[0], point[1], point[2]
-        status[i] = CONVERGED
-        if not (np.isfinite(x) and np.isfinite(y) and np.isfinite(z)):
-            status[i] = NOT_FINITE
-            facet[i] = -1
-            continue
-        # Neighbours in the list are often neighbours in space: the facet of the last point is a good first guess.
-        guess = best_facet
-        best, best_facet, reach, same = np.inf, -1, np.inf, 0.0
-        best_s, best_t, bx, by, bz = 0.0, 0.0, 0.0, 0.0, 0.0
-        stack[0], top = -1, 1  # -1: the guess, which is looked at before the tree
-        while top > 0:
-            top -= 1
-            box = stack[top]
-            first, last = 0, 1
-            if box >= 0:
-                if _distance_to_box(x, y, z, low, high, box) > reach:
+        span = max(span, nodes[k, 0] - nodes[0, 0])
+    slack = 0.0
+    for d in range(3):
+        slack = max(slack, SAME_PLACE * (boxes[root, 3 + d].max() - boxes[root, d].min()))
+    for run in range(begin, end, RUN):
+        run_end = min(run + RUN, n)
+        middle, last, count = (run + run_end) // 2, -1, 0
+        for slot in range(run_end - run):
+            number = middle if slot == 0 else run + slot - 1 if run + slot <= middle else run + slot
+            i = points_order[number]
+            x, y, z = points[i, 0] - midst[0], points[i, 1] - midst[1], points[i, 2] - midst[2]
+            status[i], facet[i] = NOT_FINITE, -1
+            if not (np.isfinite(x) and np.isfinite(y) and np.isfinite(z)):
+                continue
+            best, found, reach, same, state, within = np.inf, -1, FAR, 0.0, CONVERGED, False
+            best_s, best_t, bx, by, bz = 0.0, 0.0, 0.0, 0.0, 0.0
+            if last >= 0 and m <= 4:
+                # No farther than this point of the last facet.
+                rx, ry, rz = x - terms[last, 0, 0], y - terms[last, 0, 1], z - terms[last, 0, 2]
+                ux, uy, uz = terms[last, 1, 0], terms[last, 1, 1], terms[last, 1, 2]
+                vx, vy, vz = terms[last, 2, 0], terms[last, 2, 1], terms[last, 2, 2]
+                wx, wy, wz = 0.0, 0.0, 0.0
+                if m == 4:
+                    wx, wy, wz = terms[last, 3, 0], terms[last, 3, 1], terms[last, 3, 2]
+                reach = (np.sqrt(_above(rx, ry, rz, ux, uy, uz, vx, vy, vz, wx, wy, wz, m == 3)) + slack) ** 2
+            elif last >= 0:
+                reach = 1.1 * (
+                    (x - corners[last, 0, 0]) ** 2 + (y - corners[last, 0, 1]) ** 2 + (z - corners[last, 0, 2]) ** 2
+                )
+            stack[0], bound[0], top = root, 0.0, 1
+            if count > 0:
+                top = 0
+                for k in range(count):
+                    dx = max(front_boxes[0, k] - x, x - front_boxes[3, k], 0.0)
+                    dy = max(front_boxes[1, k] - y, y - front_boxes[4, k], 0.0)
+                    dz = max(front_boxes[2, k] - z, z - front_boxes[5, k], 0.0)
+                    front_away[k] = dx * dx + dy * dy + dz * dz
+                for k in range(count):
+                    if front_away[k] <= reach:
+                        at = top
+                        while at > 0 and bound[at - 1] < front_away[k]:
+                            stack[at], bound[at] = stack[at - 1], bound[at - 1]
+                            at -= 1
+                        stack[at], bound[at] = front[k], front_away[k]
+                        top += 1
+            while top > 0:
+                top -= 1
+                node = stack[top]
+                if bound[top] > reach:
                     continue
-                if child[box] >= 0:
-                    near, far = child[box], child[box] + 1
-                    if _distance_to_box(x, y, z, low, high, far) < _distance_to_box(x, y, z, low, high, near):
-                        near, far = far, near
-                    stack[top], stack[top + 1] = far, near
-                    top += 2
+                if node < 0:
+                    f = -1 - node
+                    simple = False
+                    if m <= 4:
+                        rx, ry, rz = x - terms[f, 0, 0], y - terms[f, 0, 1], z - terms[f, 0, 2]
+                        ux, uy, uz = terms[f, 1, 0], terms[f, 1, 1], terms[f, 1, 2]
+                        vx, vy, vz = terms[f, 2, 0], terms[f, 2, 1], terms[f, 2, 2]
+                        if m == 3:
+                            s, t = _on_flat(rx, ry, rz, ux, uy, uz, vx, vy, vz)
+                            px = terms[f, 0, 0] + s * ux + t * vx
+                            py = terms[f, 0, 1] + s * uy + t * vy
+                            pz = terms[f, 0, 2] + s * uz + t * vz
+                            simple = True
+                        else:
+                            wx, wy, wz = terms[f, 3, 0], terms[f, 3, 1], terms[f, 3, 2]
+                            s, t, d = _on_bilinear(rx, ry, rz, ux, uy, uz, vx, vy, vz, wx, wy, wz, np.sqrt(reach))
+                            if d == np.inf:
+                                continue
+                            px = terms[f, 0, 0] + s * ux + t * vx + s * t * wx
+                            py = terms[f, 0, 1] + s * uy + t * vy + s * t * wy
+                            pz = terms[f, 0, 2] + s * uz + t * vz + s * t * wz
+                            simple = abs((x - px) * wx + (y - py) * wy + (z - pz) * wz) < convex[f] and d >= 0.0
+                        d = (x - px) ** 2 + (y - py) ** 2 + (z - pz) ** 2
+                        converged = True
+                    if not simple:
+                        point[0], point[1], point[2] = x, y, z
+                        s, t, d, converged = _project(
+                            terms, corners, f, bend[f], convex[f], nodes, triangles, sides, point, reach
+                        )
+                        if d == np.inf:
+                            continue
+                        px = _component(terms, f, 0, s, t)[0]
+                        py = _component(terms, f, 1, s, t)[0]
+                        pz = _component(terms, f, 2, s, t)[0]
+                        d = (x - px) ** 2 + (y - py) ** 2 + (z - pz) ** 2
+                    meet = (px - bx) ** 2 + (py - by) ** 2 + (pz - bz) ** 2 <= same * same
+                    if (order[f] < order[found]) if found >= 0 and (meet or d == best) else d < best:
+                        found, best_s, best_t, bx, by, bz = f, s, t, px, py, pz
+                        if m == 3:
+                            within = s > ON_SIDE and t > ON_SIDE and 1.0 - s - t > ON_SIDE
+                        else:
+                            within = simple and abs(s) < 1.0 and abs(t) < 1.0
+                        state = CONVERGED if converged else NOT_CONVERGED
+                        same = 0.0
+                        for j in range(3):
+                            same = max(same, boxes[f // width, 3 + j, f % width] - boxes[f // width, j, f % width])
+                        same *= SAME_PLACE
+                    if d < best:
+                        best = d
+                        reach = (np.sqrt(best) + same) ** 2
                     continue
-                first, last = span[box, 0], span[box, 1]
-            for k in range(first, last):
-                f = order[k] if box >= 0 else guess
-                if (box >= 0 and f == guess) or _distance_to_box(x, y, z, box_low, box_high, f) > reach:
-                    continue
-                s, t, d, converged = _project(terms, corners, f, bend[f], nodes, triangles, sides, point, reach)
-                if d == np.inf:
-                    continue
-                px = _component(terms, f, 0, s, t)[0]
-                py = _component(terms, f, 1, s, t)[0]
-                pz = _component(terms, f, 2, s, t)[0]
-                d = (x - px) ** 2 + (y - py) ** 2 + (z - pz) ** 2
-                meet = (px - bx) ** 2 + (py - by) ** 2 + (pz - bz) ** 2 <= same * same
-                if (f < best_facet) if (meet or d == best) and best_facet >= 0 else d < best:
-                    best_facet, best_s, best_t, bx, by, bz = f, s, t, px, py, pz
-                    status[i] = CONVERGED if converged else NOT_CONVERGED
-                    same = 0.0
-                    for j in range(3):
-                        same = max(same, SAME_PLACE * (box_high[f, j] - box_low[f, j]))
-                if d < best:
-                    best = d
-                    reach = (np.sqrt(best) + same) ** 2
-            if box < 0:
-                stack[0], top = 0, 1
-        best_s, best_t = _onto_sides(sides, best_s, best_t)
-        facet[i], xi[i, 0], xi[i, 1] = best_facet, best_s, best_t
-        position[i, 0], position[i, 1], position[i, 2] = bx, by, bz
-        overhang[i] = _frame(terms, best_facet, best_s, best_t, point, sides, span_s, normal[i])
-        if not np.isfinite(normal[i, 0]):
-            status[i] = NOT_CONVERGED
+                for k in range(width):
+                    dx = max(boxes[node, 0, k] - x, x - boxes[node, 3, k], 0.0)
+                    dy = max(boxes[node, 1, k] - y, y - boxes[node, 4, k], 0.0)
+                    dz = max(boxes[node, 2, k] - z, z - boxes[node, 5, k], 0.0)
+                    away[k] = dx * dx + dy * dy + dz * dz
+                if node < n_leaves:
+                    # Facets have numbers below zero.
+                    child, sign = -1 - first[node], -1
+                else:
+                    child, sign = first[node], 1
+                # The list stays sorted, with the nearest box on top; a long one no more, lest that take longest.
+                bottom = 0 if top < SORTED else top
+                for k in range(width):
+                    if away[k] <= reach:
+                        at = top
+                        while at > bottom and bound[at - 1] < away[k]:
+                            stack[at], bound[at] = stack[at - 1], bound[at - 1]
+                            at -= 1
+                        stack[at], bound[at] = child + sign * k, away[k]
+                        top += 1
+                continue
+            last = found
+            if found < 0:
+                continue
+            if slot == 0:
+                farthest = 0.0
+                for other in range(run, run_end):
+                    j = points_order[other]
+                    square = 0.0
+                    for d in range(3):
+                        square += (points[j, d] - points[i, d]) ** 2
+                    farthest = max(farthest, square)
+                # Nothing that any point of the run may be closest to lies farther from this one.
+                radius = (np.sqrt(best) + 2.0 * np.sqrt(farthest) + same) * (1.0 + 1e-9)
+                count = _front(boxes, first, order.shape[0], x, y, z, radius * radius, stack, front, front_boxes, away)
+            if within:
+                ux, uy, uz = terms[found, 1, 0], terms[found, 1, 1], terms[found, 1, 2]
+                vx, vy, vz = terms[found, 2, 0], terms[found, 2, 1], terms[found, 2, 2]
+                if m == 4:
+                    wx, wy, wz = terms[found, 3, 0], terms[found, 3, 1], terms[found, 3, 2]
+                    ux, uy, uz = ux + best_t * wx, uy + best_t * wy, uz + best_t * wz
+                    vx, vy, vz = vx + best_s * wx, vy + best_s * wy, vz + best_s * wz
+                nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+                size = np.sqrt(nx * nx + ny * ny + nz * nz)
+                normal[i, 0], normal[i, 1], normal[i, 2], overhang[i] = nx / size, ny / size, nz / size, 0.0
+            else:
+                point[0], point[1], point[2] = x, y, z
+                best_s, best_t = _onto_sides(sides, best_s, best_t)
+                overhang[i] = _frame(terms, found, best_s, best_t, point, sides, span, unit)
+                normal[i, 0], normal[i, 1], normal[i, 2] = unit[0], unit[1], unit[2]
+                if not np.isfinite(unit[0]):
+                    state = NOT_CONVERGED
+            facet[i], xi[i, 0], xi[i, 1], status[i] = order[found], best_s, best_t, state
+            position[i, 0], position[i, 1], position[i, 2] = bx + midst[0], by + midst[1], bz + midst[2]
+            distance[i] = np.sqrt((x - bx) ** 2 + (y - by) ** 2 + (z - bz) ** 2)
+
+
+@kernel
+def _front(boxes, first, n, x, y, z, square, stack, front, front_boxes, away):
+    """Fill `front` with the nodes above the leaves within a squared distance of a point, with their boxes (6, FRONT).
+
+    Returns their number, or 0 where there are more than have room, or no such nodes.
+    """
+    width, root = boxes.shape[2], boxes.shape[0] - 1
+    n_leaves = (n + width - 1) // width
+    upper = n_leaves + (n_leaves + width - 1) // width  # nodes from here on are above those above the leaves
+    if root < upper:
+        return 0
+    stack[0], top, count = root, 1, 0
+    while top > 0:
+        top -= 1
+        node = stack[top]
+        _distances(boxes, node, x, y, z, away)
+        for k in range(width):
+            if not away[k] <= square:
+                continue
+            child = first[node] + k
+            if child >= upper:
+                stack[top] = child
+                top += 1
+                continue
+            if count == front.shape[0]:
+                return 0
+            front[count] = child
+            for d in range(6):
+                front_boxes[d, count] = boxes[node, d, k]
+            count += 1
+    return count
 
 
 @kernel

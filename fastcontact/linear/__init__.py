@@ -16,7 +16,7 @@ OPTIONAL = {"cholmod": ("kvxopt", "cholmod"), "pardiso": ("pypardiso", "mkl")}
 KNOWN = tuple(name for _, name, _ in pkgutil.iter_modules(__path__) if not name.startswith("_"))
 SOLVERS = tuple(name for name in KNOWN if name not in OPTIONAL or importlib.util.find_spec(OPTIONAL[name][0]))
 # Above these sizes a multigrid solution is cheaper than a factorisation (measured, see bench/README.md).
-DIRECT_UP_TO = {2: 500_000, 3: 15_000}
+DIRECT_UP_TO = {2: 1_000_000, 3: 15_000}
 
 
 def make(

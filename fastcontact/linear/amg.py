@@ -288,7 +288,7 @@ class _Loaded:
         return R @ self._unloaded(), reduced(self._solver.compliance, R)
 
     def near(self, force: Array, elsewhere: Array | None) -> Array:
-        return self._solver.solution(self._f + force, None, None)
+        return self._solver.solution(self._f + force, None, None) if force.any() else self._unloaded()
 
     def everywhere(self, force: Array, u: Array | None = None) -> Array:
         return self.near(force, None) if u is None else u

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import tomllib
 from typing import Any
@@ -27,15 +28,19 @@ def damaged(text: str, random: np.random.Generator) -> str:
         holder, key = places[int(random.integers(len(places)))]
         kind = random.random()
         if kind < 0.6:
-            holder[key] = WILD[int(random.integers(len(WILD)))]
+            holder[key] = _wild(random)
         elif kind < 0.75:
             del holder[key]
         elif kind < 0.9:
             other, name = places[int(random.integers(len(places)))]
             holder[key] = json.loads(json.dumps(other[name])) if name in range(10**6) or name in other else 0
         elif isinstance(holder, dict):
-            holder[KEYS[int(random.integers(len(KEYS)))]] = WILD[int(random.integers(len(WILD)))]
+            holder[KEYS[int(random.integers(len(KEYS)))]] = _wild(random)
     return "".join(f"{json.dumps(key)} = {_value(value)}\n" for key, value in data.items())
+
+
+def _wild(random: np.random.Generator) -> Any:
+    return copy.deepcopy(WILD[int(random.integers(len(WILD)))])
 
 
 def _places(data: Any) -> Any:

@@ -19,8 +19,8 @@ import fuzz_readers
 
 import fastcontact
 
-MEMORY = 1 << 30  # bytes more than a process that has read all formats once
-SECONDS = 10
+MEMORY = 1 << 30  # bytes more than before a file is read
+SECONDS = int(os.environ.get("FUZZ_SECONDS", 10))  # of CPU time, a file
 _OPENED = 0x20 | 0x2 | 0x100 | 0x200  # IN_OPEN, IN_MODIFY, IN_CREATE, IN_DELETE
 
 
@@ -63,6 +63,12 @@ class Opened:
             self.names.append(f"{event} {full}")
 
 
+def _address_space() -> int:
+    """Return what this process has taken so far [bytes]."""
+    with open("/proc/self/statm", encoding="ascii") as file:
+        return int(file.read().split()[0]) * resource.getpagesize()
+
+
 def main() -> None:
     """Answer until the input ends."""
     seed, seeds_folder, folder, outside = int(sys.argv[1]), *map(Path, sys.argv[2:5])
@@ -72,11 +78,9 @@ def main() -> None:
     warnings.simplefilter("ignore")
     for path in seeds.values():
         fuzz_readers.outcome(path)
-    with open("/proc/self/statm", encoding="ascii") as file:
-        used = int(file.read().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, used + MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
+    most = resource.getrlimit(resource.RLIMIT_AS)[1]
     opened = Opened(folder)
     print(json.dumps({"ready": True}), file=answers, flush=True)
     for line in sys.stdin:
@@ -85,10 +89,12 @@ def main() -> None:
         # Named before it is read, so that the file is known if reading kills this process.
         print(json.dumps({"number": number, "name": name, "path": str(path)}), file=answers, flush=True)
         resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time()) + SECONDS + 1, hard))
+        resource.setrlimit(resource.RLIMIT_AS, (_address_space() + MEMORY, most))
         watch, started = Watch(outside), time.process_time()
         opened.on, opened.names = True, []
         kind, message = fuzz_readers.outcome(path)
         opened.on = False
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
         if watch.touched() or opened.names:
             kind, message = "outside", f"{opened.names} {message}"
         if watch._file >= 0:

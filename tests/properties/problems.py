@@ -96,6 +96,11 @@ class Blocks:
         )  # fmt: skip
 
 
+def hundredths(low: int, high: int) -> st.SearchStrategy[float]:
+    """Return a strategy of numbers that are easy to read and to shrink."""
+    return st.integers(low, high).map(lambda k: k / 100)
+
+
 def recipes(friction: bool = False, kinematics: tuple[str, ...] = PLANES, elements: tuple[str, ...] = FLAT, **fixed):
     """Return a strategy of recipes; `fixed` takes the place of what would be chosen."""
     solid = kinematics == ("3d",)
@@ -104,10 +109,10 @@ def recipes(friction: bool = False, kinematics: tuple[str, ...] = PLANES, elemen
         "kinematics": st.sampled_from(kinematics),
         "element": st.sampled_from(SOLIDS if solid else elements),
         "lower": cells, "upper": cells,
-        "crown": st.floats(0.0, 0.05), "tilt": st.floats(-0.02, 0.02),
-        "contrast": st.floats(-2.0, 2.0), "nu": st.tuples(*[st.floats(0.0, 0.45)] * 2),
-        "push": st.floats(1e-3, 0.03), "aside": st.floats(-0.5, 0.5),
+        "crown": hundredths(0, 5), "tilt": hundredths(-2, 2),
+        "contrast": hundredths(-200, 200), "nu": st.tuples(*[hundredths(0, 45)] * 2),
+        "push": st.integers(1, 30).map(lambda k: k / 1000), "aside": hundredths(-50, 50),
         "formulation": st.sampled_from(FORMULATIONS),
-        "friction": st.floats(0.05, 0.4) if friction else st.just(0.0),
+        "friction": hundredths(5, 40) if friction else st.just(0.0),
     }  # fmt: skip
     return st.builds(Blocks, **{**choices, **{name: st.just(value) for name, value in fixed.items()}})

@@ -145,3 +145,33 @@ def test_steps_that_converge_are_not_cut():
 def test_the_number_of_halvings_is_checked(halvings):
     with pytest.raises(fc.ModelError, match="max_halvings"):
         Criteria(max_halvings=halvings)
+
+
+def test_a_step_that_fails_says_which_one_it_is():
+    criteria = Criteria(max_active_set_iterations=1, max_halvings=0)
+    message = (
+        r"the active set did not settle in 1 iterations: 4 constraints still change, at points .* of contact 'hertz'\. Use "
+        r"more load steps or more iterations \(max_active_set_iterations\) \(step 1 from 0 to 0\.5\)$"
+    )
+    with pytest.raises(fc.ConvergenceError, match=message) as caught:
+        fc.solve(spheres(friction=0.0), fc.linear_ramp(2), linear_solver="direct", criteria=criteria)
+    (entry,) = caught.value.history
+    assert entry["settled"] is False
+    assert len(entry["nodes"]["hertz"]) == 4
+
+
+def test_what_fails_inside_a_pairing_is_told_with_the_pairings_before_it(monkeypatch):
+    """A linear solver that gives up knows of no pairings; the history of the step does."""
+    analysis = analysis_of()
+    solve, calls = Analysis._inequalities, []
+
+    def failing(self, *arguments, **options):
+        calls.append(1)
+        if len(calls) == 3:
+            raise fc.ConvergenceError("conjugate gradients stand still")
+        return solve(self, *arguments, **options)
+
+    monkeypatch.setattr(Analysis, "_inequalities", failing)
+    with pytest.raises(fc.ConvergenceError, match=r"stand still \(step 1 from 0 to 1\)") as caught:
+        step_control.advance(analysis, 1, 0.0, 1.0, True, 0)
+    assert [entry["settled"] for entry in caught.value.history] == [True, True]

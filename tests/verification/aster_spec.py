@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from aster_contact import add_zone, criteria_of, missing_in_contact
 from aster_loads import add_loads, supports_of
-from aster_mesh import Entry, MissingError, listed, mesh_of
+from aster_mesh import Entry, MissingError, listed, mesh_of, nodes_of
 from aster_springs import add_springs, missing_in_springs
 
 import fastcontact as fc
@@ -91,8 +91,10 @@ def problem(path: Path, number: int) -> Problem:
         groups = None if entry["groups"] == "ALL" else entry["groups"]
         model.add_material(_material(entry), groups)
     solid = np.unique(np.concatenate([block.ravel() for block in mesh.solids.values()]))
+    masters = [nodes_of(mesh, {"GROUP_MA": zone["master"]}) for zone in run["contact"]["zones"]]
+    obstacles = np.setdiff1d(np.concatenate(masters), solid)
     for support in supports:
-        if not np.isin(support.nodes, solid).any():  # of an obstacle: a half space that stands still
+        if np.isin(support.nodes, obstacles).all():  # `add_zone` turns these into half spaces that stand still
             continue
         model.prescribe(support.group, ramp=support.history, **{support.component: support.value})
     for load in run["loads"]:

@@ -1,0 +1,49 @@
+"""Kill runs at random instants: does every file open, is every step right, does every run end right when it is resumed?
+
+    python bench/kills.py [--kills 200] [--seed 1] [--cases forma04c friction] [--failures FOLDER]
+
+Half of the kills fall on FORMA04 C, half on a case in three dimensions with friction (tests/kills/kill_cases.py). Six in
+ten fall while a step is written, the others anywhere between start and end; three in ten runs are killed again when they
+are resumed. Prints what was found, a column a case; files that went wrong are kept; exit code 1 if there are any.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "kills"))
+
+import kill_cases
+import killing
+
+
+def main() -> int:
+    """Kill and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--kills", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument(
+        "--cases", nargs="+", choices=("forma04c", "friction", "small"), default=["forma04c", "friction"]
+    )
+    parser.add_argument("--failures", type=Path, default=Path("kill-failures"))
+    given = parser.parse_args()
+    begin, all_found = time.perf_counter(), {}
+    for number, name in enumerate(given.cases):
+        count = given.kills * (number + 1) // len(given.cases) - given.kills * number // len(given.cases)
+        with tempfile.TemporaryDirectory() as folder:
+            known = killing.reference(kill_cases.prepared(name, Path(folder)), Path(folder))
+            all_found[name] = killing.run(known, count, given.seed, Path(folder), given.failures)
+    print(f"{'':<20}" + "".join(f"{name:>12}" for name in all_found))
+    for row in zip(*(found.rows() for found in all_found.values()), strict=True):
+        print(f"{row[0][0]:<20}" + "".join(f"{text:>12}" for _, text in row))
+    failures = [text for found in all_found.values() for text in found.failures]
+    print("\n".join([*failures, f"seed {given.seed}, {time.perf_counter() - begin:.0f} s in all"]))
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,66 @@
+"""Run chosen tests in a forked process, which has the big libraries loaded already but nothing of the package."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import resource
+import signal
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+# Loaded once; every mutant's process is forked from here.
+LIBRARIES = ("numpy", "scipy.sparse.linalg", "scipy.spatial", "scipy.linalg", "scipy.optimize", "numba", "h5py", "hypothesis")
+MEMORY = 12 << 30
+
+
+class Chosen:
+    """Leaves the chosen tests only, in their order."""
+
+    def __init__(self, tests: list[str]) -> None:
+        self.order = {test: place for place, test in enumerate(tests)}
+
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        """Choose."""
+        items[:] = sorted((item for item in items if item.nodeid in self.order), key=lambda i: self.order[i.nodeid])
+
+
+def load() -> None:
+    """Load the big libraries."""
+    for name in LIBRARIES:
+        importlib.import_module(name)
+
+
+def verdict(tree: Path, tests: list[str], limit: float, log: Path) -> str:
+    """Return ``"survived"``, ``"killed"`` or ``"hung"`` for the package in `tree` under tests."""
+    child = os.fork()
+    if child == 0:
+        os._exit(_run(tree, tests, log))
+    deadline = time.monotonic() + limit
+    while time.monotonic() < deadline:
+        done, status = os.waitpid(child, os.WNOHANG)
+        if done:
+            return "survived" if status == 0 else "killed"
+        time.sleep(0.02)
+    os.killpg(child, signal.SIGKILL)  # its own group, see below
+    os.waitpid(child, 0)
+    return "hung"
+
+
+def _run(tree: Path, tests: list[str], log: Path) -> int:
+    os.setpgid(0, 0)
+    out = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    os.dup2(out, 1)
+    os.dup2(out, 2)
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+    os.chdir(tree)
+    os.environ["PYTHONPATH"] = str(tree)
+    sys.path.insert(0, str(tree))
+    files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
+    options = ["-o", "addopts=", "-p", "no:cacheprovider", "-p", "no:xdist", "-x", "-q", "--tb=line", "-m", ""]
+    code = pytest.main([*options, *files], plugins=[Chosen(tests)])
+    sys.stdout.flush()
+    return int(code)

@@ -1,0 +1,180 @@
+"""What goes wrong below a result file: the disk fails, somebody stops the program, another program takes the file away."""
+
+from __future__ import annotations
+
+import errno
+import gc
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from test_result_files import MESH, assert_same, step_result
+
+from fastcontact import FileError, ResultWriter, open_results
+from fastcontact.io import _commits
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "run.vtkhdf"
+
+
+def assert_holds(path: Path, n_steps: int) -> None:
+    with open_results(path) as results:
+        assert len(results) == n_steps
+        for number, step in enumerate(results):
+            assert_same(step, step_result(number), f"step {number}")
+
+
+def failing_after(count: int, error: BaseException, monkeypatch: pytest.MonkeyPatch, name: str) -> list[int]:
+    """Let every call of a method of the file fail after the first `count`; the list tells how many were made."""
+    method, calls = getattr(_commits.CommittedFile, name), []
+
+    def fail(self: _commits.CommittedFile, *arguments: object) -> object:
+        calls.append(len(calls))
+        if len(calls) > count:
+            raise error
+        return method(self, *arguments)
+
+    monkeypatch.setattr(_commits.CommittedFile, name, fail)
+    return calls
+
+
+def write_until(path: Path, fail: Callable[[], list[int]]) -> list[int]:
+    """Write a step, then two more that may fail; return the calls that were made."""
+    with ResultWriter(path, MESH) as out:
+        out.write(step_result(0))
+        calls = fail()
+        out.write(step_result(1))
+        out.write(step_result(2))
+    return calls
+
+
+@pytest.mark.parametrize("error", [OSError(errno.EIO, "Input/output error"), KeyboardInterrupt()], ids=["disk", "user"])
+def test_any_write_may_fail(error: BaseException, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """HDF5, which does not take exceptions well, never sees one."""
+    calls = write_until(path, lambda: failing_after(10**9, error, monkeypatch, "_put"))
+    total, lengths = len(calls), set()
+    assert total > 80
+    monkeypatch.undo()
+    for count in range(0, total, 5):
+        with monkeypatch.context() as patch:
+            refused = pytest.raises(FileError if isinstance(error, OSError) else type(error))
+            with refused as caught:
+                write_until(path, lambda count=count, patch=patch: failing_after(count, error, patch, "_put"))
+            gc.collect()  # files that nobody knows any more are closed
+        with open_results(path) as results:
+            lengths.add(len(results))
+            assert not results.complete
+        assert_holds(path, len(results))
+        if isinstance(error, OSError):
+            assert f"(Input/output error), {len(results)} steps are complete: see whether" in str(caught.value)
+        assert os.listdir(path.parent) == [path.name]
+        del caught, refused
+    assert lengths == {1, 2, 3}
+    with ResultWriter(path, MESH, resume=True) as out:  # now the disk is well again
+        for number in range(out.n_steps, 4):
+            out.write(step_result(number))
+    assert_holds(path, 4)
+    assert open_results(path).complete
+
+
+def test_a_failing_read_is_told_and_nothing_is_written_any_more(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with ResultWriter(path, MESH) as out:
+        out.write(step_result(0))
+    before = path.read_bytes()
+    failing_after(0, OSError(errno.EIO, "Input/output error"), monkeypatch, "_get")
+    out = ResultWriter(path, MESH, resume=True)
+    with pytest.raises(FileError, match=r"cannot be written at step 2 .*, 1 steps are complete"), out:
+        out.write(step_result(1))
+    assert path.read_bytes() == before
+
+
+def test_a_writer_that_failed_does_not_write_again(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = ResultWriter(path, MESH)
+    out.write(step_result(0))
+    with monkeypatch.context() as patch:
+        failing_after(5, OSError(errno.ENOSPC, "No space left on device"), patch, "_put")
+        with pytest.raises(FileError, match=r"written at step 2 \(No space left on device\), 1 steps are complete"):
+            out.write(step_result(1))
+    with pytest.raises(FileError, match=r"written at step 2 \(No space left on device\), 1 steps are complete"):
+        out.write(step_result(1))
+    out.close()
+    assert_holds(path, 1)
+
+
+def test_what_another_program_writes_into_the_file_stays(path: Path) -> None:
+    """Copied over, so that the file is the same one for the system."""
+    with ResultWriter(path.with_name("other.vtkhdf"), MESH) as other:
+        for number in range(5):
+            other.write(step_result(number))
+    theirs = other.path.read_bytes()
+
+    def overwritten() -> None:
+        with ResultWriter(path, MESH) as out:
+            out.write(step_result(0))
+            shutil.copyfile(other.path, path)
+            out.write(step_result(1))
+
+    with pytest.raises(
+        FileError, match="was changed by another program after 1 steps, what it holds now is left alone"
+    ):
+        overwritten()
+    assert path.read_bytes() == theirs
+    assert_holds(path, 5)
+
+
+def change(path: Path, how: str) -> None:
+    if how == "removed":
+        path.unlink()
+    elif how == "replaced":
+        other = path.with_name("other")
+        shutil.copy(path, other)
+        os.replace(other, path)
+    else:
+        with ResultWriter(path.with_name("longer.vtkhdf"), MESH) as longer:
+            longer.write(step_result(0))
+            longer.write(step_result(1))
+        shutil.copyfile(longer.path, path)
+        longer.path.unlink()
+
+
+@pytest.mark.parametrize("how", ["removed", "replaced", "changed"])
+def test_a_file_that_is_taken_up_and_then_changes_is_left_alone(how: str, path: Path) -> None:
+    """The first step of a resumed run may take hours."""
+    with ResultWriter(path, MESH) as out:
+        out.write(step_result(0))
+    out = ResultWriter(path, MESH, resume=True)
+    change(path, how)
+    before = path.read_bytes() if path.exists() else None
+    with (
+        pytest.raises(FileError, match=r"is no longer there: .* after 1 steps\. Put it back and resume, or start"),
+        out,
+    ):
+        out.write(step_result(1))
+    assert (path.read_bytes() if path.exists() else None) == before
+    assert os.listdir(path.parent) == ([path.name] if before else [])
+
+
+def test_a_pair_is_in_the_file_as_a_whole_or_not_at_all(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stopped by hand while the first step brings its contact pairs."""
+    import fastcontact.io._appending as appending
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    def stopped(which: str) -> None:
+        with ResultWriter(path, MESH) as out:
+            monkeypatch.setattr(appending, which, stop)
+            out.write(step_result(1))
+
+    for which in ("growing_table", "_append_contact"):
+        with pytest.raises(KeyboardInterrupt):
+            stopped(which)
+        monkeypatch.undo()
+        with ResultWriter(path, MESH, resume=True) as out:
+            out.write(step_result(0))
+            out.write(step_result(1))
+        assert_holds(path, 2)

@@ -1,0 +1,154 @@
+"""Files that declare what they cannot hold: refused before the memory is taken or the time is lost."""
+
+import struct
+import time
+
+import h5py
+import numpy as np
+import pytest
+from test_result_files import MESH, write
+
+import fastcontact as fc
+from fastcontact.errors import FileError, MeshError
+from fastcontact.io import _heaps
+from fastcontact.io.med import write_med_mesh
+from fastcontact.io.tables import read_csv
+
+HEAP = b"GCOL\x01\0\0\0"
+
+
+@pytest.fixture
+def results(tmp_path):
+    path = tmp_path / "results.vtkhdf"
+    write(path, 2)
+    return path
+
+
+def replaced(path, name, **created):
+    with h5py.File(path, "r+") as file:
+        attributes = dict(file[name].attrs)
+        del file[name]
+        file.create_dataset(name, **created).attrs.update(attributes)
+
+
+def free_room(data, place):
+    """Where the free room of a heap is described."""
+    at = place + 16
+    while struct.unpack_from("<H", data, at)[0]:
+        at += 16 + (struct.unpack_from("<Q", data, at + 8)[0] + 7) // 8 * 8
+    return at
+
+
+@pytest.mark.parametrize("size", [0, 8, 3584, 2**40])
+def test_a_heap_whose_end_hdf5_would_not_find_is_refused_at_once(results, size):
+    """With a size of 0, HDF5 2.0 goes round for ever; with one that ends in zeros, too."""
+    data = bytearray(results.read_bytes())
+    at = free_room(data, data.find(HEAP))
+    assert struct.unpack_from("<Q", data, at + 8)[0] > 3584
+    struct.pack_into("<Q", data, at + 8, size)
+    results.write_bytes(data)
+    started = time.process_time()
+    with pytest.raises(FileError, match="is damaged where it keeps its texts, at byte"):
+        fc.open_results(results)
+    assert time.process_time() - started < 2
+
+
+def test_a_heap_in_a_mesh_file_is_looked_through_too(tmp_path):
+    path = tmp_path / "mesh.med"
+    write_med_mesh(path, MESH)
+    with h5py.File(path, "r+") as file:
+        file["ENS_MAA/mesh"].attrs["DES"] = ["a text", "of any length"]
+    assert fc.read_mesh(path).n_points == MESH.n_points
+    data = bytearray(path.read_bytes())
+    at = free_room(data, data.find(HEAP))
+    struct.pack_into("<Q", data, at + 8, 0)
+    path.write_bytes(data)
+    with pytest.raises(FileError, match="is damaged where it keeps its texts"):
+        fc.read_mesh(path)
+
+
+@pytest.mark.parametrize("length_size", [4, 8])
+def test_heaps_of_both_sizes_of_lengths(tmp_path, length_size):
+    settings = h5py.h5p.create(h5py.h5p.FILE_CREATE)
+    settings.set_sizes(8, length_size)
+    path = tmp_path / "heaps.h5"
+    with h5py.File(h5py.h5f.create(str(path).encode(), h5py.h5f.ACC_TRUNC, settings)) as file:
+        for number in range(40):
+            file[f"text {number}"] = "x" * 17 * number
+    assert path.read_bytes().count(HEAP) > 1
+    _heaps.check_all(path, length_size)
+
+
+def test_numbers_that_look_like_a_heap_are_no_heap(tmp_path):
+    path = tmp_path / "plain.bin"
+    path.write_bytes(HEAP[:4] * 100)
+    _heaps.check_all(path, 8)
+
+
+@pytest.mark.parametrize(
+    ("name", "created", "message"),
+    [
+        ("fastcontact/mesh/points", {"shape": (2**40, 3), "dtype": "f8", "chunks": (1000, 3)}, r"declares 2.64e\+13 bytes"),
+        ("fastcontact/notes", {"shape": (4,), "maxshape": (None,), "dtype": "u1", "chunks": (2**30,)}, r"1.07e\+09 bytes"),
+        ("fastcontact/mesh/elements", {"shape": (10**6,), "dtype": h5py.string_dtype()}, "1000000 texts or references"),
+        ("fastcontact/versions", {"data": ["{}"], "dtype": h5py.string_dtype()}, "is no text"),
+        ("fastcontact/case", {"data": "x", "dtype": h5py.string_dtype(), "chunks": None}, "Expecting value"),
+        ("fastcontact/mesh/cell_groups/sizes", {"data": np.zeros(10**6, np.int64)}, r"6 names for sizes of shape"),
+    ],
+)
+def test_result_files_that_declare_too_much(results, name, created, message):
+    replaced(results, name, **created)
+    with pytest.raises(FileError, match=message):
+        fc.open_results(results)
+
+
+@pytest.mark.parametrize("value", [1.0, "2", [1, 2], h5py.Empty("i8")])
+def test_a_schema_that_is_no_whole_number(results, value):
+    with h5py.File(results, "r+") as file:
+        file["fastcontact"].attrs["schema"] = value
+    with pytest.raises(FileError, match=r"'schema' of '/fastcontact' is no whole number|damaged"):
+        fc.open_results(results)
+
+
+def test_a_result_file_behind_a_block_of_others_is_refused(results):
+    results.write_bytes(bytes(512) + results.read_bytes())
+    with pytest.raises(FileError, match="its addresses are none of ours"):
+        fc.open_results(results)
+
+
+def test_unknown_kinds_of_cells_are_listed_in_short(tmp_path):
+    path = tmp_path / "kinds.med"
+    write_med_mesh(path, MESH)
+    with h5py.File(path, "r+") as file:
+        cells = next(iter(file["ENS_MAA/mesh"].values()))["MAI"]
+        for number in range(2000):
+            cells.create_group(f"kind {number:04d}")
+    with pytest.raises(MeshError, match=r"0 cells of kind kind 0000, .* 1988 kinds more, which fastcontact") as caught:
+        fc.read_mesh(path)
+    assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("a,,b\n1,2,3\n", "column 2 has no name"), ("a,b,a\n1,2,3\n", "column 3 has the name 'a' again")],
+)
+def test_tables_whose_columns_have_no_names_of_their_own(tmp_path, text, message):
+    path = tmp_path / "table.csv"
+    path.write_text(text)
+    with pytest.raises(FileError, match=message):
+        read_csv(path)
+
+
+def test_points_that_are_no_numbers(tmp_path):
+    path = tmp_path / "points.obj"
+    path.write_text("f 1 2 3\n")
+    with pytest.raises((MeshError, FileError), match=r"points\.obj"):
+        fc.read_mesh(path)
+
+
+def test_gmsh_files_of_more_blocks_than_bytes(tmp_path):
+    path = tmp_path / "blocks.msh"
+    head = b'$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n2 1 "A"\n$EndPhysicalNames\n'
+    path.write_bytes(head + b"$Elements\n50000000 1 1 1\n2 1 3 1\n1 1 2 3 4\n$EndElements\n")
+    with pytest.raises(FileError, match="it declares 50000000 blocks or entries"):
+        fc.read_mesh(path)

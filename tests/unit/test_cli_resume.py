@@ -1,0 +1,294 @@
+"""`fastcontact run` and `run --resume` when something goes wrong: one line, the right exit code, nothing damaged."""
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_cli import CASE
+
+import fastcontact as fc
+from fastcontact.cli import main
+
+DOUBT = "warning: contact 'hertz' has only 3 elements across its radius"
+STEPS = 6
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The case file, and the steps of a run that nothing disturbed."""
+    folder = tmp_path_factory.mktemp("resume")
+    case = folder / "small.toml"
+    case.write_text(CASE.replace("steps = 3", f"steps = {STEPS}"))
+    assert main(["run", str(case), "-q", "-o", str(folder / "whole.vtkhdf")]) == 0
+    return case, list(fc.open_results(folder / "whole.vtkhdf"))
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "run.vtkhdf"
+
+
+def run(case, path, *options):
+    return main(["run", str(case), "-q", "-o", str(path), *options])
+
+
+def only_line(told: str) -> str:
+    """The one line of an error, apart from warnings."""
+    (line,) = [line for line in told.splitlines() if not line.startswith(DOUBT)]
+    return line
+
+
+def stopped(case, path, monkeypatch, after=2, act=None) -> int:
+    """Run until something happens after some steps; from the keyboard unless told otherwise."""
+    write = fc.ResultWriter.write
+
+    def disturbed(self, step):
+        write(self, step)
+        if step.index == after:
+            if act is None:
+                raise KeyboardInterrupt
+            act()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(fc.ResultWriter, "write", disturbed)
+        return run(case, path)
+
+
+def assert_same(path, steps):
+    with fc.open_results(path) as results:
+        assert results.complete == (len(results) == STEPS)
+        for found, expected in zip(results, steps, strict=True):
+            np.testing.assert_array_equal(found.displacement, expected.displacement)
+            np.testing.assert_array_equal(found.stress, expected.stress)
+
+
+# ------------------------------------------------------------------------------------------------ resuming
+
+
+def test_without_a_file_a_resumed_run_begins(whole, path, capsys):
+    case, steps = whole
+    assert main(["run", str(case), "-o", str(path), "--resume"]) == 0
+    assert f"wrote {path}" in capsys.readouterr().out
+    assert_same(path, steps)
+
+
+def test_an_interrupted_run_goes_on_and_a_complete_one_stays(whole, path, capsys, monkeypatch):
+    case, steps = whole
+    assert stopped(case, path, monkeypatch) == 130
+    assert_same(path, steps[:2])
+    summary = path.with_name("summary.json")
+    assert main(["run", str(case), "-o", str(path), "--resume", "--json", str(summary)]) == 0
+    captured = capsys.readouterr()
+    assert f"wrote {path} (went on after step 2), {summary}" in captured.out
+    assert captured.err.count(DOUBT) == 1
+    assert_same(path, steps)
+    before = path.read_bytes()
+    assert main(["run", str(case), "-o", str(path), "--resume"]) == 0
+    captured = capsys.readouterr()
+    assert f"{path} was complete with {STEPS} steps, nothing was left to solve" in captured.out
+    assert captured.err.count(DOUBT) == 1
+    assert path.read_bytes() == before
+
+
+def test_without_resume_a_run_begins_anew(whole, path, monkeypatch):
+    case, steps = whole
+    stopped(case, path, monkeypatch)
+    assert run(case, path) == 0
+    assert_same(path, steps)
+
+
+CHANGED = {
+    "material": ("nu = 0.3\n[[", "nu = 0.31\n[[", "the materials"),
+    "support": ("y = -2.0", "y = -2.1", "the supports"),
+    "contact": ('primary = "CONT2"', 'primary = "CONT2"\nfriction = 0.1', "contact 'hertz'"),
+    "ramp": ("steps = 6", "steps = 6\nend = 2.0\ntable = [[0.0, 0.0], [2.0, 1.0]]", "the load history up to 0.333333"),
+    "solve": ("[probes]", "[solve]\ngeometry_updates = 2\n[probes]", "the option geometry_updates"),
+}
+
+
+@pytest.mark.parametrize("name", CHANGED)
+def test_a_case_that_was_changed_since_is_refused(name, whole, path, capsys, monkeypatch):
+    old, new, what = CHANGED[name]
+    case, _ = whole
+    stopped(case, path, monkeypatch)
+    before, text = path.read_bytes(), case.read_text()
+    assert text.count(old) == 1
+    changed = path.with_name("changed.toml")
+    changed.write_text(text.replace(old, new))
+    capsys.readouterr()
+    assert run(changed, path, "--resume") == 1
+    assert only_line(capsys.readouterr().err) == (
+        f"error: '{path}' cannot be resumed: the steps so far belong to another case; changed since: {what}. Go on with "
+        "what they were computed for, or start anew without resuming"
+    )
+    assert path.read_bytes() == before
+
+
+def test_a_changed_mesh_is_refused(whole, path, capsys, monkeypatch):
+    case, _ = whole
+    stopped(case, path, monkeypatch)
+    before, changed = path.read_bytes(), path.with_name("changed.toml")
+    changed.write_text(case.read_text().replace("size = 6.0", "size = 5.0"))
+    capsys.readouterr()
+    assert run(changed, path, "--resume") == 1
+    assert only_line(capsys.readouterr().err).startswith(f"error: '{path}' belongs to another mesh: resume the case it")
+    assert path.read_bytes() == before
+
+
+def test_what_does_not_change_the_answer_may_change(whole, path, monkeypatch):
+    """A title, a probe, a check, the order of the supports, a limit."""
+    case, steps = whole
+    stopped(case, path, monkeypatch)
+    text = case.read_text().replace("small spheres", "still small").replace("tolerance = 0.2", "tolerance = 0.3")
+    parts = text.split("[[support]]")
+    contact = parts[3].index("[contact")
+    parts[3], parts[1] = parts[1] + parts[3][contact:], parts[3][:contact]
+    text = "[[support]]".join(parts).replace("[probes]", "[solve]\nmax_geometry_updates = 70\n[probes]")
+    changed = path.with_name("changed.toml")
+    changed.write_text(text)
+    assert run(changed, path, "--resume") == 0
+    results = fc.open_results(path)
+    assert "still small" in results.case_text
+    largest = np.abs(steps[-1].displacement).max()
+    assert np.abs(results[-1].displacement - steps[-1].displacement).max() <= 1e-12 * largest
+
+
+# ---------------------------------------------------------------------------------------------- accidents
+
+
+def test_a_second_run_on_the_file_of_a_first_one_is_refused(whole, path, capsys, monkeypatch):
+    case, steps = whole
+    told = []
+
+    def second():
+        command = [sys.executable, "-m", "fastcontact", "run", str(case), "-o", str(path)]
+        for extra in ([], ["--resume"]):
+            told.append(subprocess.run([*command, *extra], capture_output=True, text=True))
+
+    assert stopped(case, path, monkeypatch, act=second) == 0
+    expected = f"error: '{path}' is being written by process {os.getpid()}: let it end or name another file"
+    assert [(done.returncode, done.stdout, done.stderr.strip()) for done in told] == [(1, "", expected)] * 2
+    assert_same(path, steps)
+    assert sorted(os.listdir(path.parent)) == [path.name]
+
+
+def test_a_folder_that_vanishes_stops_the_run(whole, tmp_path, capsys, monkeypatch):
+    case, steps = whole
+    folder, moved = tmp_path / "here", tmp_path / "there"
+    folder.mkdir()
+    path = folder / "run.vtkhdf"
+    assert stopped(case, path, monkeypatch, act=lambda: folder.rename(moved)) == 1
+    assert only_line(capsys.readouterr().err) == (
+        f"error: '{path}' is no longer there: the file or its folder was removed, moved or replaced after 2 steps. Put it "
+        "back and resume, or start again"
+    )
+    assert_same(moved / "run.vtkhdf", steps[:2])
+    assert run(case, moved / "run.vtkhdf", "--resume") == 0
+    assert_same(moved / "run.vtkhdf", steps)
+
+
+def test_a_file_that_is_replaced_stops_the_run(whole, path, capsys, monkeypatch):
+    case, _ = whole
+
+    def replace():
+        other = path.with_name("mine")
+        other.write_text("mine")
+        os.replace(other, path)
+
+    assert stopped(case, path, monkeypatch, act=replace) == 1
+    assert "moved or replaced after 2 steps" in only_line(capsys.readouterr().err)
+    assert path.read_text() == "mine"
+    assert run(case, path, "--resume") == 1
+    assert only_line(capsys.readouterr().err).startswith(f"error: '{path}' is no HDF5 file: name a result file")
+    assert path.read_text() == "mine"
+
+
+def test_a_device_is_no_result_file(whole, capsys):
+    if not os.path.exists("/dev/full"):
+        pytest.skip("there is no /dev/full here")
+    for extra in ([], ["--resume"]):
+        assert run(whole[0], "/dev/full", *extra) == 1
+        assert only_line(capsys.readouterr().err) == "error: '/dev/full' is a device or a pipe: name a plain file"
+
+
+LIMITED = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2); "
+LIMITED += "from fastcontact.cli import main; sys.exit(main(sys.argv[2:]))"
+
+
+@pytest.mark.skipif(importlib.util.find_spec("resource") is None, reason="needs resource limits")
+@pytest.mark.parametrize("extra", [[], ["--resume"]], ids=["anew", "resumed"])
+def test_a_disk_that_is_full_stops_the_run(extra, whole, path, monkeypatch):
+    """Simulated by a limit for the size of files."""
+    case, steps = whole
+    stopped(case, path, monkeypatch, after=1)
+    begun = path.stat().st_size
+    limit = begun + 600_000  # room for a step or two besides the reserve
+    command = [sys.executable, "-c", LIMITED, str(limit), "run", str(case), "-q", "-o", str(path), *extra]
+    done = subprocess.run(command, capture_output=True, text=True)
+    n_steps = len(fc.open_results(path))
+    assert 1 <= n_steps < STEPS
+    assert done.returncode == 1
+    assert only_line(done.stderr) == (
+        f"error: '{path}' cannot be written at step {n_steps + 1} (File too large), {n_steps} steps are complete: see "
+        "whether the disk is full or the folder protected"
+    )
+    assert_same(path, steps[:n_steps])
+    assert run(case, path, "--resume") == 0
+    assert_same(path, steps)
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A folder with room for a megabyte."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    if os.name != "posix" or os.geteuid() != 0 or shutil.which("mount") is None:
+        pytest.skip("only root may mount a small file system")
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(folder)], capture_output=True)
+    if mounted.returncode:
+        pytest.skip(f"no small file system here: {mounted.stderr.decode().strip()}")
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_a_full_disk_stops_the_run_before_anything_is_replaced(whole, small_disk, capsys):
+    case, steps = whole
+    path = small_disk / "run.vtkhdf"
+    shutil.copy(case.with_name("whole.vtkhdf"), path)
+    before = path.read_bytes()
+    with open(small_disk / "other", "wb") as other:
+        other.write(bytes(shutil.disk_usage(small_disk).free))
+    assert run(case, path) == 1
+    assert only_line(capsys.readouterr().err) == (
+        f"error: '{path}' cannot be begun (No space left on device), 0 steps are complete: see whether the disk is full "
+        "or the folder protected"
+    )
+    assert path.read_bytes() == before
+    assert_same(path, steps)
+    assert sorted(os.listdir(small_disk)) == ["other", path.name]
+
+
+def test_two_runs_begun_at_once_leave_one_good_file(whole, path):
+    case, steps = whole
+    command = [sys.executable, "-m", "fastcontact", "run", str(case), "-q", "-o", str(path)]
+    found = []
+    threads = [
+        threading.Thread(target=lambda: found.append(subprocess.run(command, capture_output=True, text=True)))
+        for _ in range(3)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert {done.returncode for done in found} <= {0, 1}
+    assert any(done.returncode == 0 for done in found)
+    refused = [only_line(done.stderr) for done in found if done.returncode]
+    assert all(line.startswith(f"error: '{path}' is being written by process ") for line in refused)
+    assert_same(path, steps)
+    assert os.listdir(Path(path).parent) == [path.name]
