@@ -162,9 +162,12 @@ def solve(
     instants = restart.remaining(ramp, steps)
     if not instants:
         return steps
-    analysis = Analysis(model, linear_solver, linear_tolerance, criteria, ramp, linear_precision)
-    for text in analysis.doubts if not steps else ():
+    model.check(ramp)
+    doubtful = plausibility.doubts(model)
+    for text in doubtful if not steps else ():
         warnings.warn(text, FastcontactWarning, stacklevel=2)
+    analysis = Analysis(model, linear_solver, linear_tolerance, criteria, ramp, linear_precision)
+    analysis.doubts = doubtful
     analysis.touched = {name: True for step in steps for name, found in step.contact.items() if found.active.any()}
     if steps:
         restart.put_back(analysis, steps[-1])
@@ -182,7 +185,7 @@ def solve(
 
 
 class Analysis:
-    """A prepared model: stiffness, linear solver and contact pairs, solved load by load.
+    """A prepared model, checked before: stiffness, linear solver and contact pairs, solved load by load.
 
     Parameters are those of `solve`. Attributes `u` (n_dofs,), the displacements of all points and then of the obstacles
     that forces drive, and `active` (m,) hold the current state.
@@ -193,14 +196,13 @@ class Analysis:
         linear_precision: str | None = None,
     ) -> None:  # fmt: skip
         self.ramp = ramp or linear_ramp()
-        model.check(self.ramp)
         self.model, self.criteria = model, criteria
-        self.doubts = plausibility.doubts(model)
+        self.doubts: list[str] = []  # about the model, for the result of the first step
         self.unsettled: tuple[int, float] | None = None  # geometry updates asked for, change by the last one
         self.touched: dict[str, bool] = {}  # pairs that were closed at the end of a step
         self.solver = linear.make(
             linear_solver, dim=model.mesh.dim, n_dofs=model.n_dofs, tolerance=linear_tolerance,
-            precision=linear_precision,
+            precision=linear_precision, columns=not all(pair.eliminable for pair in model.contact),
         )  # fmt: skip
         self.pairs: dict[str, Formulation] = {pair.name: model.bind(pair) for pair in model.contact}
         self.moduli, self.material = model.material_numbers()

@@ -96,6 +96,11 @@ class ContactPair:
     force: Driving = ()
 
     @property
+    def eliminable(self) -> bool:
+        """Whether closed constraints can be eliminated: not with friction or where they give way by themselves."""
+        return self.formulation != "continuous" and not (self.options.get("friction") or self.options.get("penalty"))
+
+    @property
     def clearance_ramp(self) -> Table | None:
         """History of the clearance; None where it does not change."""
         return clearance_ramp(self.name, self.options)
@@ -537,7 +542,9 @@ class Model:
     def _add_pair(self, pair: ContactPair) -> None:
         if pair.name in {other.name for other in self.contact}:
             raise ContactError(f"there is already a contact pair '{pair.name}': names must differ")
-        self.bind(pair)
+        bound = self.bind(pair)
+        if isinstance(bound.primary, RigidSide):
+            _check_obstacle(self.mesh, pair, bound.secondary, bound.primary)
         for other in self.contact:
             if pair.primary and {pair.secondary, pair.primary} == {other.secondary, other.primary}:
                 raise ContactError(
@@ -763,9 +770,23 @@ def _check_sides(mesh: Mesh, pair: ContactPair, secondary: Surface, primary: Sur
         np.linalg.norm(apart, axis=2) < np.minimum.outer(ours[2], theirs[2])
     )
     if not (facing & ahead).any():
+        behind = -np.einsum("ijd,id->ij", apart, ours[1])[facing]
+        inside = f", or do the bodies lie inside each other, by {behind.min():.4g} or more" if len(behind) else ""
         raise ContactError(
             f"no facet of '{pair.secondary}' faces '{pair.primary}': the outer sides of the two groups look away from "
-            "each other; is one of them the wrong face of its body?"
+            f"each other; is one of them the wrong face of its body{inside}?"
+        )
+
+
+def _check_obstacle(mesh: Mesh, pair: ContactPair, secondary: Surface, obstacle: RigidSide) -> None:
+    """Refuse an obstacle that no facet of the secondary side faces."""
+    centres, outward, _ = _facet_frames(mesh, secondary)
+    _, normal, paired, _ = obstacle.facing(centres)
+    along = np.einsum("id,id->i", outward, normal)[paired]
+    if len(along) and (along >= 0).all():
+        raise ContactError(
+            f"the rigid obstacle of contact '{pair.name}' looks the same way as '{pair.secondary}', so that they cannot "
+            "touch: turn its normal or its facets round, or name another face of the body"
         )
 
 

@@ -62,12 +62,12 @@ class FreeMotions:
         return ["; ".join(f"{body}: {motion}" for body, motion in self._mixed(column)) for column in self.parts.T]
 
     def by_body(self) -> dict[str, list[str]]:
-        """Return the names of the motions of each body."""
+        """Return the names of the motions of each body, each once: joint motions may hold alike ones of one body."""
         found: dict[str, list[str]] = {}
         for column in self.parts.T:
             for body, motion in self._mixed(column):
                 found.setdefault(body, []).append(motion)
-        return found
+        return {body: list(dict.fromkeys(motions)) for body, motions in found.items()}
 
     def _mixed(self, column: Array) -> list[tuple[str, str]]:
         mixed: dict[str, list[str]] = {}

@@ -9,7 +9,7 @@ from typing import Any
 
 from fastcontact.errors import CaseError, unknown
 
-_PART = re.compile(r"([^.\[\]]+)((?:\[\d+\])*)$")
+_PART = re.compile(r"([^.\[\]]+)((?:\[\d{1,9}\])*)$")
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _LAW = re.compile(rf"\s*(?:({_NUMBER})\s*\*\s*)?value(?:\s*\^\s*({_NUMBER}))?\s*$")
 
@@ -50,7 +50,10 @@ def _by_law(law: Any, value: Any, where: str) -> Any:
         return value
     if isinstance(value, str) or (match[2] is not None and value < 0):
         raise CaseError(f"{where} = '{law}' cannot be taken of {value!r}")
-    return float(match[1] or 1.0) * float(value) ** float(match[2] or 1.0)
+    try:
+        return float(match[1] or 1.0) * float(value) ** float(match[2] or 1.0)
+    except ArithmeticError:
+        raise CaseError(f"{where} = '{law}' is too large a number for {value!r}") from None
 
 
 def _set(data: dict[str, Any], path: str, value: Any, names: Iterable[str]) -> None:

@@ -18,9 +18,9 @@ def inner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
     """Points (m, 2) inside the convex polygon `outline` (n, 2), about ``density * spacing`` apart [length]."""
     from scipy.spatial import cKDTree
 
-    corners = _apart(_corner_seeds(outline, spacing, density), outline, spacing, density)
     low, high = outline.min(axis=0), outline.max(axis=0)
     field = _lattice(spacing, density, low, high) if spacing.uniform else _rings(spacing, density, low, high)
+    corners = _apart(_corner_seeds(outline, spacing, density), outline, spacing, density)
     size = density * spacing(field)
     inside = field[_depth(outline, field) > _CLEAR * size]
     if not len(corners):

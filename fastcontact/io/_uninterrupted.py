@@ -20,14 +20,14 @@ def uninterrupted() -> Iterator[None]:
         yield
         return
     arrived: list[tuple[int, FrameType | None]] = []
-    handlers = {number: signal.getsignal(number) for number in signal.valid_signals()}
+    handlers = {int(number): signal.getsignal(number) for number in signal.valid_signals()}
     with contextlib.ExitStack() as restored:  # which goes on restoring when something is raised meanwhile
         for number, handler in handlers.items():
             if callable(handler):
                 restored.callback(signal.signal, number, handler)
                 signal.signal(number, lambda *signal_and_frame: arrived.append(signal_and_frame))
         yield
-    for number, frame in arrived:
-        handler = handlers[signal.Signals(number)]
+    for which, frame in arrived:
+        handler = handlers[which]
         assert callable(handler)
-        handler(number, frame)
+        handler(which, frame)

@@ -172,7 +172,7 @@ class ResultWriter:
             self._flush()
             self._file["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(self.n_steps + 1))
             self._flush()
-        self.n_steps += 1
+            self.n_steps += 1
 
     def close(self, log: Any = None, warnings: Iterable[str] = ()) -> None:
         """Finish the file; a second call does nothing.

@@ -15,12 +15,14 @@ log = logging.getLogger("fastcontact")
 OPTIONAL = {"cholmod": ("kvxopt", "cholmod"), "pardiso": ("pypardiso", "mkl")}
 KNOWN = tuple(name for _, name, _ in pkgutil.iter_modules(__path__) if not name.startswith("_"))
 SOLVERS = tuple(name for name in KNOWN if name not in OPTIONAL or importlib.util.find_spec(OPTIONAL[name][0]))
-# Above these sizes a multigrid solution is cheaper than a factorisation (measured, see bench/README.md).
+# Above these sizes a multigrid solution is cheaper than a factorisation (measured, see bench/README.md). The second where
+# constraints need columns of K^-1, which factors give at once and multigrid one solution each.
 DIRECT_UP_TO = {2: 1_000_000, 3: 15_000}
+DIRECT_WITH_COLUMNS_UP_TO = {2: 1_000_000, 3: 60_000}
 
 
 def make(
-    name: str, *, dim: int, n_dofs: int, tolerance: float = 1e-10, precision: str | None = None
+    name: str, *, dim: int, n_dofs: int, tolerance: float = 1e-10, precision: str | None = None, columns: bool = False
 ) -> LinearSolver:  # fmt: skip
     """Return a linear solver by name.
 
@@ -36,6 +38,9 @@ def make(
         Relative residual of iterative solvers.
     precision : {"single", "double"}, optional
         Of the multigrid cycle, single by default; direct solvers work in double precision always.
+    columns : bool
+        Whether constraints cannot be eliminated, but need columns of ``K^-1``: those with friction or with a compliance of
+        their own. For ``"auto"``.
 
     Raises
     ------
@@ -45,7 +50,7 @@ def make(
     if not 0.0 < tolerance < 1.0:
         raise ModelError(f"the tolerance {tolerance} of the linear solver must lie between 0 and 1, such as 1e-10")
     if name == "auto":
-        name, reason = chosen(dim, n_dofs)
+        name, reason = chosen(dim, n_dofs, columns)
         log.info("linear solver: %s, %s", name, reason)
     if name in OPTIONAL and name not in SOLVERS:
         package, extra = OPTIONAL[name]
@@ -57,9 +62,9 @@ def make(
     return solver
 
 
-def chosen(dim: int, n_dofs: int) -> tuple[str, str]:
+def chosen(dim: int, n_dofs: int, columns: bool = False) -> tuple[str, str]:
     """Return the solver that ``"auto"`` stands for, and why."""
-    limit = DIRECT_UP_TO[dim]
+    limit = (DIRECT_WITH_COLUMNS_UP_TO if columns else DIRECT_UP_TO)[dim]
     if n_dofs <= limit:
         return "direct", f"for {n_dofs} unknowns in {dim}D a factorisation is cheapest (up to {limit})"
     return "amg", f"for {n_dofs} unknowns in {dim}D a factorisation is dearer than multigrid (beyond {limit})"

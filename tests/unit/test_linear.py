@@ -68,6 +68,26 @@ def test_no_equations_is_a_plain_solution_and_the_solver_describes_itself(name, 
 def test_auto_chooses_by_dimension_and_size():
     assert linear.make("auto", dim=2, n_dofs=1000).name == "direct"
     assert linear.make("auto", dim=3, n_dofs=1_000_000).name == "amg"
+    assert linear.make("auto", dim=3, n_dofs=40_000).name == "amg"
+    assert linear.make("auto", dim=3, n_dofs=40_000, columns=True).name == "direct"
+
+
+@pytest.mark.parametrize(
+    ("options", "solver"),
+    [
+        ({"formulation": "node_to_segment"}, "amg"), ({"formulation": "node_to_segment", "friction": 0.3}, "direct"),
+        ({"formulation": "mortar"}, "amg"), ({"formulation": "mortar", "penalty": 1e6}, "direct"),
+        ({"formulation": "continuous"}, "direct"),
+    ],
+)  # fmt: skip
+def test_auto_looks_at_what_the_contact_asks_of_a_solver(options, solver, monkeypatch):
+    monkeypatch.setattr(linear, "DIRECT_UP_TO", {2: 100, 3: 100})
+    model = fc.Model(fc.generate.block_on_block("quad4"), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    model.fix("LOWER_BOTTOM", "xy")
+    model.prescribe("UPPER_TOP", x=0.0, y=-1e-3)
+    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
+    assert Analysis(model, "auto", 1e-10, Criteria()).solver.name == solver
 
 
 def test_an_unknown_solver_is_refused():

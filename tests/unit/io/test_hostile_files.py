@@ -88,8 +88,16 @@ def test_numbers_that_look_like_a_heap_are_no_heap(tmp_path):
 @pytest.mark.parametrize(
     ("name", "created", "message"),
     [
-        ("fastcontact/mesh/points", {"shape": (2**40, 3), "dtype": "f8", "chunks": (1000, 3)}, r"declares 2.64e\+13 bytes"),
-        ("fastcontact/notes", {"shape": (4,), "maxshape": (None,), "dtype": "u1", "chunks": (2**30,)}, r"1.07e\+09 bytes"),
+        (
+            "fastcontact/mesh/points",
+            {"shape": (2**40, 3), "dtype": "f8", "chunks": (1000, 3)},
+            r"declares 2.64e\+13 bytes",
+        ),
+        (
+            "fastcontact/notes",
+            {"shape": (4,), "maxshape": (None,), "dtype": "u1", "chunks": (2**30,)},
+            r"1.07e\+09 bytes",
+        ),
         ("fastcontact/mesh/elements", {"shape": (10**6,), "dtype": h5py.string_dtype()}, "1000000 texts or references"),
         ("fastcontact/versions", {"data": ["{}"], "dtype": h5py.string_dtype()}, "is no text"),
         ("fastcontact/case", {"data": "x", "dtype": h5py.string_dtype(), "chunks": None}, "Expecting value"),
@@ -149,6 +157,7 @@ def test_points_that_are_no_numbers(tmp_path):
 def test_gmsh_files_of_more_blocks_than_bytes(tmp_path):
     path = tmp_path / "blocks.msh"
     head = b'$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n2 1 "A"\n$EndPhysicalNames\n'
-    path.write_bytes(head + b"$Elements\n50000000 1 1 1\n2 1 3 1\n1 1 2 3 4\n$EndElements\n")
+    nodes = b"$Nodes\n1 3 1 3\n2 1 0 3\n1\n2\n3\n0 0 0\n1 0 0\n0 1 0\n$EndNodes\n"
+    path.write_bytes(head + nodes + b"$Elements\n50000000 1 1 1\n2 1 3 1\n1 1 2 3 4\n$EndElements\n")
     with pytest.raises(FileError, match="it declares 50000000 blocks or entries"):
         fc.read_mesh(path)
