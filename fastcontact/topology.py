@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import wraps
+from types import MappingProxyType
+from typing import TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +20,7 @@ from fastcontact.mesh import Mesh
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
+Found = TypeVar("Found")
 
 
 def corner_areas(mesh: Mesh, name: str) -> Array:
@@ -44,6 +50,12 @@ def oriented(mesh: Mesh) -> tuple[Mesh, int]:
     """Return the mesh with every solid cell the right way round, and how many cells were turned.
 
     Two-dimensional cells run counter-clockwise; in three dimensions the outer facets of `elements` look outward.
+
+    Raises
+    ------
+    MeshError
+        If a cell that was inside out lies on the same side of a facet as its neighbour: the mesh is folded there, and
+        turning the cell would hide that.
     """
     measure = corner_areas if mesh.dim == 2 else corner_volumes
     cells, turned = dict(mesh.cells), 0
@@ -54,9 +66,57 @@ def oriented(mesh: Mesh) -> tuple[Mesh, int]:
             block[inside_out] = block[inside_out][:, elements.get(name).reversed]
             cells[name] = block
             turned += int(inside_out.sum())
-    return (mesh.replace(cells=cells) if turned else mesh), turned
+    if not turned:
+        return mesh, 0
+    mesh = mesh.replace(cells=cells)
+    _check_folds(mesh)
+    return mesh, turned
 
 
+def _check_folds(mesh: Mesh) -> None:
+    """Raise MeshError if two solid cells, all of them oriented, go round a common facet in the same direction."""
+    found, owners = [], []
+    for name, block in mesh.solids.items():
+        element = elements.get(name)
+        numbers = mesh.offsets[name] + np.arange(len(block))
+        for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
+            found.append(_direction(block[:, list(facet)[: elements.get(facet_element).n_corners]].astype(np.int64)))
+            owners.append(numbers)
+    keys, owner = np.concatenate(found), np.concatenate(owners)
+    order = np.lexsort(keys.T)
+    same = np.flatnonzero((keys[order[1:]] == keys[order[:-1]]).all(axis=1))
+    if len(same):
+        first, second = sorted((int(owner[order[same[0]]]), int(owner[order[same[0] + 1]])))
+        where = ", ".join(f"{x:.6g}" for x in mesh.points[keys[order[same[0]]][:2]].mean(axis=0))
+        raise MeshError(
+            f"cells {first} and {second} lie on the same side of the facet between them, near ({where}), one of "
+            f"{len(same)} such pairs: the mesh is folded there; move its nodes or remesh"
+        )
+
+
+def _direction(facets: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return three nodes (n, 3) that tell facets, and the way round them, apart: the lowest, the next, the last."""
+    first = facets.argmin(axis=1)
+    rows, count = np.arange(len(facets)), facets.shape[1]
+    # The two ends of a line are told apart by their order alone.
+    ahead, behind = (facets[rows, (first + k) % count] for k in (1, -1))
+    return np.column_stack([facets[rows, first], ahead, behind if count > 2 else first])
+
+
+def _remembered(function: Callable[[Mesh], Found]) -> Callable[[Mesh], Found]:
+    """Ask `function` once for every mesh: meshes do not change, and many parts of an analysis want the same of one."""
+    known: WeakKeyDictionary[Mesh, Found] = WeakKeyDictionary()
+
+    @wraps(function)
+    def asked(mesh: Mesh) -> Found:
+        if mesh not in known:
+            known[mesh] = function(mesh)
+        return known[mesh]
+
+    return asked
+
+
+@_remembered
 def bodies(mesh: Mesh) -> tuple[int, NDArray[np.int32]]:
     """Return the number of bodies (sets of solid cells connected by nodes) and the body of each point, -1 for none."""
     rows, columns, used = [], [], np.zeros(mesh.n_points, bool)
@@ -72,10 +132,12 @@ def bodies(mesh: Mesh) -> tuple[int, NDArray[np.int32]]:
     found, compact = np.unique(label[used], return_inverse=True)
     body = np.full(mesh.n_points, -1, np.int32)
     body[used] = compact
+    body.setflags(write=False)
     return len(found), body
 
 
-def outer_facets(mesh: Mesh) -> dict[str, Indices]:
+@_remembered
+def outer_facets(mesh: Mesh) -> Mapping[str, Indices]:
     """Return the facets that belong to exactly one solid cell, by facet element, normals pointing outward."""
     found: dict[str, list[Indices]] = {}
     for name, block in mesh.solids.items():
@@ -83,7 +145,7 @@ def outer_facets(mesh: Mesh) -> dict[str, Indices]:
         for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
             found.setdefault(facet_element, []).append(block[:, list(facet)])
     outer = {name: _single(np.concatenate(blocks)) for name, blocks in found.items()}
-    return {name: facets for name, facets in outer.items() if len(facets)}
+    return MappingProxyType({name: facets for name, facets in outer.items() if len(facets)})
 
 
 def _single(facets: Indices) -> Indices:
@@ -92,7 +154,9 @@ def _single(facets: Indices) -> Indices:
     order = np.lexsort(keys.T)
     differs = (keys[order[1:]] != keys[order[:-1]]).any(axis=1)
     alone = np.concatenate([[True], differs]) & np.concatenate([differs, [True]])
-    return np.ascontiguousarray(facets[np.sort(order[alone])])
+    kept = np.ascontiguousarray(facets[np.sort(order[alone])])
+    kept.setflags(write=False)
+    return kept
 
 
 @dataclass(frozen=True, eq=False)

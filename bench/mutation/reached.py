@@ -17,6 +17,7 @@ from types import FrameType, TracebackType
 PACKAGE = os.environ["MUTATION_PACKAGE"] + os.sep
 places: dict[str, set[tuple[str, int]]] = defaultdict(set)
 seconds: dict[str, float] = defaultdict(float)
+failed: set[str] = set()
 
 
 def pytest_configure() -> None:
@@ -54,10 +55,13 @@ def _add(test: str, frame: FrameType, line: int) -> None:
 def pytest_runtest_logreport(report) -> None:
     """Add up what the parts of a test take."""
     seconds[report.nodeid] += report.duration
+    if not report.passed:  # such a test would seem to notice everything
+        failed.add(report.nodeid)
 
 
 def pytest_sessionfinish() -> None:
     """Write the notes of this process."""
-    notes = {test: [round(seconds[test], 3), sorted(found)] for test, found in places.items() if test}
+    notes = {test: [round(seconds[test], 3), sorted(found)] for test, found in places.items() if test in seconds}
+    notes = {test: found for test, found in notes.items() if test not in failed}
     if notes:
         Path(os.environ["MUTATION_NOTES"], f"{os.getpid()}.json").write_text(json.dumps(notes), encoding="utf-8")

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from fastcontact.cli._outputs import check_outputs
 from fastcontact.errors import CaseError, FileError
 
 
@@ -36,12 +37,10 @@ def check_targets(options: argparse.Namespace) -> None:
 
     Raises
     ------
-    FileError
-        If a folder is missing.
+    FileError, FastcontactError
+        See `check_outputs`.
     """
-    for path in (options.json, options.csv, options.png, options.html):
-        if path and not Path(path).resolve().parent.is_dir():
-            raise FileError(f"cannot write '{path}': the folder '{Path(path).parent}' does not exist; create it first")
+    check_outputs(options.case, [options.json, options.csv, options.html], [options.png])
 
 
 def names(text: str | None) -> list[str] | None:

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from fastcontact.cli._outputs import check_outputs
 from fastcontact.cli._progress import Progress
 from fastcontact.cli._warnings import told
 from fastcontact.errors import ConvergenceError, FileError, ModelError
@@ -47,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
         _set_threads(options.threads)
     case = read_case(options.case)
     output = Path(options.output or f"{case.name}.vtkhdf")
-    _check_targets(options.json, options.plot)
+    check_outputs(options.case, [output, options.json], [options.plot])
     read = time.perf_counter()
     case.model.check(case.ramp)  # a wrong one must not replace the file of a right one
     with told() as caught:
@@ -138,12 +139,6 @@ def _set_threads(count: int) -> None:
     if not 1 <= count <= limit:
         raise CaseError(f"--threads {count} must lie between 1 and {limit}, the number of processors")
     _jit.set_threads(count)
-
-
-def _check_targets(*paths: str | None) -> None:
-    for path in paths:
-        if path and not Path(path).resolve().parent.is_dir():
-            raise FileError(f"cannot write '{path}': the folder '{Path(path).parent}' does not exist; create it first")
 
 
 def _write_json(path: str, numbers: dict[str, Any]) -> None:

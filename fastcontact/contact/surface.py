@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -118,9 +119,12 @@ def surface(mesh: Mesh, group: str) -> Surface:
     return Surface(group, blocks, points, abscissa)
 
 
-def _outward(mesh: Mesh, group: str, name: str, block: Indices, outer: dict[str, Indices]) -> Indices:
+def _outward(mesh: Mesh, group: str, name: str, block: Indices, outer: Mapping[str, Indices]) -> Indices:
     """Return the facets `outer` of the solids that match `block`, with the solid's orientation."""
     candidates = outer.get(name, np.empty((0, elements.get(name).n_nodes), np.int32))
+    near = np.zeros(mesh.n_points, bool)
+    near[block] = True
+    candidates = candidates[near[candidates].all(axis=1)]
     keys = {tuple(sorted(facet)): row for row, facet in enumerate(candidates.tolist())}
     rows = [keys.get(tuple(sorted(facet)), -1) for facet in block.tolist()]
     missing = [i for i, row in enumerate(rows) if row < 0]
@@ -133,7 +137,7 @@ def _outward(mesh: Mesh, group: str, name: str, block: Indices, outer: dict[str,
     return np.ascontiguousarray(candidates[np.unique(rows)])
 
 
-def _ordered(mesh: Mesh, group: str, facets: dict[str, Indices]) -> tuple[Indices, Array]:
+def _ordered(mesh: Mesh, group: str, facets: Mapping[str, Indices]) -> tuple[Indices, Array]:
     if mesh.dim == 2:
         try:
             line = ordered_line(mesh, group)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from reprlib import repr
 from typing import Any
 
 from fastcontact.errors import MeshError, unknown
@@ -23,9 +24,9 @@ def number(name: str, value: Any) -> float:
     try:
         result = float(value)
     except (TypeError, ValueError):
-        raise MeshError(f"{name} must be a number, not {value!r}") from None
+        raise MeshError(f"{name} must be a number, not {repr(value)}") from None
     if not math.isfinite(result):
-        raise MeshError(f"{name} must be a finite number, not {value!r}")
+        raise MeshError(f"{name} must be a finite number, not {repr(value)}")
     if abs(result) > LARGEST:
         raise MeshError(f"{name} = {result:g} is out of range: its size must be at most {LARGEST:g}")
     return result
@@ -54,9 +55,9 @@ def count(name: str, value: Any) -> int:
     """Return `value` as an int; MeshError unless it is a whole number from 1 to MOST_ALONG."""
     result = number(name, value)
     if result != int(result) or result < 1:
-        raise MeshError(f"{name} = {value!r} is out of range: it must be a whole number, at least 1")
+        raise MeshError(f"{name} = {repr(value)} is out of range: it must be a whole number, at least 1")
     if result > MOST_ALONG:
-        raise MeshError(f"{name} = {value!r} is out of range: it must be at most {MOST_ALONG}")
+        raise MeshError(f"{name} = {repr(value)} is out of range: it must be at most {MOST_ALONG}")
     return int(result)
 
 
@@ -82,14 +83,14 @@ def affordable(n_cells: float) -> None:
 def pair(name: str, value: Any) -> tuple[Any, Any]:
     """Return `value` as a tuple of two; MeshError if it is anything else."""
     if isinstance(value, str) or not hasattr(value, "__len__") or len(value) != 2:
-        raise MeshError(f"{name} must be two numbers, not {value!r}")
+        raise MeshError(f"{name} must be two numbers, not {repr(value)}")
     return value[0], value[1]
 
 
 def one_of(name: str, value: Any, known: Sequence[str]) -> str:
     """Return `value`; MeshError that offers the near names unless it is one of `known`."""
     if value not in known:
-        raise MeshError(unknown(name, str(value), known))
+        raise MeshError(unknown(name, str(value)[:80], known))
     return str(value)
 
 
@@ -97,4 +98,4 @@ def unused(element: str, **arguments: Any) -> None:
     """Raise MeshError if an argument that means nothing to `element` was given (is not None)."""
     for name, value in arguments.items():
         if value is not None:
-            raise MeshError(f"{name} = {value!r} means nothing to {element} meshes: leave it out")
+            raise MeshError(f"{name} = {repr(value)} means nothing to {element} meshes: leave it out")

@@ -53,6 +53,8 @@ NODE_ORDER: dict[str, Orders] = {
     "gmsh22": _WEDGE_OF_GMSH,
 }
 
+# How much of what meshio says goes into a message.
+LONGEST = 300
 KEEPS_ALL = "write a .med file to keep them"
 USUAL = (".med", ".msh", ".vtu", ".vtk", ".inp", ".xdmf", ".mesh")
 OTHER_FORMATS = "write .med, .vtu or .msh instead"
@@ -90,6 +92,7 @@ def _contained(action: str, path: Path) -> Iterator[None]:
     except (Exception, SystemExit) as error:
         words = said.getvalue() if isinstance(error, SystemExit) else str(error)
         reason = " ".join(words.split()) or type(error).__name__
+        reason = reason if len(reason) <= LONGEST else f"{reason[:LONGEST]}..."
         remedy = "check the file, or convert it to .med" if action == "read" else OTHER_FORMATS
         raise FileError(f"meshio cannot {action} '{path}' ({reason}): {remedy}") from error
     if said.getvalue():

@@ -11,6 +11,7 @@ import builtins
 import gzip
 import lzma
 import os
+import re
 import sys
 import zlib
 from collections.abc import Callable, Iterator
@@ -35,6 +36,12 @@ UNPACKED_EXPANSION = 30
 # Formats that are HDF5 files, and those that consist of several files.
 HDF5_FORMATS = ("cgns", "h5m", "hmf", "exodus")
 SEVERAL_FILES = ("tetgen", "xdmf", "dolfin-xml")
+
+
+# Surfaces as text. meshio's own pattern takes time without end to find that a text is none; this one never goes back.
+_NUMBER = r"[+-]?+(?:\d++\.?+\d*+|\.\d++)"
+_POINT = rf"{_NUMBER}\s++{_NUMBER}\s++{_NUMBER}(?:\s++{_NUMBER})?+"
+WKT = re.compile(rf"TIN\s*+\((?:\s*+\(\s*+\(\s*+{_POINT}(?:\s*+,\s*+{_POINT}){{3}}\s*+\)\s*+\)\s*+,?+)*+\s*+\)")
 
 
 class ImplausibleError(Exception):
@@ -65,6 +72,8 @@ def bounded(path: Path, file_format: str) -> Iterator[None]:
         _check_packed(path, most)
     if file_format == "xdmf":
         _check_references(path)
+    if file_format == "wkt" and not WKT.match(path.read_text(encoding="utf-8", errors="replace").strip()):
+        raise ImplausibleError("it holds no triangles as TIN (((x y z, ...)), ...)")
     stand_ins: dict[str, Any] = {
         "np": _Bounded(np, _arrays(limit, size, allowed)),
         "zlib": _Bounded(zlib, {"decompress": lambda data: _unpacked(zlib.decompressobj(), data, most)}),
@@ -179,7 +188,9 @@ class _Ending:
         return self._counted(self._file.readline(*args))
 
     def read(self, *args: Any) -> Any:
-        """Read a part."""
+        """Read a part, and make room only for what is there."""
+        if args and args[0] is not None and args[0] >= 0:
+            args = (min(args[0], os.fstat(self._file.fileno()).st_size),)
         return self._counted(self._file.read(*args)) if args != (0,) else self._file.read(0)
 
 

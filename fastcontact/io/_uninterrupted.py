@@ -21,13 +21,15 @@ def uninterrupted() -> Iterator[None]:
         return
     arrived: list[tuple[int, FrameType | None]] = []
     handlers = {int(number): signal.getsignal(number) for number in signal.valid_signals()}
-    with contextlib.ExitStack() as restored:  # which goes on restoring when something is raised meanwhile
-        for number, handler in handlers.items():
-            if callable(handler):
-                restored.callback(signal.signal, number, handler)
-                signal.signal(number, lambda *signal_and_frame: arrived.append(signal_and_frame))
-        yield
-    for which, frame in arrived:
-        handler = handlers[which]
-        assert callable(handler)
-        handler(which, frame)
+    try:
+        with contextlib.ExitStack() as restored:  # which goes on restoring when something is raised meanwhile
+            for number, handler in handlers.items():
+                if callable(handler):
+                    restored.callback(signal.signal, number, handler)
+                    signal.signal(number, lambda *signal_and_frame: arrived.append(signal_and_frame))
+            yield
+    finally:
+        for which, frame in arrived:
+            handler = handlers[which]
+            assert callable(handler)
+            handler(which, frame)

@@ -201,6 +201,7 @@ class ResultWriter:
             with self._explained("closed"):
                 self._open()
                 try:
+                    self._check_ours()
                     if self._below.writable:
                         self._reserve(len(as_json(run)))
                         appending.append_run(self._file, self.n_steps, run, self._flush)
@@ -231,15 +232,19 @@ class ResultWriter:
     def _check_in_place(self) -> None:
         """Refuse to go on writing to a file that nobody would find, or that cannot be written any more."""
         self._below.check()
+        self._check_ours()
+        with contextlib.suppress(OSError):
+            if os.path.samestat(os.fstat(self._below.fileno()), os.stat(self.path)):
+                return
+        raise FileError(self._gone())
+
+    def _check_ours(self) -> None:
+        """Refuse to write into what another program has written."""
         if not self._below.intact():
             raise FileError(
                 f"'{self.path}' was changed by another program after {self.n_steps} steps, what it holds now is left "
                 "alone: let no other program write to it, name another file and start again"
             )
-        with contextlib.suppress(OSError):
-            if os.path.samestat(os.fstat(self._below.fileno()), os.stat(self.path)):
-                return
-        raise FileError(self._gone())
 
     def _gone(self) -> str:
         return (
@@ -257,15 +262,15 @@ class ResultWriter:
     @contextlib.contextmanager
     def _explained(self, what: str) -> Iterator[None]:
         """Turn what HDF5 or the system says into one sentence with a remedy; meanwhile signals wait."""
-        try:
-            with uninterrupted():
+        with uninterrupted():
+            try:
                 yield
-        except (OSError, RuntimeError) as error:
-            reason = getattr(error, "strerror", None) or next(iter(str(error).splitlines()), type(error).__name__)
-            raise FileError(
-                f"'{self.path}' cannot be {what} ({reason}), {self.n_steps} steps are complete: "
-                "see whether the disk is full or the folder protected"
-            ) from error
+            except (OSError, RuntimeError) as error:
+                reason = getattr(error, "strerror", None) or next(iter(str(error).splitlines()), type(error).__name__)
+                raise FileError(
+                    f"'{self.path}' cannot be {what} ({reason}), {self.n_steps} steps are complete: "
+                    "see whether the disk is full or the folder protected"
+                ) from error
 
     def _begin(self, kinematics: str, case_text: str) -> None:
         """Write all but the steps under another name, then put it in the place of the old file."""

@@ -306,6 +306,42 @@ CASES = [
         "",
         r"case\.toml: unknown contact pair in 'theory' 'hertz': there is none here",
     ),
+    (
+        "two materials for one body in a case",
+        "[ramp]",
+        '[[material]]\ngroups = ["SPHBAS"]\nE = 1000.0\nnu = 0.3\n[ramp]',
+        r"1584 cells of 'SPHBAS' have two materials, E = 20000, nu = 0\.3 and E = 1000, nu = 0\.3: give each group one; one for all other cells comes first, without groups",
+    ),
+    (
+        "no body is held",
+        '[[support]]\ngroup = "A2B2"\ny = -2.0\n\n[[support]]\ngroup = "A1B1"\ny = 2.0',
+        "",
+        r"1 rigid-body motion is not supported: body '\w+': translation along y \(the axis\); body '\w+': translation along y \(the axis\)\. Fix or prescribe a displacement component that stops each, or let a load press the body against a contact",
+    ),
+    (
+        "one pair twice in a case",
+        "[ramp]",
+        '[contact.again]\nsecondary = "CONT2"\nprimary = "CONT1"\n[ramp]',
+        r"contact 'again' joins 'CONT2' and 'CONT1', which contact 'hertz' joins already: leave out one of the two",
+    ),
+    (
+        "key of the convergence criteria misspelled",
+        "[ramp]",
+        "[solver]\nrelativ = 1e-6\n[ramp]",
+        r"case\.toml: unknown key 'solver",
+    ),
+    (
+        "history that ends too early",
+        'group = "A2B2"\ny = -2.0',
+        'group = "A2B2"\ny = -2.0\nramp = [[0.0, 0.0], [0.5, 1.0]]',
+        r"the ramp of the displacement y prescribed on 'A2B2' covers 0 to 0\.5, but the analysis has the instant 0\.55: extend the table",
+    ),
+    (
+        "code instead of data",
+        "E = 20000.0",
+        "E = 2 * 10000.0",
+        r"'case\.toml' is not valid TOML: ",
+    ),
 ]
 
 # What is asked of the command line, and a pattern of the message.
@@ -341,5 +377,65 @@ COMMANDS = [
         "information on nothing",
         ["info", "nothing.med"],
         r"there is no file 'nothing\.med': check its name and the folder you are in",
+    ),
+    (
+        "folder of the summary missing",
+        ["run", "case.toml", "--json", "no/such.json"],
+        r"folder '.*no' does not exist: create it or name another file",
+    ),
+    (
+        "picture of no known kind",
+        ["run", "case.toml", "--plot", "a.pgn"],
+        r"'a\.pgn' has a suffix that no kind of picture has: use \.png, \.svg or \.pdf",
+    ),
+    (
+        "two outputs of one name",
+        ["run", "case.toml", "--json", "a.png", "--plot", "a.png"],
+        r"two outputs are to be written to 'a\.png': name another file for one of them",
+    ),
+    (
+        "summary over the case file",
+        ["run", "case.toml", "--json", "case.toml"],
+        r"'case\.toml' is what this command reads: name another file to write",
+    ),
+    (
+        "results over the mesh",
+        ["run", "case.toml", "-o", "forma04a.med"],
+        r"'.*forma04a\.med' exists and is no result file: name another file or remove it first",
+    ),
+    (
+        "threads in words",
+        ["run", "case.toml", "--threads", "two"],
+        r"argument --threads: invalid int value: 'two'; see 'fastcontact run --help'",
+    ),
+    (
+        "no level asked for",
+        ["converge", "case.toml", "--levels", "0"],
+        r"levels = 0 must be at least 1; a limit takes 3",
+    ),
+    (
+        "unknown parameter of a sweep",
+        ["sweep", "case.toml", "--set", "aproach=1,2"],
+        r"unknown parameter 'aproach': did you mean 'approach'\?",
+    ),
+    (
+        "report of a study into a missing folder",
+        ["converge", "case.toml", "--html", "no/study.html"],
+        r"folder '.*no' does not exist: create it or name another file",
+    ),
+    (
+        "size of a mesh is negative",
+        ["mesh", "half-spheres", "--size", "-1", "-o", "a.med"],
+        r"size = -1 is out of range: it must be greater than 0 and at most R = 50",
+    ),
+    (
+        "mesh into a suffix of no format",
+        ["mesh", "half-spheres", "-o", "a.xyz"],
+        r"'.*a\.xyz': unknown mesh file suffix '\.xyz': use \.med, \.msh, \.vtu, \.vtk, \.inp, \.xdmf, \.mesh or another format of meshio",
+    ),
+    (
+        "export of a case file",
+        ["export", "case.toml", "--xdmf", "a.xdmf"],
+        r"'case\.toml' is no HDF5 file: name a result file that fastcontact wrote \(\.vtkhdf\)",
     ),
 ]

@@ -274,7 +274,7 @@ def flat_cell():
 
 def nearly_folded():
     """A quadratic triangle with a mid node far from the middle."""
-    nodes = [[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.8]]
+    nodes = [[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.82]]
     return held(fc.Mesh(nodes, {"tri6": [range(6)]}, point_groups={"ALL": [0, 1]}))
 
 

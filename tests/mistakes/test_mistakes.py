@@ -5,7 +5,9 @@ import shutil
 from pathlib import Path
 
 import pytest
+from accidents import ACCIDENTS
 from catalogue import CASES, COMMANDS
+from spoilt import MESHES
 
 from fastcontact import analysis
 from fastcontact.cli import main
@@ -48,9 +50,10 @@ def test_the_case_without_mistake_goes_on_to_the_numerics(folder):
 
 
 def test_the_catalogue_is_as_long_as_it_must_be_and_names_each_mistake_once():
-    names = [entry[0] for entry in (*CASES, *COMMANDS)]
-    assert len(set(names)) == len(names) >= 60
-    assert all(entry[-1] for entry in (*CASES, *COMMANDS))
+    entries = [*CASES, *COMMANDS, *MESHES, *ACCIDENTS]
+    names = [entry[0] for entry in entries]
+    assert len(set(names)) == len(names) >= 100
+    assert all(entry[-1] for entry in entries)
 
 
 @pytest.mark.parametrize(("old", "new", "pattern"), [c[1:] for c in CASES], ids=[c[0] for c in CASES])
@@ -64,4 +67,18 @@ def test_mistakes_in_a_case_file(folder, capsys, old, new, pattern):
 @pytest.mark.parametrize(("arguments", "pattern"), [c[1:] for c in COMMANDS], ids=[c[0] for c in COMMANDS])
 def test_mistakes_on_the_command_line(folder, capsys, arguments, pattern):
     (folder / "case.toml").write_text(case_text())
+    refused(capsys, arguments, pattern)
+
+
+@pytest.mark.parametrize(("write", "pattern"), [m[1:] for m in MESHES], ids=[m[0] for m in MESHES])
+def test_mistakes_in_a_mesh_file(folder, capsys, write, pattern):
+    write(folder / "forma04a.med", folder / "spoilt.med")
+    (folder / "case.toml").write_text(case_text().replace("forma04a.med", "spoilt.med"))
+    refused(capsys, ["run", "case.toml"], pattern)
+
+
+@pytest.mark.parametrize(("arrange", "arguments", "pattern"), [a[1:] for a in ACCIDENTS], ids=[a[0] for a in ACCIDENTS])
+def test_places_that_cannot_be_written(folder, capsys, monkeypatch, arrange, arguments, pattern):
+    (folder / "case.toml").write_text(case_text())
+    arrange(monkeypatch, folder)
     refused(capsys, arguments, pattern)

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 from hypothesis import settings
 from hypothesis import strategies as st
-from images import Job
+from images import Image, Job, model_of
 from two_bodies import boxes
 
 import fastcontact as fc
+from fastcontact.analysis import Analysis
 
 FORMULATIONS = (
     ("node_to_segment", ()),
@@ -44,6 +45,7 @@ class Blocks:
     formulation: tuple[str, tuple] = FORMULATIONS[0]
     friction: float = 0.0
     steps: int = 1
+    matching: bool = False  # whether nodes may lie opposite to nodes
 
     @property
     def dim(self) -> int:
@@ -67,8 +69,10 @@ class Blocks:
             )
         points = mesh.points.copy()
         x = points[mesh.points_of(self.names["upper"])]
-        middle = 0.0 if self.kinematics == "axisymmetric" else 5.0
-        across = (x[:, :-1] - middle) / 10
+        # Narrower, and off the middle where there is no axis: no node lies opposite to another one.
+        if not self.matching:
+            x[:, :-1] = 9.3 / 10 * x[:, :-1] + (0.0 if self.kinematics == "axisymmetric" else 0.43)
+        across = (x[:, :-1] - (0.0 if self.kinematics == "axisymmetric" else 5.0)) / 10
         lift = self.crown * 4 * (across**2).sum(axis=1) + self.tilt * (across[:, 0] + 0.5)
         x[:, -1] += 10 * lift * (1 - x[:, -1] / 5)
         points[mesh.points_of(self.names["upper"])] = x
@@ -116,3 +120,21 @@ def recipes(friction: bool = False, kinematics: tuple[str, ...] = PLANES, elemen
         "friction": hundredths(5, 40) if friction else st.just(0.0),
     }  # fmt: skip
     return st.builds(Blocks, **{**choices, **{name: st.just(value) for name, value in fixed.items()}})
+
+
+class Watched(Analysis):
+    """An analysis that keeps what it found last: constraints and their solution."""
+
+    def _contact(self, *arguments):
+        self.constraints, self.state = super()._contact(*arguments)
+        return self.constraints, self.state
+
+
+def analysis_of(job: Job, ramp: fc.Ramp | None = None, solver: str = "direct", **criteria) -> Watched:
+    """Return the analysis of a job, before its first step."""
+    return Watched(model_of(job, Image())[0], solver, 1e-12, fc.Criteria(**criteria), ramp)
+
+
+def carried(step: fc.StepResult, recipe: Blocks) -> bool:
+    """Whether the bodies press on each other by more than round-off."""
+    return step.contact["pair 0"].pressure_max > 1e-4 * E * recipe.push

@@ -98,8 +98,8 @@ def _scaled(options, image):
     return {name: value * units[name] if name in units else value for name, value in options.items()}
 
 
-def solved(job, image):
-    """Return the last step of the image of a job, and the old number of each point."""
+def model_of(job, image):
+    """Return the model of the image of a job, and the old number of each point."""
     mesh, order = image_of(job.mesh, image)
     model = fc.Model(mesh, job.kinematics)
     for groups, E, nu in job.materials:
@@ -124,6 +124,12 @@ def solved(job, image):
             f"plane {number}", secondary=secondary, obstacle=plane,
             motion=_components(motion, image, image.length), **_scaled(options, image),
         )  # fmt: skip
+    return model, order
+
+
+def solved(job, image):
+    """Return the last step of the image of a job, and the old number of each point."""
+    model, order = model_of(job, image)
     last = fc.solve(model, fc.linear_ramp(job.steps), linear_solver=job.solver, linear_tolerance=job.tolerance)[-1]
     return last, order
 

@@ -6,6 +6,8 @@ import errno
 import gc
 import os
 import shutil
+import signal
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +16,7 @@ from test_result_files import MESH, assert_same, step_result
 
 from fastcontact import FileError, ResultWriter, open_results
 from fastcontact.io import _commits
+from fastcontact.io._uninterrupted import uninterrupted
 
 
 @pytest.fixture
@@ -112,18 +115,19 @@ def test_what_another_program_writes_into_the_file_stays(path: Path) -> None:
             other.write(step_result(number))
     theirs = other.path.read_bytes()
 
-    def overwritten() -> None:
+    def overwritten(before_the_end: bool) -> None:
         with ResultWriter(path, MESH) as out:
             out.write(step_result(0))
             shutil.copyfile(other.path, path)
-            out.write(step_result(1))
+            if not before_the_end:
+                out.write(step_result(1))
 
-    with pytest.raises(
-        FileError, match="was changed by another program after 1 steps, what it holds now is left alone"
-    ):
-        overwritten()
-    assert path.read_bytes() == theirs
-    assert_holds(path, 5)
+    message = "was changed by another program after 1 steps, what it holds now is left alone"
+    for before_the_end in (False, True):
+        with pytest.raises(FileError, match=message):
+            overwritten(before_the_end)
+        assert path.read_bytes() == theirs
+        assert_holds(path, 5)
 
 
 def change(path: Path, how: str) -> None:
@@ -178,3 +182,74 @@ def test_a_pair_is_in_the_file_as_a_whole_or_not_at_all(path: Path, monkeypatch:
             out.write(step_result(0))
             out.write(step_result(1))
         assert_holds(path, 2)
+
+
+# ---------------------------------------------------------------------------------------------- signals
+
+
+def test_a_signal_waits_for_the_end_of_a_write(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The step that is being written is complete, counted, and in the record of how the run ended."""
+    put, seen = _commits.CommittedFile._put, []
+
+    def interrupted(self: _commits.CommittedFile, place: int, data: bytes) -> None:
+        if not seen:
+            signal.raise_signal(signal.SIGINT)
+        seen.append(place)
+        put(self, place, data)
+
+    def run() -> None:
+        with ResultWriter(path, MESH) as out:
+            out.write(step_result(0))
+            monkeypatch.setattr(_commits.CommittedFile, "_put", interrupted)
+            out.write(step_result(1))
+            pytest.fail("the signal was lost")
+
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        run()
+    assert len(seen) > 20
+    assert signal.getsignal(signal.SIGINT) is before
+    assert_holds(path, 2)
+    assert open_results(path).error == "KeyboardInterrupt: "
+
+
+def fail_uninterrupted() -> None:
+    with uninterrupted():
+        signal.raise_signal(signal.SIGTERM)
+        raise ZeroDivisionError
+
+
+def test_signals_wait_with_handlers_of_any_kind() -> None:
+    arrived = []
+    before = signal.signal(signal.SIGTERM, lambda number, frame: arrived.append((number, frame.f_code.co_name)))
+    try:
+        with uninterrupted():
+            signal.raise_signal(signal.SIGTERM)
+            signal.raise_signal(signal.SIGTERM)
+            assert not arrived
+            with uninterrupted():  # one within the other
+                signal.raise_signal(signal.SIGTERM)
+            assert not arrived
+        assert [number for number, _ in arrived] == [signal.SIGTERM] * 3
+        signal.raise_signal(signal.SIGTERM)
+        assert arrived[-1] == (signal.SIGTERM, "test_signals_wait_with_handlers_of_any_kind")
+        with pytest.raises(ZeroDivisionError):
+            fail_uninterrupted()
+        assert len(arrived) == 5
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def test_other_threads_have_no_signals_to_wait_for(path: Path) -> None:
+    found = []
+
+    def work() -> None:
+        with ResultWriter(path, MESH) as out:
+            out.write(step_result(0))
+            found.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert found == [signal.getsignal(signal.SIGINT)]
+    assert_holds(path, 1)

@@ -147,6 +147,28 @@ def test_tables_whose_columns_have_no_names_of_their_own(tmp_path, text, message
         read_csv(path)
 
 
+@pytest.mark.parametrize("tail", ["", ",", ")", "x"])
+def test_surfaces_as_text_that_are_none(tmp_path, tail):
+    """A pattern that goes back and forth takes twice as long with each further point."""
+    path = tmp_path / "surface.wkt"
+    path.write_text("TIN (((" + "0.0 1.0 0.0, 2.0 0.0 0.02.0 " * 400 + tail)
+    with pytest.raises(FileError, match="it holds no triangles"):
+        fc.read_mesh(path)
+    path.write_text("TIN (((0 0 0, 1 0. 0, .5 1.0 0, 0 0 0)),((0 0 0, 1. 0 0, 0 -1 0, 0 0 0)))")
+    assert fc.read_mesh(path).n_cells == 2
+
+
+def test_parts_longer_than_the_file(tmp_path):
+    path = tmp_path / "points.ply"
+    head = "ply\nformat binary_little_endian 1.0\nelement vertex 999999999999\nproperty double x\nproperty double y\n"
+    path.write_bytes(
+        (head + "property double z\nelement face 1\nproperty list uint8 int32 vertex_indices\nend_header\n").encode()
+    )
+    with pytest.raises((FileError, MeshError), match=r"points\.ply") as caught:
+        fc.read_mesh(path)
+    assert not isinstance(caught.value.__cause__, MemoryError)
+
+
 def test_points_that_are_no_numbers(tmp_path):
     path = tmp_path / "points.obj"
     path.write_text("f 1 2 3\n")

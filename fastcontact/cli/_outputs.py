@@ -1,0 +1,52 @@
+"""Files that a command will write when its work is done, checked before it begins."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from fastcontact.errors import FastcontactError, FileError
+
+
+def check_outputs(
+    read: str | os.PathLike[str],
+    files: Iterable[str | os.PathLike[str] | None],
+    pictures: Iterable[str | os.PathLike[str] | None] = (),
+) -> None:
+    """Refuse files that could not be written, or would replace the one to `read`; None is a file that nobody asks for.
+
+    Raises
+    ------
+    FileError
+        If a folder is missing or write-protected, a path is a folder, the file to read or that of another output,
+        or the suffix of a picture is of no known format.
+    FastcontactError
+        If there is no matplotlib for a picture.
+    """
+    from fastcontact.io._targets import checked_target
+
+    drawn = [str(path) for path in pictures if path]
+    source, seen = Path(os.path.realpath(read)), set()
+    for path in [*(str(path) for path in files if path), *drawn]:
+        if Path(path).is_char_device() or Path(path).is_fifo():  # such as /dev/stdout
+            continue
+        target = checked_target(path)
+        if target == source:
+            raise FileError(f"'{path}' is what this command reads: name another file to write")
+        if target in seen:
+            raise FileError(f"two outputs are to be written to '{path}': name another file for one of them")
+        seen.add(target)
+    if drawn:
+        _check_formats(drawn)
+
+
+def _check_formats(paths: list[str]) -> None:
+    try:
+        from matplotlib.backend_bases import FigureCanvasBase
+    except ImportError as error:
+        raise FastcontactError("pictures need matplotlib: pip install 'fastcontact[plot]'") from error
+    known = FigureCanvasBase.get_supported_filetypes()
+    for path in paths:
+        if Path(path).suffix[1:].lower() not in known:
+            raise FileError(f"'{path}' has a suffix that no kind of picture has: use .png, .svg or .pdf")
