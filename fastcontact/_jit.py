@@ -6,6 +6,7 @@ in every process instead, and one line in the log says so.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 from collections.abc import Callable
@@ -62,10 +63,8 @@ def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = 
 
 def _notice_fork() -> None:
     global _forked_without_threads
-    try:
-        _forked_without_threads = numba.threading_layer() == "omp" and not numba.config.DISABLE_JIT
-    except ValueError:  # no parallel kernel was loaded yet: the child starts threads of its own
-        pass
+    with contextlib.suppress(ValueError):  # no parallel kernel was loaded yet: the child starts threads of its own
+        _forked_without_threads = numba.threading_layer() == "omp" and compiled()
 
 
 if hasattr(os, "register_at_fork"):
@@ -89,6 +88,11 @@ def check_threads() -> None:
             "survive a fork: start processes by multiprocessing's 'spawn' or 'forkserver', or set "
             "NUMBA_THREADING_LAYER=workqueue"
         )
+
+
+def compiled() -> bool:
+    """Return whether kernels are compiled in this process: not where NUMBA_DISABLE_JIT is set."""
+    return not getattr(numba.config, "DISABLE_JIT", False)
 
 
 def set_threads(count: int) -> None:

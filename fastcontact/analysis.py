@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -18,7 +17,7 @@ from fastcontact.contact.constraints import Constraints, stacked
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.result import contact_result
 from fastcontact.contact.rigid import RigidSide
-from fastcontact.errors import ConvergenceError, FastcontactWarning, ModelError
+from fastcontact.errors import ConvergenceError, ModelError, warn
 from fastcontact.extrapolation import Extrapolation
 from fastcontact.floating import SLACK, Floating, Settled
 from fastcontact.kernels.multigrid import largest_row_sum
@@ -165,7 +164,7 @@ def solve(
     model.check(ramp)
     doubtful = plausibility.doubts(model)
     for text in doubtful if not steps else ():
-        warnings.warn(text, FastcontactWarning, stacklevel=2)
+        warn(text)
     analysis = Analysis(model, linear_solver, linear_tolerance, criteria, ramp, linear_precision)
     analysis.doubts = doubtful
     analysis.touched = {name: True for step in steps for name, found in step.contact.items() if found.active.any()}
@@ -211,10 +210,10 @@ class Analysis:
         for pair in self.pairs.values():
             pair.supported = supported
         self.prescribed, self.forces = driven.prescribed(prescribed), driven.forces(model.forces_by_ramp())
-        K = stiffness(model.mesh, model.kinematics, self.moduli, self.material)
-        self.K = driven.stiffness(stiffened(K, model.springs))
+        K = stiffened(stiffness(model.mesh, model.kinematics, self.moduli, self.material), model.springs)
         relations = driven.relations(model.relations)
-        self.system = System(self.K, driven.supported(supported).ravel(), relations, driven.loose)
+        self.system = System(driven.stiffness(K), driven.supported(supported).ravel(), relations, driven.loose)
+        self.K = self.system.K
         self.surface_dofs = self._surface_dofs()
         involved = self.system.involved(self.surface_dofs)
         motions = driven.motions(free_motions(model.mesh, model.kinematics, supported, model.holding_rows()))
@@ -604,8 +603,9 @@ class Analysis:
 
     def _force_round_off(self) -> float:
         """Return how far internal forces may be off by round-off and the tolerance of the linear solver [force]."""
-        K = self.K
-        row_sums = largest_row_sum(K.indptr, K.indices, K.data.reshape(-1), self.u, K.blocksize[0])
+        row_sums = sum(
+            largest_row_sum(K.indptr, K.indices, K.data.reshape(-1), self.u, K.blocksize[0]) for K in self.K.parts
+        )
         return max(max(1e-13, self.solver.tolerance) * 10 * row_sums, SLACK * self.largest_force)
 
     def _result(
@@ -643,7 +643,7 @@ class Analysis:
             if self.unsettled:
                 found += doubts.unsettled(*self.unsettled)
         for text in found:
-            warnings.warn(text, FastcontactWarning, stacklevel=4)
+            warn(text)
         return self.doubts * (index == 1) + found
 
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import os
+import sys
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -56,6 +59,15 @@ class ConvergenceError(FastcontactError):
 
 class FastcontactWarning(UserWarning):
     """Something a user should know, with the number that says how much."""
+
+
+def warn(text: str) -> None:
+    """Give a FastcontactWarning at the line outside the package that called it."""
+    package = os.path.dirname(__file__) + os.sep
+    level, frame = 2, sys._getframe(1)
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(package):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(text, FastcontactWarning, stacklevel=level)
 
 
 # What is shown of a name that nobody can have meant.

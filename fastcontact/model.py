@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
-from fastcontact import elements
 from fastcontact.contact.default import default_formulation
+from fastcontact.contact.facing import check_obstacle, check_sides
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
 from fastcontact.contact.rigid import RigidSide
 from fastcontact.contact.surface import Surface, surface
@@ -544,7 +544,7 @@ class Model:
             raise ContactError(f"there is already a contact pair '{pair.name}': names must differ")
         bound = self.bind(pair)
         if isinstance(bound.primary, RigidSide):
-            _check_obstacle(self.mesh, pair, bound.secondary, bound.primary)
+            check_obstacle(self.mesh, pair, bound.secondary, bound.primary)
         for other in self.contact:
             if pair.primary and {pair.secondary, pair.primary} == {other.secondary, other.primary}:
                 raise ContactError(
@@ -573,7 +573,7 @@ class Model:
             primary = RigidSide(pair.obstacle, np.array(pair.motion))
         else:
             primary = surface(self.mesh, pair.primary)
-            _check_sides(self.mesh, pair, secondary, primary)
+            check_sides(self.mesh, pair, secondary, primary)
         modulus = min((m.E / (1 - m.nu**2) for m, _ in self.materials), default=1.0)
         terms = terms_of(pair.name, pair.options, self.mesh, secondary, against_obstacle=pair.obstacle is not None)
         own = {key: value for key, value in pair.options.items() if key not in TERMS}
@@ -749,67 +749,3 @@ def _table(ramp: History, what: str) -> Table | None:
     if ramp is None:
         return None
     return ramp.table if isinstance(ramp, Ramp) else checked_table(ramp, f"the ramp of {what}")
-
-
-def _check_sides(mesh: Mesh, pair: ContactPair, secondary: Surface, primary: Surface) -> None:
-    """Refuse sides that share nodes or cannot face each other."""
-    if pair.secondary == pair.primary:
-        raise ContactError(
-            f"contact '{pair.name}' has '{pair.primary}' on both sides: name the group of the other body as one of them"
-        )
-    shared = np.intersect1d(secondary.points, primary.points)
-    if len(shared):
-        raise ContactError(
-            f"the two sides of contact '{pair.name}' share {len(shared)} nodes (first: point {shared[0]}): "
-            "duplicate the nodes of the interface, one set for each side"
-        )
-    ours, theirs = _facet_frames(mesh, secondary), _facet_frames(mesh, primary)
-    apart = theirs[0][None] - ours[0][:, None]
-    facing = np.einsum("id,jd->ij", ours[1], theirs[1]) < 0
-    ahead = (np.einsum("ijd,id->ij", apart, ours[1]) > -0.1 * np.linalg.norm(apart, axis=2)) | (
-        np.linalg.norm(apart, axis=2) < np.minimum.outer(ours[2], theirs[2])
-    )
-    if not (facing & ahead).any():
-        behind = -np.einsum("ijd,id->ij", apart, ours[1])[facing]
-        inside = f", or do the bodies lie inside each other, by {behind.min():.4g} or more" if len(behind) else ""
-        raise ContactError(
-            f"no facet of '{pair.secondary}' faces '{pair.primary}': the outer sides of the two groups look away from "
-            f"each other; is one of them the wrong face of its body{inside}?"
-        )
-
-
-def _check_obstacle(mesh: Mesh, pair: ContactPair, secondary: Surface, obstacle: RigidSide) -> None:
-    """Refuse an obstacle that no facet of the secondary side faces."""
-    centres, outward, _ = _facet_frames(mesh, secondary)
-    _, normal, paired, _ = obstacle.facing(centres)
-    along = np.einsum("id,id->i", outward, normal)[paired]
-    if len(along) and (along >= 0).all():
-        raise ContactError(
-            f"the rigid obstacle of contact '{pair.name}' looks the same way as '{pair.secondary}', so that they cannot "
-            "touch: turn its normal or its facets round, or name another face of the body"
-        )
-
-
-def _facet_frames(mesh: Mesh, side: Surface) -> tuple[Array, Array, Array]:
-    """Return centres, unit normals and sizes of at most about 200 facets of each kind of a surface, as if flat."""
-    centres, normals, sizes = [], [], []
-    for block in side.blocks:
-        some = block.facets[:: max(1, len(block.facets) // 200), : elements.get(block.element).n_corners]
-        corners = mesh.points[some]
-        normal = _right_of(corners) if mesh.dim == 2 else _vector_area(corners)
-        centres.append(corners.mean(axis=1))
-        normals.append(normal / np.linalg.norm(normal, axis=1, keepdims=True))
-        sizes.append(np.linalg.norm(normal, axis=1) ** (1 / (mesh.dim - 1)))
-    return np.concatenate(centres), np.concatenate(normals), np.concatenate(sizes)
-
-
-def _right_of(ends: Array) -> Array:
-    """Return the vectors (n, 2) to the right of lines (n, 2, 2), as long as they."""
-    along = ends[:, 1] - ends[:, 0]
-    return np.column_stack([along[:, 1], -along[:, 0]])
-
-
-def _vector_area(corners: Array) -> Array:
-    """Return the vector areas (n, 3) of polygons (n, n_corners, 3)."""
-    spokes = corners[:, 1:] - corners[:, :1]
-    return 0.5 * np.cross(spokes[:, :-1], spokes[:, 1:]).sum(axis=1)

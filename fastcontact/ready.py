@@ -40,8 +40,13 @@ def case_path(given: str | Path) -> Path:
         If neither exists; the message offers the nearest ready cases.
     """
     path = Path(given)
-    if path.exists() or path.suffix or path.name != str(given):
-        return path
+    try:
+        if path.exists() or path.suffix or path.name != str(given):
+            return path
+    except OSError as error:
+        raise CaseError(
+            f"cannot look for the case file '{str(given)[:200]}' ({error.strerror}): check its name"
+        ) from None
     try:
         return ready_case(path.name)
     except CaseError as error:

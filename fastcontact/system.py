@@ -8,6 +8,7 @@ for their diagonal, so that it keeps the size and blocks of K.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +23,26 @@ Mask = NDArray[np.bool_]
 CONFLICT = 1e-9
 
 
+@dataclass(frozen=True, eq=False)
+class Stiffness:
+    """A stiffness matrix as the sum of `parts` (n, n): the linear solver's, and what supports took out of it.
+
+    Two matrices that differ in the rows and columns of supports alone need not be kept both.
+    """
+
+    parts: tuple[bsr_array, ...]
+
+    def __matmul__(self, u: Array) -> Array:
+        return np.asarray(sum(part @ u for part in self.parts))
+
+
 class System:
     """Stiffness, supports and relations of a model.
 
     Parameters
     ----------
     K : bsr_array (n, n)
-        Stiffness [force / length].
+        Stiffness [force / length]; what supports take out of it is taken out of this array.
     supported : ndarray of bool (n,)
         Displacement components that are prescribed.
     relations : sequence of Relation
@@ -37,6 +51,8 @@ class System:
 
     Attributes
     ----------
+    K : Stiffness
+        All of it.
     matrix : bsr_array (n, n)
         For the linear solver.
     fixed : ndarray of bool (n,)
@@ -50,7 +66,6 @@ class System:
     def __init__(
         self, K: bsr_array, supported: Mask, relations: Sequence[Relation] = (), loose: Mask | None = None
     ) -> None:
-        self.K = K
         R = stacked_rows(relations, K.shape[0])
         related = np.zeros(K.shape[0], bool)
         related[R.indices] = True
@@ -61,12 +76,14 @@ class System:
         self.T = self._constraints.T if relations else None
         self.free: Mask = self._constraints.free
         if self.T is None:
-            self.matrix = with_supports(K, self.fixed)
+            self.K = Stiffness(supports_apart(K, self.fixed))
+            self.matrix = self.K.parts[0]
         else:
+            self.K = Stiffness((K,))
             condensed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
             condensed.sort_indices()
             self.free &= (condensed.diagonal() > 0) | loose  # not points that relations tie to nothing but each other
-            self.matrix = with_supports(condensed, ~self.free)
+            self.matrix = supports_apart(condensed, ~self.free)[0]
 
     def lift(self, prescribed: Array, values: Array) -> Array:
         """Return t for the prescribed displacements (n,) and the right-hand sides (m,) of the relations.
@@ -174,22 +191,35 @@ class ConstrainedMotion:
         return self.relations[int(np.searchsorted(ends, row, side="right"))].name
 
 
-def with_supports(K: bsr_array, fixed: Mask) -> bsr_array:
-    """Return K with the rows and columns of supported degrees of freedom cleared and their diagonal kept."""
+def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, bsr_array]:
+    """Take the rows and columns of supported degrees of freedom out of K (n, n), which is changed in place.
+
+    Returns
+    -------
+    matrix : bsr_array (n, n)
+        K without them, their diagonal kept.
+    taken : bsr_array (n, n)
+        What K was, minus `matrix`: few blocks.
+    """
     K = _with_diagonal(K)
-    data = K.data.copy()
-    size = data.shape[1]
+    size = K.blocksize[0]
     supported = fixed.reshape(-1, size)
     block_row = np.repeat(np.arange(len(K.indptr) - 1), np.diff(K.indptr))
-    data[supported[block_row][:, :, None] | supported[K.indices][:, None, :]] = 0.0
+    some: Mask = np.asarray(supported.any(axis=1))
+    touched = np.flatnonzero(some[block_row] | some[K.indices])
+    row, column, before = block_row[touched], K.indices[touched], K.data[touched]
+    after = before.copy()
+    after[supported[row][:, :, None] | supported[column][:, None, :]] = 0.0
     diagonal = K.diagonal()
     typical = diagonal.max(initial=1.0)
-    on_diagonal = np.flatnonzero(block_row == K.indices)
+    on_diagonal = np.flatnonzero(row == column)
     for k in range(size):
-        held = on_diagonal[supported[:, k]]
-        kept = diagonal[k::size][supported[:, k]]
-        data[held, k, k] = np.where(kept > 0, kept, typical)
-    return bsr_array((data, K.indices, K.indptr), shape=K.shape)
+        held = on_diagonal[supported[row[on_diagonal], k]]
+        kept = diagonal[row[held] * size + k]
+        after[held, k, k] = np.where(kept > 0, kept, typical)
+    K.data[touched] = after
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=len(K.indptr) - 1))])
+    return K, bsr_array((before - after, column, indptr), shape=K.shape)
 
 
 def _with_diagonal(K: bsr_array) -> bsr_array:

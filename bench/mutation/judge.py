@@ -1,4 +1,7 @@
-"""Run chosen tests in a forked process, which has the big libraries loaded already but nothing of the package."""
+"""Run chosen tests in a forked process, which has the big libraries loaded already but nothing of the package.
+
+It has a home and a folder for temporary files of its own.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +10,23 @@ import os
 import resource
 import signal
 import sys
+import tempfile
 import time
 from pathlib import Path
 
 import pytest
 
 # Loaded once; every mutant's process is forked from here.
-LIBRARIES = ("numpy", "scipy.sparse.linalg", "scipy.spatial", "scipy.linalg", "scipy.optimize", "numba", "h5py", "hypothesis")
+LIBRARIES = (
+    "numpy",
+    "scipy.sparse.linalg",
+    "scipy.spatial",
+    "scipy.linalg",
+    "scipy.optimize",
+    "numba",
+    "h5py",
+    "hypothesis",
+)
 MEMORY = 12 << 30
 
 
@@ -35,15 +48,19 @@ def load() -> None:
 
 
 def verdict(tree: Path, tests: list[str], limit: float, log: Path) -> str:
-    """Return ``"survived"``, ``"killed"`` or ``"hung"`` for the package in `tree` under tests."""
+    """Return ``"survived"``, ``"killed"``, ``"crashed"`` or ``"hung"`` for the package in `tree` under tests."""
     child = os.fork()
     if child == 0:
-        os._exit(_run(tree, tests, log))
+        code = 99  # of a process that did not come to its tests
+        try:
+            code = _run(tree, tests, log)
+        finally:
+            os._exit(code)
     deadline = time.monotonic() + limit
     while time.monotonic() < deadline:
         done, status = os.waitpid(child, os.WNOHANG)
         if done:
-            return "survived" if status == 0 else "killed"
+            return {0: "survived", 1: "killed", 2: "killed"}.get(os.waitstatus_to_exitcode(status), "crashed")
         time.sleep(0.02)
     os.killpg(child, signal.SIGKILL)  # its own group, see below
     os.waitpid(child, 0)
@@ -56,8 +73,11 @@ def _run(tree: Path, tests: list[str], log: Path) -> int:
     os.dup2(out, 1)
     os.dup2(out, 2)
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+    own = tree.parent / "own"
+    own.mkdir(exist_ok=True)
     os.chdir(tree)
-    os.environ["PYTHONPATH"] = str(tree)
+    os.environ |= {"PYTHONPATH": str(tree), "HOME": str(own), "TMPDIR": str(own)}
+    tempfile.tempdir = None
     sys.path.insert(0, str(tree))
     files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
     options = ["-o", "addopts=", "-p", "no:cacheprovider", "-p", "no:xdist", "-x", "-q", "--tb=line", "-m", ""]

@@ -35,6 +35,8 @@ class CommittedFile:
         Where the contents end, as HDF5 last told; the file may take more room.
     ours : bool
         Whether nobody else has written to the file, as `intact` last saw; if somebody has, nothing more is written.
+    failure : BaseException, optional
+        What went wrong first.
     """
 
     def __init__(self, path: Path) -> None:
@@ -42,7 +44,7 @@ class CommittedFile:
         self._position = 0
         self._pending: dict[int, bytes] = {}
         self.ours = True
-        self._failure: BaseException | None = None
+        self.failure: BaseException | None = None
         self._head = self._read_head()
         self.end = self._contents()
         self._starts, self._ends = [0], [self.end]  # of what has been written, in order and apart
@@ -64,13 +66,13 @@ class CommittedFile:
 
     def check(self) -> None:
         """Raise what has gone wrong so far, if anything has."""
-        if self._failure is not None:
-            raise self._failure
+        if self.failure is not None:
+            raise self.failure
 
     @property
     def writable(self) -> bool:
         """Whether nothing has gone wrong and nobody else has written to the file."""
-        return self.ours and self._failure is None
+        return self.ours and self.failure is None
 
     def fileno(self) -> int:
         """Return the descriptor of the file."""
@@ -97,7 +99,7 @@ class CommittedFile:
         try:
             self._get(start, data)
         except BaseException as error:
-            self._failure = self._failure or error
+            self._fail(error)
         for place, waiting in self._pending.items():
             first, last = max(place, start), min(place + len(waiting), start + size)
             if first < last:
@@ -143,7 +145,12 @@ class CommittedFile:
             if self.writable:
                 self._commit()
         except BaseException as error:
-            self._failure = error
+            self._fail(error)
+
+    def _fail(self, error: BaseException) -> None:
+        """Keep an error, the first one of all, without the frames of HDF5's callers, which would keep its objects open."""
+        error = error.with_traceback(None)
+        self.failure = self.failure or error
 
     def _commit(self) -> None:
         waiting = sorted(self._pending.items(), key=lambda entry: self._turn(*entry))
@@ -186,7 +193,10 @@ class CommittedFile:
         if self._file.closed:
             return
         try:
-            if self.writable:
+            if self.failure is not None:  # what HDF5 told last may not have come to the file
+                self._head = self._read_head()
+                self.end = self._contents()
+            if self.ours:
                 self._file.truncate(self.end)
                 os.fsync(self.fileno())
         finally:

@@ -21,6 +21,15 @@ def existing_file(path: PathLike) -> Path:
         If there is no such file, or if it is a folder.
     """
     found = Path(path)
+    try:
+        found.stat()
+    except FileNotFoundError:
+        pass
+    except (OSError, ValueError) as error:  # a name too long, a folder that is none, a zero in it
+        reason = getattr(error, "strerror", None) or str(error)
+        raise FileError(
+            f"'{str(path)[:200]}' cannot be looked for ({reason}): check its name and the folder"
+        ) from error
     if found.is_dir():
         raise FileError(f"'{path}' is a folder: name a file in it")
     if not found.exists():

@@ -144,7 +144,12 @@ def _arrays(limit: int, size: int, allowed: Path) -> dict[str, Callable[..., Any
             raise ImplausibleError(f"it declares {found[:2].max()} blocks or entries")
         return found
 
+    def fromiter(items: Any, dtype: Any, count: Any = -1, **kwargs: Any) -> Any:
+        check(max(int(count), 0), dtype)
+        return np.fromiter(items, dtype, int(count), **kwargs)
+
     return {
+        "fromiter": fromiter,
         "empty": made(np.empty), "zeros": made(np.zeros), "ones": made(np.ones), "full": full,
         "arange": arange, "fromfile": fromfile,
     }  # fmt: skip

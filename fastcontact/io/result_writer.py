@@ -104,6 +104,7 @@ class ResultWriter:
         self._mesh: Mesh = mesh
         self._pairs: dict[str, Any] = {}
         self._file: Any = None
+        self._below: Any = None
         self._closed = self._ended = False
         self._new_case: str | None = None
         self._left: tuple[int, ...] | None = None
@@ -226,7 +227,11 @@ class ResultWriter:
             if self._left is not None and self._left != left_at(self.path):
                 raise FileError(self._gone())
             self._below = CommittedFile(self.path)
-            self._file = h5py.File(self._below, "r+")
+            try:
+                self._file = h5py.File(self._below, "r+")
+            except BaseException:
+                self._below.close()
+                raise
             self._pairs = {json.loads(pair["name"][()]): pair for pair in self._file["fastcontact/contact"].values()}
 
     def _check_in_place(self) -> None:
@@ -265,8 +270,14 @@ class ResultWriter:
         with uninterrupted():
             try:
                 yield
-            except (OSError, RuntimeError) as error:
-                reason = getattr(error, "strerror", None) or next(iter(str(error).splitlines()), type(error).__name__)
+            except (OSError, RuntimeError, LookupError, ValueError) as error:  # HDF5 has many words for a failed read
+                failure = self._below.failure if self._below is not None else None
+                if failure is None and not isinstance(error, (OSError, RuntimeError)):
+                    raise
+                told = failure or error
+                if not isinstance(told, Exception):
+                    raise told from None
+                reason = getattr(told, "strerror", None) or next(iter(str(told).splitlines()), type(told).__name__)
                 raise FileError(
                     f"'{self.path}' cannot be {what} ({reason}), {self.n_steps} steps are complete: "
                     "see whether the disk is full or the folder protected"

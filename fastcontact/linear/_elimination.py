@@ -10,6 +10,7 @@ from scipy.linalg import qr
 from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.csgraph import connected_components, min_weight_full_bipartite_matching
 
+from fastcontact.errors import ConvergenceError
 from fastcontact.kernels import multigrid
 from fastcontact.linear._peeling import peeled
 
@@ -17,6 +18,12 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 # An unknown of its own is taken as pivot where its entry is at least this part of the largest one of the equation.
 SMALLEST = 0.25
+# Equations whose inverse is larger, in units of their entries, repeat each other but for round-off.
+SINGULAR = 1e12
+_REPEATED = (
+    "active contact constraints repeat each other, so that an iterative solver cannot eliminate them: leave out one of "
+    "two contacts on the same nodes, or use the direct solver"
+)
 # Beyond so many equations without unknowns of their own a dense factorisation costs more than it gains.
 DENSE_UP_TO = 400
 
@@ -66,6 +73,11 @@ def eliminate(B: csr_array, c: Array) -> Elimination:
     are the assignment of unknowns to equations with the largest product of entries (Duff and Koster, 2001), so that the
     matrix to invert is as well conditioned as a permutation allows; groups of equations that share pivots are inverted
     group by group.
+
+    Raises
+    ------
+    ConvergenceError
+        If equations repeat each other, so that there is no unknown to eliminate for each.
     """
     B = csr_array(B, copy=True)
     if not B.has_canonical_format:
@@ -115,7 +127,10 @@ def _matched(B: csr_array) -> Indices:
         return np.asarray(columns[order[: B.shape[0]]], np.intp)
     largest = np.abs(B.data).max()
     cost = csr_array((1.0 + np.log(largest) - np.log(np.abs(B.data)), B.indices, B.indptr), shape=B.shape)
-    row, pivots = min_weight_full_bipartite_matching(cost)
+    try:
+        row, pivots = min_weight_full_bipartite_matching(cost)
+    except ValueError:
+        raise ConvergenceError(_REPEATED) from None
     return np.asarray(pivots[np.argsort(row)], np.intp)
 
 
@@ -128,7 +143,13 @@ def _block_inverse(A: csr_array) -> csr_array:
     rows, cols, values = [], [], []
     for first, end in zip(np.r_[0, ends[:-1]], ends, strict=True):
         members = order[first:end]
-        inverse = np.linalg.inv(columns[:, members].tocsr()[members].toarray())
+        block = columns[:, members].tocsr()[members].toarray()
+        try:
+            inverse = np.linalg.inv(block)
+        except np.linalg.LinAlgError:
+            raise ConvergenceError(_REPEATED) from None
+        if not np.abs(block).max() * np.abs(inverse).max() < SINGULAR:
+            raise ConvergenceError(_REPEATED)
         rows.append(np.repeat(members, len(members)))
         cols.append(np.tile(members, len(members)))
         values.append(inverse.ravel())

@@ -73,7 +73,6 @@ class Amg:
 
     def prepare(self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None) -> None:
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
-        check_threads()
         size = K.blocksize[0]
         self._given = K, rigid_modes
         self.K = Matrix(K.indptr, K.indices, K.data.reshape(-1), (0,) * size, (0,) * size)
@@ -83,6 +82,7 @@ class Amg:
         self.compliance = ComplianceCache(K.shape[0], self._solve_many)
 
     def _build(self) -> None:
+        check_threads()
         K, rigid_modes = self._given
         for old in ("_ties", "hierarchy"):  # two hierarchies at a time need not be remembered
             self.__dict__.pop(old, None)
@@ -124,6 +124,7 @@ class Amg:
         A hierarchy for the same pivots that follow others with nearly the same weights is kept: it preconditions as
         well, since only the unknowns beside the pivots count.
         """
+        check_threads()  # every solution begins here, also that of a child forked after the hierarchy was built
         if elimination is not self._tied:
             if not _alike(elimination, self._tied_as):
                 self._ties.tie(elimination)

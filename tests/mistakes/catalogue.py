@@ -327,8 +327,8 @@ CASES = [
     (
         "key of the convergence criteria misspelled",
         "[ramp]",
-        "[solver]\nrelativ = 1e-6\n[ramp]",
-        r"case\.toml: unknown key 'solver",
+        "[solve]\nrelativ = 1e-6\n[ramp]",
+        r"case\.toml: unknown key 'solve\.relativ': did you mean 'solve\.relative'",
     ),
     (
         "history that ends too early",

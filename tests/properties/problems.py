@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
 from images import Image, Job, model_of
@@ -51,6 +52,12 @@ class Blocks:
     def dim(self) -> int:
         """2 or 3."""
         return 3 if self.kinematics == "3d" else 2
+
+    @property
+    def stiffest(self) -> float:
+        """The larger modulus, times the depth of the bodies where they have one [force / length]."""
+        depth = {"axisymmetric": 2 * np.pi * 10, "3d": 10.0}.get(self.kinematics, 1.0)
+        return E * max(1.0, 10.0**self.contrast) * depth
 
     @property
     def names(self) -> dict[str, str]:

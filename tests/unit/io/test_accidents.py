@@ -7,6 +7,9 @@ import gc
 import os
 import shutil
 import signal
+import subprocess
+import sys
+import textwrap
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -84,15 +87,33 @@ def test_any_write_may_fail(error: BaseException, path: Path, monkeypatch: pytes
     assert open_results(path).complete
 
 
-def test_a_failing_read_is_told_and_nothing_is_written_any_more(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with ResultWriter(path, MESH) as out:
-        out.write(step_result(0))
+READS = """
+    import errno, sys
+    from pathlib import Path
+    import pytest
+    sys.path.insert(0, sys.argv[1])
+    import test_accidents as t
+    path = Path(sys.argv[2])
+    with t.ResultWriter(path, t.MESH) as out:
+        out.write(t.step_result(0))
     before = path.read_bytes()
-    failing_after(0, OSError(errno.EIO, "Input/output error"), monkeypatch, "_get")
-    out = ResultWriter(path, MESH, resume=True)
-    with pytest.raises(FileError, match=r"cannot be written at step 2 .*, 1 steps are complete"), out:
-        out.write(step_result(1))
-    assert path.read_bytes() == before
+    for count in (0, 1, 2, 5, 10, 20, 30, 40, 60):
+        with pytest.MonkeyPatch.context() as patch:
+            out = t.ResultWriter(path, t.MESH, resume=True)
+            calls = t.failing_after(count, OSError(errno.EIO, "Input/output error"), patch, "_get")
+            with pytest.raises(t.FileError, match=r"step 2 \\(Input/output error\\), 1 steps are complete"), out:
+                out.write(t.step_result(1))
+            assert len(calls) > count
+        assert path.read_bytes() == before
+"""
+
+
+def test_failing_reads_are_told_and_nothing_is_written_any_more(path: Path) -> None:
+    """In a process of its own: HDF5 must not crash at its end over what it could not close."""
+    command = [sys.executable, "-c", textwrap.dedent(READS), str(Path(__file__).parent), str(path)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert_holds(path, 1)
 
 
 def test_a_writer_that_failed_does_not_write_again(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ import pytest
 from test_result_files import MESH, write
 
 import fastcontact as fc
+from fastcontact.case import read_case
 from fastcontact.errors import FileError, MeshError
 from fastcontact.io import _heaps
 from fastcontact.io.med import write_med_mesh
@@ -167,6 +168,18 @@ def test_parts_longer_than_the_file(tmp_path):
     with pytest.raises((FileError, MeshError), match=r"points\.ply") as caught:
         fc.read_mesh(path)
     assert not isinstance(caught.value.__cause__, MemoryError)
+
+
+@pytest.mark.parametrize("name", ["a" * 5000 + ".med", "a\0b.med", "/etc/hostname/mesh.med", "missing.med"])
+def test_names_that_no_file_can_have(name):
+    with pytest.raises(FileError, match=r"cannot be looked for|there is no file") as caught:
+        fc.read_mesh(name)
+    assert len(str(caught.value)) < 400
+
+
+def test_case_names_that_no_file_can_have():
+    with pytest.raises(fc.CaseError, match="cannot"):
+        read_case("a" * 5000)
 
 
 def test_points_that_are_no_numbers(tmp_path):

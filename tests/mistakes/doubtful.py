@@ -1,0 +1,207 @@
+"""Cases that are solved but doubtful: what their mesh and case file are, and a pattern of the warning with its number."""
+# ruff: noqa: E501 (messages stay in one piece)
+
+from typing import NamedTuple
+
+import library
+
+import fastcontact as fc
+from fastcontact import generate
+from fastcontact.generate import block, block_on_block
+
+
+class Doubt(NamedTuple):
+    """A doubtful case: its name, a function that makes its mesh, its case file, and patterns of all its warnings."""
+
+    name: str
+    mesh: object
+    case: str
+    patterns: tuple[str, ...]
+
+
+HEAD = """
+title = "a doubtful case"
+kinematics = "{kinematics}"
+units = {{ length = "mm", force = "N", pressure = "MPa" }}
+mesh.file = "doubtful.med"
+ramp.steps = {steps}
+"""
+STEEL = """
+[[material]]
+E = 1000.0
+nu = 0.3
+"""
+BLOCKS = """
+[[support]]
+group = "LOWER_BOTTOM"
+x = 0.0
+y = 0.0
+[[support]]
+group = "UPPER_TOP"
+x = 0.0
+y = -0.01
+"""
+SPHERES = """
+[[support]]
+group = "A1A2"
+x = 0.0
+[[support]]
+group = "A2B2"
+y = -2.0
+[[support]]
+group = "A1B1"
+y = 2.0
+[contact.pair]
+secondary = "CONT1"
+primary = "CONT2"
+formulation = "node_to_segment"
+"""
+PAIR = """
+[contact.pair]
+secondary = "CONT_UPPER"
+primary = "CONT_LOWER"
+"""
+
+
+def of(*parts, kinematics="plane_strain", steps=1):
+    return HEAD.format(kinematics=kinematics, steps=steps) + "".join(parts)
+
+
+def held(group, **components):
+    return f'\n[[support]]\ngroup = "{group}"\n' + "".join(f"{axis} = {value}\n" for axis, value in components.items())
+
+
+def raised(height):
+    mesh = block_on_block()
+    points = mesh.points.copy()
+    points[mesh.points_of("UPPER"), 1] += height
+    return mesh.replace(points=points)
+
+
+def bent():
+    """A quadratic triangle with a side that is bent far inward."""
+    nodes = [[0, 0], [1, 0], [0, 1], [0.5, 0], [0.25, 0.25], [0, 0.5]]
+    return fc.Mesh(nodes, {"tri6": [range(6)]}, point_groups={"ALL": [0, 1, 3]})
+
+
+def turned(angle):
+    """Supports that turn a square without deforming it, as linear kinematics see it."""
+    corners = {"BOTTOM_LEFT": (0, 0), "BOTTOM_RIGHT": (1, 0), "TOP_LEFT": (0, 1), "TOP_RIGHT": (1, 1)}
+    return "".join(held(name, x=float(-angle * y), y=float(angle * x)) for name, (x, y) in corners.items())
+
+
+DOUBTS = [
+    Doubt(
+        "too few geometry updates were asked for",
+        lambda: generate.half_spheres("tri3", size=5.0),
+        of(STEEL, SPHERES, "[solve]\ngeometry_updates = 1\n", kinematics="axisymmetric"),
+        (
+            r"the contact geometry had not settled after the 1 updates asked for: the last one changed the displacement by \d\.\d% of its largest component\. Allow more geometry_updates, or leave them out",
+        ),
+    ),
+    Doubt(
+        "contact is lost",
+        block_on_block,
+        of(STEEL, BLOCKS, PAIR, steps=4).replace(
+            "ramp.steps = 4", "ramp = { steps = 4, table = [[0.0, 0.0], [0.5, 1.0], [1.0, -1.0]] }"
+        ),
+        (r"contact 'pair' is lost at the end, after it was closed: the smallest gap is 0\.01",),
+    ),
+    Doubt(
+        "contact is never reached",
+        lambda: raised(1.0),
+        of(STEEL, BLOCKS, PAIR),
+        (r"contact 'pair' never closed: the smallest gap is 0\.99\. Check its sides and which way the loads push",),
+    ),
+    Doubt(
+        "bodies interpenetrate where no contact is defined",
+        lambda: raised(0.001),
+        of(STEEL, BLOCKS),
+        (
+            r"bodies '\w+' and '\w+' interpenetrate by 0\.009 near \[.*\], and no contact is defined between them: add_contact for the groups that meet",
+        ),
+    ),
+    Doubt(
+        "strains are large",
+        lambda: block((1.0, 1.0), (2, 2)),
+        of(STEEL, held("BOTTOM", x=0.0, y=0.0), held("TOP", y=0.3)),
+        (r"the largest equivalent strain is 0\.\d+, beyond the 0\.1 where linear kinematics hold well",),
+    ),
+    Doubt(
+        "rotations are large",
+        lambda: block((1.0, 1.0), (1, 1)),
+        of(STEEL, turned(0.5)),
+        (
+            r"the largest rotation is 0\.500 radian, near \[0\.5 0\.5\]: linear kinematics take it for small, which leaves out strains of about 0\.125",
+        ),
+    ),
+    Doubt(
+        "springs that regularise rigid motions carry load",
+        lambda: raised(30.0),
+        of(
+            STEEL,
+            held("LOWER_BOTTOM", x=0.0, y=0.0),
+            held("UPPER_TOP", x=0.0),
+            '[[couple]]\ngroup = "UPPER_TOP"\ncomponent = "y"\n',
+            '[[force]]\ngroup = "UPPER_TOP_LEFT"\ny = -1e-6\n',
+            PAIR,
+        ),
+        (
+            r"the springs that regularise body 'UPPER': translation along y still carry \d\.\de-\d\d of the load: rigid motions are so much larger than deformations that round-off leaves no more",
+        ),
+    ),
+    Doubt(
+        "a cell is poor",
+        library.uneven,
+        of(STEEL, held("BOTTOM", x=0.0, y=0.0)),
+        (r"cell \d+ \(tri6 .*\) is poor: its smallest Jacobian is 0\.0\d+ of its largest; move its nodes or remesh",),
+    ),
+    Doubt(
+        "the mesh does not resolve the contact",
+        lambda: generate.half_spheres("tri3", size=5.0),
+        of(STEEL, SPHERES, kinematics="axisymmetric"),
+        (r"contact 'pair' has only \d elements? across its radius: its pressure needs 4 or more; refine 'CONT1'",),
+    ),
+    Doubt(
+        "the quadrature of the stiffness is not exact",
+        bent,
+        of(STEEL, held("ALL", x=0.0, y=0.0)),
+        (
+            r"the quadrature of the stiffness is not exact on curved or distorted cells: it is off by \d+\.\d+% of the whole; use smaller cells, or better shaped ones",
+        ),
+    ),
+    Doubt(
+        "nodes were not merged",
+        lambda: generate.union(
+            block((0.5, 1.0), (2, 2), name="A"), block((0.5, 1.0), (2, 2), origin=(0.5, 0.0), name="B")
+        ),
+        of(STEEL, held("BOTTOM", x=0.0, y=0.0)),
+        (
+            r"3 nodes lie where another one is, and no contact joins them \(first: points \d+ and \d+ at \(0\.5, 0\)\): merge them in the mesher or with generate\.transform\.merge_points, or define the contact",
+        ),
+    ),
+    Doubt(
+        "E is in Pa where the case names MPa",
+        lambda: block((1.0, 1.0), (2, 2)),
+        of(STEEL.replace("1000.0", "2.1e11"), held("BOTTOM", x=0.0, y=0.0)),
+        (
+            r"Young's modulus E = 2\.1e\+11 MPa of all cells is 1\.05e\+05 times that of diamond: is it in another unit\?",
+        ),
+    ),
+    Doubt(
+        "the loads are in another unit than E",
+        lambda: block((1.0, 1.0), (2, 2)),
+        of(STEEL, held("BOTTOM", x=0.0, y=0.0), '[[pressure]]\ngroup = "TOP"\nvalue = 1e-10\n'),
+        (
+            r"the loads strain the model by about 1e-13 \(all forces over E times its size squared\): are loads, lengths and E in one set of units\?",
+        ),
+    ),
+    Doubt(
+        "a penalty is too soft",
+        block_on_block,
+        of(STEEL, BLOCKS, PAIR, "penalty = 1000.0\n"),
+        (
+            r"contact 'pair' penetrates by 0\.\d+, which is \d+\.\d% of the largest displacement: raise its penalty from 1000 to about \S+, or leave it out",
+        ),
+    ),
+]

@@ -1,0 +1,76 @@
+"""The page of the documentation about mistakes, made from the catalogue: ``python tests/mistakes/page.py`` writes it."""
+
+import re
+from pathlib import Path
+
+import library
+from accidents import ACCIDENTS
+from catalogue import CASES, COMMANDS
+from doubtful import DOUBTS
+from otherwise import OTHERWISE
+from spoilt import MESHES
+
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "mistakes.md"
+HEAD = """# Mistakes and what is said about them
+
+Whatever is wrong in an input is told at once: in one line that names the culprit and the remedy, before any numerics
+begin. `fastcontact` then ends with exit code 1; the library raises one of its [errors](errors.md) with the same text, one
+kind for each kind of mistake. What can be solved but is doubtful is solved, and gives a warning with its number: on screen,
+in the log, in `--json` and in the result file, from which `open_results(path).warnings` gives it back; the library warns with
+`FastcontactWarning`.
+
+This page is made from the tests, which make each mistake and compare the message. The last column says what
+finite-element programs commonly do with the same mistake; none does all of it.
+"""
+SECTIONS = (
+    ("In a case file", "`fastcontact run`, with the ready case FORMA04 A and one change.", CASES),
+    ("In a mesh file", "The same, with a mesh that is spoilt.", MESHES),
+    ("On the command line", "", COMMANDS),
+    ("Where results are written", "", ACCIDENTS),
+    ("In calls: meshes", "", library.MESH),
+    ("In calls: materials and units", "", library.MATERIALS),
+    ("In calls: supports", "", library.SUPPORTS),
+    ("In calls: contact", "", library.CONTACT),
+    ("In calls: loads", "", library.LOADS),
+    ("In calls: ramp and options", "", [*library.RAMP, *library.OPTIONS]),
+    ("Warnings", "The case is solved; its result is doubtful.", DOUBTS),
+)
+CONSEQUENCE = {name: text for text, names in OTHERWISE.items() for name in names}
+
+
+def page() -> str:
+    """Return the text of the page."""
+    parts = [HEAD]
+    for title, remark, entries in SECTIONS:
+        rows = [f"| {name} | {cell(said)} | {CONSEQUENCE[name]} |" for name, said in map(named, entries)]
+        table = "\n".join(["| mistake | what we say | what happens without it |", "| --- | --- | --- |", *rows])
+        parts.append("\n\n".join(text for text in (f"## {title}", remark, table) if text) + "\n")
+    return "\n".join(parts)
+
+
+def named(entry) -> tuple[str, str]:
+    """Return the name of a mistake and its message, with the kind of error where the library raises one."""
+    name, patterns = entry[0], entry[-1]
+    text = "; ".join(map(readable, [patterns] if isinstance(patterns, str) else patterns))
+    if not isinstance(entry, library.Mistake):
+        return name, text
+    return name, f"{entry.kind.__name__}: {text}"
+
+
+def readable(pattern: str) -> str:
+    """Return what a pattern of a message looks like: what differs from run to run as three dots."""
+    text = re.sub(r"(?<!\\)\$$", "", pattern).replace("elements?", "elements")
+    text = re.sub(r"\((\w+(?:\|\w+)+)\)", "...", text)
+    text = re.sub(r"(?<!\\)\\(?:d|w|S)\+?(?:\\\.\\d\+?)?(?:e-\\d\\d|e-\\d)?", "...", text)
+    text = re.sub(r"(?<!\\)(\.|\[[^\]]*\]| )[*+]", "...", text)
+    text = re.sub(r"\\(.)", r"\1", text)
+    return re.sub(r"(\.\.\.[\s.]*)*\.\.\.(?:\.\.\.)*", "...", text)
+
+
+def cell(text: str) -> str:
+    """Return a text that no table takes for one of its own marks."""
+    return "`" + text.replace("|", "\\|").replace("`", "'") + "`"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")

@@ -1,0 +1,127 @@
+"""Mistakes that few make in case files and studies: changes of the FORMA04 A case, commands, and calls."""
+# ruff: noqa: E501 (messages stay in one piece)
+
+import errno
+from pathlib import Path
+
+import numpy as np
+
+import fastcontact as fc
+from fastcontact.case import read_case
+from fastcontact.cli import _study
+from fastcontact.convergence import adaptive_study, execute, fit
+from fastcontact.convergence.levels import make_mesh
+from fastcontact.convergence.settings import settings
+from fastcontact.convergence.store import Store
+from fastcontact.generate import block, box, half_spheres, merge_points
+from fastcontact.generate.refine import Circle, refined
+
+CASES = [
+    ("material is a list of words", '[[material]]\ngroups = ["SPHHAU", "SPHBAS"]\nE = 20000.0\nnu = 0.3', "", r"'material' must be a list of tables: write \[\[material\]\] above each"),
+    ("mesh is a word", '[mesh]\nfile = "forma04a.med"', 'mesh = "forma04a.med"', r"of 'mesh' must be of type dict|'mesh' must be a table"),
+    ("probes are a table of tables", 'C1 = "C1"', "C1 = {a = 1}", r"case\.toml"),
+    ("entry of supports is a word", '[[support]]\ngroup = "A1A2"\nx = 0.0', 'support = ["A1A2"]\n', r"case\.toml"),
+    ("contact without name", "[contact.hertz]", "[contact]", r"'contact' needs a name for each pair: write \[contact\.NAME\] above its keys, not 'secondary'"),
+    ("theory without kind", 'kind = "hertz_point"\n', "", r"'theory\.hertz' needs the key 'kind', one of "),
+    ("radius in words", "R1 = 50.0", 'R1 = "fifty"', r"the value of 'theory\.hertz\.R1' must be a number, not 'fifty'"),
+    ("radius is a list", "R1 = 50.0", "R1 = [50.0]", r"'theory\.hertz': .* are not of the kinds that it takes"),
+    ("target of a check is zero", 'theory = "hertz"\ntolerance', 'theory = "hertz"\nof = "beyond"\ntolerance', r"unknown number of the theory in check\[0\]\.of 'beyond'"),
+    ("unknown pair of a study", "[study]", '[study]\ncontact = "herz"', r"unknown contact pair in study\.contact 'herz': did you mean 'hertz'\?"),
+    ("unknown formulation in options of a study", "[study.options.node_to_segment]", "[study.options.node_to_segmnt]", r"unknown formulation in study\.options 'node_to_segmnt': did you mean 'node_to_segment'\?"),
+    ("meshes of a study without maker", 'generator = "half-spheres"', "", r"study\.\w+ needs 'study\.generator', the mesh maker it is meant for"),
+    ("combination of one word", '"tri3 node_to_segment"', '"tri3"', r"an entry of study\.combinations must name an element and a formulation, not 'tri3'"),
+    ("combination with an unknown formulation", '"tri3 node_to_segment"', '"tri3 node_to_segmnt"', r"unknown contact formulation 'node_to_segmnt': did you mean 'node_to_segment'\?"),
+    ("unknown maker of a study", 'generator = "half-spheres"', 'generator = "half-sphere"', r"unknown study\.generator 'half-sphere': did you mean 'half-spheres'"),
+    ("unknown argument of a maker", "[study.triangles]", "[study.triangles]\nsiz = 3.0", r"unknown argument of the generator half-spheres in \[study\] 'siz': did you mean 'size'"),
+    ("curve without radius", "[study]", '[study]\ncurves = [{ group = "CONT1", centre = [0.0, 50.0] }]', r"study\.curves\[0\] must be \{ group = 'NAME', centre = \[x, y\], radius = R \}"),
+    ("element that the study has no sizes for", '"tri3 node_to_segment"', '"hex8 node_to_segment"', r"there are no meshes of hex8 in this study: give the arguments of level 0 in \[study\.triangles\]"),
+]  # fmt: skip
+
+COMMANDS = [
+    ("nothing to export", ["export", "run.vtkhdf"], r"nothing to export: give --med FILE or --xdmf FILE"),
+    ("two elements for adaptive meshes", ["converge", "case.toml", "--adaptive", "--elements", "tri3,quad4"], r"adaptive meshes take one element, not 2: tri3,quad4"),
+    ("unknown place to run", ["converge", "case.toml", "--executor", "grid"], r"--executor 'grid' must be processes, mpi, or the address of a Dask scheduler"),
+    ("unknown quantity of a study", ["converge", "case.toml", "--levels", "1", "--quantities", "forse", "--workers", "1"], r"unknown quantity 'forse': did you mean 'force'"),
+    ("no worker", ["converge", "case.toml", "--levels", "1", "--workers", "0"], r"workers = 0 must be at least 1, the number of processes"),
+    ("power beyond all numbers", ["sweep", "case.toml", "--set", "approach=1e300"], r"."),
+]  # fmt: skip
+
+
+def solid_case():
+    case = read_case("forma04a")
+    case.mesh.__class__  # the case of the plane is only a base
+    object.__setattr__(case, "mesh", box())
+    return case
+
+
+def changed_settings(**study):
+    case = read_case("forma04a")
+    data = {"mesh": {"generator": "half-spheres"}, "study": study}
+    return settings(case, data)
+
+
+def without_dask(patch):
+    import sys
+
+    patch.setitem(sys.modules, "dask", None)
+    patch.setitem(sys.modules, "dask.distributed", None)
+    with _study.executor("tcp://localhost:1"):
+        pass
+
+
+def without_mpi(patch):
+    import sys
+
+    patch.setitem(sys.modules, "mpi4py", None)
+    patch.setitem(sys.modules, "mpi4py.futures", None)
+    with _study.executor("mpi"):
+        pass
+
+
+def no_worker_starts(patch):
+    from concurrent.futures.process import BrokenProcessPool
+
+    class Pool:
+        def __init__(self, *_, **__):
+            pass
+
+        def submit(self, *_):
+            raise BrokenProcessPool
+
+    patch.setattr(execute, "ProcessPoolExecutor", Pool)
+    execute._pool(1)
+
+
+def protected_text(patch):
+    def refuse(*_, **__):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    patch.setattr(Path, "write_text", refuse)
+    _study.text("a.json", "{}")
+
+
+def file_for_a_store(patch):
+    def refuse(*_, **__):
+        raise OSError(errno.EEXIST, "File exists")
+
+    patch.setattr(Path, "mkdir", refuse)
+    Store("runs")
+
+
+CALLS = [
+    ("adaptive meshes in space", lambda: adaptive_study(solid_case(), 0.1), fc.errors.CaseError, r"adaptive refinement is for triangles and quadrangles in two dimensions; this case is in 3D"),
+    ("sizes without values", lambda: fit.extrapolated([1.0, 0.5], [1.0]), fc.errors.CaseError, r"mesh sizes and values must be two lists of one length, not \(2,\) and \(1,\)"),
+    ("a limit of two meshes", lambda: fit.extrapolated([1.0, 0.5], [1.0, 2.0]), fc.errors.CaseError, r"a limit needs the values of at least 3 meshes, not 2: compute more levels"),
+    ("one size twice", lambda: fit.extrapolated([1.0, 0.5, 0.5], [1.0, 2.0, 3.0]), fc.errors.CaseError, r"the mesh sizes must be positive and all different, not \[1\.0, 0\.5, 0\.5\]"),
+    ("refining nothing", lambda: make_mesh({"refinements": 1, "element": None, "curves": None}, None), fc.errors.FastcontactError, r"a mesh that is refined needs the mesh to start from"),
+    ("a maker without sizes", lambda: changed_settings(generator="block"), fc.errors.CaseError, r"'study\.generator' needs the arguments of level 0 in \[study\.triangles\] or \[study\.quadrangles\]"),
+    ("Dask is not installed", without_dask, fc.errors.CaseError, r"--executor tcp://localhost:1 needs Dask .*: pip install distributed"),
+    ("mpi4py is not installed", without_mpi, fc.errors.CaseError, r"--executor mpi needs mpi4py .*: pip install mpi4py"),
+    ("no worker starts", no_worker_starts, fc.errors.FastcontactError, r"no worker process could start: in a script, put what calls the study under if __name__ == '__main__':"),
+    ("a text on a read-only disk", protected_text, fc.errors.FileError, r"cannot write 'a\.json': Read-only file system"),
+    ("a file where the store should be", file_for_a_store, fc.errors.FileError, r"the folder 'runs' cannot be made: File exists; name another store"),
+    ("refining solids in space", lambda: refined(box()), fc.MeshError, r"cells of hex8 cannot be refined: only lines, triangles and quadrangles are divided here"),
+    ("a curve elsewhere", lambda: refined(block((1.0, 1.0), (2, 2)), curves=[Circle((50.0, 50.0), 1.0)]), fc.MeshError, r"no outer facet has all its nodes on .*: check its centre and radius"),
+    ("a negative tolerance of merging", lambda: merge_points(half_spheres(size=20.0), -1.0), fc.MeshError, r"tolerance = -1 is out of range: it must be at least 0"),
+    ("a tolerance that is no number", lambda: merge_points(half_spheres(size=20.0), np.nan), fc.MeshError, r"tolerance must be a finite number, not nan"),
+]  # fmt: skip

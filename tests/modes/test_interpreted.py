@@ -1,0 +1,17 @@
+"""NUMBA_DISABLE_JIT=1: the same kernels in plain Python find the same numbers."""
+
+import json
+
+import pytest
+from starting import finished, start
+
+# The preconditioner works in single precision, and conjugate gradients stop at a residual of 1e-10.
+CLOSE = {"plane": 1e-11, "friction": 1e-11, "small": 1e-9}
+
+
+@pytest.mark.parametrize("run", CLOSE)
+def test_interpreted_kernels_find_the_numbers_of_compiled_ones(run):
+    compiled, interpreted = (
+        json.loads(finished(start("whole_runs.py", run, NUMBA_DISABLE_JIT=off))[0])[run]["sizes"] for off in "01"
+    )
+    assert interpreted == pytest.approx(compiled, rel=CLOSE[run], abs=0.0)
