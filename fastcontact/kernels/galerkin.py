@@ -150,8 +150,8 @@ def _smooth_row(
 
 
 @parallel_kernel
-def smooth_prolongator(indptr, indices, data, inverse, aggregate, tentative, omega, start, rows, cols):
-    """Return (columns, blocks) of ``(I - omega D^-1 A) T`` with the row pointers `start`.
+def smooth_prolongator(indptr, indices, data, inverse, aggregate, tentative, omega, start, out, rows, cols):
+    """Return the columns of ``(I - omega D^-1 A) T`` with the row pointers `start`, and fill its blocks into `out`.
 
     `tentative` (n_nodes * m * n,) is the block of T in each node's own aggregate; `aggregate` is -1 for nodes in none.
     """
@@ -161,7 +161,6 @@ def smooth_prolongator(indptr, indices, data, inverse, aggregate, tentative, ome
     for i in range(n):
         widest = max(widest, start[i + 1] - start[i])
     columns = np.empty(start[n], np.int32)
-    out = np.empty(start[n] * m * len(cols))
     for c in prange((n + CHUNK - 1) // CHUNK):
         found = np.empty(widest + 1, np.int32)
         sums = np.empty((widest + 1) * m * len(cols))
@@ -183,7 +182,7 @@ def smooth_prolongator(indptr, indices, data, inverse, aggregate, tentative, ome
                 rows,
                 cols,
             )
-    return columns, out
+    return columns
 
 
 @kernel

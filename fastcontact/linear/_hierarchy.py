@@ -218,14 +218,15 @@ class Hierarchy:
         omega = self.unit * 4.0 / 3.0 / (level.bound / SAFETY)
         cols = (0,) * n_modes
         indptr = galerkin.count_prolongator(A.indptr, A.indices, aggregate)
-        columns, blocks = galerkin.smooth_prolongator(
-            A.indptr, A.indices, A.data, level.inverse, aggregate, tentative.ravel(), omega, indptr, A.rows, cols
+        # In the precision of the cycle from the start: the coarse matrix is then the exact product of what is used.
+        blocks = np.empty(int(indptr[-1]) * size * n_modes, self.dtype)
+        columns = galerkin.smooth_prolongator(
+            A.indptr, A.indices, A.data, level.inverse, aggregate, tentative.ravel(), omega, indptr, blocks, A.rows, cols
         )  # fmt: skip
         del tentative, T
         index = galerkin.transposed(indptr, columns, n_coarse)
         P = Matrix(indptr, columns, blocks, A.rows, cols)
         coarse = product(A, P, index)
-        P.data = blocks.astype(self.dtype)
         R = Matrix(index[0], index[1], np.empty_like(P.data), cols, A.rows)
         galerkin.transpose_blocks(index[2], P.data, R.data, A.rows, cols)
         return P, R, coarse, coarse_modes

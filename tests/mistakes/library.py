@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 import fastcontact as fc
-from fastcontact import elements, generate
+from fastcontact import elements, generate, topology
 from fastcontact.generate import block, block_on_block
 
 
@@ -173,6 +173,12 @@ MESH = [
     ),
     Mistake("a folded cell", lambda: of_square(moved(4, (0.9, 0.9))), fc.MeshError, r"cell 3 .* is inverted"),
     Mistake(
+        "a folded mesh in space whose cells were turned",
+        lambda: topology.oriented(folded_box()),
+        fc.MeshError,
+        r"cells \d+ and \d+ lie on the same side of the facet between them, near \(.*\), one of \d+ such pairs: the mesh is folded there; move its nodes or remesh",
+    ),
+    Mistake(
         "a degenerate cell",
         lambda: fc.Model(fc.Mesh([[0, 0], [1, 0], [2, 0]], {"tri3": [[0, 1, 2]]}), "plane_strain"),
         fc.MeshError,
@@ -245,6 +251,15 @@ MESH = [
         r"cell \d+ \(tri6 .*\) is poor: its smallest Jacobian is 0\.0\d+ of its largest; move its nodes or remesh",
     ),
 ]
+
+
+def folded_box():
+    """Tetrahedra, of which an inner node was moved beyond its neighbours."""
+    mesh = generate.box((1.0, 1.0, 1.0), (3, 3, 3), "tet4")
+    points = mesh.points.copy()
+    inner = int(np.argmin(np.linalg.norm(points - 1 / 3, axis=1)))
+    points[inner] += (0.45, 0.33, 0.4)
+    return mesh.replace(points=points)
 
 
 def square_in_two():

@@ -97,7 +97,7 @@ OTHERWISE = {
     ),
     "negative volumes: a stiffness that is too small or not definite, often without a word": (
         "the mesh in the file lies at r < 0", "the mesh in the file is folded", "nodes at r < 0", "an inverted cell",
-        "a folded cell", "a cell in the file is flat", "a degenerate cell",
+        "a folded cell", "a folded mesh in space whose cells were turned", "a cell in the file is flat", "a degenerate cell",
     ),
     "nothing is said: the body is twice as stiff there": (
         "a cell in the file stands there twice", "a cell stands there twice",

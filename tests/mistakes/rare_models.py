@@ -22,9 +22,7 @@ def obstacle(**options):
 
 def round_obstacle(**options):
     model = fc.Model(half_spheres(size=20.0), "axisymmetric")
-    model.add_obstacle(
-        "plane", secondary="CONT1", obstacle=fc.obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0)), **options
-    )
+    model.add_obstacle("plane", secondary="CONT1", obstacle=fc.obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0)), **options)
 
 
 def spring_without_length():
@@ -216,7 +214,7 @@ MISTAKES = [
     ),
     Mistake(
         "a line in two pieces",
-        two_lines,
+        lambda: two_lines(),
         fc.MeshError,
         r"group 'LINE' is not one open line: it has 4 ends, not 2",
     ),

@@ -2,29 +2,32 @@
 # ruff: noqa: E501 (messages stay in one piece)
 
 import errno
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 
 import fastcontact as fc
-from fastcontact.case import read_case
+from fastcontact.case import build_case, read_case
+from fastcontact.checks import Check, _check_target
 from fastcontact.cli import _study
-from fastcontact.convergence import adaptive_study, execute, fit
+from fastcontact.cli._main import parser
+from fastcontact.convergence import adaptive_study, convergence_study, execute, fit
 from fastcontact.convergence.levels import make_mesh
-from fastcontact.convergence.settings import settings
+from fastcontact.convergence.settings import combinations, settings
 from fastcontact.convergence.store import Store
+from fastcontact.convergence.substitute import _by_law
 from fastcontact.generate import block, box, half_spheres, merge_points
 from fastcontact.generate.refine import Circle, refined
 
 CASES = [
-    ("material is a list of words", '[[material]]\ngroups = ["SPHHAU", "SPHBAS"]\nE = 20000.0\nnu = 0.3', "", r"'material' must be a list of tables: write \[\[material\]\] above each"),
     ("mesh is a word", '[mesh]\nfile = "forma04a.med"', 'mesh = "forma04a.med"', r"of 'mesh' must be of type dict|'mesh' must be a table"),
     ("probes are a table of tables", 'C1 = "C1"', "C1 = {a = 1}", r"case\.toml"),
     ("entry of supports is a word", '[[support]]\ngroup = "A1A2"\nx = 0.0', 'support = ["A1A2"]\n', r"case\.toml"),
-    ("contact without name", "[contact.hertz]", "[contact]", r"'contact' needs a name for each pair: write \[contact\.NAME\] above its keys, not 'secondary'"),
     ("theory without kind", 'kind = "hertz_point"\n', "", r"'theory\.hertz' needs the key 'kind', one of "),
     ("radius in words", "R1 = 50.0", 'R1 = "fifty"', r"the value of 'theory\.hertz\.R1' must be a number, not 'fifty'"),
-    ("radius is a list", "R1 = 50.0", "R1 = [50.0]", r"'theory\.hertz': .* are not of the kinds that it takes"),
+    ("radius of an obstacle is a list", "[probes]", '[obstacle.ball]\nsecondary = "CONT1"\nshape = { kind = "sphere", centre = [0.0, 0.0], R = [1.0] }\n[probes]', r"'obstacle\.ball\.shape': .* are not of the kinds that it takes"),
     ("target of a check is zero", 'theory = "hertz"\ntolerance', 'theory = "hertz"\nof = "beyond"\ntolerance', r"unknown number of the theory in check\[0\]\.of 'beyond'"),
     ("unknown pair of a study", "[study]", '[study]\ncontact = "herz"', r"unknown contact pair in study\.contact 'herz': did you mean 'hertz'\?"),
     ("unknown formulation in options of a study", "[study.options.node_to_segment]", "[study.options.node_to_segmnt]", r"unknown formulation in study\.options 'node_to_segmnt': did you mean 'node_to_segment'\?"),
@@ -41,15 +44,12 @@ COMMANDS = [
     ("nothing to export", ["export", "run.vtkhdf"], r"nothing to export: give --med FILE or --xdmf FILE"),
     ("two elements for adaptive meshes", ["converge", "case.toml", "--adaptive", "--elements", "tri3,quad4"], r"adaptive meshes take one element, not 2: tri3,quad4"),
     ("unknown place to run", ["converge", "case.toml", "--executor", "grid"], r"--executor 'grid' must be processes, mpi, or the address of a Dask scheduler"),
-    ("unknown quantity of a study", ["converge", "case.toml", "--levels", "1", "--quantities", "forse", "--workers", "1"], r"unknown quantity 'forse': did you mean 'force'"),
     ("no worker", ["converge", "case.toml", "--levels", "1", "--workers", "0"], r"workers = 0 must be at least 1, the number of processes"),
-    ("power beyond all numbers", ["sweep", "case.toml", "--set", "approach=1e300"], r"."),
 ]  # fmt: skip
 
 
 def solid_case():
     case = read_case("forma04a")
-    case.mesh.__class__  # the case of the plane is only a base
     object.__setattr__(case, "mesh", box())
     return case
 
@@ -108,11 +108,37 @@ def file_for_a_store(patch):
     Store("runs")
 
 
+def case_of(**parts):
+    return build_case({"mesh": {"generator": "half-spheres"}, "kinematics": "axisymmetric", **parts}, name="case")
+
+
+def unknown_quantity():
+    convergence_study("forma04a", 1, ["tri3"], ["node_to_segment"], quantities=["forse"], workers=1)
+
+
+def interrupted(patch, command):
+    def stop(*_, **__):
+        raise KeyboardInterrupt
+
+    patch.setattr(f"fastcontact.convergence.{command}", stop)
+    name = {"convergence_study": ["converge"], "parameter_sweep": ["sweep", "--set", "approach=1"]}[command]
+    options = parser(name[0]).parse_args([name[0], "forma04a", *name[1:]])
+    options.run(options)
+
+
 CALLS = [
+    ("materials that are no tables", lambda: case_of(material=[1]), fc.errors.CaseError, r"'material' must be a list of tables: write \[\[material\]\] above each"),
+    ("a contact without name", lambda: case_of(material=[{"E": 1.0, "nu": 0.3}], contact={"secondary": "CONT1"}), fc.errors.CaseError, r"'contact' needs a name for each pair: write \[contact\.NAME\] above its keys, not 'secondary'"),
+    ("a check of what is zero", lambda: _check_target("check[0]", Check("a", "b.force", 0.1, "hertz", of="zero"), SimpleNamespace(zero=0.0)), fc.errors.CaseError, r"check\[0\]: the theory's zero is 0, so no relative deviation can be told"),
+    ("an unknown quantity of a study", unknown_quantity, fc.errors.CaseError, r"unknown quantity 'forse': did you mean 'force'"),
+    ("a study that is interrupted", lambda patch: interrupted(patch, "convergence_study"), fc.errors.FastcontactError, r"stopped; with --store DIR the same command would go on where it stopped"),
+    ("a sweep that is interrupted", lambda patch: interrupted(patch, "parameter_sweep"), fc.errors.FastcontactError, r"stopped; with --store DIR the same command would go on where it stopped"),
+    ("formulations without contact", lambda: combinations(replace(settings(read_case("forma04a")), pair=None), None, ["mortar"]), fc.errors.CaseError, r"this case has no contact pair, so there are no formulations to compare"),
+    ("a law beyond all numbers", lambda: _by_law("value^400", 1e300, "study.parameters.a"), fc.errors.CaseError, r"study\.parameters\.a = 'value\^400' is too large a number for 1e\+300"),
     ("adaptive meshes in space", lambda: adaptive_study(solid_case(), 0.1), fc.errors.CaseError, r"adaptive refinement is for triangles and quadrangles in two dimensions; this case is in 3D"),
-    ("sizes without values", lambda: fit.extrapolated([1.0, 0.5], [1.0]), fc.errors.CaseError, r"mesh sizes and values must be two lists of one length, not \(2,\) and \(1,\)"),
-    ("a limit of two meshes", lambda: fit.extrapolated([1.0, 0.5], [1.0, 2.0]), fc.errors.CaseError, r"a limit needs the values of at least 3 meshes, not 2: compute more levels"),
-    ("one size twice", lambda: fit.extrapolated([1.0, 0.5, 0.5], [1.0, 2.0, 3.0]), fc.errors.CaseError, r"the mesh sizes must be positive and all different, not \[1\.0, 0\.5, 0\.5\]"),
+    ("sizes without values", lambda: fit.fit_limit([1.0, 0.5], [1.0]), fc.errors.CaseError, r"mesh sizes and values must be two lists of one length, not \(2,\) and \(1,\)"),
+    ("a limit of two meshes", lambda: fit.fit_limit([1.0, 0.5], [1.0, 2.0]), fc.errors.CaseError, r"a limit needs the values of at least 3 meshes, not 2: compute more levels"),
+    ("one size twice", lambda: fit.fit_limit([1.0, 0.5, 0.5], [1.0, 2.0, 3.0]), fc.errors.CaseError, r"the mesh sizes must be positive and all different, not \[1\.0, 0\.5, 0\.5\]"),
     ("refining nothing", lambda: make_mesh({"refinements": 1, "element": None, "curves": None}, None), fc.errors.FastcontactError, r"a mesh that is refined needs the mesh to start from"),
     ("a maker without sizes", lambda: changed_settings(generator="block"), fc.errors.CaseError, r"'study\.generator' needs the arguments of level 0 in \[study\.triangles\] or \[study\.quadrangles\]"),
     ("Dask is not installed", without_dask, fc.errors.CaseError, r"--executor tcp://localhost:1 needs Dask .*: pip install distributed"),

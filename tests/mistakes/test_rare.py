@@ -4,18 +4,22 @@ import inspect
 import re
 
 import pytest
+import rare_files
 import rare_models
 import rare_studies
 from test_mistakes import case_text, folder, refused  # noqa: F401 (a fixture)
 
-CALLS = [*rare_models.MISTAKES, *rare_studies.CALLS]
+CALLS = [*rare_models.MISTAKES, *rare_studies.CALLS, *rare_files.CALLS]
 
 
 @pytest.mark.parametrize(("make", "kind", "pattern"), [c[1:] for c in CALLS], ids=[c[0] for c in CALLS])
-def test_calls(make, kind, pattern, monkeypatch):
-    given = [monkeypatch] if inspect.signature(make).parameters else []
-    with monkeypatch.context(), pytest.raises(kind) as caught:
-        make(*given)
+def test_calls(make, kind, pattern, monkeypatch, tmp_path):
+    """Some are given a folder, or a means to change modules, by name."""
+    monkeypatch.chdir(tmp_path)
+    offered = {"folder": tmp_path, "patch": monkeypatch}
+    with pytest.raises(kind) as caught:
+        make(**{name: offered[name] for name in inspect.signature(make).parameters})
+    monkeypatch.undo()
     assert type(caught.value) is kind
     assert re.search(pattern, str(caught.value)), str(caught.value)
 

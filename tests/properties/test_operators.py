@@ -4,13 +4,14 @@ import numpy as np
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from images import Image, model_of
-from problems import FORMULATIONS, E, analysis_of, examples, recipes
+from problems import FORMULATIONS, analysis_of, examples, recipes
 from scipy.sparse import bsr_array, csr_array
 
 import fastcontact as fc
 from fastcontact import linear
 from fastcontact.assembly import rigid_modes, stiffness
 from fastcontact.linear._elimination import eliminate
+from fastcontact.linear.amg import RAISE, RAISES
 
 # Over the largest entry.
 ROUNDING, SOLVED = 1e-14, 1e-9
@@ -28,7 +29,7 @@ def constrained(recipe):
     return bsr_array(system.matrix), system.unknowns_of(modes), csr_array(rows)
 
 
-@examples(30)
+@examples(40)
 @given(recipe=recipes() | recipes(**SPACE))
 def test_stiffness_is_symmetric_and_costs_no_energy_in_rigid_motions(recipe):
     model = model_of(recipe.job(), Image())[0]
@@ -40,7 +41,6 @@ def test_stiffness_is_symmetric_and_costs_no_energy_in_rigid_motions(recipe):
     assert np.abs(K @ modes).max() <= 100 * ROUNDING * size * np.abs(modes).max()
     spectrum = np.linalg.eigvalsh(dense)
     assert spectrum[0] >= -1e3 * ROUNDING * spectrum[-1]
-    assert size < 100 * E * 10.0 ** max(recipe.contrast, 0.0) * (1 if recipe.dim == 2 else 10) * 10
 
 
 @examples(25)
@@ -72,7 +72,9 @@ def test_compliance_is_symmetric_and_positive(recipe, solver):
     tied=st.booleans(), seed=st.integers(0, 99),
 )  # fmt: skip
 def test_the_multigrid_cycle_is_symmetric_and_positive(recipe, tied, seed):
-    """As conjugate gradients need it: also where the equations of a contact are eliminated."""
+    """As conjugate gradients need it: also where the equations of a contact are eliminated, if need be after the
+    bounds of the smoothers have been raised, as the solver does where it notices.
+    """
     K, modes, B = constrained(recipe)
     assume(B.shape[0])
     amg = linear.make("amg", dim=recipe.dim, n_dofs=K.shape[0], tolerance=1e-12, precision="double")
@@ -88,13 +90,23 @@ def test_the_multigrid_cycle_is_symmetric_and_positive(recipe, tied, seed):
     if elimination is not None:
         for column in basis.T:
             elimination.condense(column)
-    M = np.empty((n, n))
-    for j in range(n):
-        z = np.empty(n)
-        amg._precondition(np.ascontiguousarray(basis[:, j]), 1.0, z)
-        M[:, j] = z
-    product = basis.T @ M
-    size = np.abs(product).max()
-    assert np.abs(product - product.T).max() <= 1e-10 * size
-    spectrum = np.linalg.eigvalsh(0.5 * (product + product.T))
-    assert spectrum[0] >= -1e-10 * spectrum[-1]
+    for raised in range(RAISES + 1):
+        product = basis.T @ applied(amg, basis)
+        size = np.abs(product).max()
+        assert np.abs(product - product.T).max() <= 1e-10 * size
+        spectrum = np.linalg.eigvalsh(0.5 * (product + product.T))
+        if spectrum[0] >= -1e-10 * spectrum[-1]:
+            return
+        assert elimination is not None  # without, the bounds of its smoothers are sure
+        assert raised < RAISES
+        amg.hierarchy.raise_bounds(RAISE)
+
+
+def applied(amg, basis):
+    """Return the preconditioner times a basis (n, n)."""
+    found = np.empty_like(basis)
+    for j, column in enumerate(basis.T):
+        z = np.empty(len(column))
+        amg._precondition(np.ascontiguousarray(column), 1.0, z)
+        found[:, j] = z
+    return found

@@ -23,7 +23,7 @@ def ended(work):
     return None, said
 
 
-@examples(60)
+@examples(100)
 @given(
     n=st.integers(1, 12), m=st.integers(1, 16), seed=st.integers(0, 2**32 - 1), spread=st.floats(0, 4),
     solver=st.sampled_from(["direct", "amg"]), repeated=st.booleans(), limit=st.integers(1, 200),
@@ -59,12 +59,13 @@ def test_any_problem_from_any_set_ends(n, m, seed, spread, solver, repeated, lim
     if limit == 200 and not repeated:
         assert state.settled
     if state.settled:
+        rounding = max(1e-9, 1e-14 * np.linalg.cond(K))
         largest = np.abs(state.multiplier).max(initial=0.0)
         assert (state.multiplier >= -1e-9 * largest).all()
-        assert (state.gap >= -1e-9 * max(1.0, np.abs(state.u).max())).all()
+        assert (state.gap >= -rounding * max(1.0, np.abs(state.u).max())).all()
 
 
-@examples(30)
+@examples(60)
 @given(
     recipe=recipes() | recipes(friction=True) | recipes(**SPACE) | recipes(friction=True, **SPACE),
     seed=st.integers(0, 2**32 - 1), share=st.floats(0, 1), solver=st.sampled_from(["direct", "amg"]),

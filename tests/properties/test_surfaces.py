@@ -53,7 +53,7 @@ def sampled(kind, corners, n):
     return points.reshape(-1, corners.shape[2]), 2.0 * apart
 
 
-@examples(40)
+@examples(100)
 @given(
     kind=st.sampled_from(sorted(SIZE)), n=st.integers(1, 8), seed=st.integers(0, 2**32 - 1), far=st.floats(-2, 1),
     scale=st.floats(-9, 9), shift=st.floats(0, 100),
@@ -89,7 +89,7 @@ def test_the_closest_point_of_a_random_surface(kind, n, seed, far, scale, shift)
     assert np.abs(np.linalg.norm(found.normal, axis=1) - 1).max() < 1e-12
 
 
-@examples(25)
+@examples(60)
 @given(kind=st.sampled_from(sorted(SIZE)), n=st.integers(1, 6), seed=st.integers(0, 2**32 - 1))
 def test_the_order_of_facets_and_points_does_not_matter(kind, n, seed):
     random = np.random.default_rng(seed)

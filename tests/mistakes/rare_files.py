@@ -1,0 +1,187 @@
+"""Mistakes that few make with files: functions that make one, the kind of error, a pattern of the message.
+
+No function names a device or anything else outside the folder it is given: a check that is missing could destroy it.
+"""
+# ruff: noqa: E501 (messages stay in one piece)
+
+import errno
+import os
+import zlib
+from pathlib import Path
+from types import SimpleNamespace
+
+import h5py
+import numpy as np
+
+import fastcontact as fc
+from fastcontact import case as cases
+from fastcontact.cli import _pictures, _results, bench
+from fastcontact.cli.run import _write_json
+from fastcontact.generate import block, block_on_block
+from fastcontact.io import _abaqus, _files, _hdf5, _packing
+from fastcontact.io._blocks import build_mesh
+
+
+def held():
+    model = fc.Model(block((1.0, 1.0), (2, 2)), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    model.fix("BOTTOM", "xy")
+    return model
+
+
+def solved(folder):
+    """A result file of one step."""
+    model = fc.Model(block_on_block(), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("LOWER_BOTTOM", "xy")
+    model.fix("UPPER_TOP", "x")
+    model.prescribe("UPPER_TOP", y=-0.01)
+    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER")
+    with fc.ResultWriter(folder / "run.vtkhdf", model) as out:
+        fc.solve(model, fc.linear_ramp(1), on_step=out.write)
+    return folder / "run.vtkhdf"
+
+
+def refusing(number):
+    def refuse(*_, **__):
+        raise OSError(number, os.strerror(number))
+
+    return refuse
+
+
+def full(patch, work):
+    patch.setattr(Path, "write_text", refusing(errno.ENOSPC))
+    work("a.json", {})
+
+
+def opened(folder, change):
+    with h5py.File(folder / "spoilt.h5", "w") as file:
+        change(file)
+    with _hdf5.opened(folder / "spoilt.h5") as file:
+        return _hdf5.values(file, "a")
+
+
+def circle(file):
+    file.create_group("one/two")
+    file["one/two/one"] = file["one"]
+
+
+def lzf(file):
+    file.create_dataset("a", data=np.zeros(1000), chunks=(100,), compression="lzf")
+
+
+def texts(file):
+    file.create_dataset("a", data=["no", "numbers"], dtype=h5py.string_dtype())
+
+
+def pipe(folder):
+    os.mkfifo(folder / "pipe.med")
+    fc.read_mesh(folder / "pipe.med")
+
+
+def vanished(folder):
+    with _files.replacing(folder / "a.txt"):
+        pass  # nothing was written that could be put in place
+
+
+def packed_of_another_kind():
+    values = _packing.packed({"a": np.arange(3.0)})
+    raw = values.tobytes().replace(b"<f8", b"|O8")
+    line, _, body = raw.partition(b"\n")
+    old = b"%d" % zlib.crc32(body.replace(b"|O8", b"<f8"))
+    _packing.unpacked(np.frombuffer(line.replace(old, b"%d" % zlib.crc32(body)) + b"\n" + body, np.uint8))
+
+
+def packed_and_changed():
+    values = _packing.packed({"a": np.arange(3.0)}).copy()
+    values[-1] ^= 1
+    _packing.unpacked(values)
+
+
+def resulting(folder, change):
+    """Change a result file, and read its last step."""
+    path = solved(folder)
+    with h5py.File(path, "r+") as file:
+        change(file)
+    with fc.open_results(path) as results:
+        assert results[-1].contact
+
+
+def kinematics_in_numbers(file):
+    del file["fastcontact/kinematics"]
+    file["fastcontact/kinematics"] = "3"
+
+
+def broken_point_numbers(file):
+    pair = next(iter(file["fastcontact/contact"].values()))
+    rows = pair["rows"][()]
+    kinds = [(name, float if name == "points" else rows.dtype[name]) for name in rows.dtype.names]
+    del pair["rows"]
+    pair["rows"] = rows.astype(kinds)
+
+
+def cell_field_cut_off(file):
+    n = len(file["VTKHDF/Types"])
+    file["VTKHDF/CellData"].create_dataset("error", data=np.zeros(n - 1))
+
+
+def announced(folder):
+    fc.ResultWriter(folder / "a.vtkhdf", held(), cell_fields=["two words"])
+
+
+def not_announced(folder):
+    model = held()
+    with fc.ResultWriter(folder / "a.vtkhdf", model, cell_fields=["error"]) as out:
+        fc.solve(model, fc.linear_ramp(1), on_step=out.write)
+
+
+def changed_by_others(folder, patch):
+    model = held()
+    with fc.ResultWriter(folder / "a.vtkhdf", model) as out:
+        patch.setattr(type(out._below), "intact", lambda self: False)
+        fc.solve(model, fc.linear_ramp(1), on_step=out.write)
+
+
+def no_step_yet(folder):
+    fc.ResultWriter(folder / "a.vtkhdf", held()).close()
+    with fc.open_results(folder / "a.vtkhdf") as results:
+        _results.chosen_step(results, -1)
+
+
+def unexpected(patch):
+    def fail(*_, **__):
+        raise OverflowError("too large")
+
+    patch.setattr(cases, "build_case", fail)
+    cases.read_case("forma04a")
+
+
+def picture_on_a_full_disk():
+    _pictures.save(SimpleNamespace(figure=SimpleNamespace(savefig=refusing(errno.ENOSPC))), "a.png")
+
+
+CALLS = [
+    ("a case with a value of another size", unexpected, fc.errors.CaseError, r"a value is of the wrong kind or size \(too large\): see the ready cases"),
+    ("a picture on a full disk", picture_on_a_full_disk, fc.errors.FileError, r"cannot write the picture 'a\.png': .*No space left on device"),
+    ("a picture without contact", lambda: _pictures.profile_picture(None, SimpleNamespace(contact={}), "a.png"), fc.errors.FastcontactError, r"there is no contact pair whose pressure could be plotted"),
+    ("a step of no steps", no_step_yet, fc.errors.CaseError, r"a\.vtkhdf' holds no finished step yet"),
+    ("a pair of a result without contact", lambda: _results.chosen_contact(SimpleNamespace(contact={}), None), fc.errors.CaseError, r"this result holds no contact pair"),
+    ("figures of benchmarks on a full disk", lambda patch: full(patch, bench._write), fc.errors.FileError, r"cannot write 'a\.json': .*No space left on device"),
+    ("a summary on a full disk", lambda patch: full(patch, _write_json), fc.errors.FileError, r"cannot write 'a\.json': No space left on device"),
+    ("a mesh from a pipe", pipe, fc.errors.FileError, r"pipe\.med' is a device or a pipe: name a plain file"),
+    ("a file that was never made", vanished, fc.errors.FileError, r"a\.txt' cannot be written: No such file or directory"),
+    ("an Abaqus file that cannot be read", lambda folder: _abaqus.check_readable(folder), fc.errors.FileError, r"cannot read '.*': .*Is a directory"),
+    ("coordinates in words", lambda: build_mesh([["a", "b"]], [], {}), fc.MeshError, r"its coordinates are no numbers: check that the file is complete"),
+    ("an HDF5 file with groups in a circle", lambda folder: opened(folder, circle), fc.errors.FileError, r"spoilt\.h5' has groups in a circle or too deep, at '.*': write it anew"),
+    ("an HDF5 file with a strange filter", lambda folder: opened(folder, lzf), fc.errors.FileError, r"is packed by the filter 32000, which not every HDF5 knows: use gzip"),
+    ("an HDF5 file with texts for numbers", lambda folder: opened(folder, texts), fc.errors.FileError, r"holds no plain numbers: the file is damaged, write it anew"),
+    ("packed data without head", lambda: _packing.unpacked(np.zeros(300, np.uint8)), ValueError, r"no packed data"),
+    ("packed data that were changed", packed_and_changed, ValueError, r"packed data are cut off or changed"),
+    ("packed data of another kind", packed_of_another_kind, ValueError, r"an array of \|O8 is none of ours"),
+    ("a result whose kinematics are a number", lambda folder: resulting(folder, kinematics_in_numbers), fc.errors.FileError, r"its kinematics or its case is no text"),
+    ("a result whose point numbers are broken", lambda folder: resulting(folder, broken_point_numbers), fc.errors.FileError, r"the contact table of 'pair' is of another kind"),
+    ("a result with a cell field cut off", lambda folder: resulting(folder, cell_field_cut_off), fc.errors.FileError, r"error of step 0 is cut off or of another kind"),
+    ("a cell field with a name of two words", announced, fc.errors.FileError, r"'two words' cannot be the name of a cell field: it is taken or no plain word; choose another"),
+    ("a cell field that never came", not_announced, fc.errors.FileError, r"step 1: the cell field 'error' that was announced has shape \(0,\), but \(4,\) is needed, a number for each solid cell"),
+    ("a result file that others change", changed_by_others, fc.errors.FileError, r"a\.vtkhdf' was changed by another program after 0 steps, what it holds now is left alone: let no other program write to it"),
+]  # fmt: skip
