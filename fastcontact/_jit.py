@@ -35,8 +35,11 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def parallel_kernel(function: Callable[..., Any]) -> Any:
-    """Like `kernel`, with `prange` loops spread over threads; iterations must write disjoint memory."""
-    return _compile(function, parallel=True)
+    """Like `kernel`, with `prange` loops spread over threads; iterations must write disjoint memory.
+
+    With NUMBA_BOUNDSCHECK=1 the loops run in one thread: Numba checks no index inside parallel ones.
+    """
+    return _compile(function, parallel=not getattr(numba.config, "BOUNDSCHECK", None))
 
 
 def summing_kernel(function: Callable[..., Any]) -> Any:

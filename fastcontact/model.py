@@ -544,7 +544,7 @@ class Model:
             raise ContactError(f"there is already a contact pair '{pair.name}': names must differ")
         bound = self.bind(pair)
         if isinstance(bound.primary, RigidSide):
-            check_obstacle(self.mesh, pair, bound.secondary, bound.primary)
+            check_obstacle(self.mesh, pair.name, bound.secondary, bound.primary)
         for other in self.contact:
             if pair.primary and {pair.secondary, pair.primary} == {other.secondary, other.primary}:
                 raise ContactError(
@@ -573,7 +573,7 @@ class Model:
             primary = RigidSide(pair.obstacle, np.array(pair.motion))
         else:
             primary = surface(self.mesh, pair.primary)
-            check_sides(self.mesh, pair, secondary, primary)
+            check_sides(self.mesh, pair.name, secondary, primary)
         modulus = min((m.E / (1 - m.nu**2) for m, _ in self.materials), default=1.0)
         terms = terms_of(pair.name, pair.options, self.mesh, secondary, against_obstacle=pair.obstacle is not None)
         own = {key: value for key, value in pair.options.items() if key not in TERMS}

@@ -6,6 +6,7 @@ It has a home and a folder for temporary files of its own.
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import resource
 import signal
@@ -31,10 +32,21 @@ MEMORY = 12 << 30
 
 
 class Chosen:
-    """Leaves the chosen tests only, in their order."""
+    """Leaves the chosen tests only, in their order, and writes which of them did not pass."""
 
-    def __init__(self, tests: list[str]) -> None:
+    def __init__(self, tests: list[str], failed: Path) -> None:
         self.order = {test: place for place, test in enumerate(tests)}
+        self.passed: set[str] = set()
+        self.failed = failed
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Note what passed."""
+        if report.when == "call" and report.passed:
+            self.passed.add(report.nodeid)
+
+    def pytest_sessionfinish(self) -> None:
+        """Write the others."""
+        self.failed.write_text(json.dumps([test for test in self.order if test not in self.passed]), encoding="utf-8")
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         """Choose."""
@@ -47,13 +59,19 @@ def load() -> None:
         importlib.import_module(name)
 
 
-def verdict(tree: Path, tests: list[str], limit: float, log: Path) -> str:
+def failing(tree: Path, tests: list[str], log: Path) -> list[str]:
+    """Return the tests that do not pass, run to the last."""
+    verdict(tree, tests, 3600.0, log, first_only=False)
+    return list(json.loads((tree.parent / "own" / "failed.json").read_text(encoding="utf-8")))
+
+
+def verdict(tree: Path, tests: list[str], limit: float, log: Path, first_only: bool = True) -> str:
     """Return ``"survived"``, ``"killed"``, ``"crashed"`` or ``"hung"`` for the package in `tree` under tests."""
     child = os.fork()
     if child == 0:
         code = 99  # of a process that did not come to its tests
         try:
-            code = _run(tree, tests, log)
+            code = _run(tree, tests, log, first_only)
         finally:
             os._exit(code)
     deadline = time.monotonic() + limit
@@ -67,7 +85,7 @@ def verdict(tree: Path, tests: list[str], limit: float, log: Path) -> str:
     return "hung"
 
 
-def _run(tree: Path, tests: list[str], log: Path) -> int:
+def _run(tree: Path, tests: list[str], log: Path, first_only: bool) -> int:
     os.setpgid(0, 0)
     out = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
     os.dup2(out, 1)
@@ -80,7 +98,19 @@ def _run(tree: Path, tests: list[str], log: Path) -> int:
     tempfile.tempdir = None
     sys.path.insert(0, str(tree))
     files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
-    options = ["-o", "addopts=", "-p", "no:cacheprovider", "-p", "no:xdist", "-x", "-q", "--tb=line", "-m", ""]
-    code = pytest.main([*options, *files], plugins=[Chosen(tests)])
+    options = [
+        "-o",
+        "addopts=",
+        "-p",
+        "no:cacheprovider",
+        "-p",
+        "no:xdist",
+        "-q",
+        "--tb=line",
+        "-m",
+        "",
+        *["-x"] * first_only,
+    ]
+    code = pytest.main([*options, *files], plugins=[Chosen(tests, own / "failed.json")])
     sys.stdout.flush()
     return int(code)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,24 +11,21 @@ from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import Mesh
 
-if TYPE_CHECKING:
-    from fastcontact.model import ContactPair
-
 Array = NDArray[np.float64]
 # Facets of each kind that are looked at.
 SAMPLE = 200
 
 
-def check_sides(mesh: Mesh, pair: ContactPair, secondary: Surface, primary: Surface) -> None:
-    """Refuse sides that share nodes or cannot face each other."""
-    if pair.secondary == pair.primary:
+def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface) -> None:
+    """Raise ContactError for sides of contact `name` that share nodes or cannot face each other."""
+    if secondary.group == primary.group:
         raise ContactError(
-            f"contact '{pair.name}' has '{pair.primary}' on both sides: name the group of the other body as one of them"
+            f"contact '{name}' has '{primary.group}' on both sides: name the group of the other body as one of them"
         )
     shared = np.intersect1d(secondary.points, primary.points)
     if len(shared):
         raise ContactError(
-            f"the two sides of contact '{pair.name}' share {len(shared)} nodes (first: point {shared[0]}): "
+            f"the two sides of contact '{name}' share {len(shared)} nodes (first: point {shared[0]}): "
             "duplicate the nodes of the interface, one set for each side"
         )
     ours, theirs = _facet_frames(mesh, secondary), _facet_frames(mesh, primary)
@@ -43,19 +38,19 @@ def check_sides(mesh: Mesh, pair: ContactPair, secondary: Surface, primary: Surf
         behind = -np.einsum("ijd,id->ij", apart, ours[1])[facing]
         inside = f", or do the bodies lie inside each other, by {behind.min():.4g} or more" if len(behind) else ""
         raise ContactError(
-            f"no facet of '{pair.secondary}' faces '{pair.primary}': the outer sides of the two groups look away from "
+            f"no facet of '{secondary.group}' faces '{primary.group}': the outer sides of the two groups look away from "
             f"each other; is one of them the wrong face of its body{inside}?"
         )
 
 
-def check_obstacle(mesh: Mesh, pair: ContactPair, secondary: Surface, obstacle: RigidSide) -> None:
-    """Refuse an obstacle that no facet of the secondary side faces."""
+def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSide) -> None:
+    """Raise ContactError for an obstacle of contact `name` that no facet of the secondary side faces."""
     centres, outward, _ = _facet_frames(mesh, secondary)
     _, normal, paired, _ = obstacle.facing(centres)
     along = np.einsum("id,id->i", outward, normal)[paired]
     if len(along) and (along >= 0).all():
         raise ContactError(
-            f"the rigid obstacle of contact '{pair.name}' looks the same way as '{pair.secondary}', so that they cannot "
+            f"the rigid obstacle of contact '{name}' looks the same way as '{secondary.group}', so that they cannot "
             "touch: turn its normal or its facets round, or name another face of the body"
         )
 

@@ -14,6 +14,7 @@ from test_cli import CASE
 
 import fastcontact as fc
 from fastcontact.cli import main
+from fastcontact.cli._progress import Progress
 
 DOUBT = "warning: contact 'hertz' has only 3 elements across its radius"
 STEPS = 6
@@ -294,3 +295,19 @@ def test_two_runs_begun_at_once_leave_one_good_file(whole, path):
     assert all(line.startswith(f"error: '{path}' is being written by process ") for line in refused)
     assert_same(path, steps)
     assert os.listdir(Path(path).parent) == [path.name]
+
+
+def test_the_progress_of_a_resumed_run_counts_what_it_solves(whole, capsys, monkeypatch):
+    """Two of six steps were there; the third took a second, so that three seconds are left."""
+    seconds = iter((10.0, 11.0, 12.0))
+    monkeypatch.setattr("fastcontact.cli._progress.time.perf_counter", lambda: next(seconds))
+    progress = Progress(STEPS, show=True, done=2)
+    progress.step(whole[1][2])
+    assert f"step 3/{STEPS}, " in (told := capsys.readouterr().err)
+    assert "nodes in contact, 3 s left" in told
+    progress.close()
+    assert capsys.readouterr().err.strip() == ""
+    quiet = Progress(STEPS, show=False)
+    quiet.step(whole[1][2])
+    quiet.close()
+    assert capsys.readouterr().err == ""
