@@ -63,16 +63,16 @@ def uncovered(report: dict) -> Iterator[Place]:
 
 
 def unlisted(places: list[Place], entries: list[dict]) -> list[Place]:
-    """Return the places without an entry that has a reason; an entry without lines stands for a whole function."""
-    known: set[Place] = set()
-    whole: set[tuple[str, str]] = set()
+    """Return the places that no entry with a reason stands for: some lines, a whole function, or a whole file."""
+    known: set[tuple[str, ...]] = set()
     for entry in entries:
         if not entry.get("reason", "").strip():
             continue
-        if "lines" not in entry:
-            whole.add((entry["file"], entry["function"]))
-        known |= {(entry["file"], entry["function"], line) for line in entry.get("lines", ())}
-    return [place for place in places if place not in known and place[:2] not in whole]
+        if "lines" in entry:
+            known |= {(entry["file"], entry["function"], line) for line in entry["lines"]}
+        else:
+            known.add((entry["file"], entry["function"]) if "function" in entry else (entry["file"],))
+    return [place for place in places if known.isdisjoint({place, place[:2], place[:1]})]
 
 
 def listing(places: list[Place]) -> str:

@@ -38,6 +38,10 @@ def main() -> int:
     print(found.table())
     for entry in sorted(found.failures, key=lambda entry: (entry["kind"], entry["name"])):
         print(f"{entry['kind']}: file {entry['number']} ({entry['name']}): {entry['message'][:200]}")
+    for entry in found.once:
+        print(
+            f"once and not again: {entry['kind']}: file {entry['number']} ({entry['name']}): {entry['message'][:200]}"
+        )
     seconds, which = found.slowest
     print(f"slowest: {which}, {seconds:.2f} s CPU; seed {given.seed}, {time.perf_counter() - started:.0f} s in all")
     return 1 if found.failures else 0

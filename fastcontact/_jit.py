@@ -50,10 +50,16 @@ def summing_kernel(function: Callable[..., Any]) -> Any:
     return _compile(function, parallel=False, fastmath=FASTMATH | {"reassoc"})
 
 
-def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = FASTMATH) -> Any:
+def inlined_kernel(function: Callable[..., Any]) -> Any:
+    """Like `kernel`, for parts of hot loops: written out where they are called. See `kernels.borrowing` for arrays."""
+    return _compile(function, parallel=False, inline="always")
+
+
+def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = FASTMATH, inline: str = "never") -> Any:
     options: dict[str, Any] = {"fastmath": fastmath, "parallel": parallel, "nogil": True, "error_model": "numpy"}
+    options["inline"] = inline
     try:
-        return numba.njit(cache=True, **options)(function)
+        return _watching(numba.njit(cache=True, **options)(function), function)
     except RuntimeError as error:  # numba: "cannot cache function ...: no locator available for file ..."
         if "cannot cache" not in str(error):
             raise
@@ -62,6 +68,16 @@ def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = 
             _cache_reported = True
             log.info("no writable folder for compiled kernels (set NUMBA_CACHE_DIR): compiling in every process")
         return numba.njit(cache=False, **options)(function)
+
+
+def _watching(compiled_kernel: Any, function: Callable[..., Any]) -> Any:
+    """Let the disk cache notice changes in the other files whose kernels this one may call; Numba looks at its own only."""
+    files = {getattr(other, "py_func", function).__code__.co_filename for other in function.__globals__.values()}
+    cache = getattr(getattr(compiled_kernel, "_cache", None), "_cache_file", None)
+    if cache is not None and len(files) > 1:
+        stats = [os.stat(file) for file in sorted(files)]
+        cache._source_stamp = [(stat.st_mtime, stat.st_size) for stat in stats]
+    return compiled_kernel
 
 
 def _notice_fork() -> None:

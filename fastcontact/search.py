@@ -10,7 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import ContactError
-from fastcontact.kernels import box_tree, packed_tree, search2d, search3d
+from fastcontact.kernels import box_tree, facets3d, packed_tree, search2d, search3d
+from fastcontact.kernels.projection3d import Domain, Facets
+from fastcontact.kernels.search3d import RUN, Answer, scratch
+from fastcontact.parallel import portions, shared
 
 Array = NDArray[np.float64]
 
@@ -19,7 +22,7 @@ _TRIANGLE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5]
 _SQUARE = np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1], [0, -1], [1, 0], [0, 1], [-1, 0], [0, 0]])
 _TRIANGLE_SIDES = np.array([[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [1.0, 1.0, 1.0]])
 _SQUARE_SIDES = np.array([[-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, -1.0, 1.0], [0.0, 1.0, 1.0]])
-# Powers of s and t, in the order of `kernels.search3d`.
+# Powers of s and t, in the order of `kernels.projection3d`.
 _POWERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1], [2, 0], [0, 2], [2, 1], [1, 2], [2, 2]])
 # The largest change of the gradient of each power from that at (0, 0), and the largest second derivative (its spectral
 # norm), for s and t up to 1.
@@ -120,30 +123,37 @@ def _on_lines(points: Array, corners: Array) -> Closest:
 
 
 def _on_faces(points: Array, corners: Array) -> Closest:
-    reference, sides, to_terms, to_hull, weights = _tables(corners.shape[1])
-    bounds = search3d.bounds(corners)
+    nodes, sides, to_terms, to_hull, weights = _tables(corners.shape[1])
+    n, size = len(points), len(corners)
+    bounds = facets3d.bounds(corners)
     # Seen from their midst: far from the origin, rounding would be coarser than the steps of a converged projection.
     midst = 0.5 * (bounds[0] + bounds[1])
-    order = packed_tree.curve_order(np.ascontiguousarray(corners[:, 0]), *bounds)
-    terms, nodes = np.empty(corners.shape), np.empty(corners.shape)
-    low, high = np.empty((len(corners), 3)), np.empty((len(corners), 3))
-    bend, convex = np.empty(len(corners)), np.empty(len(corners))
-    search3d.prepare(
-        corners, order, 0, len(corners), midst, to_terms, to_hull, weights, terms, nodes, low, high, bend, convex
+    numbers = packed_tree.curve_order(np.ascontiguousarray(corners[:, 0]), *bounds)
+    facets = Facets(np.empty(corners.shape), np.empty(corners.shape), np.empty(size), np.empty(size), numbers)
+    low, high = np.empty((size, 3)), np.empty((size, 3))
+    shared(
+        lambda part: facets3d.prepare(corners, *part, midst, to_terms, to_hull, weights, facets, low, high),
+        portions(size),
     )
-    tree = packed_tree.pack(low, high)
-    along = packed_tree.curve_order(points, *bounds)
-    n = len(points)
-    facet, xi, normal, overhang = np.empty(n, np.intp), np.empty((n, 2)), np.empty((n, 3)), np.empty(n)
-    position, distance, status = np.empty((n, 3)), np.empty(n), np.empty(n, np.int8)
-    search3d.closest_facets(
-        points, along, 0, n, midst, terms, nodes, bend, convex, reference, flat_triangles(len(reference)), sides,
-        *tree, order, facet, xi, normal, overhang, position, distance, status,
+    tree, domain = packed_tree.pack(low, high), Domain(nodes, flat_triangles(len(nodes)), sides)
+    order = packed_tree.curve_order(points, *bounds)
+    answer = Answer(
+        np.empty(n, np.intp), np.empty((n, 2)), np.empty((n, 3)), np.empty(n), np.empty((n, 3)), np.empty(n),
+        np.empty(n, np.int8),
     )  # fmt: skip
-    wrong = np.flatnonzero(status != search3d.CONVERGED)
+    shared(
+        lambda part: search3d.closest_facets(points, order, *part, midst, facets, domain, tree, answer, scratch()),
+        _runs(n),
+    )
+    wrong = np.flatnonzero(answer.status != search3d.CONVERGED)
     if len(wrong):
-        _refuse(points[wrong], facet[wrong], corners)
-    return Closest(facet, xi, normal, overhang, position, distance)
+        _refuse(points[wrong], answer.facet[wrong], corners)
+    return Closest(*answer[:-1])
+
+
+def _runs(n: int) -> list[tuple[int, int]]:
+    """Return the portions of `n` points, cut between runs: a point's own depends on no thread."""
+    return [(begin - begin % RUN, end - end % RUN if end < n else n) for begin, end in portions(n)]
 
 
 def _refuse(points: Array, facet: NDArray[np.intp], corners: Array) -> None:
@@ -162,7 +172,7 @@ def _refuse(points: Array, facet: NDArray[np.intp], corners: Array) -> None:
 def _tables(n_nodes: int) -> tuple[Array, Array, Array, Array, Array]:
     """Return the reference nodes and sides of a facet in 3D, matrices from nodes to terms and to a hull, and weights.
 
-    The weights (3, n_nodes) of the terms are those of `kernels.search3d.prepare`.
+    The weights (3, n_nodes) of the terms are those of `kernels.facets3d.prepare`.
     """
     if n_nodes not in _FLAT:
         raise ContactError(f"there are no facets of {n_nodes} nodes in three dimensions: known are {sorted(_FLAT)}")

@@ -1,4 +1,7 @@
-"""Closest facets of a wavy surface of quadrangles, in nearest-point queries of SciPy's cKDTree, as many."""
+"""Closest facets of a wavy surface or line, in nearest-point queries of SciPy's cKDTree, as many; everything shuffled.
+
+Ours include the tree over the facets, the queries do not: building theirs is told apart.
+"""
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -8,14 +11,43 @@ from fastcontact.search import closest
 SIZES = (1_000, 10_000, 100_000)
 
 
-def works(size):
+def quadrangles(size):
     n = max(4, round(size**0.5))
     x, y = np.meshgrid(np.linspace(0.0, 1.0, n + 1), np.linspace(0.0, 1.0, n + 1), indexing="ij")
     nodes = np.stack([x, y, 0.05 * np.sin(5 * x) * np.cos(4 * y)], axis=-1)
-    corners = np.stack([nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]], axis=2).reshape(-1, 4, 3)
-    points = corners.mean(axis=1) + np.array([0.3 / n, 0.2 / n, 0.1 / n])
-    middles = corners.mean(axis=1)
-    return len(points), {
-        "closest facets": lambda: closest(points, corners),
-        "cKDTree, build and query": lambda: cKDTree(middles).query(points),
+    return np.stack([nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]], axis=2).reshape(-1, 4, 3)
+
+
+def triangles(size):
+    corners = quadrangles(size / 2)
+    return np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
+
+
+def lines(size):
+    angle = np.linspace(0.0, 2 * np.pi, size + 1)
+    nodes = ((1 + 0.1 * np.cos(7 * angle)) * [np.cos(angle), np.sin(angle)]).T
+    return np.stack([nodes[:-1], nodes[1:]], axis=1)
+
+
+def surface(make, size):
+    """Facets (n, n_nodes, dim) and a point a third of a facet off the middle of each, both in any order."""
+    rng, corners = np.random.default_rng(0), make(size)
+    off = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)[:, None] * np.array([0.3, 0.2, 0.1])[: corners.shape[2]]
+    return np.ascontiguousarray(rng.permutation(corners)), rng.permutation(corners.mean(axis=1) + off)
+
+
+def works(size):
+    (quad4, on_quad4), (tri3, on_tri3), (line2, on_line2) = (
+        surface(make, size) for make in (quadrangles, triangles, lines)
+    )
+    middles, middles_2d = quad4.mean(axis=1), line2.mean(axis=1)
+    tree, tree_2d = cKDTree(middles), cKDTree(middles_2d)
+    return len(on_quad4), {
+        "quad4": lambda: closest(on_quad4, quad4),
+        "tri3": lambda: closest(on_tri3, tri3),
+        "line2": lambda: closest(on_line2, line2),
+        "cKDTree, build 2D": lambda: cKDTree(middles_2d),
+        "cKDTree, query 2D": lambda: tree_2d.query(on_line2),
+        "cKDTree, build": lambda: cKDTree(middles),
+        "cKDTree, query": lambda: tree.query(on_quad4),
     }

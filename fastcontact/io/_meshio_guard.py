@@ -60,9 +60,7 @@ def bounded(path: Path, file_format: str) -> Iterator[None]:
         Inside the block, if meshio is made to read another file, to take more memory than the file can mean, or to
         wait beyond its end.
     """
-    import h5py
-
-    if file_format in HDF5_FORMATS and (file_format != "exodus" or h5py.is_hdf5(path)):  # or an older kind of netCDF
+    if file_format in HDF5_FORMATS and (file_format != "exodus" or _is_hdf5(path)):
         with _hdf5.opened(path):
             pass
     size = os.path.getsize(path)
@@ -91,6 +89,13 @@ def bounded(path: Path, file_format: str) -> Iterator[None]:
         for names, originals in before:
             names.pop("open", None)
             names.update(originals)
+
+
+def _is_hdf5(path: Path) -> bool:
+    """Return whether a file is one of HDF5: others may be of an older kind of netCDF."""
+    import h5py
+
+    return bool(h5py.is_hdf5(path))
 
 
 class _Bounded:

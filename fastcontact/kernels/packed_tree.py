@@ -7,7 +7,10 @@ distances to all of them are one short loop; missing ones are infinitely far. ``
 child, and at the leaves, which come first, the position of the first facet; the root comes last.
 """
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from fastcontact._jit import kernel
 
@@ -15,6 +18,19 @@ WIDTH = 8
 # Sorting takes three or four passes over digits of so many bits.
 DIGIT, PASSES = 12, 4
 BLOCK = 256
+
+
+class Tree(NamedTuple):
+    """What is in the nodes: boxes (n_nodes, 2 dim, WIDTH), and the number of the first (n_nodes,)."""
+
+    boxes: NDArray[np.float64]
+    first: NDArray[np.int64]
+
+
+@kernel
+def leaves(n):
+    """Return the number of nodes that hold `n` facets or nodes."""
+    return (n + WIDTH - 1) // WIDTH
 
 
 @kernel
@@ -148,12 +164,12 @@ def pack(low, high):
     n, dim = low.shape
     count, level = 0, n
     while count == 0 or level > 1:
-        level = max((level + WIDTH - 1) // WIDTH, 1)
+        level = max(leaves(level), 1)
         count += level
     boxes, first = np.empty((count, 2 * dim, WIDTH)), np.empty(count, np.int64)
     boxes[:, :dim] = np.inf
     boxes[:, dim:] = -np.inf
-    n_leaves = (n + WIDTH - 1) // WIDTH
+    n_leaves = max(leaves(n), 1)
     for node in range(n_leaves):
         first[node] = node * WIDTH
         for k in range(min(WIDTH, n - node * WIDTH)):
@@ -169,4 +185,4 @@ def pack(low, high):
                     boxes[node, dim + d, k] = boxes[start + k, dim + d].max()
             node += 1
         begin, end = end, node
-    return boxes, first
+    return Tree(boxes, first)

@@ -55,7 +55,12 @@ def _project(corners, f, x, y):
             s = new
             if change < 1e-15:
                 break
-    px, py, _, _, _, _ = _curve(corners, f, s)
+    # At a node that facets share, all of them have the same distance to the last bit: then the first one is taken.
+    if abs(s) == 1.0:
+        end = 0 if s < 0.0 else 1
+        px, py = corners[f, end, 0], corners[f, end, 1]
+    else:
+        px, py, _, _, _, _ = _curve(corners, f, s)
     return s, (x - px) ** 2 + (y - py) ** 2
 
 

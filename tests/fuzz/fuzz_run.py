@@ -19,16 +19,19 @@ import numpy as np
 
 GOOD = ("read", "refused")
 BAD = ("other error", "many lines", "memory", "outside", "crash", "hang")
+# What another program on the machine may cause, too: counted where it comes again in a fresh process.
+FROM_OUTSIDE = ("outside", "crash", "hang", "memory")
 WALL_SECONDS = 120  # the limit of CPU time is the worker's own; this one is for a process that waits
 
 
 @dataclass
 class Found:
-    """What came of the files: how often each outcome by seed, the slowest, and those that went wrong."""
+    """What came of the files: how often what by seed, the slowest, those that went wrong, and those that did only once."""
 
     counts: dict[str, Counter] = field(default_factory=dict)
     slowest: tuple[float, str] = (0.0, "")
     failures: list[dict] = field(default_factory=list)
+    once: list[dict] = field(default_factory=list)
 
     def add(self, entry: dict) -> None:
         self.counts.setdefault(entry["name"], Counter())[entry["kind"]] += 1
@@ -75,6 +78,15 @@ def run(numbers: list[int], seed: int, folder: Path, failures: Path | None = Non
                     break
                 number = waiting.pop()
             entry = _one(process, number)
+            if entry["kind"] in FROM_OUTSIDE:
+                if process.poll() is None:
+                    process.stdin.close()
+                    process.wait(timeout=WALL_SECONDS)
+                process = _start(seed, folder, place)
+                entry, before = _one(process, number), entry
+                if entry["kind"] in GOOD:
+                    with lock:
+                        found.once.append(before)
             path = Path(entry.get("path", ""))
             with lock:
                 found.add(entry)

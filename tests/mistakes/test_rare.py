@@ -5,11 +5,12 @@ import re
 
 import pytest
 import rare_files
+import rare_inside
 import rare_models
 import rare_studies
 from test_mistakes import case_text, folder, refused  # noqa: F401 (a fixture)
 
-CALLS = [*rare_models.MISTAKES, *rare_studies.CALLS, *rare_files.CALLS]
+CALLS = [*rare_models.MISTAKES, *rare_studies.CALLS, *rare_files.CALLS, *rare_inside.CALLS]
 
 
 @pytest.mark.parametrize(("make", "kind", "pattern"), [c[1:] for c in CALLS], ids=[c[0] for c in CALLS])

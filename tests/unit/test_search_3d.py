@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from fastcontact import ContactError, elements
+from fastcontact import ContactError, _jit, elements
 from fastcontact.kernels import box_tree
 from fastcontact.search import _tables, _terms, closest, closest_of_kinds, flat_triangles
 
@@ -159,7 +159,7 @@ def test_several_kinds_are_one_surface():
 @pytest.mark.parametrize("name", KINDS)
 def test_the_tables_are_those_of_the_elements(name):
     element = elements.get(name)
-    nodes, sides, to_terms, hull, (bend, _, _) = _tables(element.n_nodes)
+    nodes, sides, to_terms, hull, (bend, turn, second) = _tables(element.n_nodes)
     assert np.array_equal(nodes, element.nodes)
     xi = grid(name, 31)
     assert np.abs(_terms(xi, element.n_nodes) @ to_terms - element.shape(xi)).max() < 1e-14
@@ -175,9 +175,95 @@ def test_the_tables_are_those_of_the_elements(name):
     for flat in flat_triangles(element.n_nodes):
         curved = np.einsum("qk,nkd->nqd", element.shape(weights @ nodes[flat]), corners)
         assert (np.linalg.norm(curved - weights @ corners[:, flat], axis=2) <= allowed[:, None] + 1e-12).all()
+    # Tangents at two places of the domain, one of them (0, 0), and second derivatives, by differences.
+    places, step = xi * (1 - 2e-4) + 1e-4 * nodes.mean(axis=0), 1e-4
+    terms = lambda s, t: _terms(places + step * np.array([s, t]), element.n_nodes)  # noqa: E731
+    slopes = np.stack([terms(1, 0) - terms(-1, 0), terms(0, 1) - terms(0, -1)], axis=-1) / (2 * step)
+    start = np.eye(element.n_nodes)[:, [1, 2]]
+    assert (np.linalg.norm(slopes - start, axis=2).max(axis=0)[3:] <= turn[3:] + 1e-7).all()
+    both = (terms(1, 1) - terms(1, -1) - terms(-1, 1) + terms(-1, -1)) / (4 * step**2)
+    twice = [(terms(s, t) - 2 * terms(0, 0) + terms(-s, -t)) / step**2 for s, t in ((1, 0), (0, 1))]
+    hessians = np.stack([twice[0], both, both, twice[1]], axis=-1).reshape(*both.shape, 2, 2)
+    assert (np.linalg.norm(hessians, ord=2, axis=(2, 3)).max(axis=0)[3:] <= second[3:] + 1e-5).all()
     areas = [np.linalg.det(nodes[flat[1:]] - nodes[flat[0]]) / 2 for flat in flat_triangles(element.n_nodes)]
     assert min(areas) > 0
     assert sum(areas) == pytest.approx(0.5 if triangular(name) else 4.0)
+
+
+def wavy(name, n):
+    """A connected surface of facets (n_facets, n_nodes, 3) over the unit square, and points near it and at its nodes."""
+    element, rng = elements.get(name), np.random.default_rng(11)
+    lower = np.array([[i, j] for i in range(n) for j in range(n)]) / n
+    local = element.nodes if triangular(name) else 0.5 * (1 + element.nodes)
+    parts = [lower[:, None] + local / n] + ([lower[:, None] + (1 - local) / n] if triangular(name) else [])
+    x, y = np.moveaxis(np.concatenate(parts), 2, 0)
+    facets = np.stack([x, y, 0.1 * np.sin(5 * x) * np.cos(4 * y)], axis=-1)
+    near = facets.mean(axis=1) + rng.normal(0, 0.3 / n, (len(facets), 3))
+    return facets, np.concatenate([near, facets[:40, 0], facets[:40, 1], 1e6 * rng.normal(size=(20, 3))])
+
+
+def of_lowest_number(points, facets):
+    """Distances to the closest facet and the first of those that are equally close, one facet after the other."""
+    found = [closest(points, facets[f : f + 1]) for f in range(len(facets))]
+    distance = np.array([one.distance for one in found])
+    best = distance.min(axis=0)
+    place = np.array([one.position for one in found])
+    nearest = place[distance.argmin(axis=0), np.arange(len(points))]
+    size = np.ptp(facets, axis=1).max()
+    meet = np.linalg.norm(place - nearest, axis=2) <= 1e-10 * size
+    return best, np.argmax(meet & (distance <= best + 1e-10 * size + 1e-14 * best), axis=0)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_tree_finds_what_one_facet_after_the_other_finds(name):
+    """Points at the nodes are shared by several facets, points a million sizes away nearly as close to many."""
+    facets, points = wavy(name, 9)
+    found = closest(points, facets)
+    distance, first = of_lowest_number(points, facets)
+    assert np.abs(found.distance - distance).max() <= 1e-15 * distance.max()
+    assert np.abs(found.distance - distance)[:-20].max() < 1e-14
+    assert np.array_equal(found.facet[:-20], first[:-20])
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_order_of_points_and_facets_changes_nothing(name):
+    facets, points = wavy(name, 9)
+    found, rng = closest(points, facets), np.random.default_rng(12)
+    some = rng.permutation(len(points))
+    again = closest(points[some], facets)
+    for field in ("facet", "xi", "normal", "overhang", "position", "distance"):
+        assert np.array_equal(getattr(again, field), getattr(found, field)[some])
+    for i in some[:30]:
+        assert closest(points[i : i + 1], facets).facet[0] == found.facet[i]
+    turned = rng.permutation(len(facets))
+    other = closest(points, facets[turned])
+    assert np.abs(other.distance - found.distance).max() <= 1e-15 * found.distance.max()
+    # The same facet but where several meet in the closest point, and then the same point.
+    alike = turned[other.facet] == found.facet
+    assert alike.mean() > 0.5
+    assert np.array_equal(other.xi[alike], found.xi[alike])
+    assert np.abs(other.position - found.position)[:-20].max() < 1e-9
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_of_facets_that_coincide_the_first_is_taken(name):
+    facets, points = wavy(name, 5)
+    found, doubled = closest(points, facets), closest(points, np.concatenate([facets, facets, facets]))
+    for field in ("facet", "xi", "normal", "overhang", "position", "distance"):
+        assert np.array_equal(getattr(doubled, field), getattr(found, field))
+
+
+@pytest.mark.parametrize("name", ["tri3", "quad4", "quad8"])
+def test_threads_do_not_change_a_bit(name, monkeypatch):
+    facets, points = wavy(name, 30)
+    points = np.concatenate([points + 1e-3 * k for k in range(30_000 // len(points) + 1)])
+    found = []
+    for count in (1, 2, 3):
+        monkeypatch.setattr(_jit, "threads", lambda count=count: count)
+        found.append(closest(points, facets))
+    for field in ("facet", "xi", "normal", "overhang", "position", "distance"):
+        assert np.array_equal(getattr(found[0], field), getattr(found[1], field))
+        assert np.array_equal(getattr(found[0], field), getattr(found[2], field))
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -1,0 +1,128 @@
+"""What the search wants to know of facets in 3D: polynomials, boxes, how bent they are, where a minimum is the only one.
+
+Polynomials are those of `projection3d`.
+"""
+
+import numpy as np
+
+from fastcontact._jit import inlined_kernel, kernel
+from fastcontact.kernels.borrowing import borrowed
+from fastcontact.kernels.projection3d import vector
+from fastcontact.kernels.straight3d import dot, room
+
+# A facet that strays from flat triangles by less than this part of its size is flat.
+FLAT = 1e-9
+
+
+@kernel
+def bounds(corners):
+    """Return the corners (3,) of the box around all nodes (n_facets, m, 3)."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for f in range(corners.shape[0]):
+        for a in range(corners.shape[1]):
+            for d in range(3):
+                low[d], high[d] = min(low[d], corners[f, a, d]), max(high[d], corners[f, a, d])
+    return low, high
+
+
+@kernel
+def prepare(corners, begin, end, midst, to_terms, to_hull, weights, facets, low, high):
+    """Fill what the search wants to know of the facets ``numbers[begin:end]``, in that order.
+
+    Parameters
+    ----------
+    corners : (n_facets, m, 3)
+        Nodes of the facets by their numbers.
+    midst : (3,)
+        New origin: far from it, rounding would be coarser than the steps of a converged projection.
+    to_terms : (m, m), to_hull : (k, m)
+        From nodes to terms, and to points whose convex hull holds the facet.
+    weights : (3, m)
+        For each term of unit size: how far it strays from flat triangles, how much it changes the tangents over the
+        domain, and its second derivative, all at most.
+    facets : Facets
+        All but the numbers is filled in place.
+    low, high : (n_facets, 3)
+        Boxes, filled in place.
+    """
+    corners, to_terms, to_hull, weights, low, high = borrowed((corners, to_terms, to_hull, weights, low, high))
+    terms, nodes, bend, convex, numbers = borrowed(facets)
+    m = corners.shape[1]
+    for i in range(begin, end):
+        for a in range(m):
+            for d in range(3):
+                nodes[i, a, d] = corners[numbers[i], a, d] - midst[d]
+        for d in range(3):
+            if m <= 4:
+                _fill_straight(nodes, i, d, terms, low, high)
+            else:
+                _fill_curved(nodes, i, d, to_terms, to_hull, terms, low, high)
+        bend[i], convex[i] = 0.0, np.inf
+        if m == 3:
+            continue
+        stray, turn, second = _curvature(terms, i, weights)
+        extent = high[i, 0] - low[i, 0], high[i, 1] - low[i, 1], high[i, 2] - low[i, 2]
+        if stray >= FLAT * max(extent):
+            bend[i] = stray
+        p, q = vector(terms, i, 1), vector(terms, i, 2)
+        diagonal = np.sqrt(dot(extent, extent))
+        convex[i] = room(p, q, vector(terms, i, 3)) if m == 4 else _convex(p, q, turn, second, diagonal)
+
+
+@inlined_kernel
+def _fill_straight(nodes, i, d, terms, low, high):
+    """Fill the terms and the box of a facet of 3 or 4 nodes, in one coordinate."""
+    p, q, r = nodes[i, 0, d], nodes[i, 1, d], nodes[i, 2, d]
+    low[i, d], high[i, d] = min(p, q, r), max(p, q, r)
+    if nodes.shape[1] == 3:
+        terms[i, 0, d], terms[i, 1, d], terms[i, 2, d] = p, q - p, r - p
+    else:
+        s = nodes[i, 3, d]
+        terms[i, 0, d], terms[i, 1, d] = 0.25 * ((p + r) + (q + s)), 0.25 * ((q - p) + (r - s))
+        terms[i, 2, d], terms[i, 3, d] = 0.25 * ((r - q) + (s - p)), 0.25 * ((p - q) + (r - s))
+        low[i, d], high[i, d] = min(low[i, d], s), max(high[i, d], s)
+
+
+@inlined_kernel
+def _fill_curved(nodes, i, d, to_terms, to_hull, terms, low, high):
+    """Fill the terms and the box of a facet with curved sides, in one coordinate."""
+    for k in range(to_terms.shape[0]):
+        value = 0.0
+        for a in range(nodes.shape[1]):
+            value += to_terms[k, a] * nodes[i, a, d]
+        terms[i, k, d] = value
+    low[i, d], high[i, d] = np.inf, -np.inf
+    for k in range(to_hull.shape[0]):
+        value = 0.0
+        for a in range(nodes.shape[1]):
+            value += to_hull[k, a] * nodes[i, a, d]
+        low[i, d], high[i, d] = min(low[i, d], value), max(high[i, d], value)
+
+
+@inlined_kernel
+def _curvature(terms, i, weights):
+    """Return how far a facet strays from flat triangles, how much its tangents change, its second derivative, at most."""
+    stray, turn, second = 0.0, 0.0, 0.0
+    for k in range(3, terms.shape[1]):
+        term = vector(terms, i, k)
+        length = np.sqrt(dot(term, term))
+        stray += length * weights[0, k]
+        turn += length * weights[1, k]
+        second += length * weights[2, k]
+    return stray, turn, second
+
+
+@kernel
+def _convex(p, q, turn, second, diagonal):
+    """Return the square of a distance below which half the squared distance is convex on a facet, with tangents p and q.
+
+    Its Hessian is J^T J - r . X'' with the tangents J: positive definite where the smallest singular value of J, squared,
+    exceeds r |X''|, with r the distance to the farthest point of the facet.
+    """
+    pp, pq, qq = dot(p, p), dot(p, q), dot(q, q)
+    least = np.sqrt(max(0.5 * (pp + qq) - np.sqrt(0.25 * (pp - qq) ** 2 + pq * pq), 0.0)) - turn
+    if not least > 0.0:
+        return 0.0
+    if second == 0.0:
+        return np.inf
+    return max(least * least / second - diagonal, 0.0) ** 2

@@ -1,0 +1,172 @@
+"""What goes wrong inside, or around: a part is made to fail, and the failure must be told. Kinds and patterns likewise."""
+# ruff: noqa: E501 (messages stay in one piece)
+
+import errno
+import os
+import sys
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import h5py
+import numpy as np
+from library import blocks, lifted, solved
+from scipy.sparse import bsr_array
+
+import fastcontact as fc
+from fastcontact import generate
+from fastcontact.benchmark import subjects
+from fastcontact.case import read_case
+from fastcontact.cli import _study, bench, cases
+from fastcontact.cli._outputs import check_outputs
+from fastcontact.contact.formulations import _cut_faces
+from fastcontact.convergence import convergence_study, parameter_sweep, pictures, study, sweep
+from fastcontact.convergence.levels import recipe
+from fastcontact.convergence.settings import Combination, settings
+from fastcontact.floating import Floating
+from fastcontact.generate import _triangulate
+from fastcontact.generate.transform import renamed
+from fastcontact.io import _hdf5
+from fastcontact.linear import amg
+from fastcontact.linear.direct import Direct
+from fastcontact.system import System
+
+
+def refusing(number):
+    def refuse(*_, **__):
+        raise OSError(number, os.strerror(number))
+
+    return refuse
+
+
+def out_of_balance(patch):
+    patch.setattr(System, "balance", lambda self, forces: (forces, 1e9))
+    solved(blocks())
+
+
+def not_slack(patch):
+    settle = Floating.settle
+    patch.setattr(Floating, "settle", lambda *given: replace(settle(*given), slack=False))
+    model = lifted()
+    model.loads.clear()
+    model.add_force("UPPER_TOP", y=-10.0)
+    solved(model, criteria=fc.Criteria(max_halvings=0))
+
+
+def no_checkout(patch, folder):
+    patch.setattr(subjects.fastcontact, "__file__", str(folder / "package" / "__init__.py"))
+    subjects.folder()
+
+
+def no_matplotlib_for_outputs(patch):
+    patch.setitem(sys.modules, "matplotlib.backend_bases", None)
+    check_outputs("case.toml", [], ["a.png"])
+
+
+def no_matplotlib_for_studies(patch):
+    patch.setitem(sys.modules, "matplotlib.backends.backend_agg", None)
+    pictures.new_figure(4.0, 3.0)
+
+
+def no_scheduler(patch):
+    modules = SimpleNamespace(Client=refusing(errno.ECONNREFUSED))
+    patch.setitem(sys.modules, "dask", SimpleNamespace(distributed=modules))
+    patch.setitem(sys.modules, "dask.distributed", modules)
+    with _study.executor("tcp://localhost:1"):
+        pass
+
+
+def drawn_on_a_full_disk(patch):
+    patch.setattr(Path, "mkdir", refusing(errno.ENOSPC))
+    bench._draw("pictures", {"a": [{"n_dofs": 1}, {"n_dofs": 2}]})
+
+
+def copied_to_a_full_disk(patch, folder):
+    case = folder / "a.toml"
+    case.write_text("title = 'a'\n")
+    patch.setattr(Path, "write_bytes", refusing(errno.ENOSPC))
+    cases._copy(case, folder / "b.toml")
+
+
+def distorted_facets(patch):
+    patch.setattr(_cut_faces.clip3d, "integrate", lambda *_: 0)
+    lower, upper = generate.box(divisions=(2, 2, 2)), generate.box(divisions=(2, 2, 2), origin=(0.0, 0.0, 1.0))
+    mesh = generate.union(renamed(lower, lambda name: f"A_{name}"), renamed(upper, lambda name: f"B_{name}"))
+    model = fc.Model(mesh, "3d")
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    model.add_contact("pair", secondary="B_ZMIN", primary="A_ZMAX", formulation="mortar")
+    model.bind(model.contact[0]).constraints(np.zeros_like(mesh.points))
+
+
+def stuck(patch):
+    patch.setattr(amg, "MAX_ITERATIONS", 0)
+    solved(blocks(), linear_solver="amg")
+
+
+def indefinite():
+    K = bsr_array(np.array([[0.0, 1.0], [1.0, 0.0]]), blocksize=(1, 1))
+    Direct(tolerance=1e-10)._with_last(K, np.array([1]))
+
+
+def no_triangulation(patch):
+    patch.setattr(_triangulate, "_attempt", lambda *_: None)
+    generate.half_spheres(size=20.0)
+
+
+def no_finer_meshes():
+    chosen = settings(read_case("forma04a"))
+    recipe(replace(chosen, generator="rings", arguments={"quadrangles": {}}), "quad4", 1)
+
+
+def not_makeable():
+    chosen = settings(read_case("forma04a"))
+    recipe(replace(chosen, generator=None, arguments={}, own=Combination("quad4", None)), "tri3", 1)
+
+
+def failing(jobs, **_):
+    return [{"error": "the mesh is folded", "kind": "MeshError"} for _ in jobs]
+
+
+def no_level(patch):
+    patch.setattr(study, "run_all", failing)
+    convergence_study("forma04a", 1, ["tri3"], ["node_to_segment"])
+
+
+def no_point(patch):
+    patch.setattr(sweep, "run_all", failing)
+    parameter_sweep("forma04a", {"approach": [1.0]})
+
+
+def packed_beyond_its_size(folder, patch):
+    with h5py.File(folder / "a.h5", "w") as file:
+        file.create_dataset("a", data=np.random.default_rng(1).random(2000), chunks=(10,), compression="gzip")
+    patch.setattr(_hdf5, "PLAUSIBLE_BYTES", -(10**6))
+    with _hdf5.opened(folder / "a.h5"):
+        pass
+
+
+def name_too_long(folder):
+    fc.ResultWriter(folder / ("a" * 300 + ".vtkhdf"), generate.box())
+
+
+CALLS = [
+    ("forces out of balance", out_of_balance, fc.ConvergenceError, r"step 1: the out-of-balance force 1e\+09 stays above .* \(1e-06 of the largest force\): use the direct solver or a smaller tolerance"),
+    ("springs that stay stretched", not_slack, fc.ConvergenceError, r"contact does not hold .*: after \d+ positions tried, a force of .* is still missing for equilibrium under a load of 10\. Add a support, or use more load steps"),
+    ("benchmarks without checkout", no_checkout, fc.errors.FastcontactError, r"the benchmarks need the source checkout, and there is no '.*': install it with pip install -e"),
+    ("outputs without matplotlib", no_matplotlib_for_outputs, fc.errors.FastcontactError, r"pictures need matplotlib: pip install 'fastcontact\[plot\]'"),
+    ("pictures of studies without matplotlib", no_matplotlib_for_studies, fc.errors.FastcontactError, r"pictures need matplotlib: pip install 'fastcontact\[plot\]'"),
+    ("no scheduler at the address", no_scheduler, fc.errors.CaseError, r"no Dask scheduler answers at --executor tcp://localhost:1: .*Connection refused"),
+    ("pictures of benchmarks on a full disk", drawn_on_a_full_disk, fc.errors.FileError, r"cannot write the picture of 'a' in 'pictures': .*No space left on device"),
+    ("a case copied to a full disk", copied_to_a_full_disk, fc.errors.FileError, r"cannot write '.*b\.toml': No space left on device"),
+    ("facets that cannot be cut", distorted_facets, fc.ContactError, r"the facets near \[.*\] and \[.*\] are too distorted to be cut: improve the mesh there"),
+    ("multigrid without iterations", stuck, fc.ConvergenceError, r"."),
+    ("a stiffness that needs pivoting", indefinite, fc.ModelError, r"the stiffness matrix needed pivoting: it is not positive definite"),
+    ("no triangulation is found", no_triangulation, fc.MeshError, r"no triangulation with edges up to .* at the pole and .* far from it was found: change a size a little, or let it grow"),
+    ("triangles that leave a hole", lambda: _triangulate._checked(np.zeros((3, 3), int), 10, 8), fc.MeshError, r"the triangulation has 3 triangles where 10 fill the outline"),
+    ("a maker of no known finer meshes", no_finer_meshes, fc.errors.CaseError, r"it is not known how the generator 'rings' makes finer meshes: name its arguments in \[study\] as halve = \[\.\.\.\] or double = \[\.\.\.\]"),
+    ("an element on other corners", not_makeable, fc.errors.CaseError, r"meshes of tri3 cannot be made from the case's quad4: give a generator"),
+    ("a study without a level", no_level, fc.MeshError, r"no level could be solved; .*: the mesh is folded"),
+    ("a sweep without a point", no_point, fc.MeshError, r"no point of the sweep could be solved; .*: the mesh is folded"),
+    ("packed data larger than unpacked", packed_beyond_its_size, fc.errors.FileError, r"takes more room packed than it can hold: the file is damaged, write it anew"),
+    ("a file name beyond all limits", name_too_long, fc.errors.FileError, r"cannot be written \(File name too long\): name another file"),
+]  # fmt: skip
