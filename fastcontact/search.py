@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import ContactError
-from fastcontact.kernels import box_tree, facets3d, packed_tree, search2d, search3d
+from fastcontact.kernels import facets3d, packed_tree, search2d, search3d
 from fastcontact.kernels.projection3d import Domain, Facets
 from fastcontact.kernels.search3d import RUN, Answer, scratch
 from fastcontact.parallel import portions, shared
@@ -111,10 +111,20 @@ def flat_triangles(n_nodes: int) -> NDArray[np.intp]:
 
 def _on_lines(points: Array, corners: Array) -> Closest:
     hull = corners if corners.shape[1] == 2 else _PARABOLA @ corners
-    tree = box_tree.build(hull.min(axis=1), hull.max(axis=1))
-    n = len(points)
+    low, high = hull.min(axis=1), hull.max(axis=1)
+    bounds = low.min(axis=0), high.max(axis=0)
+    numbers = packed_tree.curve_order(np.ascontiguousarray(corners[:, 0]), *bounds)
+    tree, sorted_corners = packed_tree.pack(low[numbers], high[numbers]), corners[numbers]
+    order, n = packed_tree.curve_order(points, *bounds), len(points)
     facet, xi, normal, overhang = np.empty(n, np.intp), np.empty(n), np.empty((n, 2)), np.empty(n)
-    search2d.closest_facets(points, corners, *tree, facet, xi, normal, overhang)
+
+    def search(part: tuple[int, int]) -> None:
+        room = np.empty(search2d.ROOM, np.int64), np.empty(search2d.ROOM), np.empty(packed_tree.WIDTH)
+        search2d.closest_facets(points, order, *part, sorted_corners, tree, numbers, room, facet, xi, normal, overhang)
+
+    shared(search, portions(n))
+    if facet.min(initial=0) < 0:
+        _refuse(points[facet < 0], facet[facet < 0], corners)
     s = xi[:, None]
     linear, quadratic = [0.5 * (1 - s), 0.5 * (1 + s)], [0.5 * s * (s - 1), 0.5 * s * (s + 1), 1 - s * s]
     shape = np.hstack(linear if corners.shape[1] == 2 else quadratic)

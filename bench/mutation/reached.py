@@ -14,6 +14,8 @@ from collections import defaultdict
 from pathlib import Path
 from types import FrameType, TracebackType
 
+import pytest
+
 PACKAGE = os.environ["MUTATION_PACKAGE"] + os.sep
 places: dict[str, set[tuple[str, int]]] = defaultdict(set)
 seconds: dict[str, float] = defaultdict(float)
@@ -30,25 +32,37 @@ def pytest_configure() -> None:
 
     FastcontactError.__new__ = noting  # type: ignore[assignment]
 
+    # Other errors reach a test by `pytest.raises` only.
+    fill = pytest.ExceptionInfo.fill_unfilled
+
+    def noting_too(self, found):
+        _note_handled(found[1])
+        fill(self, found)
+
+    pytest.ExceptionInfo.fill_unfilled = noting_too
+
 
 def _note() -> None:
-    test = os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" (")[0]
     frame: FrameType | None = sys._getframe(2)
     while frame is not None:
-        _add(test, frame, frame.f_lineno)
+        _add(frame, frame.f_lineno)
         frame = frame.f_back
-    error = sys.exc_info()[1]
+    _note_handled(sys.exc_info()[1])
+
+
+def _note_handled(error: BaseException | None) -> None:
     while error is not None:
         trace: TracebackType | None = error.__traceback__
         while trace is not None:
-            _add(test, trace.tb_frame, trace.tb_lineno)
+            _add(trace.tb_frame, trace.tb_lineno)
             trace = trace.tb_next
         error = error.__cause__ or error.__context__
 
 
-def _add(test: str, frame: FrameType, line: int) -> None:
+def _add(frame: FrameType, line: int) -> None:
     file = frame.f_code.co_filename
     if file.startswith(PACKAGE):
+        test = os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" (")[0]
         places[test].add((file[len(PACKAGE) :], line))
 
 

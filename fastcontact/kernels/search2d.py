@@ -1,22 +1,22 @@
 """Closest facet to a point in 2D: projection on line facets (narrow phase) through a tree of boxes.
 
 Facets are straight (2 nodes) or quadratic (3 nodes, the middle last); ``corners`` below is (n_facets, n_nodes, 2).
-The tree is that of `box_tree`.
+The tree is that of `packed_tree`.
 """
 
 import numpy as np
 
-from fastcontact._jit import kernel
+from fastcontact._jit import inlined_kernel, kernel
+from fastcontact.kernels.borrowing import borrowed
+from fastcontact.kernels.packed_tree import WIDTH, leaves
+
+# Squared distances to boxes and facets are rounded.
+ROUNDING = 1.0 + 1e-14
+# Length of the list of boxes still to look into, for trees of up to 2^60 facets.
+ROOM = 20 * WIDTH
 
 
-@kernel
-def _distance_to_box(x, y, low, high, box):
-    dx = max(low[box, 0] - x, 0.0, x - high[box, 0])
-    dy = max(low[box, 1] - y, 0.0, y - high[box, 1])
-    return dx * dx + dy * dy
-
-
-@kernel
+@inlined_kernel
 def _curve(corners, f, s):
     """Return the point and the first and second derivatives of facet `f` at s in [-1, 1]."""
     ax, ay, bx, by = corners[f, 0, 0], corners[f, 0, 1], corners[f, 1, 0], corners[f, 1, 1]
@@ -29,7 +29,7 @@ def _curve(corners, f, s):
     return mx + s * tx + 0.5 * s * s * cx, my + s * ty + 0.5 * s * s * cy, tx + s * cx, ty + s * cy, cx, cy
 
 
-@kernel
+@inlined_kernel
 def _project(corners, f, x, y):
     """Return s in [-1, 1] of the point of facet `f` closest to (x, y), and the squared distance."""
     if corners.shape[1] == 2:
@@ -65,37 +65,57 @@ def _project(corners, f, x, y):
 
 
 @kernel
-def closest_facets(points, corners, low, high, child, span, order, facet, xi, normal, overhang):
-    """Project every point on its closest facet; of equally close facets the one with the lowest number.
+def closest_facets(points, points_order, begin, end, corners, tree, numbers, scratch, facet, xi, normal, overhang):
+    """Project points on their closest facets; of equally close facets on the one with the lowest number.
 
-    Fills, in place, ``facet`` (n,), ``xi`` (n,) in [-1, 1], ``normal`` (n, 2) unit outward at the projection, and
-    ``overhang`` (n,): how far the point stands out beyond the end of its facet, in facet lengths, 0 within.
+    Parameters
+    ----------
+    points : (n, 2), points_order : (n,)
+        Points, and the order to go through them, along a curve: the facet of the last one is near the next.
+    begin, end : int
+        Which of that order.
+    corners : (n_facets, n_nodes, 2), tree : Tree, numbers : (n_facets,)
+        Facets in the order of the tree, and their numbers.
+    scratch : (stack (ROOM,) of int64, bound (ROOM,), away (WIDTH,))
+        Overwritten.
+    facet : (n,), xi : (n,), normal : (n, 2), overhang : (n,)
+        Filled in place: number of the facet, or -1 where a point is not finite; place in [-1, 1]; unit outward normal there;
+        how far the point stands out beyond the end of its facet, in facet lengths, 0 within.
     """
-    stack = np.empty(128, np.int64)
-    for i in range(points.shape[0]):
+    points, points_order, corners, numbers = borrowed((points, points_order, corners, numbers))
+    facet, xi, normal, overhang = borrowed((facet, xi, normal, overhang))
+    tree, scratch = borrowed(tree), borrowed(scratch)
+    stack, bound, away = scratch
+    n_leaves, last = leaves(len(numbers)), -1
+    for place in range(begin, end):
+        i = points_order[place]
         x, y = points[i, 0], points[i, 1]
-        best, best_facet, best_s = np.inf, -1, 0.0
-        stack[0] = 0
-        top = 1
+        facet[i] = -1
+        if not (np.isfinite(x) and np.isfinite(y)):
+            continue
+        best, found, best_s = np.inf, last, 0.0
+        if last >= 0:
+            best_s, best = _project(corners, last, x, y)
+        reach = ROUNDING * best
+        stack[0], bound[0], top = len(tree.boxes) - 1, 0.0, 1
         while top > 0:
             top -= 1
-            box = stack[top]
-            if _distance_to_box(x, y, low, high, box) > best:
+            node = stack[top]
+            if bound[top] > reach:
                 continue
-            if child[box] < 0:
-                for k in range(span[box, 0], span[box, 1]):
-                    s, d = _project(corners, order[k], x, y)
-                    if d < best or (d == best and order[k] < best_facet):
-                        best, best_facet, best_s = d, order[k], s
+            if node >= 0:
+                top = _pushed_children(tree, n_leaves, node, x, y, reach, stack, bound, away, top)
                 continue
-            left = child[box]
-            near, far = left, left + 1
-            if _distance_to_box(x, y, low, high, far) < _distance_to_box(x, y, low, high, near):
-                near, far = far, near
-            stack[top], stack[top + 1] = far, near
-            top += 2
-        facet[i], xi[i] = best_facet, best_s
-        px, py, tx, ty, _, _ = _curve(corners, best_facet, best_s)
+            f = -1 - node
+            s, d = _project(corners, f, x, y)
+            if d < best or (d == best and numbers[f] < numbers[found]):
+                best, found, best_s = d, f, s
+                reach = ROUNDING * best
+        last = found
+        if found < 0:  # only collapsed facets
+            continue
+        facet[i], xi[i] = numbers[found], best_s
+        px, py, tx, ty, _, _ = _curve(corners, found, best_s)
         length = np.sqrt(tx * tx + ty * ty)
         normal[i, 0], normal[i, 1] = ty / length, -tx / length
         along = ((x - px) * tx + (y - py) * ty) / (length * length)
@@ -104,3 +124,26 @@ def closest_facets(points, corners, low, high, child, span, order, facet, xi, no
             overhang[i] = 0.5 * along
         elif best_s == -1.0 and along < 0.0:
             overhang[i] = -0.5 * along
+
+
+@inlined_kernel
+def _pushed_children(tree, n_leaves, node, x, y, reach, stack, bound, away, top):
+    """Put the children of a node on the list that are within reach, facets with numbers below zero; return its length.
+
+    Those of one node are sorted, with the nearest on top.
+    """
+    boxes, bottom = tree.boxes[node], top
+    for k in range(boxes.shape[1]):
+        dx = max(boxes[0, k] - x, x - boxes[2, k], 0.0)
+        dy = max(boxes[1, k] - y, y - boxes[3, k], 0.0)
+        away[k] = dx * dx + dy * dy
+    for k in range(boxes.shape[1]):
+        if away[k] <= reach and away[k] < np.inf:
+            at = top
+            while at > bottom and bound[at - 1] < away[k]:
+                stack[at], bound[at] = stack[at - 1], bound[at - 1]
+                at -= 1
+            child = tree.first[node] + k
+            stack[at], bound[at] = -1 - child if node < n_leaves else child, away[k]
+            top += 1
+    return top

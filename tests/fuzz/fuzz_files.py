@@ -22,13 +22,19 @@ def kinds(seeds: dict[str, Path]) -> list[str]:
     return [name for name, path in sorted(seeds.items()) for _ in range(WEIGHTS.get(path.suffix, 2))]
 
 
-def make_file(number: int, seed: int, seeds: dict[str, Path], folder: Path, outside: Path) -> tuple[str, Path]:
-    """Write damaged file `number` into `folder`; return the name of its seed and its path."""
+def chosen(number: int, seed: int, seeds: dict[str, Path]) -> tuple[np.random.Generator, str, str]:
+    """Return the random numbers of file `number`, the name of the seed it is made from, and its own name."""
     random = np.random.default_rng([seed, number])
     every = kinds(seeds)
     name = every[int(random.integers(len(every)))]
-    source = seeds[name]
-    target = folder / f"{number}{''.join(source.suffixes[-2:]) if source.suffix == '.gz' else source.suffix}"
+    suffixes = seeds[name].suffixes
+    return random, name, f"{number}{''.join(suffixes[-2:] if suffixes[-1] == '.gz' else suffixes[-1:])}"
+
+
+def make_file(number: int, seed: int, seeds: dict[str, Path], folder: Path, outside: Path) -> tuple[str, Path]:
+    """Write damaged file `number` into `folder`; return the name of its seed and its path."""
+    random, name, file_name = chosen(number, seed, seeds)
+    source, target = seeds[name], folder / file_name
     shutil.copy(source, target)
     for sibling in source.parent.glob(f"{source.stem}.*"):  # parts of formats of several files
         if sibling.suffix in (".h5", ".ele", ".bin") and source.suffix in (".xdmf", ".node"):

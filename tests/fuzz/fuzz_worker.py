@@ -69,6 +69,21 @@ def _address_space() -> int:
         return int(file.read().split()[0]) * resource.getpagesize()
 
 
+def _made(number: int, seed: int, seeds: dict[str, Path], folder: Path, outside: Path) -> tuple[str, Path]:
+    """Make a file in a child: what HDF5 does to itself on the way there is no matter of who reads the file."""
+    child = os.fork()
+    if not child:
+        status = 1
+        try:
+            fuzz_files.make_file(number, seed, seeds, folder, outside)
+            status = 0
+        finally:
+            os._exit(status)
+    os.waitpid(child, 0)  # what it had written when it died is a damaged file as well
+    _, name, file_name = fuzz_files.chosen(number, seed, seeds)
+    return name, folder / file_name
+
+
 def main() -> None:
     """Answer until the input ends."""
     seed, seeds_folder, folder, outside = int(sys.argv[1]), *map(Path, sys.argv[2:5])
@@ -85,7 +100,7 @@ def main() -> None:
     print(json.dumps({"ready": True}), file=answers, flush=True)
     for line in sys.stdin:
         number = int(line)
-        name, path = fuzz_files.make_file(number, seed, seeds, folder, outside)
+        name, path = _made(number, seed, seeds, folder, outside)
         # Named before it is read, so that the file is known if reading kills this process.
         print(json.dumps({"number": number, "name": name, "path": str(path)}), file=answers, flush=True)
         resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time()) + SECONDS + 1, hard))

@@ -9,7 +9,7 @@ import pytest
 
 import fastcontact as fc
 
-N_FILES = 300
+N_FILES = 250
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of memory and time as Linux knows them")

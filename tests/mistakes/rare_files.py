@@ -160,7 +160,19 @@ def picture_on_a_full_disk():
     _pictures.save(SimpleNamespace(figure=SimpleNamespace(savefig=refusing(errno.ENOSPC))), "a.png")
 
 
+def of_ansys(folder):
+    (folder / "a.msh").write_text('(0 "GAMBIT to Fluent File")\n')
+    fc.read_mesh(folder / "a.msh")
+
+
+def steps_announced(file):
+    file["VTKHDF/Steps"].attrs["NSteps"] = 2
+
+
 CALLS = [
+    ("a mesh of Ansys with Gmsh's suffix", of_ansys, fc.errors.FileError, r"a\.msh' is no Gmsh file, which starts with \$MeshFormat: convert it to \.med"),
+    ("a result with fewer steps than it says", lambda folder: resulting(folder, steps_announced), fc.errors.FileError, r"only 1 of 2 steps"),
+    ("a case with a name beyond all limits", lambda: cases.read_case("a" * 5000 + ".toml"), fc.errors.CaseError, r"cannot look for the case file 'a+' \(File name too long\)"),
     ("a case with a value of another size", unexpected, fc.errors.CaseError, r"a value is of the wrong kind or size \(too large\): see the ready cases"),
     ("a picture on a full disk", picture_on_a_full_disk, fc.errors.FileError, r"cannot write the picture 'a\.png': .*No space left on device"),
     ("a picture without contact", lambda: _pictures.profile_picture(None, SimpleNamespace(contact={}), "a.png"), fc.errors.FastcontactError, r"there is no contact pair whose pressure could be plotted"),

@@ -3,6 +3,7 @@
 
 import errno
 import os
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from types import SimpleNamespace
 import h5py
 import numpy as np
 from library import blocks, lifted, solved
-from scipy.sparse import bsr_array
+from scipy.sparse import bsr_array, csr_array
 
 import fastcontact as fc
 from fastcontact import generate
@@ -26,10 +27,12 @@ from fastcontact.convergence.settings import Combination, settings
 from fastcontact.floating import Floating
 from fastcontact.generate import _triangulate
 from fastcontact.generate.transform import renamed
-from fastcontact.io import _hdf5
-from fastcontact.linear import amg
+from fastcontact.io import _hdf5, _meshio, med, result_reader
+from fastcontact.linear import _elimination, amg
 from fastcontact.linear.direct import Direct
 from fastcontact.system import System
+
+REPEATED = re.escape(_elimination._REPEATED)
 
 
 def refusing(number):
@@ -149,7 +152,41 @@ def name_too_long(folder):
     fc.ResultWriter(folder / ("a" * 300 + ".vtkhdf"), generate.box())
 
 
+def profile_beyond_the_mesh(folder):
+    with h5py.File(folder / "a.h5", "w") as file:
+        file["PROFILS/P/PFL"] = np.array([1, 9])
+        file["NOE/P/CO"] = np.array([0.5, 1.5])
+        med._read_instant(file, file["NOE"], 4, 1)
+
+
+def parts_that_do_not_fit(folder, patch):
+    fc.write_mesh(folder / "a.vtk", generate.box())
+
+    def fail(*_):
+        raise TypeError("of another kind")
+
+    patch.setattr(_meshio, "build_mesh", fail)
+    fc.read_mesh(folder / "a.vtk")
+
+
+def unreadable(folder, patch):
+    (folder / "a.vtkhdf").touch()
+    patch.setattr(result_reader.os, "access", lambda *_, **__: False)
+    fc.open_results(folder / "a.vtkhdf")
+
+
+def repeated_equations(patch):
+    patch.setattr(_elimination, "DENSE_UP_TO", 0)
+    _elimination._matched(csr_array(np.array([[1.0, 0.0], [2.0, 0.0]])))
+
+
 CALLS = [
+    ("values of points beyond the mesh", profile_beyond_the_mesh, fc.errors.FileError, r"profile 'P' names point 9 of 4: write the file anew"),
+    ("parts of a file that do not fit", parts_that_do_not_fit, fc.errors.FileError, r"the parts of '.*a\.vtk' do not fit together: check the file, or convert it to \.med"),
+    ("a result that may not be read", unreadable, fc.errors.FileError, r"a\.vtkhdf' may not be read: ask its owner for the permission"),
+    ("equations on the same unknown", repeated_equations, fc.ConvergenceError, REPEATED),
+    ("equations that are equal", lambda: _elimination._block_inverse(csr_array(np.ones((2, 2)))), fc.ConvergenceError, REPEATED),
+    ("equations that are nearly equal", lambda: _elimination._block_inverse(csr_array([[1.0, 1.0], [1.0, 1.0 + 1e-14]])), fc.ConvergenceError, REPEATED),
     ("forces out of balance", out_of_balance, fc.ConvergenceError, r"step 1: the out-of-balance force 1e\+09 stays above .* \(1e-06 of the largest force\): use the direct solver or a smaller tolerance"),
     ("springs that stay stretched", not_slack, fc.ConvergenceError, r"contact does not hold .*: after \d+ positions tried, a force of .* is still missing for equilibrium under a load of 10\. Add a support, or use more load steps"),
     ("benchmarks without checkout", no_checkout, fc.errors.FastcontactError, r"the benchmarks need the source checkout, and there is no '.*': install it with pip install -e"),

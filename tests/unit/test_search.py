@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fastcontact import ContactError, _jit
 from fastcontact.search import closest
 
 
@@ -90,3 +91,47 @@ def test_of_equally_close_facets_the_first_is_taken():
     corners = np.array([[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [2.0, 0.0]]])
     facet, xi, _, _ = search(np.array([[1.0, 0.7]]), corners)
     assert (facet[0], xi[0]) == (0, 1.0)
+
+
+@pytest.mark.parametrize("n_nodes", [2, 3])
+def test_the_tree_finds_what_one_facet_after_the_other_finds(n_nodes):
+    """Points near, at the ends and a million sizes away; facets that coincide, in any order of points."""
+    corners, near = random_facets(7, 300, n_nodes)
+    corners[200:220] = corners[100:120]
+    rng = np.random.default_rng(8)
+    near = np.concatenate([near, corners[:, 0], corners[:, 1], rng.uniform(-7, 7, (500, 2))])
+    points = np.concatenate([near, 1e6 * rng.normal(size=(20, 2))])
+    found = closest(points, corners)
+    alone = [closest(points, corners[f : f + 1]) for f in range(len(corners))]
+    distance = np.array([one.distance for one in alone])
+    assert found.distance == pytest.approx(distance.min(axis=0), rel=1e-15, abs=0)
+    first = np.argmin(distance[:, : len(near)], axis=0)
+    same = found.facet[: len(near)] == first
+    # Equally close but for rounding, where facets share an end or cross.
+    assert (
+        np.abs(distance[found.facet[: len(near)], np.arange(len(near))] - distance.min(axis=0)[: len(near)]).max()
+        < 1e-14
+    )
+    assert same[~np.isclose(np.sort(distance, axis=0)[1, : len(near)], distance.min(axis=0)[: len(near)])].all()
+    assert not np.isin(found.facet, np.arange(200, 220)).any()
+    some = rng.permutation(len(points))
+    again = closest(points[some], corners)
+    for field in ("facet", "xi", "normal", "overhang", "position", "distance"):
+        assert np.array_equal(getattr(again, field), getattr(found, field)[some])
+
+
+def test_threads_do_not_change_a_bit(monkeypatch):
+    corners, _ = random_facets(9, 500, 2)
+    points, found = np.random.default_rng(10).uniform(-7, 7, (30_000, 2)), []
+    for count in (1, 3):
+        monkeypatch.setattr(_jit, "threads", lambda count=count: count)
+        found.append(closest(points, corners))
+    for field in ("facet", "xi", "normal", "overhang", "position", "distance"):
+        assert np.array_equal(getattr(found[0], field), getattr(found[1], field))
+
+
+def test_points_that_are_not_finite_are_told():
+    corners, points = random_facets(1, 5, 3)
+    points[3, 1] = np.nan
+    with pytest.raises(ContactError, match="1 points to project are not finite"):
+        closest(points, corners)
