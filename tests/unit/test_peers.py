@@ -109,7 +109,9 @@ def test_costs_of_a_process(tmp_path):
     found = measured([sys.executable, "-c", busy], threads=1, folder=tmp_path, limit_s=60)
     assert found["status"] == 0
     assert 0.5 <= found["cpu_s"] < 2.0
-    own = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # a process counts what its parent had when it began
+    own = (
+        1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    )  # a process counts what its parent had when it began
     assert 4e8 < found["peak_bytes"] < max(6e8, 1.1 * own)
     idle = measured([sys.executable, "-c", "import time; time.sleep(0.5)"], threads=1, folder=tmp_path, limit_s=60)
     assert idle["wall_s"] >= 0.5
