@@ -126,7 +126,14 @@ def test_the_two_sides_may_be_swapped(element):
 def test_curved_sides_need_averaged_normals():
     """Opposite a node the normal of either facet is off by half their angle, and the pairing flips for ever."""
     with pytest.raises(fc.ConvergenceError, match='normals="averaged"'):
-        quarter("quad4", 8, 8, "node_to_segment", clearance=-INTERFERENCE, normals="facet")
-    model, last = quarter("quad4", 8, 8, "node_to_segment", clearance=-INTERFERENCE, normals="averaged")
+        quarter("quad8", 8, 12, "node_to_segment", clearance=-INTERFERENCE, normals="facet")
+    model, last = quarter("quad8", 8, 12, "node_to_segment", clearance=-INTERFERENCE, normals="averaged")
+    assert last.iterations["geometry_updates"] <= 10
+    assert abs(errors(model, last)[1]) < 5e-4
+
+
+def test_nodes_opposite_nodes_settle_on_one_facet():
+    """Exactly between two facets the first is taken, whatever the rounding, so that the pairing stands still."""
+    model, last = quarter("quad4", 8, 8, "node_to_segment", clearance=-INTERFERENCE, normals="facet")
     assert last.iterations["geometry_updates"] <= 10
     assert abs(errors(model, last)[1]) < 5e-3
