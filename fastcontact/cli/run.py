@@ -28,7 +28,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--resume", action="store_true", help="go on after the last complete step of the result file, if it holds any"
     )
-    parser.add_argument("--json", metavar="FILE", help="write a summary of the last step and the iterations")
+    parser.add_argument(
+        "--json", metavar="FILE", help="write a summary of the last step and the iterations, or why the run failed"
+    )
     parser.add_argument("--plot", metavar="PNG", help="plot the contact pressure of the last step against theory")
     parser.add_argument("--linear", metavar="SOLVER", help="linear solver: auto, direct or amg (default: the case's)")
     parser.add_argument("--estimate-error", action="store_true", help="estimate the error of every cell, into the file")
@@ -75,6 +77,9 @@ def run(options: argparse.Namespace) -> int:
                 )
             except (ConvergenceError, KeyboardInterrupt) as error:
                 error.add_note(_kept(output, writer.n_steps))
+                if options.json:  # in place of the summary of an earlier run
+                    reason = str(error) or "interrupted from the keyboard"
+                    _write_json(options.json, {"failed": reason, "complete_steps": writer.n_steps})
                 raise
             finally:
                 progress.close()

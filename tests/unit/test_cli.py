@@ -161,7 +161,9 @@ def test_no_convergence_is_exit_code_two_and_keeps_finished_steps(solved, tmp_pa
     text = CASE.replace("[probes]", "[solve]\nmax_halvings = 1\nmax_geometry_updates = 2\ngeometry = 1e-3\n[probes]")
     case = tmp_path / "hard.toml"
     case.write_text(text.replace("steps = 3", "instants = [0.001, 1.0]"))
-    code = main(["run", str(case), "-o", str(tmp_path / "hard.vtkhdf")])
+    summary = tmp_path / "hard.json"
+    summary.write_text('{"of": "an earlier run"}')
+    code = main(["run", str(case), "-o", str(tmp_path / "hard.vtkhdf"), "--json", str(summary)])
     assert code == 2
     cut, told, *history, kept = capsys.readouterr().err.splitlines()
     assert cut.startswith(
@@ -180,6 +182,8 @@ def test_no_convergence_is_exit_code_two_and_keeps_finished_steps(solved, tmp_pa
     ((name, nodes),) = results.log["failed_step"][-1]["nodes"].items()
     assert (name, len(nodes)) == ("hertz", 3)
     assert f"most at points {nodes[0]} [" in told
+    failed = {"failed": results.error.split(": ", 1)[1], "complete_steps": 1}
+    assert json.loads(summary.read_text()) == failed
     assert main(["info", str(path)]) == 0
     assert f"  stopped: {results.error}" in capsys.readouterr().out.splitlines()
 
