@@ -25,7 +25,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 import fastcontact as fc
-from fastcontact.analysis import Analysis, Criteria, near_nullspace
+from fastcontact.analysis import Analysis, near_nullspace
+from fastcontact.criteria import Criteria
 from fastcontact.extrapolation import Extrapolation
 from fastcontact.kernels import krylov
 from fastcontact.linear import _hierarchy

@@ -14,8 +14,8 @@ logging.getLogger(__name__).addHandler(logging.NullHandler())  # nothing on scre
 
 if TYPE_CHECKING:
     from fastcontact import analytic, generate, obstacles, plot, recovery, topology
-    from fastcontact.analysis import Criteria, solve
     from fastcontact.convergence import adaptive_study, convergence_study, parameter_sweep
+    from fastcontact.criteria import Criteria
     from fastcontact.error_estimate import ErrorEstimate, estimate_error
     from fastcontact.error_norms import ErrorNorms, error_against
     from fastcontact.errors import (
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from fastcontact.model import Model
     from fastcontact.ramp import Ramp, linear_ramp
     from fastcontact.results import ContactResult, StepResult
+    from fastcontact.solving import solve
     from fastcontact.topology import ordered_line
 
 _MODULES = ("analytic", "generate", "obstacles", "plot", "recovery", "topology")
@@ -48,7 +49,7 @@ _HOME = {
     "ContactError": "errors",
     "ContactResult": "results",
     "ConvergenceError": "errors",
-    "Criteria": "analysis",
+    "Criteria": "criteria",
     "ErrorEstimate": "error_estimate",
     "ErrorNorms": "error_norms",
     "FastcontactError": "errors",
@@ -75,7 +76,7 @@ _HOME = {
     "quality": "mesh_quality",
     "read_med_field": "io.med",
     "read_mesh": "io.mesh_files",
-    "solve": "analysis",
+    "solve": "solving",
     "write_agr": "io.xmgrace",
     "write_csv": "io.tables",
     "write_med_results": "io.med",

@@ -1,30 +1,29 @@
-"""The ramp: per load step pair, constrain, solve, recover, hand over the result."""
+"""A prepared model: for one load pair, constrain, solve until both stand still, recover."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fastcontact import active_set, doubts, friction, linear, parallel, plausibility, recovery, restart, step_control
+from fastcontact import active_set, friction, linear, parallel, recovery
 from fastcontact.acceleration import Anderson
 from fastcontact.assembly import rigid_modes, stiffness
 from fastcontact.contact.constraints import Constraints, stacked
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.result import contact_result
 from fastcontact.contact.rigid import RigidSide
-from fastcontact.errors import ConvergenceError, ModelError, warn
+from fastcontact.criteria import Criteria
+from fastcontact.errors import ConvergenceError
 from fastcontact.extrapolation import Extrapolation
 from fastcontact.floating import SLACK, Floating, Settled
 from fastcontact.kernels.multigrid import largest_row_sum
-from fastcontact.kernels.norms import largest_difference
+from fastcontact.kernels.norms import largest, largest_difference
 from fastcontact.model import Model, combined, multiplier
 from fastcontact.ramp import Ramp, linear_ramp
-from fastcontact.results import ContactResult, StepResult
+from fastcontact.results import StepResult
 from fastcontact.rigid_motions import free_motions, generalised, resisting, stopped_at
 from fastcontact.springs import ground_force, stiffened
 from fastcontact.system import System
@@ -43,151 +42,11 @@ FIRST_RESIDUAL, RESIDUAL = 1e-2, 0.03
 MIXED = 5
 
 
-@dataclass(frozen=True)
-class Criteria:
-    """When a load step counts as converged.
-
-    Parameters
-    ----------
-    relative : float
-        Largest out-of-balance force over the largest applied force, reaction or contact force (RESI_GLOB_RELA).
-    absolute : float, optional
-        Largest out-of-balance force [force] that is small enough by itself (RESI_GLOB_MAXI). Without forces a relative
-        criterion is 0/0; then, and by default, the bound is the round-off of the internal forces.
-    geometry_updates : int or None
-        How many times to re-pair on the deformed configuration after the first pairing of a step; None: until the
-        displacement changes by less than `geometry` of its largest component.
-    geometry : float
-        See `geometry_updates`.
-    keep_pairing : bool
-        Keep the pairing of the undeformed bodies through all steps, with its normals and projections (REAC_GEOM =
-        'SANS'); for small motions only. Without friction the state then does not depend on the steps that lead to it.
-    max_geometry_updates, max_active_set_iterations : int
-        Limits per step, and per pairing.
-    max_halvings : int
-        How many times a load step that does not converge is cut in halves before the analysis gives up (DECOUPE).
-        Parts of a step are steps of their own, so that friction slides along their path; only the instants of the ramp
-        give a result, whose ``iterations["substeps"]`` lists the ends of its parts. 0: never.
-    """
-
-    relative: float = 1e-6
-    absolute: float | None = None
-    geometry_updates: int | None = None
-    geometry: float = 1e-11
-    keep_pairing: bool = False
-    max_geometry_updates: int = 60
-    max_active_set_iterations: int = 200
-    max_halvings: int = 4
-
-    def __post_init__(self) -> None:
-        if not self.relative > 0 or not self.geometry > 0:
-            raise ModelError("the convergence criteria `relative` and `geometry` must be positive")
-        if self.geometry_updates is not None and self.geometry_updates < 0:
-            raise ModelError(f"geometry_updates = {self.geometry_updates} must be None or a whole number >= 0")
-        for name, least in (("max_geometry_updates", 0), ("max_active_set_iterations", 1)):
-            if getattr(self, name) < least:
-                raise ModelError(f"{name} = {getattr(self, name)} must be a whole number >= {least}")
-        if self.absolute is not None and not self.absolute >= 0:
-            raise ModelError(f"the convergence criterion absolute = {self.absolute} must be a force >= 0, or None")
-        if self.max_halvings < 0 or int(self.max_halvings) != self.max_halvings:
-            raise ModelError(f"max_halvings = {self.max_halvings} must be a whole number >= 0")
-        if self.keep_pairing and self.geometry_updates:
-            raise ModelError(
-                f"keep_pairing leaves no room for geometry_updates = {self.geometry_updates}: give one or the other"
-            )
-
-
-def solve(
-    model: Model,
-    ramp: Ramp | None = None,
-    *,
-    linear_solver: str = "auto",
-    linear_tolerance: float = 1e-10,
-    linear_precision: str | None = None,
-    criteria: Criteria | None = None,
-    on_step: Callable[[StepResult], None] | None = None,
-    resume: Sequence[StepResult] = (),
-) -> list[StepResult]:
-    """Solve a model along a load ramp, from its beginning or after steps that are there already.
-
-    Parameters
-    ----------
-    model : Model
-        Checked whole before any numerics.
-    ramp : Ramp, optional
-        By default 20 equal steps.
-    linear_solver : str
-        ``"direct"``, ``"cholmod"``, ``"pardiso"``, ``"amg"`` or ``"auto"``; see `linear.make`.
-    linear_tolerance : float
-        Relative residual of iterative linear solvers.
-    linear_precision : {"single", "double"}, optional
-        Of the numbers inside the multigrid cycle, single by default; the solution is in double precision always.
-    criteria : Criteria, optional
-        Convergence criteria and the handling of the geometry.
-    on_step : callable, optional
-        Called with every new `StepResult` as soon as its step has converged, e.g. ``ResultWriter.write``.
-    resume : sequence of StepResult
-        Steps of the same case to go on after: what `solve` returned, ``open_results(path)`` or ``ResultWriter.done``;
-        none by default. The analysis goes on with the instants of the ramp after the last of them and ends as if it had
-        never stopped. Linear solver, tolerances and limits may be others, and so may the ramp from there on.
-
-    Returns
-    -------
-    list of StepResult
-        Those to go on after, and the new ones. Of all these only the last one keeps its `restart`.
-
-    Raises
-    ------
-    MeshError, ModelError, ContactError
-        If the model is wrong, or is another one than that of the steps to go on after.
-    ConvergenceError
-        If a step does not converge, nor in parts (`Criteria.max_halvings`); steps before it have been handed to
-        `on_step`.
-
-    Warns
-    -----
-    FastcontactWarning
-        At the beginning, if the model is doubtful: units that slipped, poor cells, integrals that are not exact, nodes
-        that coincide. At the end, if bodies interpenetrate where no contact is defined, a contact never closed, was lost
-        or is not resolved by the mesh, a penalty lets it penetrate by more than 1 % of the largest displacement, strains
-        or rotations leave the range of linear kinematics, or a fixed number of geometry updates was too small. The
-        results of the first and of the last step keep the texts.
-    """
-    ramp, criteria = ramp or linear_ramp(), criteria or Criteria()
-    case = restart.identity(model, ramp, criteria)
-    steps, begin = list(resume), ramp.table[0][0]
-    if steps:
-        restart.check(steps[-1], case)
-    instants = restart.remaining(ramp, steps)
-    if not instants:
-        return steps
-    model.check(ramp)
-    doubtful = plausibility.doubts(model)
-    for text in doubtful if not steps else ():
-        warn(text)
-    analysis = Analysis(model, linear_solver, linear_tolerance, criteria, ramp, linear_precision)
-    analysis.doubts = doubtful
-    analysis.touched = {name: True for step in steps for name, found in step.contact.items() if found.active.any()}
-    if steps:
-        restart.put_back(analysis, steps[-1])
-        begin = steps[-1].load_factor
-    for index, instant in enumerate(instants, start=steps[-1].index + 1 if steps else 1):
-        step = step_control.advance(analysis, index, begin, instant, instant == instants[-1], criteria.max_halvings)
-        step = replace(step, restart=restart.taken(analysis, case))
-        begin = instant
-        if on_step is not None:
-            on_step(step)
-        if steps and steps[-1].restart is not None:
-            steps[-1] = replace(steps[-1], restart=None)
-        steps.append(step)
-    return steps
-
-
 class Analysis:
     """A prepared model, checked before: stiffness, linear solver and contact pairs, solved load by load.
 
-    Parameters are those of `solve`. Attributes `u` (n_dofs,), the displacements of all points and then of the obstacles
-    that forces drive, and `active` (m,) hold the current state.
+    Parameters are those of `solving.solve`. Attributes `u` (n_dofs,), the displacements of all points and then of the
+    obstacles that forces drive, and `active` (m,) hold the current state.
     """
 
     def __init__(
@@ -196,7 +55,6 @@ class Analysis:
     ) -> None:  # fmt: skip
         self.ramp = ramp or linear_ramp()
         self.model, self.criteria = model, criteria
-        self.doubts: list[str] = []  # about the model, for the result of the first step
         self.unsettled: tuple[int, float] | None = None  # geometry updates asked for, change by the last one
         self.touched: dict[str, bool] = {}  # pairs that were closed at the end of a step
         self.solver = linear.make(
@@ -249,15 +107,19 @@ class Analysis:
         """Displacements (n_points, dim) of the points of the mesh [length]."""
         return self.u[: self.model.n_dofs].reshape(-1, self.model.mesh.dim)
 
-    def step(self, index: int, instant: float, last: bool = False) -> StepResult:
-        """Solve for the loads at `instant` and return the state; see `solve`."""
+    def step(self, index: int, instant: float) -> StepResult:
+        """Solve for the loads at `instant` and return the state; see `solving.solve`."""
         with parallel.one_blas_thread():
-            return self._step(index, instant, last)
+            return self._step(index, instant)
 
-    def _step(self, index: int, instant: float, last: bool) -> StepResult:
+    def loaded(self, instant: float) -> bool:
+        """Return whether loads or prescribed displacements are there at an instant."""
+        return bool(self._external(instant).any() or self._lift(instant).any())
+
+    def _step(self, index: int, instant: float) -> StepResult:
         lift = self._lift(instant)
-        self.external = combined(self.forces, self.ramp, instant, self.shape).ravel()
-        self.largest_force = max(self.largest_force, np.abs(self.external).max(initial=0.0))
+        self.external = self._external(instant)
+        self.largest_force = max(self.largest_force, largest(self.external))
         self.before = self.u
         for side in self.pairs.values():
             side.before = self.u.reshape(self.shape)
@@ -269,10 +131,10 @@ class Analysis:
         before = self.solver.counters.iterations
         self.expected = 0.0  # displacement, for the first step under forces only
         if self.pairs and self.external.any() and not (self.u.any() or lift.any()):
-            self.expected = float(np.abs(loaded.everywhere(np.zeros(len(lift)))).max())
+            self.expected = largest(loaded.everywhere(np.zeros(len(lift))))
         if self.pairs and self.model.springs:
             # Weak springs alone would let bodies move far; contact takes that back, but not its round-off.
-            alone = float(np.abs(loaded.everywhere(np.zeros(len(lift)))).max())
+            alone = largest(loaded.everywhere(np.zeros(len(lift))))
             self.round_off = max(self.round_off, 16 * np.finfo(float).eps * alone)
         history: list[dict[str, Any]] = []
         if self.pairs:
@@ -299,7 +161,7 @@ class Analysis:
         }
         if self.floating is not None and self.settled is not None:
             iterations["regularised"] = self.floating.report(self.settled, self.largest_work)
-        return self._result(index, instant, reaction, constraints, state, iterations, last)
+        return self._result(index, instant, reaction, constraints, state, iterations)
 
     def _move_sides(self, instant: float) -> None:
         for pair in self.model.contact:
@@ -319,6 +181,10 @@ class Analysis:
             positions[pair.name] = side.now = u[self.driven.dofs(number)]
         return positions
 
+    def _external(self, instant: float) -> Array:
+        """Return the forces (n_dofs,) of the loads at `instant`."""
+        return combined(self.forces, self.ramp, instant, self.shape).ravel()
+
     def _lift(self, instant: float) -> Array:
         """Return what supports and relations prescribe at `instant`; see `System.lift`."""
         prescribed = combined(self.prescribed, self.ramp, instant, self.shape)
@@ -337,7 +203,7 @@ class Analysis:
         accelerated, known = Anderson(MIXED, self.surface_dofs, self.solver.iterative), None
         tolerance = self.solver.tolerance
         start, last_active = self.u, dict(self.active)
-        moved_by_lift = np.abs(lift).max(initial=0.0)
+        moved_by_lift = largest(lift)
         extended = fixed_updates is None and self.floating is None and self.solver.iterative
         if extended:
             self.u = self.extrapolation.displacement(self.u)
@@ -360,7 +226,7 @@ class Analysis:
                 state, u = self._floating(loaded, constraints, lift, active, history)
             change = largest_difference(u, self.u)
             # Rigid motions of bodies that only contact holds do not count.
-            size = max(np.abs(state.u).max(initial=0.0), moved_by_lift)
+            size = max(largest(state.u), moved_by_lift)
             before, self.u = self.u, u
             self._remember(state)
             history.append(
@@ -477,7 +343,7 @@ class Analysis:
     def _noise(self, lift: Array, tolerance: float) -> tuple[float, float]:
         """Return the relative accuracy of a solution, and the absolute one of its gaps [length]."""
         noise = max(10 * self.solver.tolerance, tolerance if self.solver.iterative else 0.0)
-        scale = np.abs(lift).max(initial=0.0) + np.abs(self.u).max(initial=0.0)
+        scale = largest(lift) + largest(self.u)
         return noise, max(noise * (scale or self.expected), self.round_off)
 
     def _floating(
@@ -584,7 +450,7 @@ class Analysis:
     def _balance(self, contact_force: Array, index: int, history: list[dict[str, Any]]) -> Array:
         """Return the reactions (n_dofs,) and check that all other degrees of freedom are in balance."""
         reaction, residual = self.system.balance(self.K @ self.u - contact_force - self.external)
-        force = max(float(np.abs(forces).max(initial=0.0)) for forces in (reaction, contact_force, self.external))
+        force = max(largest(forces) for forces in (reaction, contact_force, self.external))
         self.largest_force = max(self.largest_force, force)
         bound = max(self.criteria.relative * force, self.criteria.absolute or 0.0)
         # Without forces the criterion is 0/0: round-off of the internal forces decides, which costs a product with K.
@@ -610,7 +476,7 @@ class Analysis:
 
     def _result(
         self, index: int, instant: float, reaction: Array, constraints: Constraints | None,
-        state: active_set.State | None, iterations: dict[str, Any], last: bool,
+        state: active_set.State | None, iterations: dict[str, Any],
     ) -> StepResult:  # fmt: skip
         mesh, kinematics = self.model.mesh, self.model.kinematics
         u = self.displacement
@@ -629,22 +495,7 @@ class Analysis:
         return StepResult(
             index, instant, u.copy(), stress, recovery.von_mises(stress), recovery.von_mises_signed(stress),
             reaction.reshape(-1, mesh.dim), contact, iterations,
-            tuple(self._warn(index, instant, stress, contact, last)),
         )  # fmt: skip
-
-    def _warn(
-        self, index: int, instant: float, stress: Array, contact: dict[str, ContactResult], last: bool
-    ) -> list[str]:
-        """Warn of what is doubtful: of the model at the first step, of the state at the last one."""
-        found = []
-        if last:
-            loaded = bool(self.external.any() or self._lift(instant).any())
-            found = doubts.at_the_end(self, stress, contact, loaded)
-            if self.unsettled:
-                found += doubts.unsettled(*self.unsettled)
-        for text in found:
-            warn(text)
-        return self.doubts * (index == 1) + found
 
 
 def near_nullspace(model: Model) -> Array:

@@ -12,8 +12,8 @@ from reprlib import repr
 from typing import Any
 
 from fastcontact import analytic, generate
-from fastcontact.analysis import Criteria
 from fastcontact.checks import KEYS, Check, read_check
+from fastcontact.criteria import Criteria
 from fastcontact.errors import CaseError, FastcontactError, unknown
 from fastcontact.io.mesh_files import read_mesh
 from fastcontact.materials import LinearElastic

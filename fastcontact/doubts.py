@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact import elements, recovery
+from fastcontact.analysis import Analysis
+from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.result import deep
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import Mesh
 from fastcontact.overlap import penetration
+from fastcontact.results import ContactResult, StepResult
 from fastcontact.rigid_motions import body_name
 from fastcontact.topology import bodies
-
-if TYPE_CHECKING:
-    from fastcontact.analysis import Analysis
-    from fastcontact.contact.formulations import Formulation
-    from fastcontact.results import ContactResult
 
 Array = NDArray[np.float64]
 # Equivalent strain beyond which linear kinematics are worth a warning.
@@ -32,21 +27,21 @@ ACROSS = 4
 UNSETTLED = 1e-2
 
 
-def at_the_end(analysis: Analysis, stress: Array, contact: Mapping[str, ContactResult], loaded: bool) -> list[str]:
-    """Return the doubts about the last step of an analysis, whose nodal `stress` and `contact` are known.
-
-    `loaded` says whether loads or prescribed displacements are left.
-    """
-    found = _interpenetration(analysis) + _large_strain(analysis, stress) + _large_rotation(analysis)
+def at_the_end(analysis: Analysis, last: StepResult) -> list[str]:
+    """Return the doubts about an analysis that has just made its `last` step."""
+    found = _interpenetration(analysis) + _large_strain(analysis, last.stress) + _large_rotation(analysis)
     found += _carrying_springs(analysis)
+    loaded = analysis.loaded(last.load_factor)
     for name, pair in analysis.pairs.items():
-        found += deep(pair, contact[name], analysis.u) + _lost(name, contact[name], name in analysis.touched, loaded)
-        found += _unresolved(name, pair, contact[name])
-    return found
+        contact = last.contact[name]
+        found += deep(pair, contact, analysis.u) + _lost(name, contact, name in analysis.touched, loaded)
+        found += _unresolved(name, pair, contact)
+    return found + _unsettled(analysis)
 
 
-def unsettled(update: int, change: float) -> list[str]:
+def _unsettled(analysis: Analysis) -> list[str]:
     """Return a doubt where the last of a fixed number of geometry updates still changed much."""
+    update, change = analysis.unsettled or (0, 0.0)
     if change <= UNSETTLED:
         return []
     return [

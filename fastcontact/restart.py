@@ -9,20 +9,19 @@ uninterrupted one bit for bit.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.analysis import Analysis
 from fastcontact.contact.rigid import RigidSide
+from fastcontact.criteria import Criteria
 from fastcontact.errors import ModelError
 from fastcontact.fingerprint import different, fingerprint
+from fastcontact.model import Model
 from fastcontact.ramp import Ramp, table_value
-
-if TYPE_CHECKING:
-    from fastcontact.analysis import Analysis, Criteria
-    from fastcontact.model import Model
-    from fastcontact.results import StepResult
+from fastcontact.results import StepResult
 
 Array = NDArray[np.float64]
 FORMAT = 1

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from fastcontact.analysis import Analysis
 from fastcontact.errors import ConvergenceError
-
-if TYPE_CHECKING:
-    from fastcontact.analysis import Analysis
-    from fastcontact.results import StepResult
+from fastcontact.results import StepResult
 
 log = logging.getLogger("fastcontact")
 # What a step changes: of the analysis, of each of its pairs, of the primary side of a pair, of the extrapolation, of
@@ -53,9 +51,7 @@ def _copied(value: Any) -> Any:
     return value.copy() if isinstance(value, (dict, list)) else value
 
 
-def advance(
-    analysis: Analysis, index: int, begin: float, end: float, last: bool = False, max_halvings: int = 0
-) -> StepResult:
+def advance(analysis: Analysis, index: int, begin: float, end: float, max_halvings: int = 0) -> StepResult:
     """Solve the step `index` from instant `begin` to `end`, in halves of halves where it does not converge.
 
     Parts of the step are steps of their own: friction slides along their path. The result is that at `end`, with the
@@ -69,19 +65,17 @@ def advance(
     """
     state = snapshot(analysis)
     try:
-        return _joined(_parts(analysis, index, begin, end, last, max_halvings, 0))
+        return _joined(_parts(analysis, index, begin, end, max_halvings, 0))
     except ConvergenceError:
         restore(state)
         raise
 
 
-def _parts(
-    analysis: Analysis, index: int, begin: float, end: float, last: bool, limit: int, halved: int
-) -> list[StepResult]:
+def _parts(analysis: Analysis, index: int, begin: float, end: float, limit: int, halved: int) -> list[StepResult]:
     middle = 0.5 * (begin + end)
     state = snapshot(analysis)
     try:
-        return [analysis.step(index, end, last=last)]
+        return [analysis.step(index, end)]
     except ConvergenceError as error:
         if halved == limit or not begin < middle < end or not error.smaller_steps_help:
             where = f"from {begin:.6g} to {end:.6g}"
@@ -93,8 +87,8 @@ def _parts(
         reason = str(error).split(". ")[0]
         log.warning("step %d from %.6g to %.6g does not converge, cut in halves: %s", index, begin, end, reason)
     restore(state)
-    first = _parts(analysis, index, begin, middle, False, limit, halved + 1)
-    return first + _parts(analysis, index, middle, end, last, limit, halved + 1)
+    first = _parts(analysis, index, begin, middle, limit, halved + 1)
+    return first + _parts(analysis, index, middle, end, limit, halved + 1)
 
 
 def _joined(parts: list[StepResult]) -> StepResult:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 from fastcontact.errors import ModelError
+from fastcontact.kernels.norms import largest
 from fastcontact.relations import Elimination, Relation, eliminate, stacked_rows
 
 Array = NDArray[np.float64]
@@ -84,6 +85,7 @@ class System:
             condensed.sort_indices()
             self.free &= (condensed.diagonal() > 0) | loose  # not points that relations tie to nothing but each other
             self.matrix = supports_apart(condensed, ~self.free)[0]
+        self._no_unknowns = np.flatnonzero(~self.free)
 
     def lift(self, prescribed: Array, values: Array) -> Array:
         """Return t for the prescribed displacements (n,) and the right-hand sides (m,) of the relations.
@@ -101,12 +103,17 @@ class System:
 
     def right(self, f: Array, t: Array) -> Array:
         """Return the right-hand side (n,) of the solver for the forces `f` (n,) on all displacements."""
-        return self.reduced(f - self.K @ t)
+        # Without relations t moves supports alone, and those act on unknowns through what was taken out of the matrix.
+        return self.reduced(f - (self.K.parts[1] if self.T is None else self.K) @ t)
 
     def reduced(self, force: Array) -> Array:
         """Return the forces (n,) on the unknowns that `force` (n,) on all displacements amounts to."""
-        on_unknowns = force if self.T is None else self.T.T @ force
-        return np.where(self.free, on_unknowns, 0.0)
+        return self._of_unknowns(force.copy() if self.T is None else self.T.T @ force)
+
+    def _of_unknowns(self, values: Array) -> Array:
+        """Clear, in place, the values (n,) of everything that is no unknown."""
+        values[self._no_unknowns] = 0.0
+        return values
 
     def rows(self, rows: csr_array, offset: Array, t: Array) -> tuple[csr_array, Array]:
         """Return ``rows @ u + offset`` as rows and offset for the unknowns v."""
@@ -122,7 +129,7 @@ class System:
 
     def unknowns(self, u: Array, t: Array | float = 0.0) -> Array:
         """Return v (n,) of displacements u (n,) that obey the relations."""
-        return np.where(self.free, u - t, 0.0)
+        return self._of_unknowns(u - t)
 
     def unknowns_of(self, motions: Array) -> Array:
         """Return the unknowns (n, k) of motions (n, k) that obey supports and relations."""
@@ -139,7 +146,7 @@ class System:
 
         `out` (n,) is the internal minus all other forces.
         """
-        return np.where(self.held, out, 0.0), float(np.abs(self.reduced(out)).max(initial=0.0))
+        return np.where(self.held, out, 0.0), largest(self.reduced(out))
 
 
 class ConstrainedMotion:

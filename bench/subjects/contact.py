@@ -15,8 +15,9 @@ from scipy.sparse.linalg import splu
 
 import fastcontact as fc
 from fastcontact import _jit, linear
-from fastcontact.analysis import Analysis, Criteria, near_nullspace
+from fastcontact.analysis import Analysis, near_nullspace
 from fastcontact.benchmark import peak_bytes
+from fastcontact.criteria import Criteria
 from fastcontact.errors import FastcontactError, unknown
 
 SIZES = (1_500, 10_000, 40_000)

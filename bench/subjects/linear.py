@@ -4,7 +4,8 @@ import numpy as np
 
 import fastcontact as fc
 from fastcontact import linear
-from fastcontact.analysis import Analysis, Criteria, near_nullspace
+from fastcontact.analysis import Analysis, near_nullspace
+from fastcontact.criteria import Criteria
 
 SIZES = (1_500, 6_000, 20_000)
 

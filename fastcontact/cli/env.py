@@ -35,11 +35,11 @@ def run(options: argparse.Namespace) -> int:
 
 def _warm_up() -> None:
     """Run a small problem through every kernel, with linear and quadratic cells."""
-    from fastcontact.analysis import solve
     from fastcontact.generate import half_spheres
     from fastcontact.materials import LinearElastic
     from fastcontact.model import Model
     from fastcontact.ramp import linear_ramp
+    from fastcontact.solving import solve
 
     for element, formulation in (("tri3", "node_to_segment"), ("tri6", "continuous")):
         model = Model(half_spheres(element, size=10.0), "axisymmetric")

@@ -40,10 +40,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Solve, write, print the summary."""
     from fastcontact import summary
-    from fastcontact.analysis import solve
     from fastcontact.case import read_case
     from fastcontact.io.result_writer import ResultWriter
     from fastcontact.restart import remaining
+    from fastcontact.solving import solve
 
     started = time.perf_counter()
     if options.threads is not None:

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact import elements
-from fastcontact.analysis import solve
 from fastcontact.case import Case, build_case, read_case
 from fastcontact.convergence import quantities
 from fastcontact.convergence.job import case_data
@@ -25,6 +24,7 @@ from fastcontact.errors import CaseError, FastcontactWarning, unknown
 from fastcontact.generate import Forest, circles, linearised, to_quadratic
 from fastcontact.mesh import Mesh
 from fastcontact.results import StepResult
+from fastcontact.solving import solve
 
 Array = NDArray[np.float64]
 # Cells that carry this part of the error are refined: a larger part makes fewer, larger steps (Doerfler, 1996).

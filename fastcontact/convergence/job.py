@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 import fastcontact
-from fastcontact.analysis import solve
 from fastcontact.case import Case, build_case
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.convergence import quantities
@@ -24,6 +23,7 @@ from fastcontact.convergence.settings import Combination, Settings
 from fastcontact.errors import FastcontactError, FastcontactWarning
 from fastcontact.mesh import Mesh
 from fastcontact.pair_terms import TERMS
+from fastcontact.solving import solve
 
 # Changes when the measured numbers or the stored form change.
 SCHEMA = 1

@@ -10,6 +10,11 @@ from fastcontact._jit import kernel
 Array = NDArray[np.float64]
 
 
+def largest(x: Array) -> float:
+    """Return the largest of ``|x|``, 0 if there is none; NaN if there is one."""
+    return float(max(x.max(initial=0.0), -x.min(initial=0.0)))
+
+
 @kernel
 def largest_difference(x: Array, y: Array) -> float:
     """Return the largest of ``|x - y|`` (n,), 0 if there is none; NaN if there is one."""

@@ -74,13 +74,13 @@ def _transposed(x, bits):
         shift = np.uint32(bit)
         below = (one << shift) - one
         for i in range(n):  # where the bit is set, invert the lower bits of the first number
-            first[i] ^= below & (np.uint32(0) - ((first[i] >> shift) & one))
+            first[i] ^= below * ((first[i] >> shift) & one)
         for d in range(1, dim):
             other = x[d]
             for i in range(n):  # the same, and where it is not, exchange them with those of this one
-                present = np.uint32(0) - ((other[i] >> shift) & one)
-                change = (first[i] ^ other[i]) & below & ~present
-                first[i] ^= change | (below & present)
+                present = below * ((other[i] >> shift) & one)
+                change = (first[i] ^ other[i]) & (below ^ present)
+                first[i] ^= change | present
                 other[i] ^= change
     for d in range(1, dim):
         other, previous = x[d], x[d - 1]
@@ -91,7 +91,7 @@ def _transposed(x, bits):
         shift = np.uint32(bit)
         below = (one << shift) - one
         for i in range(n):
-            turn[i] ^= below & (np.uint32(0) - ((last[i] >> shift) & one))
+            turn[i] ^= below * ((last[i] >> shift) & one)
     for d in range(dim):
         other = x[d]
         for i in range(n):

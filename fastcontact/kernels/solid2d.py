@@ -98,21 +98,42 @@ def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric,
 
 @kernel
 def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, out):
-    """Fill `out` (n_cells, n_q, 4) with the stress xx, yy, zz, xy at the points of the tables N, dN."""
+    """Fill `out` (n_cells, n_q, 4) with the stress xx, yy, zz, xy at the points of the tables N, dN.
+
+    Positions and displacements are differentiated along the cell, and their derivatives divided: no shape function's
+    gradient is formed.
+    """
     n_cells, n_nodes = cells.shape
-    gradient = np.empty((n_nodes, 2))
+    local = np.empty((n_nodes, 4))
     for c in range(n_cells):
         D = moduli[material[c]]
+        for a in range(n_nodes):
+            p = cells[c, a]
+            local[a, 0], local[a, 1] = points[p, 0], points[p, 1]
+            local[a, 2], local[a, 3] = displacement[p, 0], displacement[p, 1]
         for q in range(N.shape[0]):
-            _, radius = _map(points, cells[c], N, dN, q, gradient)
-            exx = eyy = ezz = gxy = 0.0
+            x_r = y_r = x_s = y_s = ux_r = uy_r = ux_s = uy_s = 0.0
             for a in range(n_nodes):
-                ux, uy = displacement[cells[c, a], 0], displacement[cells[c, a], 1]
-                exx += gradient[a, 0] * ux
-                eyy += gradient[a, 1] * uy
-                gxy += gradient[a, 1] * ux + gradient[a, 0] * uy
-                if axisymmetric:
-                    ezz += N[q, a] * ux / radius
+                along_r, along_s = dN[q, a, 0], dN[q, a, 1]
+                x_r += along_r * local[a, 0]
+                y_r += along_r * local[a, 1]
+                ux_r += along_r * local[a, 2]
+                uy_r += along_r * local[a, 3]
+                x_s += along_s * local[a, 0]
+                y_s += along_s * local[a, 1]
+                ux_s += along_s * local[a, 2]
+                uy_s += along_s * local[a, 3]
+            inverse = 1.0 / (x_r * y_s - y_r * x_s)
+            exx = (ux_r * y_s - ux_s * y_r) * inverse
+            eyy = (uy_s * x_r - uy_r * x_s) * inverse
+            gxy = (ux_s * x_r - ux_r * x_s + uy_r * y_s - uy_s * y_r) * inverse
+            ezz = 0.0
+            if axisymmetric:
+                radius = ux = 0.0
+                for a in range(n_nodes):
+                    radius += N[q, a] * local[a, 0]
+                    ux += N[q, a] * local[a, 2]
+                ezz = ux / radius
             for i in range(4):
                 out[c, q, i] = D[i, 0] * exx + D[i, 1] * eyy + D[i, 2] * ezz + D[i, 3] * gxy
 

@@ -94,17 +94,31 @@ def backward(
     gathered = np.empty(len(x))
     for s in range(len(first) - 2, -1, -1):
         low, high = first[s], first[s + 1]
+        j = high - 1
+        while j >= low and given[j]:
+            j -= 1
+        if j < low:
+            continue
         below = begin[s + 1] - begin[s]
         for k in range(below):
             gathered[k] = x[rows[begin[s] + k]]
-        for j in range(high - 1, low - 1, -1):
-            if given[j]:
-                continue
+        # Two columns at a time read only once what both are multiplied with; the last one may be alone.
+        while j >= low:
+            alone = j == low
+            one = start[j] + 1
+            other = one if alone else start[j - 1] + 2
+            first_sum, second_sum = 0.0, 0.0
             # Slices, since the compiler sees of those that their entries lie side by side.
-            beside, under = values[start[j] + 1 : start[j] + high - j], values[start[j] + high - j : start[j + 1]]
-            total = 0.0
-            for k in range(high - j - 1):
-                total += beside[k] * x[j + 1 + k]
+            n = high - 1 - j
+            a, b, beside = values[one : one + n], values[other : other + n], x[j + 1 : high]
+            for k in range(n):
+                first_sum += a[k] * beside[k]
+                second_sum += b[k] * beside[k]
+            a, b = values[one + n : one + n + below], values[other + n : other + n + below]
             for k in range(below):
-                total += under[k] * gathered[k]
-            x[j] -= total
+                first_sum += a[k] * gathered[k]
+                second_sum += b[k] * gathered[k]
+            x[j] -= first_sum
+            if not alone:
+                x[j - 1] -= second_sum + values[other - 1] * x[j]
+            j -= 2

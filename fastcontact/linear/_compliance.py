@@ -56,6 +56,17 @@ class ComplianceCache:
         place = self._place[dofs]
         return self._values[np.ix_(place, place)]
 
+    def condensed(self, R: csr_array) -> Array:
+        """Return ``R K^-1 R.T`` (m, m) for sparse rows R (m, n)."""
+        used = R.data != 0.0
+        dofs = R.indices[used]
+        new = dofs[self._place[dofs] < 0]
+        if len(new):
+            self._extend(np.unique(new).astype(np.intp))
+        starts = np.concatenate([[0], np.cumsum(used)])[R.indptr]
+        rows = csr_array((R.data[used], self._place[dofs], starts), shape=(R.shape[0], len(self._dofs)))
+        return np.asarray(rows @ (rows @ self._values).T)
+
     def ask_again(self, asked: Iterable[NDArray[np.intp]]) -> None:
         """Solve for what another cache of this matrix was asked for, in its order; see `asked`."""
         for dofs in asked:
@@ -82,9 +93,7 @@ class ComplianceCache:
 
 def reduced(cache: ComplianceCache, R: csr_array) -> Array:
     """Return ``R K^-1 R.T`` (m, m)."""
-    dofs = np.unique(R.indices[R.data != 0.0]).astype(np.intp)
-    rows = R[:, dofs].toarray()
-    flexibility: Array = rows @ cache.of(dofs) @ rows.T
+    flexibility = cache.condensed(R)
     return 0.5 * (flexibility + flexibility.T)
 
 

@@ -9,7 +9,8 @@ from scipy.sparse import bsr_array, csr_array
 
 import fastcontact as fc
 from fastcontact import linear
-from fastcontact.analysis import Analysis, Criteria
+from fastcontact.analysis import Analysis
+from fastcontact.criteria import Criteria
 from fastcontact.errors import ModelError
 
 

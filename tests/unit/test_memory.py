@@ -5,7 +5,8 @@ import gc
 import pytest
 
 import fastcontact as fc
-from fastcontact.analysis import Analysis, Criteria
+from fastcontact.analysis import Analysis
+from fastcontact.criteria import Criteria
 
 
 @pytest.mark.parametrize("solver", ["direct", "amg"])
@@ -21,7 +22,7 @@ def test_no_cycle_keeps_a_finished_analysis(solver, formulation):
 
     def solved():
         analysis = Analysis(model, solver, 1e-10, Criteria(geometry_updates=2), fc.linear_ramp(1))
-        return analysis.step(1, 1.0, last=False).index
+        return analysis.step(1, 1.0).index
 
     solved()
     gc.collect()

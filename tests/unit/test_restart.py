@@ -7,7 +7,8 @@ import pytest
 
 import fastcontact as fc
 from fastcontact import restart, step_control
-from fastcontact.analysis import Analysis, Criteria
+from fastcontact.analysis import Analysis
+from fastcontact.criteria import Criteria
 from fastcontact.generate import block, box, renamed, union
 
 FRICTIONLESS, FRICTION = 1e-12, 1e-10

@@ -7,8 +7,9 @@ from scipy.sparse.linalg import splu
 
 import fastcontact as fc
 from fastcontact import linear
-from fastcontact.analysis import Analysis, Criteria
+from fastcontact.analysis import Analysis
 from fastcontact.assembly import stiffness
+from fastcontact.criteria import Criteria
 from fastcontact.kernels import triangular
 from fastcontact.linear._known_loads import KnownLoads
 from fastcontact.linear._order import fill_reducing

@@ -1,0 +1,61 @@
+"""When a load step counts as converged, and what happens where it does not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fastcontact.errors import ModelError
+
+
+@dataclass(frozen=True)
+class Criteria:
+    """When a load step counts as converged.
+
+    Parameters
+    ----------
+    relative : float
+        Largest out-of-balance force over the largest applied force, reaction or contact force (RESI_GLOB_RELA).
+    absolute : float, optional
+        Largest out-of-balance force [force] that is small enough by itself (RESI_GLOB_MAXI). Without forces a relative
+        criterion is 0/0; then, and by default, the bound is the round-off of the internal forces.
+    geometry_updates : int or None
+        How many times to re-pair on the deformed configuration after the first pairing of a step; None: until the
+        displacement changes by less than `geometry` of its largest component.
+    geometry : float
+        See `geometry_updates`.
+    keep_pairing : bool
+        Keep the pairing of the undeformed bodies through all steps, with its normals and projections (REAC_GEOM =
+        'SANS'); for small motions only. Without friction the state then does not depend on the steps that lead to it.
+    max_geometry_updates, max_active_set_iterations : int
+        Limits per step, and per pairing.
+    max_halvings : int
+        How many times a load step that does not converge is cut in halves before the analysis gives up (DECOUPE).
+        Parts of a step are steps of their own, so that friction slides along their path; only the instants of the ramp
+        give a result, whose ``iterations["substeps"]`` lists the ends of its parts. 0: never.
+    """
+
+    relative: float = 1e-6
+    absolute: float | None = None
+    geometry_updates: int | None = None
+    geometry: float = 1e-11
+    keep_pairing: bool = False
+    max_geometry_updates: int = 60
+    max_active_set_iterations: int = 200
+    max_halvings: int = 4
+
+    def __post_init__(self) -> None:
+        if not self.relative > 0 or not self.geometry > 0:
+            raise ModelError("the convergence criteria `relative` and `geometry` must be positive")
+        if self.geometry_updates is not None and self.geometry_updates < 0:
+            raise ModelError(f"geometry_updates = {self.geometry_updates} must be None or a whole number >= 0")
+        for name, least in (("max_geometry_updates", 0), ("max_active_set_iterations", 1)):
+            if getattr(self, name) < least:
+                raise ModelError(f"{name} = {getattr(self, name)} must be a whole number >= {least}")
+        if self.absolute is not None and not self.absolute >= 0:
+            raise ModelError(f"the convergence criterion absolute = {self.absolute} must be a force >= 0, or None")
+        if self.max_halvings < 0 or int(self.max_halvings) != self.max_halvings:
+            raise ModelError(f"max_halvings = {self.max_halvings} must be a whole number >= 0")
+        if self.keep_pairing and self.geometry_updates:
+            raise ModelError(
+                f"keep_pairing leaves no room for geometry_updates = {self.geometry_updates}: give one or the other"
+            )

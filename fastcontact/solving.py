@@ -1,0 +1,103 @@
+"""The ramp: load steps one after the other, from the beginning or where others stopped, each handed over when it is done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from fastcontact import doubts, plausibility, restart, step_control
+from fastcontact.analysis import Analysis
+from fastcontact.criteria import Criteria
+from fastcontact.errors import warn
+from fastcontact.model import Model
+from fastcontact.ramp import Ramp, linear_ramp
+from fastcontact.results import StepResult
+
+
+def solve(
+    model: Model,
+    ramp: Ramp | None = None,
+    *,
+    linear_solver: str = "auto",
+    linear_tolerance: float = 1e-10,
+    linear_precision: str | None = None,
+    criteria: Criteria | None = None,
+    on_step: Callable[[StepResult], None] | None = None,
+    resume: Sequence[StepResult] = (),
+) -> list[StepResult]:
+    """Solve a model along a load ramp, from its beginning or after steps that are there already.
+
+    Parameters
+    ----------
+    model : Model
+        Checked whole before any numerics.
+    ramp : Ramp, optional
+        By default 20 equal steps.
+    linear_solver : str
+        ``"direct"``, ``"cholmod"``, ``"pardiso"``, ``"amg"`` or ``"auto"``; see `linear.make`.
+    linear_tolerance : float
+        Relative residual of iterative linear solvers.
+    linear_precision : {"single", "double"}, optional
+        Of the numbers inside the multigrid cycle, single by default; the solution is in double precision always.
+    criteria : Criteria, optional
+        Convergence criteria and the handling of the geometry.
+    on_step : callable, optional
+        Called with every new `StepResult` as soon as its step has converged, e.g. ``ResultWriter.write``.
+    resume : sequence of StepResult
+        Steps of the same case to go on after: what `solve` returned, ``open_results(path)`` or ``ResultWriter.done``;
+        none by default. The analysis goes on with the instants of the ramp after the last of them and ends as if it had
+        never stopped. Linear solver, tolerances and limits may be others, and so may the ramp from there on.
+
+    Returns
+    -------
+    list of StepResult
+        Those to go on after, and the new ones. Of all these only the last one keeps its `restart`.
+
+    Raises
+    ------
+    MeshError, ModelError, ContactError
+        If the model is wrong, or is another one than that of the steps to go on after.
+    ConvergenceError
+        If a step does not converge, nor in parts (`Criteria.max_halvings`); steps before it have been handed to
+        `on_step`.
+
+    Warns
+    -----
+    FastcontactWarning
+        At the beginning, if the model is doubtful: units that slipped, poor cells, integrals that are not exact, nodes
+        that coincide. At the end, if bodies interpenetrate where no contact is defined, a contact never closed, was lost
+        or is not resolved by the mesh, a penalty lets it penetrate by more than 1 % of the largest displacement, strains
+        or rotations leave the range of linear kinematics, or a fixed number of geometry updates was too small. The
+        results of the first and of the last step keep the texts.
+    """
+    ramp, criteria = ramp or linear_ramp(), criteria or Criteria()
+    case = restart.identity(model, ramp, criteria)
+    steps, begin = list(resume), ramp.table[0][0]
+    if steps:
+        restart.check(steps[-1], case)
+    instants = restart.remaining(ramp, steps)
+    if not instants:
+        return steps
+    model.check(ramp)
+    doubtful = plausibility.doubts(model)
+    for text in doubtful if not steps else ():
+        warn(text)
+    analysis = Analysis(model, linear_solver, linear_tolerance, criteria, ramp, linear_precision)
+    analysis.touched = {name: True for step in steps for name, found in step.contact.items() if found.active.any()}
+    if steps:
+        restart.put_back(analysis, steps[-1])
+        begin = steps[-1].load_factor
+    for index, instant in enumerate(instants, start=steps[-1].index + 1 if steps else 1):
+        step = step_control.advance(analysis, index, begin, instant, criteria.max_halvings)
+        found = doubts.at_the_end(analysis, step) if instant == instants[-1] else []
+        for text in found:
+            warn(text)
+        told = (*doubtful * (index == 1), *found)
+        step = replace(step, warnings=told, restart=restart.taken(analysis, case))
+        begin = instant
+        if on_step is not None:
+            on_step(step)
+        if steps and steps[-1].restart is not None:
+            steps[-1] = replace(steps[-1], restart=None)
+        steps.append(step)
+    return steps
