@@ -483,6 +483,7 @@ class Analysis:
         self._place_obstacles(self.u)
         at_points = recovery.stress_at_points(mesh, kinematics, self.moduli, self.material, u)
         stress = recovery.nodal_average(mesh, at_points)
+        von_mises = recovery.von_mises(stress)
         contact, first = {}, 0
         for name, pair in self.pairs.items():
             assert constraints is not None
@@ -493,7 +494,7 @@ class Analysis:
             first = rows.stop
         self.touched |= {name: True for name, found in contact.items() if found.active.any()}
         return StepResult(
-            index, instant, u.copy(), stress, recovery.von_mises(stress), recovery.von_mises_signed(stress),
+            index, instant, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises),
             reaction.reshape(-1, mesh.dim), contact, iterations,
         )  # fmt: skip
 

@@ -78,7 +78,7 @@ def von_mises(stress: Array) -> Array:
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * shear)
 
 
-def von_mises_signed(stress: Array) -> Array:
-    """Return the von Mises stress with the sign of the trace, as VMIS_SG of code_aster."""
+def von_mises_signed(stress: Array, equivalent: Array | None = None) -> Array:
+    """Return the von Mises stress (`equivalent`, where it is known) with the sign of the trace, as VMIS_SG of code_aster."""
     trace = stress[..., 0] + stress[..., 1] + stress[..., 2]
-    return np.where(trace < 0, -1.0, 1.0) * von_mises(stress)
+    return np.where(trace < 0, -1.0, 1.0) * (von_mises(stress) if equivalent is None else equivalent)

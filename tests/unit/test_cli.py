@@ -234,6 +234,45 @@ def test_a_run_interrupted_from_the_keyboard_says_what_it_keeps(solved, tmp_path
     np.testing.assert_array_equal(fc.open_results(path)[-1].displacement, expected.displacement)
 
 
+def test_a_run_that_fails_at_once_keeps_nothing_and_says_so(solved, tmp_path, capsys):
+    text = CASE.replace("[probes]", "[solve]\nmax_halvings = 0\nmax_geometry_updates = 1\n[probes]")
+    case = tmp_path / "hard.toml"
+    case.write_text(text)
+    assert main(["run", str(case), "-o", str(tmp_path / "hard.vtkhdf")]) == 2
+    assert capsys.readouterr().err.splitlines()[-1] == f"  '{tmp_path / 'hard.vtkhdf'}' holds no complete step"
+
+
+def test_errors_of_cells_are_estimated_on_request(solved, tmp_path):
+    path = tmp_path / "estimated.vtkhdf"
+    assert main(["run", str(solved / "small.toml"), "-q", "--estimate-error", "-o", str(path)]) == 0
+    with fc.open_results(path) as results:
+        errors = results[-1].cell_fields["error"]
+        assert len(errors) == sum(map(len, results.mesh.solids.values()))
+        assert errors.min() > 0.0
+
+
+def test_a_step_is_chosen_by_its_number(solved, tmp_path, capsys):
+    for number in ("1", "3"):
+        assert main(["profile", str(solved / "small.vtkhdf"), "--step", number]) == 0
+        assert capsys.readouterr().out.count("\n") > 5
+
+
+def test_a_file_whose_case_is_no_toml_is_shown_without_theory(solved, tmp_path, capsys):
+    with fc.open_results(solved / "small.vtkhdf") as results:
+        with fc.ResultWriter(tmp_path / "odd.vtkhdf", results.mesh, case_text="[contact") as out:
+            out.write(results[0])
+    assert main(["profile", str(tmp_path / "odd.vtkhdf")]) == 0
+    assert "theory" not in capsys.readouterr().out
+
+
+def test_a_reader_that_goes_away_is_no_error_of_ours(monkeypatch):
+    def gone(*_):
+        raise BrokenPipeError
+
+    monkeypatch.setattr("builtins.print", gone)
+    assert main(["env"]) == 1
+
+
 def test_steps_and_pairs_that_do_not_exist(solved, capsys):
     assert main(["profile", str(solved / "small.vtkhdf"), "--step", "9"]) == 1
     assert "steps 1 to 3" in capsys.readouterr().err
@@ -252,6 +291,16 @@ def test_nothing_but_warnings_is_printed_when_quiet(solved, tmp_path, capsys):
 def test_environment_is_shown(capsys):
     assert main(["env"]) == 0
     assert "numba" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_kernels_are_compiled_on_request(capsys):
+    assert main(["env", "--warmup"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1].startswith("warm-up")
+
+
+def test_all_names_are_offered():
+    assert set(fc.__all__) <= set(dir(fc))
 
 
 def test_import_is_light():

@@ -122,6 +122,7 @@ def test_the_box_is_its_own_obstacle(kinematics):
     top = np.zeros((20, box.dim))
     top[:, 0] = np.linspace(0.0, 1.0, 20)
     gap, normal = box.distance(top)
+    assert box.pressure_max == -box.stress(np.zeros((1, box.dim)))[0, 1 if box.dim == 2 else 2]
     assert (normal == [*[0.0] * (box.dim - 1), -1.0]).all()
     left = gap + (normal * box.displacement(top)).sum(axis=1)
     np.testing.assert_allclose(left[top[:, 0] < box.radius], 0.0, atol=1e-15)

@@ -111,3 +111,11 @@ def test_bad_input_is_named():
         hertz_elliptical(**{**good, "R1x": -1.0}, force=1.0)
     with pytest.raises(ModelError, match="exactly one of force, approach, pressure_max"):
         hertz_elliptical(**good)
+
+
+def test_the_same_contact_at_another_force_or_approach():
+    hertz = hertz_elliptical(E1=1.0, nu1=0.3, R1x=2.0, R1y=1.0, force=1e-3)
+    other = hertz.at_force(8e-3)
+    assert other.radius == pytest.approx(math.sqrt(other.radius_x * other.radius_y), rel=1e-15)
+    assert other.radius == pytest.approx(2.0 * hertz.radius, rel=1e-13)
+    assert hertz.at_approach(other.approach).force == pytest.approx(8e-3, rel=1e-13)

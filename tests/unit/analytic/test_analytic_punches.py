@@ -127,6 +127,7 @@ def test_power_law_round_trips_and_work(exponent, force):
         assert again.force == pytest.approx(force, rel=1e-10)
     # A deeper contact of the same force law: dF/d(approach) = 2 E* a (Barber and Billings 1990).
     step = 1e-4 * punch.approach
+    assert punch.at_force(2.0 * force).at_force(force).radius == pytest.approx(punch.radius, rel=1e-12)
     forces = [punch.at_approach(punch.approach + k * step).force for k in (-1, 1)]
     assert (forces[1] - forces[0]) / (2.0 * step) == pytest.approx(2.0 * punch.E_star * punch.radius, rel=1e-6)
     big = power_law_punch(
@@ -155,6 +156,7 @@ def test_plane_punch_satisfies_the_equations_of_the_half_plane(nu, bonded):
 
 def test_plane_punch_at_its_edges():
     punch = flat_punch_2d(nu=0.2, half_width=2.0, force=3.0)
+    assert punch.radius == 2.0
     np.testing.assert_array_equal(punch.pressure([-2.0, 2.0, 2.5]), [math.inf, math.inf, 0.0])
     np.testing.assert_array_equal(punch.shear([-2.0, 0.5, 2.5]), [0.0, 0.0, 0.0])
     assert punch.pressure(0.0) == pytest.approx(3.0 / (2.0 * math.pi), rel=1e-14)
@@ -174,6 +176,7 @@ def test_stick_ratio_has_its_limits():
     assert spence_stick_ratio(nu=0.5, friction=0.1) == 1.0
     assert spence_stick_ratio(nu=0.3, friction=100.0) == pytest.approx(1.0, abs=1e-15)
     assert spence_stick_ratio(nu=0.0, friction=0.01) < 1e-10
+    assert spence_stick_ratio(nu=0.0, friction=1e-4) == 0.0
     ratios = [spence_stick_ratio(nu=0.3, friction=f) for f in (0.1, 0.2, 0.4, 0.8)]
     assert ratios == sorted(ratios)
 
