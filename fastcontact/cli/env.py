@@ -5,6 +5,9 @@ from __future__ import annotations
 import argparse
 import os
 import time
+import warnings
+
+from fastcontact.errors import FastcontactWarning
 
 HELP = "show versions, threads and the cache folder of compiled kernels"
 
@@ -28,24 +31,35 @@ def run(options: argparse.Namespace) -> int:
     print(f"{'cache':<12} {cache}")
     if options.warmup:
         started = time.perf_counter()
-        _warm_up()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FastcontactWarning)  # nobody looks at the results
+            _warm_up()
         print(f"{'warm-up':<12} {time.perf_counter() - started:.1f} s")
     return 0
 
 
 def _warm_up() -> None:
-    """Run a small problem through every kernel, with linear and quadratic cells."""
-    from fastcontact.generate import half_spheres
+    """Run small problems through the kernels that most runs need, in two and three dimensions."""
+    from fastcontact import generate
     from fastcontact.materials import LinearElastic
     from fastcontact.model import Model
     from fastcontact.ramp import linear_ramp
     from fastcontact.solving import solve
 
-    for element, formulation in (("tri3", "node_to_segment"), ("tri6", "continuous")):
-        model = Model(half_spheres(element, size=10.0), "axisymmetric")
+    for element, formulation in (("tri3", "node_to_segment"), ("tri6", "continuous"), ("tri3", "mortar")):
+        model = Model(generate.half_spheres(element, size=10.0), "axisymmetric")
         model.add_material(LinearElastic(E=1.0, nu=0.3))
         model.fix("A1A2", "x")
         model.prescribe("A2B2", y=-0.1)
         model.prescribe("A1B1", y=0.1)
         model.add_contact("pair", secondary="CONT1", primary="CONT2", formulation=formulation)
         solve(model, linear_ramp(1))
+    for element, formulation, solver in (("hex8", "node_to_segment", "amg"), ("tet4", "mortar", "direct")):
+        model = Model(generate.sphere_on_block(element, R=1.0, size=0.4, contact_size=0.2, contact_radius=0.2), "3d")
+        model.add_material(LinearElastic(E=1.0, nu=0.3))
+        model.fix("SYMMETRY_X", "x")
+        model.fix("SYMMETRY_Z", "z")
+        model.fix("BLOCK_BOTTOM", "y")
+        model.prescribe("SPHERE_TOP", y=-0.02)
+        model.add_contact("pair", secondary="CONT_SPHERE", primary="CONT_BLOCK", formulation=formulation)
+        solve(model, linear_ramp(1), linear_solver=solver)

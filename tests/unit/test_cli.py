@@ -258,10 +258,13 @@ def test_a_step_is_chosen_by_its_number(solved, tmp_path, capsys):
 
 
 def test_a_file_whose_case_is_no_toml_is_shown_without_theory(solved, tmp_path, capsys):
-    with fc.open_results(solved / "small.vtkhdf") as results:
-        with fc.ResultWriter(tmp_path / "odd.vtkhdf", results.mesh, case_text="[contact") as out:
-            out.write(results[0])
-    assert main(["profile", str(tmp_path / "odd.vtkhdf")]) == 0
+    path = tmp_path / "odd.vtkhdf"
+    with (
+        fc.open_results(solved / "small.vtkhdf") as results,
+        fc.ResultWriter(path, results.mesh, case_text="[contact") as out,
+    ):
+        out.write(results[0])
+    assert main(["profile", str(path)]) == 0
     assert "theory" not in capsys.readouterr().out
 
 
