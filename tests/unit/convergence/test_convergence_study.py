@@ -1,0 +1,137 @@
+"""A study of made-up runs, whose limits and model errors are known: tables, sentences, pictures, JSON and CSV."""
+
+import json
+
+import numpy as np
+import pytest
+
+from fastcontact.case import read_case
+from fastcontact.convergence import study as studies
+from fastcontact.convergence.settings import combinations, settings
+from fastcontact.errors import CaseError, ContactError
+
+FORCE, PRESSURE = 600_000.0, 2900.0  # of theory
+LIMITS = {"force": 1.1 * FORCE, "pressure_max": 1.04 * PRESSURE, "C1.stress.yy": -2800.0}
+
+
+def made_up(level, order=2.0, theory=True, reference=None, broken=False):
+    """What a run of this level gives; `broken` ones say why they failed instead."""
+    if broken:
+        return {"error": "the contact geometry did not settle", "kind": "ConvergenceError", "seconds": 1.0}
+    h = 0.5**level
+    values = {name: limit * (1.0 + 0.1 * h**order) for name, limit in LIMITS.items()}
+    r = np.linspace(0.0, 9.0, 10)
+    return {
+        "h": h, "n_dofs": 100 * 4**level, "values": values, "seconds": 2.0, "warnings": [],
+        "profile": {"r": r.tolist(), "pressure": (PRESSURE * np.sqrt(1.0 - (r / 9.0) ** 2)).tolist()},
+        "theory": {"force": FORCE, "pressure_max": PRESSURE} if theory else {}, "reference": reference or {},
+    }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def case(root):
+    return read_case(root / "data/cases/forma04c.toml")
+
+
+def gathered(case, results, elements=("quad8",), wanted=("C1.stress.yy",)):
+    """The study of these results, one list of levels an element."""
+    chosen = settings(case)
+    members = combinations(chosen, elements, ["continuous"])
+    jobs = [studies._job(case, chosen, member, level) for member in members for level in range(len(results[0]))]
+    return studies._gathered(case, chosen, members, jobs, [one for levels in results for one in levels], wanted)
+
+
+@pytest.fixture(scope="module")
+def found(case):
+    levels = range(5)
+    return gathered(case, [[made_up(k, reference={"force": LIMITS["force"]}) for k in levels]])
+
+
+def test_limits_and_model_errors_are_those_put_in(found):
+    told = json.loads(json.dumps(found.as_dict()))
+    for name, model in (("force", 0.1), ("pressure_max", 0.04)):
+        entry = told["quantities"][name]
+        assert entry["limit"] == pytest.approx(LIMITS[name], rel=2e-5)
+        assert abs(entry["limit"] - LIMITS[name]) <= entry["uncertainty"]
+        assert entry["order"] == pytest.approx(2.0, abs=0.05)
+        assert entry["model_error"] == pytest.approx(model, abs=2e-5)
+        # Model and mesh error add up to what the finest mesh differs from theory.
+        finest = found.best.finest.values[name] / found.best.theory[name] - 1.0
+        assert entry["model_error"] + entry["mesh_error"] == pytest.approx(finest, abs=1e-12)
+    assert told["quantities"]["force"]["reference_in_error_bar"]
+    assert told["quantities"]["C1.stress.yy"]["theory"] is None
+    assert told["failed_combinations"] == {}
+    # The theory of the case, at the limit of the force.
+    at_force = found.theory.at_force(told["quantities"]["force"]["limit"]).pressure_max
+    assert told["equal_force"]["pressure_max"]["theory"] == pytest.approx(at_force, rel=1e-12)
+
+
+def test_a_row_for_every_level(found):
+    table = found.table()
+    assert table["level"].tolist() == [0, 1, 2, 3, 4]
+    assert table["element"].tolist() == ["quad8"] * 5
+    assert table["force_error"] == pytest.approx(0.1 * 0.25 ** np.arange(5), abs=2e-5)
+    assert table["force_order"][1:] == pytest.approx(2.0, abs=0.05)
+    assert table["force_from_theory"] == pytest.approx(1.1 * (1.0 + 0.1 * 0.25 ** np.arange(5)) - 1.0)
+    assert "C1.stress.yy_from_theory" not in table.dtype.names  # no theory knows it
+
+
+def test_tables_and_sentences(found):
+    text = "\n".join(found.lines())
+    assert "model error" in text
+    assert "+9.999 %" in text or "+10.000 %" in text
+    assert "inside the error bar" in text
+    assert "at equal force" in text
+
+
+def test_two_levels_have_no_limit_and_say_so(case):
+    study = gathered(case, [[made_up(0), made_up(1)]])
+    assert not study.best.limits
+    text = "\n".join(study.lines())
+    assert "no limits: 2 levels were solved, and a limit takes three" in text
+    assert study.as_dict()["quantities"]["force"]["limit"] is None
+    assert np.isnan(study.best.orders("force")).all()
+    study.figure()
+    assert "<td>-</td>" in study.html()
+
+
+def test_what_failed_is_told_and_the_rest_shown(case):
+    good, poor = [made_up(k) for k in range(4)], [made_up(k, broken=k != 1) for k in range(4)]
+    study = gathered(case, [good, poor, [made_up(k, broken=True) for k in range(4)]], ("quad8", "quad4", "tri6"))
+    assert study.best.combination.element == "quad8"
+    text = "\n".join(study.lines())
+    for told in ("level 0 failed: the contact geometry did not settle", "quad8 continuous", "tri6 continuous failed"):
+        assert told in text
+    assert len(study.as_dict()["failed_combinations"]) == 1
+    assert len(study.series[1].failed) == 3
+    assert study.html().count("class='failed'") >= 2
+    assert study.table()["element"].tolist() == ["quad8"] * 4 + ["quad4"]
+
+
+def test_where_nothing_could_be_solved_the_first_error_is_raised(case):
+    broken = {"error": "side 'CONT1' is empty", "kind": "ContactError", "seconds": 1.0}
+    with pytest.raises(ContactError, match=r"no level could be solved; .* side 'CONT1' is empty"):
+        gathered(case, [[broken, broken]])
+
+
+def test_a_quantity_that_nothing_gives_is_named(case):
+    with pytest.raises(CaseError, match=r"'C1.stres.yy'.*C1.stress.yy"):
+        gathered(case, [[made_up(k) for k in range(3)]], wanted=("C1.stres.yy",))
+
+
+def test_without_theory_the_mesh_error_is_all_there_is(case):
+    study = gathered(case, [[made_up(k, theory=False) for k in range(4)]])
+    entry = study.as_dict()["quantities"]["force"]
+    assert entry["model_error"] is None
+    assert entry["mesh_error"] == pytest.approx(0.1 * 0.25**3, abs=3e-4)
+    assert "the mesh error of the contact force is" in "\n".join(study.lines())
+
+
+def test_a_mesh_that_agrees_with_theory_by_chance_is_told(case):
+    """The limit is 4 % above theory, and coarse meshes come from below: one lies on the theory by chance."""
+    levels = [made_up(k) for k in range(5)]
+    for k, level in enumerate(levels):
+        level["values"]["pressure_max"] = 1.04 * PRESSURE * (1.0 - 0.16 * 0.25**k)
+    text = "\n".join(gathered(case, [levels]).lines())
+    assert "that it agrees is no proof of a good mesh" in text
+    assert "Level 1 " in text
