@@ -5,7 +5,10 @@ import json
 import numpy as np
 import pytest
 
+import fastcontact as fc
 from fastcontact.case import read_case
+from fastcontact.cli import main
+from fastcontact.convergence import levels
 from fastcontact.convergence import study as studies
 from fastcontact.convergence.settings import combinations, settings
 from fastcontact.errors import CaseError, ContactError
@@ -135,3 +138,43 @@ def test_a_mesh_that_agrees_with_theory_by_chance_is_told(case):
     text = "\n".join(gathered(case, [levels]).lines())
     assert "that it agrees is no proof of a good mesh" in text
     assert "Level 1 " in text
+
+
+@pytest.fixture(scope="module")
+def on_a_mesh_file(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    fc.write_mesh(folder / "coarse.med", fc.generate.half_spheres("tri3", size=15.0))
+    path = folder / "coarse.toml"
+    path.write_text(
+        'kinematics = "axisymmetric"\n[mesh]\nfile = "coarse.med"\n[[material]]\nE = 20000.0\nnu = 0.3\n'
+        '[[support]]\ngroup = "A1A2"\nx = 0.0\n[[support]]\ngroup = "A2B2"\ny = -2.0\n'
+        '[[support]]\ngroup = "A1B1"\ny = 2.0\n[contact.c]\nsecondary = "CONT1"\nprimary = "CONT2"\n[ramp]\nsteps = 1\n'
+    )
+    return path
+
+
+@pytest.mark.filterwarnings("ignore::fastcontact.errors.FastcontactWarning")
+def test_a_mesh_file_is_refined_with_its_arcs_round(on_a_mesh_file, tmp_path, capsys):
+    told = tmp_path / "study.json"
+    arguments = ["converge", str(on_a_mesh_file), "--levels", "2", "--elements", "tri3,tri6", "--workers", "1"]
+    assert main([*arguments, "--formulations", "continuous", "--json", str(told)]) == 0
+    linear, quadratic = json.loads(told.read_text())["combinations"]
+    for series in (linear, quadratic):
+        coarse, fine = series["levels"]
+        assert 3.0 < fine["n_dofs"] / coarse["n_dofs"] < 4.0
+        assert fine["h"] == pytest.approx(0.5 * coarse["h"], rel=0.05)
+    # Mid nodes are the corners of the next level.
+    assert quadratic["levels"][0]["n_dofs"] == linear["levels"][1]["n_dofs"]
+    force = [series["levels"][1]["force"] for series in (linear, quadratic)]
+    assert force[0] == pytest.approx(force[1], rel=0.2)
+    assert "no limits: 2 levels were solved" in capsys.readouterr().out
+
+
+def test_corners_of_a_quadratic_mesh_file_make_a_linear_study(on_a_mesh_file):
+    mesh = fc.generate.half_spheres("tri6", size=15.0)
+    case = read_case(on_a_mesh_file)
+    for element, kinds in (("tri3", {"tri3"}), ("tri6", {"tri6"}), (None, {"tri6"})):
+        recipe = levels.recipe(settings(case), element, 1)
+        made = levels.make_mesh(recipe, mesh)
+        assert set(made.solids) == kinds
+        assert len(made.cells[kinds.pop()]) == 4 * len(mesh.cells["tri6"])
