@@ -11,7 +11,7 @@ import subprocess
 import sys
 import textwrap
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -208,6 +208,15 @@ def test_a_pair_is_in_the_file_as_a_whole_or_not_at_all(path: Path, monkeypatch:
 # ---------------------------------------------------------------------------------------------- signals
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """A process that can be interrupted: shells let those that they start in the background ignore it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_a_signal_waits_for_the_end_of_a_write(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The step that is being written is complete, counted, and in the record of how the run ended."""
     put, seen = _commits.CommittedFile._put, []
