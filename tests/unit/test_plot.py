@@ -1,9 +1,12 @@
 """Pictures: what is drawn of a solid, and where; looked at through the artists and through the pixels."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import fastcontact as fc
+from fastcontact.cli._pictures import _normal_stress
 from fastcontact.generate import block, box, union
 from fastcontact.results import StepResult
 
@@ -99,3 +102,18 @@ def test_a_pressure_profile_in_space_is_over_the_distance_from_first_contact():
     assert np.isin(distance, contact.abscissa).all()
     assert distance.max() > 0.1
     assert [text.get_text() for text in ax.get_legend().get_texts()][1] == r"$-\sigma_{nn}$ at the nodes"
+
+
+def test_the_stress_along_normals_in_space_is_that_of_the_tensor():
+    """A pressure on each node's own plane, and a shear that its normal does not see."""
+    random = np.random.default_rng(5)
+    normal = random.normal(size=(6, 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    along = np.cross(normal, random.normal(size=(6, 3)))
+    tensor = -np.arange(6.0)[:, None, None] * np.einsum("ni,nj->nij", normal, normal)
+    tensor += np.einsum("ni,nj->nij", normal, along) + np.einsum("ni,nj->nij", along, normal)
+    stress = np.zeros((9, 6))
+    points = np.array([8, 1, 3, 5, 7, 0])
+    stress[points] = tensor[:, [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
+    contact, step = SimpleNamespace(points=points, normal=normal), SimpleNamespace(stress=stress)
+    np.testing.assert_allclose(_normal_stress(contact, step), -np.arange(6.0), atol=1e-14)
