@@ -9,6 +9,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.cli import main
+from fastcontact.cli._main import _history
 
 CASE = """
 title = "small spheres"
@@ -311,3 +312,7 @@ def test_import_is_light():
     code = f"import sys, fastcontact; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_failure_without_history_shows_none():
+    assert _history([]) == []

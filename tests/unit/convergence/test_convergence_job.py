@@ -1,0 +1,89 @@
+"""Runs of a study by themselves: their case, their key in the store, and what becomes of a run that goes wrong."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.case import read_case
+from fastcontact.convergence import fit_limit, job
+from fastcontact.convergence.levels import recipe
+from fastcontact.convergence.settings import Combination, combinations, settings
+from fastcontact.convergence.words import percent
+
+
+@pytest.fixture(scope="module")
+def chosen(root):
+    return settings(read_case(root / "data/cases/forma04b.toml"))
+
+
+def of(base=None, **data):
+    return job.Job("a run", "case", data, "c", {"refinements": 1}, base, {})
+
+
+def test_the_key_tells_what_the_numbers_depend_on():
+    mesh = fc.generate.half_spheres("tri3", size=20.0)
+    moved = replace(mesh, points=mesh.points + 1e-12)
+    keys = [of(material=1).key, of(material=2).key, of(mesh, material=1).key, of(moved, material=1).key]
+    assert len(set(keys)) == 4
+    assert of(mesh, material=1, title="another").key == keys[2]
+
+
+def test_options_that_another_formulation_does_not_have_are_dropped(chosen):
+    own = {**chosen.data["contact"]["hertz"], "integration": "simpson"}
+    chosen = replace(chosen, data={**chosen.data, "contact": {"hertz": own}})
+    assert own["formulation"] == "continuous"
+    mortar = job.case_data(chosen, Combination("tri6", "mortar"))["contact"]["hertz"]
+    assert mortar["formulation"] == "mortar"
+    assert "integration" not in mortar
+    assert job.case_data(chosen, Combination("tri6", None))["contact"]["hertz"] == own
+
+
+def test_fewer_load_steps_end_where_the_ramp_does():
+    assert job._fewer({"steps": 20}, 2) == {"steps": 2}
+    assert job._fewer({"instants": [0.1, 0.5, 2.0]}, 4)["instants"] == [0.5, 1.0, 1.5, 2.0]
+
+
+def test_a_run_that_goes_wrong_in_any_way_is_a_result(monkeypatch):
+    def wrong(_):
+        raise ZeroDivisionError("by nothing")
+
+    monkeypatch.setattr(job, "_solved", wrong)
+    found = job.run(of())
+    assert found["kind"] == "ZeroDivisionError"
+    assert found["error"].startswith("by nothing (wrong, line ")
+
+
+def test_all_stands_for_every_element_on_the_same_corners_and_every_formulation(tmp_path):
+    fc.write_mesh(tmp_path / "m.med", fc.generate.half_spheres("tri3", size=20.0))
+    (tmp_path / "own.toml").write_text(
+        'kinematics = "axisymmetric"\n[mesh]\nfile = "m.med"\n[[material]]\nE = 20000.0\nnu = 0.3\n'
+        '[contact.c]\nsecondary = "CONT1"\nprimary = "CONT2"\n'
+    )
+    found = combinations(settings(read_case(tmp_path / "own.toml")), ["all"], ["all"])
+    assert {member.element for member in found} == {"tri3", "tri6"}
+    assert {member.formulation for member in found} == {"node_to_segment", "continuous", "mortar"}
+    assert len(found) == 6
+
+
+def test_a_cylinder_without_sizes_starts_from_a_hundredth_of_its_radius(root):
+    data = {"mesh": {"generator": "cylinder-on-block", "element": "quad4", "R": 2.0}}
+    case = read_case(root / "data/cases/cylinder-on-block.toml")
+    own = replace(settings(case), generator="cylinder-on-block", arguments={"": {"R": data["mesh"]["R"]}})
+    arguments = recipe(own, "quad4", 2)["arguments"]
+    assert arguments["size"] == pytest.approx(2.0 / 10 / 4)
+    assert arguments["contact_size"] == pytest.approx(2.0 / 100 / 4)
+
+
+def test_a_quantity_that_does_not_change_is_its_own_limit():
+    limit = fit_limit([4.0, 2.0, 1.0], [3.0, 3.0, 3.0])
+    assert limit.value == 3.0
+    assert 0.0 < limit.uncertainty < 1e-10
+    assert np.isnan(limit.order)
+    assert limit.converging
+
+
+def test_a_limit_known_well_is_told_with_more_digits():
+    assert percent(0.0400513, 1e-4) == "+4.005 %"
+    assert percent(0.0400513, 1e-6) == "+4.0051 %"
