@@ -1,9 +1,12 @@
 """The estimated error against the true one on Hertz in a box, and what an exact solution gives."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import fastcontact as fc
+from fastcontact import elements
 
 
 def pressed(kinematics, element, n):
@@ -70,3 +73,25 @@ def test_stress_that_jumps_between_materials_is_not_an_error():
     model.prescribe("TOP", y=0.01)  # both halves stretch alike, the stresses are 10 and 50
     step = fc.solve(model, fc.linear_ramp(1))[-1]
     assert fc.estimate_error(model, step).relative < 1e-10
+
+
+@pytest.mark.parametrize("element", ["hex8", "tet4", "wedge6", "hex20", "tet10"])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_block_in_space_pressed_on_a_plane_has_no_error_and_a_wrong_pressure_has(element, axis):
+    """The contact term: a uniform pressure balances the stress of the cells under it, another one does not."""
+    name, others = "XYZ"[axis], [k for k in range(3) if k != axis]
+    model = fc.Model(fc.generate.box((1.0, 1.0, 1.0), (2, 2, 2), element), "3d")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    for k in others:
+        model.fix(f"{'XYZ'[k]}MIN", "xyz"[k])
+    model.prescribe(f"{name}MAX", **{"xyz"[axis]: -0.01})
+    plane = fc.obstacles.HalfSpace(point=(0.0, 0.0, 0.0), normal=tuple(float(k == axis) for k in range(3)))
+    formulation = "node_to_segment" if elements.get(element).order == 1 else "continuous"
+    model.add_obstacle("c", secondary=f"{name}MIN", obstacle=plane, formulation=formulation)
+    step = fc.solve(model, fc.linear_ramp(1))[-1]
+    assert fc.estimate_error(model, step).relative < 1e-9
+    wrong = replace(step.contact["c"], pressure=1.1 * step.contact["c"].pressure)
+    found = fc.estimate_error(model, replace(step, contact={"c": wrong}))
+    # h / E times the square of a pressure of 1 over the face, h the diagonal of a facet's box.
+    assert found.contact.max() > 0.0
+    assert np.sum(found.contact**2) == pytest.approx(np.sqrt(0.5) / 1000.0, rel=1e-6)
