@@ -54,7 +54,7 @@ def test_the_radius_is_where_the_pressure_of_hertz_ends():
     [
         ([0.0] * 5, (np.nan, np.nan), np.nan),  # open
         ([1.0, 0.5, 0.0, 0.0, 0.0], (0.25, 0.5), 0.375),  # too few nodes for a line
-        ([1.0, 1.1, 1.3, 1.7, 3.0], (1.0, np.inf), 1.0),  # a punch
+        ([1.0, 1.0, 1.1, 1.1, 1.2, 1.4, 1.8, 3.0, 0.0], (0.875, 1.0), 1.0),  # a punch
     ],
 )
 def test_where_there_is_no_edge_to_fit_the_bracket_answers(pressure, bracket, radius):
