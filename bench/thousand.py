@@ -58,20 +58,20 @@ def main() -> int:
     runs = parser.parse_args().runs
     case_file = Path(__file__).resolve().parents[1] / "data/cases/forma04a.toml"
     random = np.random.default_rng(0)
-    memory, seconds = [], []
+    memory, seconds = np.zeros((2, runs))  # made at once: numbers kept one by one pin the memory around them
     with tempfile.TemporaryDirectory() as name:
         for number in range(runs):
             started = time.process_time()
             one(case_file, Path(name), random.uniform(2.0, 4.0))
-            seconds.append(time.process_time() - started)
+            seconds[number] = time.process_time() - started
             if number in (WARM, runs - 1):
                 gc.collect()
-            memory.append(resident())
+            memory[number] = resident()
             if number == WARM:
                 open_before = handles()
             if (number + 1) % max(runs // 10, 1) == 0:
-                milliseconds = 1e3 * np.median(seconds[-100:])
-                print(f"run {number + 1:5d}: {memory[-1]:7.1f} MB, {milliseconds:6.1f} ms CPU, {handles()} handles")
+                milliseconds = 1e3 * np.median(seconds[max(number - 99, 0) : number + 1])
+                print(f"run {number + 1:5d}: {memory[number]:7.1f} MB, {milliseconds:6.1f} ms CPU, {handles()} handles")
     growth = memory[-1] - memory[WARM]
     tenth = max((runs - WARM) // 10, 1)
     drift = float(np.median(seconds[-tenth:]) / np.median(seconds[WARM : WARM + tenth]))
