@@ -33,6 +33,7 @@ def measure(tests: dict[str, list[str]], workers: int, data: Path) -> int:
         old.unlink()
     quick = {
         "NUMBA_DISABLE_JIT": "1",
+        "PYTHONPATH": str(ROOT),  # commands, too, run what stands here, not what is installed
         "OPENBLAS_NUM_THREADS": "1",
         "COVERAGE_CORE": "ctrace",
         "COVERAGE_FILE": f"{data}/.coverage",
