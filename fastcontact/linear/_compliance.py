@@ -50,27 +50,28 @@ class ComplianceCache:
 
     def of(self, dofs: NDArray[np.intp]) -> Array:
         """Return ``K^-1`` at the rows and columns `dofs` (k,), shape (k, k)."""
-        new = dofs[self._place[dofs] < 0]
-        if len(new):
-            self._extend(new)
-        place = self._place[dofs]
+        place = self._places(dofs)
         return self._values[np.ix_(place, place)]
 
     def condensed(self, R: csr_array) -> Array:
         """Return ``R K^-1 R.T`` (m, m) for sparse rows R (m, n)."""
         used = R.data != 0.0
-        dofs = R.indices[used]
-        new = dofs[self._place[dofs] < 0]
-        if len(new):
-            self._extend(np.unique(new).astype(np.intp))
+        place = self._places(R.indices[used])
         starts = np.concatenate([[0], np.cumsum(used)])[R.indptr]
-        rows = csr_array((R.data[used], self._place[dofs], starts), shape=(R.shape[0], len(self._dofs)))
+        rows = csr_array((R.data[used], place, starts), shape=(R.shape[0], len(self._dofs)))
         return np.asarray(rows @ (rows @ self._values).T)
 
     def ask_again(self, asked: Iterable[NDArray[np.intp]]) -> None:
         """Solve for what another cache of this matrix was asked for, in its order; see `asked`."""
         for dofs in asked:
-            self.of(dofs)
+            self._places(dofs)
+
+    def _places(self, dofs: NDArray[np.integer]) -> NDArray[np.intp]:
+        """Return where `dofs` (k,), which may repeat, stand among those kept; solve for those that are new."""
+        new = np.unique(dofs[self._place[dofs] < 0]).astype(np.intp)
+        if len(new):
+            self._extend(new)
+        return self._place[dofs]
 
     def _extend(self, new: NDArray[np.intp]) -> None:
         old = len(self._dofs)

@@ -252,10 +252,13 @@ def test_errors_of_cells_are_estimated_on_request(solved, tmp_path):
         assert errors.min() > 0.0
 
 
-def test_a_step_is_chosen_by_its_number(solved, tmp_path, capsys):
-    for number in ("1", "3"):
+def test_a_step_is_chosen_by_its_number(solved, capsys):
+    told = []
+    for number in ("1", "3", "-1"):
         assert main(["profile", str(solved / "small.vtkhdf"), "--step", number]) == 0
-        assert capsys.readouterr().out.count("\n") > 5
+        told.append(capsys.readouterr().out)
+        assert told[-1].count("\n") > 5
+    assert told[0] != told[1] == told[2]
 
 
 def test_a_file_whose_case_is_no_toml_is_shown_without_theory(solved, tmp_path, capsys):

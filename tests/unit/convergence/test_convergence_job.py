@@ -68,9 +68,8 @@ def test_all_stands_for_every_element_on_the_same_corners_and_every_formulation(
 
 
 def test_a_cylinder_without_sizes_starts_from_a_hundredth_of_its_radius(root):
-    data = {"mesh": {"generator": "cylinder-on-block", "element": "quad4", "R": 2.0}}
     case = read_case(root / "data/cases/cylinder-on-block.toml")
-    own = replace(settings(case), generator="cylinder-on-block", arguments={"": {"R": data["mesh"]["R"]}})
+    own = replace(settings(case), generator="cylinder-on-block", arguments={"": {"R": 2.0}})
     arguments = recipe(own, "quad4", 2)["arguments"]
     assert arguments["size"] == pytest.approx(2.0 / 10 / 4)
     assert arguments["contact_size"] == pytest.approx(2.0 / 100 / 4)
