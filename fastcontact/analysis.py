@@ -38,6 +38,8 @@ EXTENDED_UPDATES = 25
 # Relative residual of the first solution of a step by an iterative solver, and of later ones in units of the relative
 # change of the displacement and of the last residual: more accuracy than the pairing itself has is lost.
 FIRST_RESIDUAL, RESIDUAL = 1e-2, 0.03
+# Newton iterations with friction as long as the residual is larger than the last one: errors turn slips to and fro.
+LOOSE_NEWTON = 3
 # Earlier geometries that are mixed into the next one.
 MIXED = 5
 
@@ -219,6 +221,7 @@ class Analysis:
             constraints = stacked([self.driven.constraints(name, parts[name], positions[name]) for name in parts])
             in_loop = in_loop and update < SEMISMOOTH_UPDATES
             active = self._initially_active(parts, displacement, extended and update == 0)
+            loose = self.solver.iterative and tolerance > self.solver.tolerance
             limit_now = 1 if in_loop else criteria.max_active_set_iterations
             if self.floating is None:
                 state, u = self._inequalities(loaded, constraints, lift, active, limit_now, tolerance)
@@ -237,19 +240,18 @@ class Analysis:
                     "settled": state.settled,
                 }
             )
-            if not (state.settled or in_loop):
+            if not (state.settled or in_loop or loose):
                 history[-1]["nodes"] = self._nearest_nodes(np.flatnonzero(state.active != state.wanted))
                 raise ConvergenceError(self._cycling(state, history[-1]["nodes"], constraints), history)
             # Iterative solvers leave a noise of their tolerance; asking for less would never end.
             enough = max(max(criteria.geometry, self.solver.tolerance) * size, self.round_off)
-            finished = tolerance <= self.solver.tolerance or not self.solver.iterative
-            if fixed_updates is None and state.settled and change <= enough and finished:
+            if fixed_updates is None and state.settled and change <= enough and not loose:
                 return constraints, state
             if fixed_updates is None:
                 tolerance = max(self.solver.tolerance, RESIDUAL * min(tolerance, change / size if size else 0.0))
                 same = known is not None and np.array_equal(known, state.active)
                 known = state.active if state.settled else None
-                if not (same and finished):
+                if loose or not same:
                     accelerated.restart()
                 self.u = accelerated.mixed(before, u)
             if extended and update == EXTENDED_UPDATES:
@@ -329,7 +331,8 @@ class Analysis:
                 constraints.friction if constraints.friction is not None else np.zeros(len(gap0)), usable,
                 compliance=constraints.compliance, directions=constraints.directions, closed=active,
                 held=constraints.held, softness=constraints.softness, loose=constraints.loose, guess=self.rubbing,
-                elsewhere=self.system.unknowns(self.u, lift),
+                elsewhere=self.system.unknowns(self.u, lift), tolerance=max(tolerance, self.solver.tolerance),
+                patience=self._newton_steps(limit, tolerance),
             )  # fmt: skip
             self.rubbing = state
         else:
@@ -339,6 +342,12 @@ class Analysis:
                 max_iterations=limit, guess=self.system.unknowns(self.u, lift), tolerance=tolerance,
             )  # fmt: skip
         return state, self.system.displacement(state.u, lift)
+
+    def _newton_steps(self, limit: int, tolerance: float) -> int | None:
+        """Return after how many steps friction may be left unsettled; None where it may not."""
+        if limit == 1:
+            return 1
+        return LOOSE_NEWTON if self.solver.iterative and tolerance > self.solver.tolerance else None
 
     def _noise(self, lift: Array, tolerance: float) -> tuple[float, float]:
         """Return the relative accuracy of a solution, and the absolute one of its gaps [length]."""

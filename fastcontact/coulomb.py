@@ -1,15 +1,10 @@
-r"""Contact with Coulomb friction on a dense compliance: forces from gaps and slips without forces.
+"""Contact with Coulomb friction on a dense compliance: forces from gaps and slips without forces.
 
-Gaps and slips are ``(g, s) = free + F (n, t)`` with the normal forces n and the tangential ones t. The solution is the
-zero of
+Gaps and slips are ``(g, s) = free + F (n, t)`` with the normal forces n and the tangential ones t. Three methods stand
+behind each other:
 
-.. math:: n - [n - c g]_+, \qquad t - P(t - c s), \qquad P \text{ the projection on the disc of radius }
-          \mu [n - c g]_+
-
-for any c > 0 (Alart and Curnier, 1991). Three methods stand behind each other:
-
-1. Newton's, semismooth, with a line search on the norm of these residuals; in two dimensions it is an active set of
-   open, stick and slip forwards or backwards. It nearly always suffices.
+1. Newton's, see `cone_newton`; in two dimensions it is an active set of open, stick and slip forwards or backwards. It
+   nearly always suffices.
 2. The same from forces that block Gauss-Seidel sweeps have found (Jean, 1999), which suffices unless mu is large.
 3. The same from the solution for a cone with few edges, a linear complementarity problem that Lemke's pivots solve for
    every positive definite F and every mu (Klarbring, 1986; Stewart and Trinkle, 1996; Klarbring and Pang, 1998).
@@ -20,50 +15,23 @@ With large mu there may be several solutions; one of them is found.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.cone_newton import Forces, Law, newton
 from fastcontact.kernels import cone, lemke
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-# Residual of a solution over the largest force; the second where round-off leaves no better one.
-EXACT, ACCEPTABLE = 1e-12, 1e-9
-# Newton iterations from one start, the shortest step along them, and how often a longer one may be of no use.
-PATIENCE, SHORTEST, UPHILL = 40, 1e-3, 3
+# Residual of a solution over the largest force where round-off leaves no better one.
+ACCEPTABLE = 1e-9
 # Relative changes down to which starts are swept, and the sweeps that one may take.
 SWEPT, MOST_SWEEPS = (1e-1, 1e-2, 1e-3, 1e-4), 2000
 # Edges of the cones in three dimensions, and the largest complementarity problem.
 EDGES, LARGEST = (8, 16, 32), 2500
 # Edges repeat each other, which pivots do not bear: their problem is shifted by this fraction.
 SHIFT = 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class Forces:
-    """A solution; arrays of forces and gaps have the shape (1 + k, m), normal first.
-
-    Attributes
-    ----------
-    y, gaps : ndarray (1 + k, m)
-        Forces; gaps and slips.
-    closed, sticking : ndarray of bool (m,)
-    settled : bool
-    residual : float
-        Largest residual over the largest force.
-    iterations : int
-        Newton iterations, each start counting as one.
-    """
-
-    y: Array
-    gaps: Array
-    closed: Mask
-    sticking: Mask
-    settled: bool
-    residual: float
-    iterations: int
 
 
 def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = None) -> Forces:
@@ -94,7 +62,7 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
     if guess is not None:
         guess = guess / (length * unit)
     for start in _starts(problem, closed, guess):
-        found = _newton(problem, start)
+        found = newton(problem, start, problem.gaps(start))
         iterations += 1 + found.iterations
         if best is None or found.residual < best.residual:
             best = found
@@ -106,29 +74,19 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
     return Forces(best.y * length * unit, gaps, best.closed, best.sticking, settled, best.residual, iterations)
 
 
-@dataclass(frozen=True, eq=False)
 class _Problem:
-    F: Array
-    free: Array
-    mu: Array
+    """See `cone_newton.Linearised`; F is scaled to compliances of one."""
+
+    def __init__(self, F: Array, free: Array, mu: Array) -> None:
+        self.F, self.free, self.mu, self.law = F, free, mu, Law(mu)
+        self.round_off = float(16 * np.finfo(float).eps * np.abs(free).max())
 
     def gaps(self, y: Array) -> Array:
         return self.free + (self.F @ y.ravel()).reshape(self.free.shape)
 
-    def trial(self, y: Array, gaps: Array) -> tuple[Array, Array, Array, Array]:
-        """Return n - g, t - s, the length of the latter and the radius of the disc."""
-        n, t = y[0] - gaps[0], y[1:] - gaps[1:]
-        return n, t, np.sqrt((t * t).sum(axis=0)), self.mu * np.maximum(n, 0.0)
-
-    def residual(self, y: Array, gaps: Array) -> Array:
-        n, t, reach, radius = self.trial(y, gaps)
-        inside = np.divide(radius, reach, out=np.ones_like(reach), where=reach > radius)
-        return np.vstack([y[0] - np.maximum(n, 0.0), y[1:] - t * inside])
-
-    def state(self, y: Array, gaps: Array) -> tuple[Mask, Mask]:
-        """Return which constraints are closed, and which of those stick."""
-        n, _, reach, radius = self.trial(y, gaps)
-        return n > 0, (n > 0) & (reach <= radius) & (self.mu > 0)
+    def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
+        there = _step(self, y, gaps, closed, sticking)
+        return there, self.gaps(there)
 
 
 def _starts(problem: _Problem, closed: Mask, guess: Array | None) -> Iterator[Array]:
@@ -136,7 +94,7 @@ def _starts(problem: _Problem, closed: Mask, guess: Array | None) -> Iterator[Ar
     if guess is not None and guess.any():
         yield guess
     sticking = closed | (problem.free[0] < 0) if not closed.any() else closed
-    yield _step(problem, np.zeros_like(problem.free), sticking, sticking)
+    yield _step(problem, np.zeros_like(problem.free), problem.free, sticking, sticking)
     y, gaps = np.zeros_like(problem.free), np.empty_like(problem.free)
     for exactness in SWEPT:
         if cone.sweep(problem.F, problem.free, problem.mu, y, gaps, exactness, MOST_SWEEPS) == MOST_SWEEPS:
@@ -148,46 +106,8 @@ def _starts(problem: _Problem, closed: Mask, guess: Array | None) -> Iterator[Ar
             yield found
 
 
-def _newton(problem: _Problem, y: Array) -> Forces:
-    """Go down to a zero of the residual."""
-    gaps = problem.gaps(y)
-    residual = problem.residual(y, gaps)
-    round_off = 16 * np.finfo(float).eps * np.abs(problem.free).max()
-    size = float(np.linalg.norm(residual))
-    uphill = iteration = 0
-    best = y, gaps, np.inf
-    for iteration in range(PATIENCE + 1):
-        largest = float(np.abs(y).max())
-        off = float(np.abs(residual).max())
-        relative = off / largest if largest else float(off > round_off)
-        if relative < best[2]:
-            best = y, gaps, relative
-        settled = off <= EXACT * largest + round_off
-        if settled or uphill > UPHILL or iteration == PATIENCE:
-            break
-        step = _step(problem, y, *problem.state(y, gaps)) - y
-        change = problem.gaps(y + step) - gaps
-        part = 1.0
-        while np.linalg.norm(problem.residual(y + part * step, gaps + part * change)) > (1 - 1e-4 * part) * size:
-            part *= 0.5
-            if part < SHORTEST:  # at a kink no step may go down: the whole one leads elsewhere
-                part, uphill = 1.0, uphill + 1
-                break
-        y = y + part * step
-        gaps = problem.gaps(y)
-        residual = problem.residual(y, gaps)
-        size = float(np.linalg.norm(residual))
-    if not settled:
-        y, gaps, relative = best
-    return Forces(y, gaps, *problem.state(y, gaps), settled, relative, iteration)
-
-
-def _step(problem: _Problem, y: Array, closed: Mask, sticking: Mask) -> Array:
-    """Return the forces at which the equations of a state, linearised at `y`, hold.
-
-    Closed gaps and sticking slips vanish; of sliding constraints ``t = mu n d`` with the direction d of t - s, which in
-    three dimensions turns with it.
-    """
+def _step(problem: _Problem, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> Array:
+    """Return the forces of `cone_newton.Linearised.step`."""
     k, m = len(problem.free) - 1, problem.free.shape[1]
     new = np.zeros_like(y)
     rows = np.flatnonzero(closed)
@@ -199,9 +119,7 @@ def _step(problem: _Problem, y: Array, closed: Mask, sticking: Mask) -> Array:
     place = np.flatnonzero(~sticking[rows])
     if len(place):
         sliding = rows[place]
-        _, t, reach, radius = problem.trial(y, problem.gaps(y))
-        d = t[:, sliding] / np.maximum(reach[sliding], 1e-300)
-        turning = np.minimum(radius[sliding] / np.maximum(reach[sliding], 1e-300), 1.0) if k == 2 else 0.0 * d[0]
+        d, turning = problem.law.slide(y, gaps, sliding)
         slips = [(1 + b) * q + place for b in range(k)]
         compliance = [A[slips[b]] for b in range(k)]
         free = [-right[slips[b]] for b in range(k)]

@@ -31,6 +31,7 @@ def at_the_end(analysis: Analysis, last: StepResult) -> list[str]:
     """Return the doubts about an analysis that has just made its `last` step."""
     found = _interpenetration(analysis) + _large_strain(analysis, last.stress) + _large_rotation(analysis)
     found += _carrying_springs(analysis)
+    found += [analysis.solver.gave_up] if analysis.solver.gave_up else []
     loaded = analysis.loaded(last.load_factor)
     for name, pair in analysis.pairs.items():
         contact = last.contact[name]

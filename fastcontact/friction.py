@@ -9,21 +9,22 @@ cone exactly.
 from __future__ import annotations
 
 import dataclasses
+import logging
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lstsq
-from scipy.sparse import block_array, csr_array, diags_array, vstack
+from scipy.sparse import csr_array, vstack
 
-from fastcontact import coulomb
+from fastcontact import coulomb, friction_eliminated
 from fastcontact.active_set import Compliance
-from fastcontact.linear import Loaded
+from fastcontact.linear import Loaded, Oblique
+from fastcontact.slip_directions import aligning, idle, own_compliance
 
+log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-# A direction of slip in which a constraint gives less than this, relative to its gap, is none.
-IDLE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +45,8 @@ class FrictionalEquilibrium:
         By how much they do not, over the largest force.
     iterations : int
         Newton iterations.
+    directions : tuple of ndarray (m, dim)
+        The k tangents.
     """
 
     u: Array
@@ -56,6 +59,17 @@ class FrictionalEquilibrium:
     settled: bool
     residual: float
     iterations: int
+    directions: tuple[Array, ...] = ()
+
+    def forces_along(self, directions: tuple[Array, ...], m: int) -> Array | None:
+        """Return normal and tangential forces (1 + k, m) along other tangents (m, dim); None for other constraints.
+
+        From one pairing to the next tangents may turn by any angle: only the plane that they span is the contact's.
+        """
+        if self.tangential.shape != (m, len(directions)):
+            return None
+        vectors = sum(t[:, None] * along for t, along in zip(self.tangential.T, self.directions, strict=True))
+        return np.vstack([self.multiplier, *((vectors * along).sum(axis=1) for along in directions)])
 
     @property
     def wanted(self) -> Mask:
@@ -73,13 +87,15 @@ def solve(
     usable: Mask,
     *,
     compliance: Compliance | None,
-    directions: tuple[Array, ...] = (),
+    directions: tuple[Array, ...],
     closed: Mask,
     held: Mask | None = None,
     softness: Array | None = None,
     loose: Array | None = None,
     guess: FrictionalEquilibrium | None = None,
     elsewhere: Array | None = None,
+    tolerance: float = 0.0,
+    patience: int | None = None,
 ) -> FrictionalEquilibrium:
     """Find displacement and contact forces under contact and friction.
 
@@ -103,7 +119,7 @@ def solve(
     compliance : Compliance, optional
         Of the constraints themselves, the same in every direction.
     directions : tuple of ndarray (m, dim)
-        The tangents, zero for constraints without friction; needed with a compliance.
+        The tangents, zero for constraints without friction.
     closed : ndarray of bool (m,)
         Constraints to start from as closed and sticking.
     held : ndarray of bool (m,), optional
@@ -115,36 +131,70 @@ def solve(
     guess : FrictionalEquilibrium, optional
         A solution with nearly the same forces; one of other constraints is passed over.
     elsewhere : ndarray (n,), optional
-        Displacement to keep where no constraint acts, see `Loaded.near`.
+        Displacement to keep where no constraint acts, see `Loaded.near`; iterative solvers start from it.
+    tolerance : float
+        Relative residual for iterative solvers.
+    patience : int, optional
+        Newton iterations after which an unsettled state will do, for solvers that eliminate constraints.
     """
+    forces = None if guess is None else guess.forces_along(directions, len(gap0))
+    if isinstance(loaded, Oblique) and compliance is None and softness is None and loose is None:
+        found = _eliminated(
+            loaded, (B, *tangents), np.vstack([gap0, slip0]), friction, usable, closed, held, forces, elsewhere, tolerance,
+            patience,
+        )  # fmt: skip
+        if found is not None:
+            return dataclasses.replace(found, directions=directions)
+        log.info("friction: the iteration on eliminated constraints did not settle, their compliance is formed")
     together = compliance is not None or loose is not None
     chosen = usable if together else usable & (closed if held is None else closed | held)
     iterations = 0
     while True:
         found = _among(
-            chosen, loaded, B, tangents, gap0, slip0, friction, compliance, directions, closed, held, softness, loose, guess,
+            chosen, loaded, B, tangents, gap0, slip0, friction, compliance, directions, closed, held, softness, loose, forces,
             elsewhere,
         )  # fmt: skip
         found.gap[~usable], found.slip[~usable] = np.inf, 0.0
         iterations += found.iterations
         missing = usable & ~chosen & (found.gap < 0.0)
         if not missing.any():
-            return dataclasses.replace(found, iterations=iterations)
+            return dataclasses.replace(found, iterations=iterations, directions=directions)
         chosen = chosen | missing
+
+
+def _eliminated(
+    loaded: Oblique, rows: tuple[csr_array, ...], free: Array, friction: Array, usable: Mask, closed: Mask,
+    held: Mask | None, forces: Array | None, elsewhere: Array | None, tolerance: float,
+    patience: int | None,
+) -> FrictionalEquilibrium | None:  # fmt: skip
+    """Solve without a compliance, see `friction_eliminated`; None where that fails."""
+    u = np.zeros(rows[0].shape[1]) if elsewhere is None else elsewhere
+    solved = friction_eliminated.solve(
+        loaded, rows, free, friction, usable, closed=closed & usable, held=held, forces=forces, u=u, tolerance=tolerance,
+        patience=patience,
+    )  # fmt: skip
+    if solved is None:
+        return None
+    u, found = solved
+    found.gaps[0, ~usable], found.gaps[1:, ~usable] = np.inf, 0.0
+    return FrictionalEquilibrium(
+        u, found.y[0], found.gaps[0], found.y[1:].T, found.gaps[1:].T, found.closed & usable, found.sticking, found.settled,
+        found.residual, found.iterations,
+    )  # fmt: skip
 
 
 def _among(
     chosen: Mask, loaded: Loaded, B: csr_array, tangents: tuple[csr_array, ...], gap0: Array, slip0: Array,
     friction: Array, compliance: Compliance | None, directions: tuple[Array, ...], closed: Mask, held: Mask | None,
-    softness: Array | None, loose: Array | None, guess: FrictionalEquilibrium | None, elsewhere: Array | None,
+    softness: Array | None, loose: Array | None, forces: Array | None, elsewhere: Array | None,
 ) -> FrictionalEquilibrium:  # fmt: skip
     """Solve with the `chosen` constraints (m,) alone; gaps and slips of the others are what the displacement leaves."""
     rows = np.flatnonzero(chosen)
     k, m = len(tangents), len(gap0)
     R = csr_array(vstack([matrix[rows] for matrix in (B, *tangents)], format="csr"))
     free, F = loaded.reduce(R)
-    Q = _aligned(F) if k == 2 else None
-    idle = _idle(F if Q is None else Q @ (Q @ F).T, k)
+    Q = aligning(own_compliance(F, 3)) if k == 2 else None
+    still = np.flatnonzero(idle(own_compliance(F if Q is None else np.asarray(Q @ (Q @ F).T), 1 + k))) + len(rows)
     if compliance is not None and len(rows):
         F += _turned(compliance.block(rows), np.stack([along[rows] for along in directions]))
     if loose is not None:
@@ -153,15 +203,13 @@ def _among(
     if softness is not None:
         F[np.arange(len(rows)), np.arange(len(rows))] += softness[rows]
     free = free.reshape(1 + k, -1) + np.vstack([gap0[rows], *(slip0[:, rows])])
-    start = None
-    if guess is not None and guess.tangential.shape == (m, k):
-        start = np.vstack([guess.multiplier, guess.tangential.T])[:, rows]
+    start = None if forces is None else forces[:, rows]
     if Q is not None:
         F, free = np.asarray(Q @ (Q @ F).T), (Q @ free.ravel()).reshape(free.shape)
         start = None if start is None else (Q @ start.ravel()).reshape(free.shape)
-    if len(idle):
-        F[idle], F[:, idle], free.ravel()[idle] = 0.0, 0.0, 0.0
-        F[idle, idle] = np.diag(F).max()
+    if len(still):
+        F[still], F[:, still], free.ravel()[still] = 0.0, 0.0, 0.0
+        F[still, still] = np.diag(F).max()
     equations = np.zeros(len(rows), bool) if held is None else held[rows]
     found = _coulomb(F, free, friction[rows], closed[rows], equations, start)
     y, relative = found.y, found.gaps
@@ -215,34 +263,3 @@ def _turned(C: Array, along: Array) -> Array:
     frame = np.concatenate([normal[None], along]).reshape(-1, normal.shape[1])
     parts = len(along) + 1
     return np.asarray(np.tile(C, (parts, parts)) * (frame @ frame.T))
-
-
-def _aligned(F: Array) -> csr_array | None:
-    """Return Q that turns two tangents so that one of them is idle where supports leave one direction of slip.
-
-    In a plane of symmetry both tangents may lie across it; then neither is idle by itself. None where nothing turns.
-    """
-    m = len(F) // 3
-    n, a, b = np.arange(3 * m).reshape(3, m)
-    gap = np.maximum(F[n, n], np.finfo(float).tiny)
-    first, second = F[a, a] - F[a, n] ** 2 / gap, F[b, b] - F[b, n] ** 2 / gap
-    mixed = F[a, b] - F[a, n] * F[b, n] / gap
-    apart = np.hypot(0.5 * (first - second), mixed)
-    largest, least = 0.5 * (first + second) + apart, 0.5 * (first + second) - apart
-    across = (least <= IDLE * np.maximum(largest, gap)) & (np.abs(mixed) > IDLE * np.maximum(largest, gap))
-    if not across.any():
-        return None
-    angle = np.where(across, 0.5 * np.arctan2(2 * mixed, first - second), 0.0)
-    c, s, zero = diags_array(np.cos(angle)), diags_array(np.sin(angle)), csr_array((m, m))
-    return csr_array(block_array([[diags_array(np.ones(m)), zero, zero], [zero, c, s], [zero, -s, c]], format="csr"))
-
-
-def _idle(F: Array, k: int) -> NDArray[np.intp]:
-    """Return the rows of tangents along which supports leave no motion, or none but that of the gap.
-
-    At an axis and in a plane of symmetry friction has nothing to do there, and its equation would be no equation.
-    """
-    m = len(F) // (1 + k)
-    tangent, normal = np.arange(m, (1 + k) * m), np.tile(np.arange(m), k)
-    own, gap, both = F[tangent, tangent], F[normal, normal], F[tangent, normal]
-    return tangent[own * gap - both * both <= IDLE * gap * np.maximum(own, gap)]

@@ -97,8 +97,8 @@ class ContactPair:
 
     @property
     def eliminable(self) -> bool:
-        """Whether closed constraints can be eliminated: not with friction or where they give way by themselves."""
-        return self.formulation != "continuous" and not (self.options.get("friction") or self.options.get("penalty"))
+        """Whether closed constraints can be eliminated: not where they give way by themselves."""
+        return self.formulation != "continuous" and not self.options.get("penalty")
 
     @property
     def clearance_ramp(self) -> Table | None:

@@ -27,6 +27,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Under another linear solver results are asked for, whichever way they come."""
+    if config.getoption("--linear-solver"):
+        config.addinivalue_line("filterwarnings", "ignore:multigrid gave up")
+
+
 @pytest.fixture(scope="session", autouse=True)
 def linear_solver(request: pytest.FixtureRequest):
     """The linear solver that ``--linear-solver`` names, in place of the automatic choice; iterative ones to round-off.

@@ -8,7 +8,7 @@ import logging
 import pkgutil
 
 from fastcontact.errors import ModelError, unknown
-from fastcontact.linear._solver import Counters, LinearSolver, Loaded
+from fastcontact.linear._solver import Counters, Drag, LinearSolver, Loaded, Oblique
 
 log = logging.getLogger("fastcontact")
 # Solvers that need a package which is not among the dependencies, and the extra that brings it.
@@ -39,8 +39,8 @@ def make(
     precision : {"single", "double"}, optional
         Of the multigrid cycle, single by default; direct solvers work in double precision always.
     columns : bool
-        Whether constraints cannot be eliminated, but need columns of ``K^-1``: those with friction or with a compliance of
-        their own. For ``"auto"``.
+        Whether constraints cannot be eliminated, but need columns of ``K^-1``: those with a compliance of their own. For
+        ``"auto"``.
 
     Raises
     ------
@@ -70,4 +70,4 @@ def chosen(dim: int, n_dofs: int, columns: bool = False) -> tuple[str, str]:
     return "amg", f"for {n_dofs} unknowns in {dim}D a factorisation is dearer than multigrid (beyond {limit})"
 
 
-__all__ = ["SOLVERS", "Counters", "LinearSolver", "Loaded", "make"]
+__all__ = ["SOLVERS", "Counters", "Drag", "LinearSolver", "Loaded", "Oblique", "make"]

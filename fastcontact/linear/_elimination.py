@@ -11,7 +11,7 @@ from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.csgraph import connected_components, min_weight_full_bipartite_matching
 
 from fastcontact.errors import ConvergenceError
-from fastcontact.kernels import multigrid
+from fastcontact.kernels import multigrid, own_pivots
 from fastcontact.linear._peeling import peeled
 
 Array = NDArray[np.float64]
@@ -39,12 +39,20 @@ class Elimination:
     tie : csr_array (m, n)
         What the pivots follow; no pivot is among it.
     t : ndarray (m,)
+    push : csr_array (m, n)
+        What forces at the pivots are moved to: `tie`, unless multipliers act through other rows than B.
     """
 
     pivots: Indices
     tie: csr_array
     t: Array
-    _inverse: csr_array  # of the pivots' columns of B
+    push: csr_array
+    _inverse: csr_array  # of the pivots' columns of the rows that multipliers act through
+
+    @property
+    def oblique(self) -> bool:
+        """Whether multipliers act through other rows than those of the equations."""
+        return self.push is not self.tie
 
     def multiplier(self, forces: Array) -> Array:
         """Return the multiplier (m,) with ``B.T multiplier = forces`` at the pivots; forces = (K u - f)[pivots]."""
@@ -58,14 +66,14 @@ class Elimination:
 
     def condense(self, r: Array) -> None:
         """Move the forces `r` (n,) at the pivots to what they follow."""
-        multigrid.condense(self.pivots, self.tie.indptr, self.tie.indices, self.tie.data, r)
+        multigrid.condense(self.pivots, self.push.indptr, self.push.indices, self.push.data, r)
 
     def release(self, r: Array, forces: Array) -> None:
         """Undo `condense`, given the `forces` (m,) that were at the pivots."""
-        multigrid.release(self.pivots, self.tie.indptr, self.tie.indices, self.tie.data, forces, r)
+        multigrid.release(self.pivots, self.push.indptr, self.push.indices, self.push.data, forces, r)
 
 
-def eliminate(B: csr_array, c: Array) -> Elimination:
+def eliminate(B: csr_array, c: Array, through: csr_array | None = None, groups: Indices | None = None) -> Elimination:
     """Choose the unknowns to eliminate from ``B u = c`` and express them by the others.
 
     Where every equation has unknowns of its own, as for node-to-segment contact and dual multipliers, its largest one
@@ -73,6 +81,15 @@ def eliminate(B: csr_array, c: Array) -> Elimination:
     are the assignment of unknowns to equations with the largest product of entries (Duff and Koster, 2001), so that the
     matrix to invert is as well conditioned as a permutation allows; groups of equations that share pivots are inverted
     group by group.
+
+    Parameters
+    ----------
+    B : csr_array (m, n)
+    c : ndarray (m,)
+    through : csr_array (m, n), optional
+        Rows that multipliers act through, ``K u = f + through.T multiplier``; B by default.
+    groups : ndarray of int (m,), optional
+        Number of the group of each equation, such as a node: those of a group may share unknowns of their own.
 
     Raises
     ------
@@ -88,18 +105,30 @@ def eliminate(B: csr_array, c: Array) -> Elimination:
     if entries is not None:
         pivots = B.indices[entries].astype(np.intp)
         inverse = csr_array(diags_array(1.0 / B.data[entries], format="csr")) if m else csr_array((0, 0))
+    elif groups is not None and (shared := _in_groups(B, groups)) is not None:
+        pivots, inverse = shared, _block_inverse(csr_array(B[:, shared]))
     elif (layered := peeled(B, SMALLEST)) is not None:
         pivots, inverse = layered
     else:
         pivots = _matched(B)
         inverse = _block_inverse(csr_array(B[:, pivots]))
+    tie = _followed(B, pivots, inverse)
+    push, t = tie, np.asarray(inverse @ c, float)
+    if through is not None:
+        inverse = _block_inverse(csr_array(through[:, pivots]))
+        push = _followed(through, pivots, inverse)
+    return Elimination(pivots, tie, t, push, inverse)
+
+
+def _followed(B: csr_array, pivots: Indices, inverse: csr_array) -> csr_array:
+    """Return what the `pivots` (m,) of the rows B (m, n) follow, given the `inverse` of their columns."""
     is_pivot = np.zeros(B.shape[1], bool)
     is_pivot[pivots] = True
     rest = csr_array((np.where(is_pivot[B.indices], 0.0, -B.data), B.indices, B.indptr), shape=B.shape, copy=True)
     rest.eliminate_zeros()
     tie = csr_array(inverse @ rest)
     tie.sort_indices()
-    return Elimination(pivots, tie, np.asarray(inverse @ c, float), inverse)
+    return tie
 
 
 def _own(B: csr_array) -> Indices | None:
@@ -117,6 +146,13 @@ def _own(B: csr_array) -> Indices | None:
     best = order[B.indptr[1:] - 1]
     largest = np.maximum.reduceat(size, B.indptr[:-1])
     return best if (own[best] >= SMALLEST * largest).all() else None
+
+
+def _in_groups(B: csr_array, groups: Indices) -> Indices | None:
+    """Return the unknown of each row among those of its group alone; None where there are too few."""
+    pivots, (present, group) = np.empty(B.shape[0], np.intp), np.unique(groups, return_inverse=True)
+    failed = own_pivots.choose(B.indptr, B.indices, B.data, group, len(present), B.shape[1], SMALLEST, pivots)
+    return None if failed else pivots
 
 
 def _matched(B: csr_array) -> Indices:

@@ -36,6 +36,7 @@ class FactorSolver:
 
     name: str
     iterative = False
+    gave_up = ""
 
     def __init__(self, tolerance: float = 1e-14) -> None:
         self.tolerance = 1e-14  # round-off, whatever was asked

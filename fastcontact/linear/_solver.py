@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,50 @@ class Loaded(Protocol):
         ...
 
 
+@dataclass(frozen=True, eq=False)
+class Drag:
+    """Forces that friction adds to those of equations.
+
+    Attributes
+    ----------
+    through : csr_array (m, n)
+        Rows that multipliers act through in place of those of the equations.
+    springs : csr_array (n, n), optional
+        S, symmetric and positive semidefinite.
+    push : ndarray (n,), optional
+        Further forces.
+    """
+
+    through: csr_array
+    springs: csr_array | None = None
+    push: Array | None = None
+
+
+@runtime_checkable
+class Oblique(Loaded, Protocol):
+    """Also solves where multipliers act through other rows than those of the equations."""
+
+    def diagonal(self) -> Array:
+        """Return the diagonal (n,) of the matrix."""
+        ...
+
+    def oblique(
+        self, B: csr_array, c: Array, groups: NDArray[np.intp], guess: Array, tolerance: float,
+        drag: Drag | None = None,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """Return (u, multiplier) with ``B u = c`` and ``K u + S u = f + push + through.T multiplier``, see `Drag`.
+
+        Equations of one of the `groups` (m,) may share unknowns. The iteration starts from `guess` (n,) and ends at a
+        relative residual of `tolerance`, or of the solver's own where that is larger.
+
+        Raises
+        ------
+        ConvergenceError
+            If equations repeat each other, seen through either rows, or the iteration does not end.
+        """
+        ...
+
+
 class LinearSolver(Protocol):
     """Solves ``K u = f`` under linear equations, for one K and many right-hand sides and sets of equations.
 
@@ -62,14 +106,19 @@ class LinearSolver(Protocol):
     ----------
     tolerance : float
         Relative accuracy of the solutions.
-    iterative : bool
-        Whether less accurate solutions cost less.
     counters : Counters
+    gave_up : str
+        Why another way of solving took over; empty where none did.
     """
 
     tolerance: float
-    iterative: bool
     counters: Counters
+    gave_up: str
+
+    @property
+    def iterative(self) -> bool:
+        """Whether less accurate solutions cost less."""
+        ...
 
     def prepare(self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None) -> None:
         """Take the symmetric positive definite matrix K (n, n) and displacements (n, n_modes) that cost it little.

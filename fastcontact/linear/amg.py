@@ -1,101 +1,69 @@
-"""Conjugate gradients preconditioned by multigrid, with the rigid-body modes as near-nullspace.
+"""Multigrid, and what takes over where it does not converge.
 
-Aggregates and prolongators are those of K and serve the whole analysis. Equations ``B u = c`` are eliminated: the
-iterates obey them, forces at the eliminated unknowns are moved to what these follow, and the hierarchy is changed
-where it is near them. Equations with a compliance of their own cannot be eliminated: they go through the compliance of
-their degrees of freedom, one solution each, kept for the whole analysis.
+Equations ``B u = c`` are eliminated, see `_multigrid`. Those with a compliance of their own cannot be: they go through the
+compliance of their degrees of freedom, one solution each, kept for the whole analysis. Where the iteration stalls, on thin
+or nearly incompressible parts, factors take over for the rest of the analysis, if the matrix is not too large.
 """
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
-from fastcontact._jit import check_threads
-from fastcontact.errors import ConvergenceError, ModelError
-from fastcontact.kernels import krylov, ties
-from fastcontact.linear._compliance import ComplianceCache, multipliers, reduced
+from fastcontact.errors import ConvergenceError
+from fastcontact.linear._compliance import multipliers, reduced
 from fastcontact.linear._elimination import Elimination, eliminate
-from fastcontact.linear._hierarchy import Hierarchy, Matrix
-from fastcontact.linear._pcg import ConjugateGradients
-from fastcontact.linear._solver import Counters, Monitor
-from fastcontact.linear._ties import Ties
+from fastcontact.linear._multigrid import Multigrid, StallError
+from fastcontact.linear._solver import Drag, Loaded, Monitor
+from fastcontact.linear.direct import Direct
 
 log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
-MAX_ITERATIONS = 1000
-# Iterations between two looks of a monitor.
-WATCH_EVERY = 2
-# Weights of ties that differ by less than this share a hierarchy.
-ALIKE = 0.02
-# Where the smoother is found to amplify something, its bound of the spectrum is raised by this factor, so many times.
-RAISE, RAISES = 1.3, 4
+# Unknowns up to which factors take over, by the number of components of a displacement.
+FACTORS_UP_TO = {1: 1_000_000, 2: 1_000_000, 3: 100_000}
 
 
-class Amg:
-    """Smoothed-aggregation multigrid as preconditioner of conjugate gradients.
+class Amg(Multigrid):
+    """See `Multigrid` for parameters.
 
-    Parameters
+    Attributes
     ----------
-    tolerance : float
-        The residual is reduced below this fraction of the right-hand side (2-norms).
-    precision : {"single", "double"}
-        Of the numbers inside the multigrid cycle; the iteration around it is in double precision.
-
-    Raises
-    ------
-    ModelError
-        If there is no such precision.
+    instead : Direct or None
+        What took over.
+    gave_up : str
+        Why.
     """
 
     name = "amg"
-    iterative = True
 
     def __init__(self, tolerance: float = 1e-10, precision: str = "single") -> None:
-        if precision not in ("single", "double"):
-            raise ModelError(f"the precision of the multigrid cycle is 'single' or 'double', not '{precision}'")
-        self.tolerance, self.precision = tolerance, precision
-        self.counters = Counters()
+        super().__init__(tolerance, precision)
+        self.instead: Direct | None = None
+        self.gave_up = ""
 
     def __repr__(self) -> str:
         if not hasattr(self, "hierarchy"):
             return "Amg(not prepared)"
+        if self.instead is not None:
+            return f"Amg(gave up, {self.instead})"
         return f"Amg({self.hierarchy}, {self.nbytes / 1e6:.1f} MB, {self.precision} precision)"
 
     @property
-    def nbytes(self) -> int:
-        """Memory of the hierarchy and the work space, without K [bytes]."""
-        return self.hierarchy.nbytes + self._cg.nbytes
+    def iterative(self) -> bool:
+        """See `LinearSolver`; not any more once factors have taken over."""
+        return self.instead is None
 
     def prepare(self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None) -> None:
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
-        size = K.blocksize[0]
-        self._given = K, rigid_modes
-        self.K = Matrix(K.indptr, K.indices, K.data.reshape(-1), (0,) * size, (0,) * size)
-        self._cg = ConjugateGradients(K.shape[0])
-        self._solved: Array | None = None  # the right-hand side that iterate and residual belong to
-        self._build()
-        self.compliance = ComplianceCache(K.shape[0], self._solve_many)
+        self.build(K, rigid_modes)
+        self._involved, self.instead, self.gave_up = involved, None, ""
 
-    def _build(self) -> None:
-        check_threads()
-        K, rigid_modes = self._given
-        for old in ("_ties", "hierarchy"):  # two hierarchies at a time need not be remembered
-            self.__dict__.pop(old, None)
-        self.hierarchy = Hierarchy(K, rigid_modes, self.precision)
-        self._ties = Ties(self.hierarchy, self.K)
-        self._tied: Elimination | None = None  # the equations that hold, and those that the hierarchy was tied for
-        self._tied_as: Elimination | None = None
-        self.counters.setups += 1
-
-    def _solve_many(self, F: Array) -> Array:
-        return np.column_stack([self.solution(np.ascontiguousarray(f), None, None) for f in F.T])
-
-    def load(self, f: Array) -> _Loaded:
+    def load(self, f: Array) -> Loaded:
         """Return the prepared matrix with right-hand side `f`."""
         return _Loaded(self, f)
 
@@ -107,10 +75,14 @@ class Amg:
             arrays = (self._tied_as.pivots, rows.indptr, rows.indices, rows.data)
             tied = dict(zip(("pivots", "indptr", "indices", "data"), arrays, strict=True))
         kept = {"precision": self.precision, "bounds": self.hierarchy.bounds, "asked": list(self.compliance.asked)}
-        return {**kept, "tied": tied}
+        instead = None if self.instead is None else {"why": self.gave_up, **self.instead.memory()}
+        return {**kept, "tied": tied, "instead": instead}
 
     def remember(self, memory: dict[str, Any]) -> None:
         """See `LinearSolver.remember`."""
+        if memory.get("instead"):
+            self._take_factors(memory["instead"]["why"]).remember(memory["instead"])
+            return
         if memory["precision"] != self.precision:
             self.precision = memory["precision"]
             self._build()
@@ -118,159 +90,39 @@ class Amg:
         self.tie(memory["tied"] and _tied_again(memory["tied"], self.hierarchy.n))
         self.hierarchy.bounds = memory["bounds"]
 
-    def tie(self, elimination: Elimination | None) -> None:
-        """Change the hierarchy to that of the eliminated matrix.
-
-        A hierarchy for the same pivots that follow others with nearly the same weights is kept: it preconditions as
-        well, since only the unknowns beside the pivots count.
-        """
-        check_threads()  # every solution begins here, also that of a child forked after the hierarchy was built
-        if elimination is not self._tied:
-            if not _alike(elimination, self._tied_as):
-                self._ties.tie(elimination)
-                self._tied_as = elimination
-            self._tied = elimination
-
-    def solution(
-        self, f: Array, elimination: Elimination | None, guess: Array | None, monitor: Monitor | None = None,
-        tolerance: float | None = None,
-    ) -> Array:  # fmt: skip
-        """Solve ``K u = f`` under the equations of `elimination` to the solver's tolerance, or a larger one.
+    def give_up(self, stalled: StallError) -> None:
+        """Factorise the matrix, since the iteration stalls.
 
         Raises
         ------
-        ConvergenceError
-            If the residual does not fall below the tolerance.
+        StallError
+            If the matrix is too large for that.
         """
-        cg, old = self._cg, self._tied
-        goes_on = guess is not None and f is self._solved and np.array_equal(guess, cg.x)
-        self.tie(elimination)
-        if goes_on:
-            self._go_on(f, old, elimination)
-        else:
-            cg.x[:] = 0.0 if guess is None else guess
-            self._begin(f, elimination)
-        self._solved = f
-        scale = self._scale(f, elimination)
-        enough = max(self.tolerance, tolerance or 0.0) * scale
-        made = raised = 0
-        while cg.norm > enough:
-            if made >= MAX_ITERATIONS or raised > RAISES:
-                raise ConvergenceError(self._stuck(cg.norm / scale, made))
-            if (
-                made
-                and monitor is not None
-                and made % WATCH_EVERY == 0
-                and self._stopped(monitor, f, elimination, cg.norm / scale)
-            ):
-                break
-            if cg.step(self._multiply, self._precondition):
-                made += 1
-                self.counters.iterations += 1
-            else:
-                raised += 1
-                self._strengthen(raised)
-                self._begin(f, elimination)
-        return cg.x.copy()
+        K, _ = self._given
+        if K.shape[0] > FACTORS_UP_TO[K.blocksize[0]]:
+            raise stalled
+        self._take_factors(f"multigrid gave up and factors took over, which cost more time and memory: {stalled}")
 
-    def _strengthen(self, times: int) -> None:
-        """Make the preconditioner positive definite again: with higher bounds, at last in double precision."""
-        if times < RAISES or self.precision == "double":
-            self.hierarchy.raise_bounds(RAISE)
-            return
-        log.info("multigrid: single precision is not enough for this matrix, the cycle goes on in double precision")
-        self.precision, tied = "double", self._tied
-        self._build()
-        self.tie(tied)
-
-    def _stuck(self, left: float, made: int) -> str:
-        return (
-            f"conjugate gradients stand at a relative residual of {left:.1e} after {made} iterations, above "
-            f"{self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
-        )
-
-    def _begin(self, f: Array, elimination: Elimination | None) -> None:
-        """Make the iterate obey the equations and compute its residual."""
-        cg = self._cg
-        if elimination is not None:
-            elimination.complete(cg.x, elimination.t)
-        self.K.combine(-1.0, cg.x, 1.0, f, cg.r)
-        if elimination is not None:
-            elimination.condense(cg.r)
-        cg.start()
-
-    def _go_on(self, f: Array, old: Elimination | None, new: Elimination | None) -> None:
-        """Let the iterate obey other equations: its residual changes near the pivots only."""
-        cg, K = self._cg, self.K
-        if old is not None:
-            old.release(cg.r, -self._forces(old, cg.x, f))
-        if new is not None:
-            before = cg.x[new.pivots]
-            new.complete(cg.x, new.t)
-            moved = before - cg.x[new.pivots]
-            ties.forces_of(new.pivots, moved, K.indptr, K.indices, K.data, len(K.rows), cg.r)
-            new.condense(cg.r)
-        cg.start()
-
-    def _forces(self, elimination: Elimination, u: Array, f: Array) -> Array:
-        """Return ``(K u - f)[pivots]``."""
-        K = self.K
-        out = np.empty(len(elimination.pivots))
-        ties.forces_at(elimination.pivots, K.indptr, K.indices, K.data, len(K.rows), u, f, out)
-        return out
-
-    def _scale(self, f: Array, elimination: Elimination | None) -> float:
-        """Return the size of the right-hand side, forces that impose the equations included."""
-        square = self._cg.dot(f, f)
-        if elimination is not None and elimination.t.any():
-            forces = np.zeros(len(f))
-            K = self.K
-            ties.forces_of(elimination.pivots, elimination.t, K.indptr, K.indices, K.data, len(K.rows), forces)
-            square += self._cg.dot(forces, forces)
-        return float(np.sqrt(square))
-
-    def _multiply(self, p: Array, q: Array) -> None:
-        self.K.multiply(p, q)
-        if self._tied is not None:
-            self._tied.condense(q)
-
-    def _precondition(self, r: Array, norm: float, z: Array) -> None:
-        top = self.hierarchy.levels[0]
-        krylov.scaled(1.0 / norm, r, top.b)
-        self.hierarchy.cycle()
-        krylov.scaled(norm * self.hierarchy.unit, top.x, z)
-        if self._tied is not None:
-            self._tied.complete(z)
-
-    def _stopped(self, monitor: Monitor, f: Array, elimination: Elimination | None, error: float) -> bool:
-        return monitor(self._cg.x, self.multiplier(elimination, self._cg.x, f), error)
-
-    def multiplier(self, elimination: Elimination | None, u: Array, f: Array) -> Array:
-        """Return the multipliers (m,) of the equations at `u`."""
-        if elimination is None:
-            return np.empty(0)
-        return elimination.multiplier(self._forces(elimination, u, f))
+    def _take_factors(self, why: str) -> Direct:
+        log.warning("%s", why)
+        self.gave_up, self.instead = why, Direct()
+        self.instead.counters = self.counters
+        self.instead.prepare(*self._given, self._involved)
+        return self.instead
 
 
 def _tied_again(tied: dict[str, Any], n: int) -> Elimination:
     """Return the elimination that a hierarchy was tied for; right-hand side and multipliers are of no more use."""
     m = len(tied["pivots"])
     rows = csr_array((tied["data"], tied["indices"], tied["indptr"]), shape=(m, n))
-    return Elimination(tied["pivots"], rows, np.zeros(m), csr_array((m, m)))
+    return Elimination(tied["pivots"], rows, np.zeros(m), rows, csr_array((m, m)))
 
 
-def _alike(new: Elimination | None, old: Elimination | None) -> bool:
-    """Return whether two eliminations have the same pivots and nearly the same weights."""
-    if new is None or old is None or not np.array_equal(new.pivots, old.pivots):
-        return new is old
-    return bool(np.abs((new.tie - old.tie).data).max(initial=0.0) <= ALIKE)
-
-
-class _Loaded:
-    """See `linear._solver.Loaded`."""
+class _Iterated:
+    """The matrix with a right-hand side, solved by multigrid."""
 
     def __init__(self, solver: Amg, f: Array) -> None:
-        self._solver, self._f = solver, np.ascontiguousarray(f, float)
+        self._solver, self._f = solver, f
         self._free: Array | None = None
 
     def solve(
@@ -284,6 +136,20 @@ class _Loaded:
             return u, solver.multiplier(elimination, u, self._f)
         multiplier = multipliers(solver.compliance, B, c - B @ self._unloaded(), C)
         return solver.solution(self._f + B.T @ multiplier, None, guess), multiplier
+
+    def oblique(
+        self, B: csr_array, c: Array, groups: NDArray[np.intp], guess: Array, tolerance: float,
+        drag: Drag | None = None,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        if drag is None:
+            elimination = eliminate(B, c, groups=groups) if B.shape[0] else None
+            u = self._solver.solution(self._f, elimination, guess, tolerance=tolerance)
+            return u, self._solver.multiplier(elimination, u, self._f)
+        elimination, springs = eliminate(B, c, drag.through, groups), drag.springs
+        f = self._f if drag.push is None else self._f + drag.push
+        u = self._solver.oblique(f, elimination, springs, guess, tolerance)
+        forces = f - (springs @ u if springs is not None else 0.0)
+        return u, self._solver.multiplier(elimination, u, forces)
 
     def reduce(self, R: csr_array) -> tuple[Array, Array]:
         return R @ self._unloaded(), reduced(self._solver.compliance, R)
@@ -299,6 +165,47 @@ class _Loaded:
         if self._free is None:
             self._free = self._solver.solution(self._f, None, None)
         return self._free
+
+
+class _Loaded:
+    """See `linear._solver.Oblique`: by multigrid, and by factors from where that stalls."""
+
+    def __init__(self, solver: Amg, f: Array) -> None:
+        self._solver, self._f = solver, np.ascontiguousarray(f, float)
+        self._iterated = _Iterated(solver, self._f)
+        self._factored: Loaded | None = None
+
+    def diagonal(self) -> Array:
+        return self._solver.diagonal()
+
+    def oblique(self, *args: Any, **options: Any) -> tuple[Array, Array]:
+        if self._solver.instead is not None:
+            raise ConvergenceError("factors give the compliance of friction")
+        return self._iterated.oblique(*args, **options)
+
+    def solve(self, *args: Any, **options: Any) -> tuple[Array, Array]:
+        return self._found(lambda loaded: loaded.solve(*args, **options))
+
+    def reduce(self, R: csr_array) -> tuple[Array, Array]:
+        return self._found(lambda loaded: loaded.reduce(R))
+
+    def near(self, force: Array, elsewhere: Array | None) -> Array:
+        return self._found(lambda loaded: loaded.near(force, elsewhere))
+
+    def everywhere(self, force: Array, u: Array | None = None) -> Array:
+        return self._found(lambda loaded: loaded.everywhere(force, u))
+
+    def _found(self, by: Callable[[Loaded], Any]) -> Any:
+        """Return what a call gives; where multigrid stalls, what factors give."""
+        if self._solver.instead is None:
+            try:
+                return by(self._iterated)
+            except StallError as stalled:
+                self._solver.give_up(stalled)
+        if self._factored is None:
+            assert self._solver.instead is not None
+            self._factored = self._solver.instead.load(self._f)
+        return by(self._factored)
 
 
 SOLVER = Amg

@@ -11,7 +11,7 @@ import fastcontact as fc
 from fastcontact import linear
 from fastcontact.assembly import rigid_modes, stiffness
 from fastcontact.linear._elimination import eliminate
-from fastcontact.linear.amg import RAISE, RAISES
+from fastcontact.linear._multigrid import RAISE, RAISES
 
 # Over the largest entry.
 ROUNDING, SOLVED = 1e-14, 1e-9
@@ -107,6 +107,6 @@ def applied(amg, basis):
     found = np.empty_like(basis)
     for j, column in enumerate(basis.T):
         z = np.empty(len(column))
-        amg._precondition(np.ascontiguousarray(column), 1.0, z)
+        amg.precondition(np.ascontiguousarray(column), 1.0, z)
         found[:, j] = z
     return found

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fastcontact import coulomb
+from fastcontact import cone_newton, coulomb
 
 
 def residual(F, free, mu, y):
@@ -135,11 +135,11 @@ def test_constraints_that_repeat_each_other_share_the_force():
 
 
 @pytest.mark.parametrize(
-    ("patience", "swept"), [(coulomb.PATIENCE, ()), (1, (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12))]
+    ("patience", "swept"), [(cone_newton.PATIENCE, ()), (1, (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12))]
 )
 def test_each_of_the_later_methods_solves_by_itself(monkeypatch, patience, swept):
     # Without sweeps Newton or pivots must do; with one Newton iteration a start, sweeps or pivots must.
-    monkeypatch.setattr(coulomb, "PATIENCE", patience)
+    monkeypatch.setattr(cone_newton, "PATIENCE", patience)
     monkeypatch.setattr(coulomb, "SWEPT", swept)
     rng = np.random.default_rng(23)
     for _ in range(100):

@@ -6,10 +6,11 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 import fastcontact as fc
-from fastcontact import coulomb, friction
+from fastcontact import cone_newton, coulomb, friction
 from fastcontact.contact.formulations._held_nodes import compliant
 from fastcontact.contact.formulations._projection import Projection
 from fastcontact.contact.pairing import normals, tangents
+from fastcontact.slip_directions import aligning, idle, own_compliance
 
 
 def unit_vectors(rng, n, dim):
@@ -72,15 +73,15 @@ def test_tangents_turn_to_the_slip_that_supports_leave():
     held = [0, 3]
     K_inverse[held], K_inverse[:, held] = 0.0, 0.0
     F = R @ K_inverse @ R.T
-    assert not len(friction._idle(F, 2))
-    Q = friction._aligned(F)
+    assert not len(np.flatnonzero(idle(own_compliance(F, 3))))
+    Q = aligning(own_compliance(F, 3))
     np.testing.assert_allclose((Q @ Q.T).toarray(), np.eye(6), atol=1e-15)
-    np.testing.assert_array_equal(friction._idle(Q @ (Q @ F).T, 2), [4, 5])
-    assert friction._aligned(R @ (A @ A.T) @ R.T) is None
+    np.testing.assert_array_equal(idle(own_compliance(Q @ (Q @ F).T, 3)), [[False, False], [True, True]])
+    assert aligning(own_compliance(R @ (A @ A.T) @ R.T, 3)) is None
 
 
 def test_what_does_not_settle_is_told_with_its_numbers(monkeypatch):
-    monkeypatch.setattr(coulomb, "PATIENCE", 0)
+    monkeypatch.setattr(cone_newton, "PATIENCE", 0)
     monkeypatch.setattr(coulomb, "SWEPT", ())
     monkeypatch.setattr(coulomb, "LARGEST", 0)
     mesh = fc.generate.block_on_block(divisions_lower=(6, 2), divisions_upper=(3, 3))

@@ -76,7 +76,7 @@ def test_auto_chooses_by_dimension_and_size():
 @pytest.mark.parametrize(
     ("options", "solver"),
     [
-        ({"formulation": "node_to_segment"}, "amg"), ({"formulation": "node_to_segment", "friction": 0.3}, "direct"),
+        ({"formulation": "node_to_segment"}, "amg"), ({"formulation": "node_to_segment", "friction": 0.3}, "amg"),
         ({"formulation": "mortar"}, "amg"), ({"formulation": "mortar", "penalty": 1e6}, "direct"),
         ({"formulation": "continuous"}, "direct"),
     ],

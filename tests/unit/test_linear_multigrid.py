@@ -342,7 +342,7 @@ def test_the_loop_allocates_nothing_that_grows_with_the_problem():
     before = tracemalloc.get_traced_memory()[0]
     tracemalloc.reset_peak()
     for _ in range(5):
-        assert solver._cg.step(solver._multiply, solver._precondition)
+        assert solver._cg.step(solver._multiply, solver.precondition)
     peak = tracemalloc.get_traced_memory()[1] - before
     tracemalloc.stop()
     assert peak < len(f)  # bytes: less than an eighth of one vector

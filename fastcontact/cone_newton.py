@@ -1,0 +1,153 @@
+r"""Newton's method for contact with Coulomb friction, whatever gives gaps and slips for forces.
+
+With normal forces n, tangential ones t, gaps g and slips s, in units in which each constraint has a compliance near one,
+the solution is the zero of
+
+.. math:: n - [n - g]_+, \qquad t - P(t - s), \qquad P \text{ the projection on the disc of radius } \mu [n - g]_+
+
+(Alart and Curnier, 1991). These residuals are semismooth; a line search goes down on their norm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+# Residual of a solution over the largest force.
+EXACT = 1e-12
+# Newton iterations from one start, the shortest step along them, and how often a longer one may be of no use.
+PATIENCE, SHORTEST, UPHILL = 40, 1e-3, 3
+
+
+@dataclass(frozen=True, eq=False)
+class Forces:
+    """A solution; arrays of forces and gaps have the shape (1 + k, m), normal first.
+
+    Attributes
+    ----------
+    y, gaps : ndarray (1 + k, m)
+        Forces; gaps and slips.
+    closed, sticking : ndarray of bool (m,)
+    settled : bool
+    residual : float
+        Largest residual over the largest force.
+    iterations : int
+        Newton iterations, each start counting as one.
+    """
+
+    y: Array
+    gaps: Array
+    closed: Mask
+    sticking: Mask
+    settled: bool
+    residual: float
+    iterations: int
+
+
+class Linearised(Protocol):
+    """What forces do to gaps and slips, and the step of Newton's method.
+
+    Attributes
+    ----------
+    law : Law
+    round_off : float
+        What gaps and slips may be off.
+    """
+
+    law: Law
+    round_off: float
+
+    def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
+        """Return forces and gaps (1 + k, m) at which the equations of a state, linearised at `y` and `gaps`, hold.
+
+        Closed gaps and sticking slips vanish; of sliding constraints ``t = mu n d`` with the direction d of t - s, which
+        in three dimensions turns with it.
+        """
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """The inequalities.
+
+    Attributes
+    ----------
+    mu : ndarray (m,)
+    held : ndarray of bool (m,), optional
+        Constraints that are equations: closed whatever their force.
+    """
+
+    mu: Array
+    held: Mask | None = None
+
+    def trial(self, y: Array, gaps: Array) -> tuple[Array, Array, Array, Array]:
+        """Return n - g, t - s, the length of the latter and the radius of the disc."""
+        n, t = y[0] - gaps[0], y[1:] - gaps[1:]
+        return n, t, np.sqrt((t * t).sum(axis=0)), self.mu * np.maximum(n, 0.0)
+
+    def residual(self, y: Array, gaps: Array) -> Array:
+        """Return the left-hand sides (1 + k, m) of the equations."""
+        n, t, reach, radius = self.trial(y, gaps)
+        inside = np.divide(radius, reach, out=np.ones_like(reach), where=reach > radius)
+        pushed = np.maximum(n, 0.0) if self.held is None else np.where(self.held, n, np.maximum(n, 0.0))
+        return np.vstack([y[0] - pushed, y[1:] - t * inside])
+
+    def state(self, y: Array, gaps: Array) -> tuple[Mask, Mask]:
+        """Return which constraints are closed, and which of those stick."""
+        n, _, reach, radius = self.trial(y, gaps)
+        closed = n > 0 if self.held is None else (n > 0) | self.held
+        return closed, (n > 0) & (reach <= radius) & (self.mu > 0)
+
+    def slide(self, y: Array, gaps: Array, sliding: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Return the directions (k, q) in which constraints `sliding` (q,) slide, and how much of a turn t follows (q,)."""
+        _, t, reach, radius = self.trial(y, gaps)
+        along = np.maximum(reach[sliding], 1e-300)
+        return t[:, sliding] / along, np.minimum(radius[sliding] / along, 1.0)
+
+
+def newton(problem: Linearised, y: Array, gaps: Array, exact: float = EXACT, patience: int | None = None) -> Forces:
+    """Go down to a zero of the residual from forces and gaps (1 + k, m).
+
+    Parameters
+    ----------
+    problem : Linearised
+    y, gaps : ndarray (1 + k, m)
+    exact : float
+        The residual that is small enough, over the largest force.
+    patience : int, optional
+        Iterations allowed; PATIENCE by default.
+    """
+    patience = PATIENCE if patience is None else patience
+    law = problem.law
+    residual = law.residual(y, gaps)
+    size = float(np.linalg.norm(residual))
+    uphill = iteration = 0
+    best = y, gaps, np.inf
+    for iteration in range(patience + 1):
+        largest = float(np.abs(y).max())
+        off = float(np.abs(residual).max())
+        relative = off / largest if largest else float(off > problem.round_off)
+        if relative < best[2]:
+            best = y, gaps, relative
+        settled = off <= exact * largest + problem.round_off
+        if settled or uphill > UPHILL or iteration == patience:
+            break
+        there, gaps_there = problem.step(y, gaps, *law.state(y, gaps))
+        step, change = there - y, gaps_there - gaps
+        part = 1.0
+        while np.linalg.norm(law.residual(y + part * step, gaps + part * change)) > (1 - 1e-4 * part) * size:
+            part *= 0.5
+            if part < SHORTEST:  # at a kink no step may go down: the whole one leads elsewhere
+                part, uphill = 1.0, uphill + 1
+                break
+        y, gaps = (there, gaps_there) if part == 1.0 else (y + part * step, gaps + part * change)
+        residual = law.residual(y, gaps)
+        size = float(np.linalg.norm(residual))
+    if not settled:
+        y, gaps, relative = best
+    return Forces(y, gaps, *law.state(y, gaps), settled, relative, iteration)

@@ -1,0 +1,50 @@
+"""Directions of slip that supports leave to a contact: tangents are turned to them, others are idle.
+
+All of it looks at the compliance of each constraint by itself: `own` (1 + k, 1 + k, m), its normal part first.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import block_array, csr_array, diags_array
+
+Array = NDArray[np.float64]
+# A direction of slip in which a constraint gives less than this, relative to its gap, is none.
+IDLE = 1e-10
+
+
+def own_compliance(F: Array, parts: int) -> Array:
+    """Return the compliance (parts, parts, m) of each constraint from that of all, F (parts m, parts m)."""
+    m = len(F) // parts
+    index = np.arange(parts * m).reshape(parts, m)
+    return np.asarray(F[index[:, None], index[None]])
+
+
+def aligning(own: Array) -> csr_array | None:
+    """Return Q (3 m, 3 m) that turns two tangents so that one is idle where supports leave one direction of slip.
+
+    In a plane of symmetry both tangents may lie across it; then neither is idle by itself. None where nothing turns.
+    """
+    m = own.shape[2]
+    gap = np.maximum(own[0, 0], np.finfo(float).tiny)
+    first, second = own[1, 1] - own[1, 0] ** 2 / gap, own[2, 2] - own[2, 0] ** 2 / gap
+    mixed = own[1, 2] - own[1, 0] * own[2, 0] / gap
+    apart = np.hypot(0.5 * (first - second), mixed)
+    largest, least = 0.5 * (first + second) + apart, 0.5 * (first + second) - apart
+    across = (least <= IDLE * np.maximum(largest, gap)) & (np.abs(mixed) > IDLE * np.maximum(largest, gap))
+    if not across.any():
+        return None
+    angle = np.where(across, 0.5 * np.arctan2(2 * mixed, first - second), 0.0)
+    c, s, zero = diags_array(np.cos(angle)), diags_array(np.sin(angle)), csr_array((m, m))
+    return csr_array(block_array([[diags_array(np.ones(m)), zero, zero], [zero, c, s], [zero, -s, c]], format="csr"))
+
+
+def idle(own: Array) -> NDArray[np.bool_]:
+    """Return the tangents (k, m) along which supports leave no motion, or none but that of the gap.
+
+    At an axis and in a plane of symmetry friction has nothing to do there, and its equation would be no equation.
+    """
+    k = len(own) - 1
+    along = own[np.arange(1, k + 1), np.arange(1, k + 1)]
+    return np.asarray(along * own[0, 0] - own[1:, 0] ** 2 <= IDLE * own[0, 0] * np.maximum(along, own[0, 0]))

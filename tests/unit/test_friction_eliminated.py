@@ -1,0 +1,207 @@
+"""Friction on eliminated constraints: pivots in groups, oblique multipliers, the iteration, and what all of it gives."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array, random_array
+
+import fastcontact as fc
+from fastcontact import friction, linear
+from fastcontact.analysis import Analysis
+from fastcontact.criteria import Criteria
+from fastcontact.errors import ConvergenceError
+from fastcontact.kernels import own_pivots
+from fastcontact.linear import _multigrid, amg
+from fastcontact.linear._elimination import eliminate
+from fastcontact.linear._gcr import KEPT, ConjugateResiduals
+
+BOTH = {"secondary": "CONT_SPHERE", "primary": "CONT_BLOCK"}
+
+
+def rubbing(formulation="node_to_segment", mu=0.3):
+    """A part of a sphere pressed on a block and then pushed along it: it sticks here and slides there."""
+    mesh = fc.generate.sphere_on_block("hex8", R=20.0, size=8.0, contact_size=1.2, contact_radius=6.0, growth=1.0)
+    model = fc.Model(mesh, kinematics="3d")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model.fix("BLOCK_BOTTOM", "xyz")
+    model.prescribe("SPHERE_TOP", y=-0.6, z=0.0, ramp=[(0, 0), (0.5, 1), (1, 1)])
+    model.prescribe("SPHERE_TOP", x=0.5, ramp=[(0, 0), (0.5, 0), (1, 1)])
+    model.add_contact("pair", **BOTH, formulation=formulation, friction=mu)
+    return model
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "mortar"])
+@pytest.mark.parametrize("mu", [0.1, 0.7])
+def test_elimination_and_compliance_agree_and_no_column_is_asked_for(formulation, mu):
+    model = rubbing(formulation, mu)
+    exact = fc.solve(model, fc.linear_ramp(6), linear_solver="direct")
+    analysis = Analysis(model, "amg", 1e-10, Criteria(), fc.linear_ramp(6))
+    slid = 0
+    for index, (one, instant) in enumerate(zip(exact, analysis.ramp.instants, strict=True), start=1):
+        other = analysis.step(index, instant)
+        a, b = one.contact["pair"], other.contact["pair"]
+        largest = np.abs(a.force_vectors).max()
+        assert np.abs(a.force_vectors - b.force_vectors).max() < 1e-6 * largest
+        np.testing.assert_array_equal(
+            a.sticking & (a.multiplier > 1e-6 * largest), b.sticking & (b.multiplier > 1e-6 * largest)
+        )
+        slid += int((b.active & ~b.sticking).sum())
+    assert slid > 5
+    assert analysis.solver.compliance.asked == []
+
+
+def test_what_fails_on_eliminated_constraints_is_solved_on_their_compliance(monkeypatch, caplog):
+    monkeypatch.setattr(friction.friction_eliminated, "solve", lambda *args, **options: None)
+    caplog.set_level("INFO", "fastcontact")
+    model = rubbing()
+    one, other = (fc.solve(model, fc.linear_ramp(2), linear_solver=name)[-1] for name in ("direct", "amg"))
+    assert "did not settle, their compliance is formed" in caplog.text
+    assert np.abs(one.displacement - other.displacement).max() < 1e-7 * np.abs(one.displacement).max()
+
+
+def test_a_run_with_friction_goes_on_bit_for_bit_with_multigrid():
+    model, ramp = rubbing(), fc.linear_ramp(6)
+    states = []
+    whole = fc.solve(model, ramp, linear_solver="amg", on_step=states.append)
+    rest = fc.solve(model, ramp, linear_solver="amg", resume=states[:4])
+    np.testing.assert_array_equal(rest[-1].displacement, whole[-1].displacement)
+
+
+def grouped(rng, n=60, groups=6):
+    """Rows in groups of three, each on three unknowns of its own and some that others share."""
+    label = np.repeat(np.arange(groups), 3)
+    rng.shuffle(label)
+    B = np.zeros((len(label), n))
+    for g in range(groups):
+        B[np.ix_(label == g, 3 * g + np.arange(3))] = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        B[np.ix_(label == g, 3 * groups + rng.choice(n - 3 * groups, 4))] = 0.25 * rng.normal(size=(3, 4))
+    return csr_array(B), label
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_pivots_of_groups_are_their_own_and_well_conditioned(seed):
+    B, label = grouped(np.random.default_rng(seed))
+    pivots = np.empty(len(label), np.int64)
+    assert own_pivots.choose(B.indptr, B.indices, B.data, label, 6, B.shape[1], 0.25, pivots) == 0
+    assert len(set(pivots)) == len(pivots)
+    taken = np.abs(B[:, pivots].toarray()) > 0
+    assert not taken[label[:, None] != label[None]].any()
+    assert np.linalg.cond(B[:, pivots].toarray()) < 50
+    # The first pivot of a group is its largest entry among the unknowns that no other group has.
+    dense = B.toarray()
+    for g in range(6):
+        others = (dense[label != g] != 0).any(axis=0)
+        own = np.abs(np.where(others, 0.0, dense[label == g]))
+        row, column = np.unravel_index(own.argmax(), own.shape)
+        assert pivots[np.flatnonzero(label == g)[row]] == column
+
+
+def test_groups_without_unknowns_of_their_own_are_told():
+    B = csr_array(np.ones((2, 3)))
+    assert own_pivots.choose(B.indptr, B.indices, B.data, np.arange(2), 2, 3, 0.25, np.empty(2, np.int64)) == 1
+    same_group = np.zeros(2, np.int64)  # two equal equations
+    assert own_pivots.choose(B.indptr, B.indices, B.data, same_group, 1, 3, 0.25, np.empty(2, np.int64)) == 1
+
+
+def test_forces_move_along_the_rows_that_multipliers_act_through():
+    rng = np.random.default_rng(3)
+    B, label = grouped(rng)
+    through = csr_array(B + 0.2 * csr_array(np.where(B.toarray() != 0, rng.normal(size=B.shape), 0.0)))
+    tied = eliminate(B, rng.normal(size=B.shape[0]), through, label)
+    x, r = rng.normal(size=(2, B.shape[1]))
+    tied.complete(x, tied.t)
+    forces = r[tied.pivots].copy()
+    moved = r.copy()
+    tied.condense(moved)
+    multiplier = tied.multiplier(forces)
+    np.testing.assert_allclose(moved, r - through.T @ multiplier, atol=1e-12)
+    assert np.abs(moved[tied.pivots]).max() < 1e-12
+    assert tied.oblique
+    assert not eliminate(B, np.zeros(B.shape[0]), groups=label).oblique
+
+
+@pytest.mark.parametrize("n", [30, 5000])
+def test_conjugate_residuals_solve_what_is_not_symmetric_and_never_grow(n):
+    rng = np.random.default_rng(n)
+    skew = random_array((n, n), density=min(1.0, 5 / n), random_state=rng)
+    A = csr_array(skew - skew.T) + csr_array((np.linspace(1, 3, n), (np.arange(n), np.arange(n))))
+    iteration = ConjugateResiduals(n)
+    iteration.r[:] = b = rng.normal(size=n)
+    iteration.start()
+    norms = [iteration.norm]
+
+    def multiply(p, q):
+        q[:] = A @ p
+
+    def precondition(r, norm, z):
+        z[:] = r / 2
+
+    while iteration.norm > 1e-10 * norms[0] and len(norms) < 200:
+        assert iteration.step(multiply, precondition)
+        norms.append(iteration.norm)
+    assert len(norms) < 100
+    assert np.all(np.diff(norms) < 1e-12)
+    assert np.abs(A @ iteration.x - b).max() < 1e-8
+    assert iteration.nbytes <= (4 + 2 * KEPT) * 8 * n + 8 * (n // 4096 + 1)
+    iteration.r[:] = 0.0
+    iteration.start()
+    assert not iteration.step(multiply, precondition)  # nowhere to go
+
+
+def test_oblique_equations_with_springs_against_a_dense_solution():
+    analysis = Analysis(rubbing(), "amg", 1e-12, Criteria())
+    solver, n = analysis.solver, analysis.model.n_dofs
+    rng = np.random.default_rng(5)
+    f = np.where(analysis.system.free, rng.normal(size=n), 0.0)
+    constraints = analysis.pairs["pair"].constraints(np.zeros_like(analysis.model.mesh.points))
+    near = np.argsort(constraints.gap0)[:4]
+    normal, first, second = (
+        analysis.system.rows(rows[near], np.zeros(4), np.zeros(n))[0] for rows in (constraints.B, *constraints.tangents)
+    )
+    through, c = csr_array(normal + 0.3 * first), 1e-3 * rng.normal(size=4)
+    springs = csr_array(50.0 * second.T @ second)
+    push = -0.2 * np.asarray(second.T @ np.ones(4))
+    u, multiplier = solver.load(f).oblique(
+        normal, c, np.arange(4), np.zeros(n), 1e-12, linear.Drag(through, springs, push)
+    )
+    out = analysis.system.matrix @ u + springs @ u - f - push - through.T @ multiplier
+    assert np.abs(normal @ u - c).max() < 1e-12
+    assert np.abs(out).max() < 1e-8 * np.abs(f).max()
+
+
+def test_an_iteration_that_does_not_end_is_told(monkeypatch):
+    from fastcontact.linear import _oblique
+
+    monkeypatch.setattr(_oblique, "MAX_ITERATIONS", 1)
+    analysis = Analysis(rubbing(), "amg", 1e-12, Criteria())
+    n = analysis.model.n_dofs
+    rows = csr_array((np.ones(2), ([0, 0], np.flatnonzero(analysis.system.free)[[0, 40]])), shape=(1, n))
+    drag = linear.Drag(csr_array(2.0 * rows))
+    f = np.where(analysis.system.free, 1.0, 0.0)
+    with pytest.raises(ConvergenceError, match=r"conjugate residuals stand at .* times the tolerance"):
+        analysis.solver.load(f).oblique(rows, np.zeros(1), np.zeros(1, np.int64), np.zeros(n), 1e-12, drag)
+
+
+def stuck(monkeypatch, limit=None):
+    monkeypatch.setattr(_multigrid, "MAX_ITERATIONS", 3)
+    if limit is not None:
+        monkeypatch.setattr(amg, "FACTORS_UP_TO", {3: limit})
+    return rubbing(mu=0.0)
+
+
+def test_where_multigrid_stalls_factors_take_over_and_say_so(monkeypatch):
+    model, ramp = stuck(monkeypatch), fc.linear_ramp(4)
+    exact = fc.solve(model, ramp, linear_solver="direct")
+    with pytest.warns(fc.FastcontactWarning, match=r"multigrid gave up .* relative residual of .* after 3 iterations"):
+        found = fc.solve(model, ramp, linear_solver="amg", on_step=(states := []).append)
+    assert np.abs(found[-1].displacement - exact[-1].displacement).max() < 1e-9 * np.abs(exact[-1].displacement).max()
+    assert "factors took over" in found[-1].warnings[0]
+    with pytest.warns(fc.FastcontactWarning, match="multigrid gave up"):
+        rest = fc.solve(model, ramp, linear_solver="amg", resume=states[:2])
+    np.testing.assert_array_equal(rest[-1].displacement, found[-1].displacement)
+    assert rest[-1].warnings == found[-1].warnings
+
+
+def test_a_matrix_too_large_for_factors_stays_an_error(monkeypatch):
+    model = stuck(monkeypatch, limit=10)
+    with pytest.raises(ConvergenceError, match="conjugate gradients stand at"):
+        fc.solve(model, fc.linear_ramp(1), linear_solver="amg", criteria=fc.Criteria(max_halvings=0))
