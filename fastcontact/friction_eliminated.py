@@ -7,6 +7,8 @@ the slip as that turns, which is a spring across d: ``t = mu n d - stiffness (s 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, vstack
@@ -112,6 +114,7 @@ class Eliminated:
         y = np.zeros_like(self._free) if forces is None else np.where(self._usable, forces, 0.0)
         if self._turn is not None:
             y = (self._turn @ y.ravel()).reshape(y.shape)
+        y[1:][~self._slips] = 0.0
         self.reached = y / self._unit
         return self.reached, self._scaled(self._gaps(self.u))
 
@@ -133,54 +136,73 @@ class Eliminated:
 
     def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
         """See `cone_newton.Linearised.step`."""
-        closed, k = closed & self._usable, len(y) - 1
+        closed = closed & self._usable
         shut = np.flatnonzero(closed)
-        stuck = [np.flatnonzero(closed & sticking & slips) for slips in self._slips]
-        sliding = np.flatnonzero(closed & ~sticking & (self.law.mu > 0.0))
-        d, turning = self.law.slide(y, gaps, sliding)
-        parts = (shut, *stuck)
-        B = csr_array(vstack([R[at] for R, at in zip(self._rows, parts, strict=True)], format="csr"))
-        c = -np.concatenate([own[at] for own, at in zip(self._free, parts, strict=True)])
-        along = np.zeros_like(y[1:])
-        along[:, sliding] = self.law.mu[sliding] * d
-        across, stiffness = self._across(sliding, d, turning)
-        drag = self._drag(B, shut, along, across, stiffness, self._across_free(sliding, d)) if len(sliding) else None
-        u, multiplier = self._loaded.oblique(B, c, np.concatenate(parts), self.u, self._tolerance, drag)
-        new, ends = np.zeros_like(y), np.cumsum([len(shut), *(len(at) for at in stuck)])
-        for a, (at, part) in enumerate(zip(parts, np.split(multiplier, ends[:-1]), strict=True)):
-            new[a, at] = part
-        new[1:, sliding] += along[:, sliding] * new[0, sliding]
-        if k == 2:
-            slip = across @ u + self._across_free(sliding, d)
-            new[1:, sliding] -= stiffness * slip * np.stack([-d[1], d[0]])
+        equations = (shut, *(np.flatnonzero(closed & sticking & slips) for slips in self._slips))
+        B = csr_array(vstack([R[at] for R, at in zip(self._rows, equations, strict=True)], format="csr"))
+        c = -np.concatenate([free[at] for free, at in zip(self._free, equations, strict=True)])
+        sliding = self._sliding(y, gaps, np.flatnonzero(closed & ~sticking & (self.law.mu > 0.0)))
+        drag = self._drag(B, shut, sliding) if len(sliding.at) else None
+        u, multiplier = self._loaded.oblique(B, c, np.concatenate(equations), self.u, self._tolerance, drag)
+        new, first = np.zeros_like(y), 0
+        for own, at in zip(new, equations, strict=True):
+            own[at] = multiplier[first : first + len(at)]
+            first += len(at)
+        new[1:, sliding.at] += sliding.force(new[0, sliding.at], u)
         self.u, self.reached = u, new / self._unit
         return self.reached, self._scaled(self._gaps(u))
 
-    def _across(self, sliding: NDArray[np.intp], d: Array, turning: Array) -> tuple[csr_array, Array]:
-        """Return rows (q, n) of the slip across d, and the stiffness (q,) against it; no rows in two dimensions."""
-        if len(d) < 2:
-            return csr_array((0, self._rows[0].shape[1])), np.empty(0)
-        first, second = (self._rows[1 + a][sliding] for a in range(2))
-        rows = diags_array(-d[1]) @ first + diags_array(d[0]) @ second
-        spring = np.minimum(turning / np.maximum(1.0 - turning, 1e-300), STIFFEST)
-        return csr_array(rows), spring * self._unit[sliding] ** 2
+    def _sliding(self, y: Array, gaps: Array, at: NDArray[np.intp]) -> _Sliding:
+        """Return what the constraints `at` (q,) do that slide."""
+        d, turning = self.law.slide(y, gaps, at)
+        pull = self.law.mu[at] * d
+        if len(d) == 1:
+            return _Sliding(at, pull)
+        across = np.stack([-d[1], d[0]])
+        rows = sum(diags_array(part) @ T[at] for part, T in zip(across, self._rows[1:], strict=True))
+        spring = np.minimum(turning / np.maximum(1.0 - turning, 1e-300), STIFFEST) * self._unit[at] ** 2
+        return _Sliding(at, pull, _Springs(across, csr_array(rows), spring, (across * self._free[1:, at]).sum(axis=0)))
 
-    def _across_free(self, sliding: NDArray[np.intp], d: Array) -> Array:
-        """Return the slip (q,) across d at u = 0."""
-        return np.asarray(d[0] * self._free[2, sliding] - d[1] * self._free[1, sliding]) if len(d) == 2 else np.empty(0)
-
-    def _drag(
-        self, B: csr_array, shut: NDArray[np.intp], along: Array, across: csr_array, stiffness: Array, free: Array
-    ) -> Drag:
+    def _drag(self, B: csr_array, shut: NDArray[np.intp], sliding: _Sliding) -> Drag:
         """Return what sliding adds to equations B whose first rows are the gaps of `shut`."""
+        pull = np.zeros((len(self._rows) - 1, len(self._usable)))
+        pull[:, sliding.at] = sliding.pull
         through = self._rows[0][shut]
-        for T, part in zip(self._rows[1:], along, strict=True):
+        for T, part in zip(self._rows[1:], pull, strict=True):
             through = through + diags_array(part[shut]) @ T[shut]
         through = csr_array(vstack([through, B[len(shut) :]], format="csr"))
-        if not across.shape[0]:
+        if sliding.springs is None:
             return Drag(through)
-        weighted = across.T @ diags_array(stiffness)
-        return Drag(through, csr_array(weighted @ across), -(weighted @ free))
+        springs = sliding.springs
+        weighted = springs.rows.T @ diags_array(springs.stiffness)
+        return Drag(through, csr_array(weighted @ springs.rows), -(weighted @ springs.free))
+
+
+@dataclass(frozen=True, eq=False)
+class _Springs:
+    """Springs across slips: along (k, q), with rows (q, n), stiffness (q,), and slips (q,) across at u = 0."""
+
+    along: Array
+    rows: csr_array
+    stiffness: Array
+    free: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Sliding:
+    """Constraints `at` (q,) that slide: tangential over normal forces (k, q), and springs in three dimensions."""
+
+    at: NDArray[np.intp]
+    pull: Array
+    springs: _Springs | None = None
+
+    def force(self, normal: Array, u: Array) -> Array:
+        """Return the tangential forces (k, q)."""
+        dragged = self.pull * normal
+        if self.springs is None:
+            return dragged
+        springs = self.springs
+        return np.asarray(dragged - springs.along * springs.stiffness * (springs.rows @ u + springs.free))
 
 
 def _own(rows: tuple[csr_array, ...], yielding: Array) -> Array:

@@ -54,12 +54,16 @@ def _warm_up() -> None:
         model.prescribe("A1B1", y=0.1)
         model.add_contact("pair", secondary="CONT1", primary="CONT2", formulation=formulation)
         solve(model, linear_ramp(1))
-    for element, formulation, solver in (("hex8", "node_to_segment", "amg"), ("tet4", "mortar", "direct")):
+    for element, formulation, solver, friction in (
+        ("hex8", "node_to_segment", "amg", 0.0), ("hex8", "node_to_segment", "amg", 0.1), ("tet4", "mortar", "direct", 0.0),
+    ):  # fmt: skip
         model = Model(generate.sphere_on_block(element, R=1.0, size=0.4, contact_size=0.2, contact_radius=0.2), "3d")
         model.add_material(LinearElastic(E=1.0, nu=0.3))
         model.fix("SYMMETRY_X", "x")
         model.fix("SYMMETRY_Z", "z")
         model.fix("BLOCK_BOTTOM", "y")
         model.prescribe("SPHERE_TOP", y=-0.02)
-        model.add_contact("pair", secondary="CONT_SPHERE", primary="CONT_BLOCK", formulation=formulation)
+        model.add_contact(
+            "pair", secondary="CONT_SPHERE", primary="CONT_BLOCK", formulation=formulation, friction=friction
+        )
         solve(model, linear_ramp(1), linear_solver=solver)

@@ -13,6 +13,7 @@ KERNEL_TESTS = (
     "tests/unit/test_friction_kernels.py",
     "tests/unit/test_linear_multigrid.py",
     "tests/unit/test_norms.py",
+    "tests/unit/test_own_pivots.py",
     "tests/unit/test_peeling.py",
     "tests/unit/test_search.py",
     "tests/unit/test_search_3d.py",
