@@ -8,51 +8,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.kernels import krylov
+from fastcontact.linear._iteration import Iteration
 
 Array = NDArray[np.float64]
 # Search directions that a new one is made orthogonal to; older ones are forgotten.
 KEPT = 20
 
 
-class ConjugateResiduals:
-    """Preconditioned generalised conjugate residuals, truncated (Eisenstat, Elman and Schultz, 1983).
+class ConjugateResiduals(Iteration):
+    """Preconditioned generalised conjugate residuals, truncated (Eisenstat, Elman and Schultz, 1983); see `Iteration`.
 
     Every iteration makes the residual as small as the directions kept allow, so it never grows; the preconditioner may
     vary. Directions are set aside as they are needed.
-
-    Parameters
-    ----------
-    n : int
-        Number of unknowns.
-
-    Attributes
-    ----------
-    x, r : ndarray (n,)
-        Iterate and residual.
-    norm : float
-        2-norm of the residual.
     """
 
     def __init__(self, n: int) -> None:
-        self.x, self.r, self._z, self._q = (np.zeros(n) for _ in range(4))
-        self._sums = np.empty(-(-n // krylov.CHUNK))
+        super().__init__(n)
+        self._z, self._q = np.zeros(n), np.zeros(n)
         # Directions of unit image, and their images turned round: what is taken from both has the same sign then.
         self._kept: list[tuple[Array, Array]] = []
         self._made = 0
-        self.norm = 0.0
 
     @property
     def nbytes(self) -> int:
         """Memory [bytes]."""
         return (4 + 2 * len(self._kept)) * self.x.nbytes + self._sums.nbytes
 
-    def dot(self, a: Array, b: Array) -> float:
-        """Return the dot product of two vectors (n,)."""
-        return float(krylov.dot(a, b, self._sums))
-
     def start(self) -> None:
-        """Begin anew from `x` and its residual `r`, both set by the caller."""
-        self.norm = float(np.sqrt(self.dot(self.r, self.r)))
+        """See `Iteration.start`."""
+        super().start()
         self._made = 0
 
     def step(

@@ -3,41 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.kernels import krylov
+from fastcontact.linear._iteration import Iteration
 
 Array = NDArray[np.float64]
-Values = NDArray[Any]
 
 
-class ConjugateGradients:
-    """Preconditioned conjugate gradients that can stop and go on.
+class ConjugateGradients(Iteration):
+    """Preconditioned conjugate gradients that can stop and go on; see `Iteration`.
 
     Round-off of a preconditioner in single precision makes it vary a little; the search directions are therefore
     turned by what the preconditioned residual has in common with the change of the residual (Polak and Ribiere's
     formula; Notay, 2000), which costs one more dot product.
-
-    Parameters
-    ----------
-    n : int
-        Number of unknowns.
-
-    Attributes
-    ----------
-    x, r : ndarray (n,)
-        Iterate and residual.
-    norm : float
-        2-norm of the residual.
     """
 
     def __init__(self, n: int) -> None:
-        self.x, self.r, self.z, self.p, self.q = (np.zeros(n) for _ in range(5))
-        self._sums = np.empty(-(-n // krylov.CHUNK))
-        self.norm = 0.0
+        super().__init__(n)
+        self.z, self.p, self.q = (np.zeros(n) for _ in range(3))
         self._rz = self._alpha = 0.0
 
     @property
@@ -45,13 +31,9 @@ class ConjugateGradients:
         """Memory [bytes]."""
         return 5 * self.x.nbytes + self._sums.nbytes
 
-    def dot(self, a: Array, b: Array) -> float:
-        """Return the dot product of two vectors (n,)."""
-        return float(krylov.dot(a, b, self._sums))
-
     def start(self) -> None:
-        """Begin anew from `x` and its residual `r`, both set by the caller."""
-        self.norm = float(np.sqrt(self.dot(self.r, self.r)))
+        """See `Iteration.start`."""
+        super().start()
         self._rz = 0.0
 
     def step(
