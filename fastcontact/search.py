@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from fastcontact.errors import ContactError
 from fastcontact.kernels import facets3d, packed_tree, search2d, search3d
 from fastcontact.kernels.projection3d import Domain, Facets
-from fastcontact.kernels.search3d import RUN, Answer, scratch
+from fastcontact.kernels.nearest_first import queue
+from fastcontact.kernels.search3d import RUN, Answer
 from fastcontact.parallel import portions, shared
 
 Array = NDArray[np.float64]
@@ -152,7 +153,7 @@ def _on_faces(points: Array, corners: Array) -> Closest:
         np.empty(n, np.int8),
     )  # fmt: skip
     shared(
-        lambda part: search3d.closest_facets(points, order, *part, midst, facets, domain, tree, answer, scratch()),
+        lambda part: search3d.closest_facets(points, order, *part, midst, facets, domain, tree, answer, queue(3)),
         _runs(n),
     )
     wrong = np.flatnonzero(answer.status != search3d.CONVERGED)
