@@ -16,11 +16,12 @@ FLAT = 1e-9
 
 @kernel
 def bounds(corners):
-    """Return the corners (3,) of the box around all nodes (n_facets, m, 3)."""
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    """Return the corners (dim,) of the box around all nodes (n_facets, m, dim)."""
+    dim = corners.shape[2]
+    low, high = np.full(dim, np.inf), np.full(dim, -np.inf)
     for f in range(corners.shape[0]):
         for a in range(corners.shape[1]):
-            for d in range(3):
+            for d in range(dim):
                 low[d], high[d] = min(low[d], corners[f, a, d]), max(high[d], corners[f, a, d])
     return low, high
 

@@ -16,8 +16,8 @@ from fastcontact.kernels.packed_tree import WIDTH
 
 # Chunks up to which the nearest box of all comes first, from there on of the last chunk: room for trees of up to 2^60 facets.
 SORTED, DEPTH = 64, 20
-# Most chunks in a front.
-FRONT = 16
+# Points in a run, and most chunks in a front.
+RUN, FRONT = 32, 16
 FAR = 1e300
 Array = NDArray[np.float64]
 
@@ -65,6 +65,12 @@ def nearest(queue, n):
         here = queue.least[chunk]
         at, away = (chunk, here) if here < away else (at, away)
     return at, away
+
+
+@inlined_kernel
+def left(n):
+    """Return the number of chunks where nothing in the last of many is within reach, or in none of few."""
+    return n - 1 if n > SORTED else 0
 
 
 @inlined_kernel

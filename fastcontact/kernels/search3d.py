@@ -11,7 +11,18 @@ from numpy.typing import NDArray
 
 from fastcontact._jit import inlined_kernel, kernel
 from fastcontact.kernels.borrowing import borrowed
-from fastcontact.kernels.nearest_first import FAR, farthest, found_front, nearest, opened, started, taken, whole_front
+from fastcontact.kernels.nearest_first import (
+    FAR,
+    RUN,
+    farthest,
+    found_front,
+    left,
+    nearest,
+    opened,
+    started,
+    taken,
+    whole_front,
+)
 from fastcontact.kernels.packed_tree import WIDTH, leaves
 from fastcontact.kernels.projection3d import component, frame, onto_sides, project, vector
 from fastcontact.kernels.straight3d import ON_SIDE, along, cross, dot, minus, on_bilinear, on_flat, unit
@@ -21,7 +32,6 @@ SAME_PLACE = 1e-9
 CONVERGED, NOT_CONVERGED, NOT_FINITE = 0, 1, 2
 # Points in a run, at whose start the last facet is forgotten; most boxes in a front; length up to which the list of boxes
 # still to look into is kept sorted.
-RUN = 32
 # Squared distances to boxes and facets are rounded: from far away by more than the size of the places that are the same.
 ROUNDING = 1.0 + 1e-14
 Array = NDArray[np.float64]
@@ -83,7 +93,7 @@ def closest_facets(points, order, begin, end, midst, facets, domain, tree, answe
             while n > 0:
                 chunk, away = nearest(queue, n)
                 if away > reach:
-                    n = n - 1 if chunk == n - 1 else 0
+                    n = left(n)
                     continue
                 child = taken(queue, chunk, away, count)
                 if child < n_nodes:
