@@ -19,10 +19,12 @@ def bounds(corners):
     """Return the corners (dim,) of the box around all nodes (n_facets, m, dim)."""
     dim = corners.shape[2]
     low, high = np.full(dim, np.inf), np.full(dim, -np.inf)
-    for f in range(corners.shape[0]):
-        for a in range(corners.shape[1]):
-            for d in range(dim):
-                low[d], high[d] = min(low[d], corners[f, a, d]), max(high[d], corners[f, a, d])
+    for d in range(dim):
+        least, most = np.inf, -np.inf
+        for f in range(corners.shape[0]):
+            for a in range(corners.shape[1]):
+                least, most = min(least, corners[f, a, d]), max(most, corners[f, a, d])
+        low[d], high[d] = least, most
     return low, high
 
 

@@ -17,7 +17,7 @@ from fastcontact.kernels.packed_tree import WIDTH
 # Chunks up to which the nearest box of all comes first, from there on of the last chunk: room for trees of up to 2^60 facets.
 SORTED, DEPTH = 64, 20
 # Points in a run, and most chunks in a front.
-RUN, FRONT = 32, 16
+RUN, FRONT = 24, 16
 FAR = 1e300
 Array = NDArray[np.float64]
 

@@ -97,10 +97,11 @@ def on_bilinear(r, a, b, c, reach):
     if not determinant > PARALLEL * aa * bb:
         return 0.0, 0.0, np.nan
     s, t = (bb * ar - ab * br) / determinant, (aa * br - ab * ar) / determinant
-    # Beyond a parallelogram by so much in its plane, and the facet strays from it by |c| at most.
-    beyond = max((abs(s) - 1.0) * np.sqrt(determinant / bb), (abs(t) - 1.0) * np.sqrt(determinant / aa))
-    if beyond > reach + np.sqrt(cc):
-        return s, t, np.inf
+    if abs(s) > 1.0 or abs(t) > 1.0:
+        # Beyond a parallelogram by so much in its plane, and the facet strays from it by |c| at most.
+        beyond = max((abs(s) - 1.0) * np.sqrt(determinant / bb), (abs(t) - 1.0) * np.sqrt(determinant / aa))
+        if beyond > reach + np.sqrt(cc):
+            return s, t, np.inf
     # The second time from inside, where the first step left the facet for good although the minimum lies in it.
     for _ in range(2):
         s, t, stationary = _stationary(aa, ab, bb, ac, bc, cc, ar, br, cr, s, t)
