@@ -41,6 +41,17 @@ def lowest_one_by_one(bits: int) -> int:
     return (bits & -bits).bit_length() - 1
 
 
+def emptied_one_by_one(boxes: Any, node: int, _point: Any) -> None:
+    """Do what `emptied` does, in NumPy."""
+    dim = boxes.shape[1] // 2
+    boxes[node, :dim], boxes[node, dim:] = np.inf, -np.inf
+
+
+def copied_one_by_one(boxes: Any, node: int, k: int, others: Any, other: int, at: int, _point: Any) -> None:
+    """Do what `copied` does, in NumPy."""
+    others[other, :, at] = boxes[node, :, k]
+
+
 def _squares(_context: Any, boxes: Any, node: Any, point: Any, away: Any, begin: Any) -> Any:
     from numba.core import types
 
@@ -92,6 +103,40 @@ def _without(_context: Any, away: Any, begin: Any, k: Any) -> Any:
         return _least(builder, squares)
 
     return types.float64(away, types.intp, types.intp), code
+
+
+def _emptied(_context: Any, boxes: Any, node: Any, point: Any) -> Any:
+    from numba.core import types
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        from llvmlite import ir
+
+        dim, start = len(signature.args[2]), _start(context, builder, signature, args, 0)
+        first, vector = builder.mul(args[1], args[1].type(2 * dim * WIDTH)), ir.VectorType(ir.DoubleType(), WIDTH)
+        for d in range(2 * dim):
+            nowhere = vector([np.inf if d < dim else -np.inf] * WIDTH)
+            builder.store(nowhere, _eight(builder, start, builder.add(first, first.type(d * WIDTH))), align=8)
+        return context.get_dummy_value()
+
+    return types.none(boxes, types.intp, point), code
+
+
+def _copied(_context: Any, boxes: Any, node: Any, k: Any, others: Any, other: Any, at: Any, point: Any) -> Any:
+    from numba.core import types
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        sides, number = 2 * len(signature.args[6]), args[1].type
+
+        def side(array: int, d: int) -> Any:
+            first = builder.mul(args[array + 1], number(sides * WIDTH))
+            index = builder.add(builder.add(first, args[array + 2]), number(d * WIDTH))
+            return builder.gep(_start(context, builder, signature, args, array), [index])
+
+        for d in range(sides):
+            builder.store(builder.load(side(0, d)), side(3, d))
+        return context.get_dummy_value()
+
+    return types.none(boxes, types.intp, types.intp, others, types.intp, types.intp, point), code
 
 
 def _lowest(_context: Any, bits: Any) -> Any:
@@ -157,5 +202,9 @@ squares = numba.extending.intrinsic(_squares) if compiled() else squares_one_by_
 within = numba.extending.intrinsic(_within) if compiled() else within_one_by_one
 # Makes away[begin + k] infinite, and returns the least of away[begin : begin + WIDTH].
 without = numba.extending.intrinsic(_without) if compiled() else without_one_by_one
+# Puts all of boxes[node] infinitely far away; only the dimension of the point counts.
+emptied = numba.extending.intrinsic(_emptied) if compiled() else emptied_one_by_one
+# Copies the box boxes[node, :, k] to others[other, :, at]; only the dimension of the point counts.
+copied = numba.extending.intrinsic(_copied) if compiled() else copied_one_by_one
 # Returns the number of the lowest bit set.
 lowest = numba.extending.intrinsic(_lowest) if compiled() else lowest_one_by_one

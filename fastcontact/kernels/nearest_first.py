@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact._jit import inlined_kernel, kernel
-from fastcontact.kernels.eight_boxes import lowest, squares, within, without
+from fastcontact.kernels.eight_boxes import copied, emptied, lowest, squares, within, without
 from fastcontact.kernels.packed_tree import WIDTH
 
 # Chunks up to which the nearest box of all comes first, from there on of the last chunk: room for trees of up to 2^60 facets.
@@ -102,11 +102,11 @@ def farthest(points, order, begin, end, i):
 
 
 @kernel
-def whole_front(queue, tree):
-    """Make the root the front, and return its length."""
-    dim = queue.boxes.shape[1] // 2
-    queue.boxes[0, :dim], queue.boxes[0, dim:] = np.inf, -np.inf
-    queue.boxes[0, :dim, 0], queue.boxes[0, dim:, 0] = -np.inf, np.inf
+def whole_front(queue, tree, point):
+    """Make the root the front, and return its length; only the dimension of the point counts."""
+    emptied(queue.boxes, 0, point)
+    for d in range(len(point)):
+        queue.boxes[0, d, 0], queue.boxes[0, len(point) + d, 0] = -np.inf, np.inf
     queue.front[0] = len(tree.first) - 1
     return 1
 
@@ -118,9 +118,9 @@ def found_front(queue, tree, n_leaves, point, radius):
     Nothing that any point of a run may be closest to lies farther from one of them than its own distance and twice its
     distance from the others.
     """
-    square, dim, root = (radius * (1.0 + 1e-9)) ** 2, queue.boxes.shape[1] // 2, len(tree.first) - 1
+    square, root = (radius * (1.0 + 1e-9)) ** 2, len(tree.first) - 1
     if root < n_leaves:
-        return whole_front(queue, tree)
+        return whole_front(queue, tree, point)
     stack, top, count, room = queue.first, 1, 0, WIDTH * (SORTED + DEPTH - 1)
     stack[0] = root
     while top > 0:
@@ -137,12 +137,11 @@ def found_front(queue, tree, n_leaves, point, radius):
                 top += 1
                 continue
             if count == FRONT * WIDTH or child >= n_leaves:
-                return whole_front(queue, tree)
+                return whole_front(queue, tree, point)
             chunk, lane = count // WIDTH, count % WIDTH
             if lane == 0:
-                queue.boxes[chunk, :dim], queue.boxes[chunk, dim:] = np.inf, -np.inf
-            for d in range(2 * dim):
-                queue.boxes[chunk, d, lane] = tree.boxes[node, d, k]
+                emptied(queue.boxes, chunk, point)
+            copied(tree.boxes, node, k, queue.boxes, chunk, lane, point)
             queue.front[count] = child
             count += 1
     return count

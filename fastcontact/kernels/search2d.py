@@ -134,7 +134,7 @@ def closest_facets(points, order, begin, end, corners, tree, numbers, answer, qu
     n_leaves, n_nodes = leaves(len(numbers)), len(tree.first)
     for run in range(begin, end, RUN):
         run_end = min(run + RUN, end)
-        middle, count = (run + run_end) // 2, whole_front(queue, tree)
+        middle, count = (run + run_end) // 2, whole_front(queue, tree, (0.0, 0.0))
         for slot in range(run_end - run):
             # The one in the middle comes first.
             i = order[middle if slot == 0 else run + slot - 1 if run + slot <= middle else run + slot]
