@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact._jit import kernel
+from fastcontact.kernels.eight_boxes_code import WIDTH
 
-WIDTH = 8
 # Sorting takes three or four passes over digits of so many bits.
 DIGIT, PASSES = 12, 4
 BLOCK = 256

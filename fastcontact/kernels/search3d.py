@@ -1,7 +1,7 @@
-"""Closest facet to each of many points in 3D, through a tree of boxes (`packed_tree`).
+"""Closest facet to each of many points in 3D, through a tree of boxes (`packed_tree`), the nearest first (`nearest_first`).
 
 Points come in the order of a space-filling curve, in runs. What may be closest to any point of a run is found once, the
-front: the boxes below which the search of each point begins. The closest facet of one point bounds the distance of the next.
+front: the boxes at which the search of each point begins.
 """
 
 from typing import NamedTuple
@@ -30,8 +30,6 @@ from fastcontact.kernels.straight3d import ON_SIDE, along, cross, dot, minus, on
 # Facets whose closest points lie nearer together than this, in facet sizes, meet there and are equally close.
 SAME_PLACE = 1e-9
 CONVERGED, NOT_CONVERGED, NOT_FINITE = 0, 1, 2
-# Points in a run, at whose start the last facet is forgotten; most boxes in a front; length up to which the list of boxes
-# still to look into is kept sorted.
 # Squared distances to boxes and facets are rounded: from far away by more than the size of the places that are the same.
 ROUNDING = 1.0 + 1e-14
 Array = NDArray[np.float64]
@@ -61,7 +59,7 @@ def closest_facets(points, order, begin, end, midst, facets, domain, tree, answe
     Parameters
     ----------
     points : (n, 3), order : (n,)
-        Points, and the order to go through them, along a curve: the facet of the last one is near the next.
+        Points, and the order to go through them, along a curve: those of a run lie near together.
     begin, end : int
         Which of that order; the first a multiple of `RUN`.
     midst : (3,)

@@ -159,27 +159,6 @@ def _on_sides(r, a, b, c, aa, ab, bb, ac, bc, cc, ar, br, cr):
 
 
 @kernel
-def above(r, a, b, c, triangle):
-    """Return the squared distance from `r` to some point of a facet, often the closest: an upper bound.
-
-    Below the perpendicular on the plane of a and b, if that meets the facet, else moved in along the coordinates.
-    """
-    aa, ab, bb, ar, br = dot(a, a), dot(a, b), dot(b, b), dot(a, r), dot(b, r)
-    determinant = aa * bb - ab * ab
-    s, t = 0.0, 0.0
-    if determinant > PARALLEL * aa * bb:
-        s, t = (bb * ar - ab * br) / determinant, (aa * br - ab * ar) / determinant
-    if triangle:
-        s, t = max(s, 0.0), max(t, 0.0)
-        total = max(s + t, 1.0)
-        s, t = s / total, t / total
-    else:
-        s, t = min(max(s, -1.0), 1.0), min(max(t, -1.0), 1.0)
-    v = rest(r, a, b, c, s, t)
-    return dot(v, v)
-
-
-@kernel
 def room(a, b, c):
     """Return how large |(r - X) . c| may be for a local minimum X of the distance to r to be the only one on the facet.
 
