@@ -132,13 +132,12 @@ def _on_faces(points: Array, corners: Array) -> Closest:
     nodes, sides, to_terms, to_hull, weights = _tables(corners.shape[1])
     n, size = len(points), len(corners)
     bounds = facets3d.bounds(corners)
-    # Seen from their midst: far from the origin, rounding would be coarser than the steps of a converged projection.
     midst = 0.5 * (bounds[0] + bounds[1])
     numbers = packed_tree.curve_order(np.ascontiguousarray(corners[:, 0]), *bounds)
-    facets = Facets(np.empty(corners.shape), np.empty(corners.shape), np.empty(size), np.empty(size), numbers)
+    facets = Facets(np.empty(corners.shape), midst, np.empty(size), np.empty(size), numbers, corners)
     low, high = np.empty((size, 3)), np.empty((size, 3))
     shared(
-        lambda part: facets3d.prepare(corners, *part, midst, to_terms, to_hull, weights, facets, low, high),
+        lambda part: facets3d.prepare(facets, *part, to_terms, to_hull, weights, low, high),
         portions(size),
     )
     tree, domain = packed_tree.pack(low, high), Domain(nodes, flat_triangles(len(nodes)), sides)
@@ -148,7 +147,7 @@ def _on_faces(points: Array, corners: Array) -> Closest:
         np.empty(n, np.int8),
     )  # fmt: skip
     shared(
-        lambda part: search3d.closest_facets(points, order, *part, midst, facets, domain, tree, answer, queue(3)),
+        lambda part: search3d.closest_facets(points, order, *part, facets, domain, tree, answer, queue(3)),
         _runs(n),
     )
     wrong = np.flatnonzero(answer.status != search3d.CONVERGED)

@@ -53,7 +53,7 @@ class Answer(NamedTuple):
 
 
 @kernel
-def closest_facets(points, order, begin, end, midst, facets, domain, tree, answer, queue):
+def closest_facets(points, order, begin, end, facets, domain, tree, answer, queue):
     """Project points on their closest facets; of facets that meet in the closest point the one with the lowest number.
 
     Parameters
@@ -62,8 +62,6 @@ def closest_facets(points, order, begin, end, midst, facets, domain, tree, answe
         Points, and the order to go through them, along a curve: those of a run lie near together.
     begin, end : int
         Which of that order; the first a multiple of `RUN`.
-    midst : (3,)
-        Origin of the facets.
     facets, domain, tree : Facets, Domain, Tree
         Facets in the order of the tree.
     answer : Answer
@@ -71,10 +69,10 @@ def closest_facets(points, order, begin, end, midst, facets, domain, tree, answe
     queue : Queue
         Overwritten.
     """
-    points, order, midst = borrowed((points, order, midst))
+    points, order = borrowed((points, order))
     facets, domain, tree = borrowed(facets), borrowed(domain), borrowed(tree)
     answer, queue = borrowed(answer), borrowed(queue)
-    n_leaves, n_nodes = leaves(len(facets.numbers)), len(tree.first)
+    midst, n_leaves, n_nodes = facets.midst, leaves(len(facets.numbers)), len(tree.first)
     for run in range(begin, end, RUN):
         run_end = min(run + RUN, end)
         middle, count = (run + run_end) // 2, whole_front(queue, tree, (0.0, 0.0, 0.0))

@@ -22,9 +22,9 @@ def prepared(corners):
     """Facets (n, m, 3) as the search wants them, in their order."""
     n, m = corners.shape[:2]
     _, _, to_terms, to_hull, weights = _tables(m)
-    facets = Facets(np.empty(corners.shape), np.empty(corners.shape), np.empty(n), np.empty(n), np.arange(n))
+    facets = Facets(np.empty(corners.shape), np.zeros(3), np.empty(n), np.empty(n), np.arange(n), corners)
     low, high = np.empty((n, 3)), np.empty((n, 3))
-    facets3d.prepare(corners, 0, n, np.zeros(3), to_terms, to_hull, weights, facets, low, high)
+    facets3d.prepare(facets, 0, n, to_terms, to_hull, weights, low, high)
     return facets, low, high
 
 
