@@ -72,12 +72,29 @@ def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = 
 
 def _watching(compiled_kernel: Any, function: Callable[..., Any]) -> Any:
     """Let the disk cache notice changes in the other files whose kernels this one may call; Numba looks at its own only."""
-    files = {getattr(other, "py_func", function).__code__.co_filename for other in function.__globals__.values()}
+    files: set[str] = set()
+    _gather(function, files)
     cache = getattr(getattr(compiled_kernel, "_cache", None), "_cache_file", None)
     if cache is not None and len(files) > 1:
         stats = [os.stat(file) for file in sorted(files)]
         cache._source_stamp = [(stat.st_mtime, stat.st_size) for stat in stats]
     return compiled_kernel
+
+
+def _gather(function: Callable[..., Any], files: set[str]) -> None:
+    """Add the file of a function and those of the kernels that it and they may call."""
+    file = function.__code__.co_filename
+    if file not in files:
+        files.add(file)
+        for other in list(function.__globals__.values()):
+            part = _written(other)
+            if part is not None:
+                _gather(part, files)
+
+
+def _written(part: Any) -> Any:
+    """Return the function from which a kernel, or a part that is written for each kernel anew, is compiled; else None."""
+    return getattr(part, "py_func", None) or getattr(part, "_defn", None)
 
 
 def _notice_fork() -> None:

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import ContactError
 from fastcontact.kernels import facets3d, packed_tree, search2d, search3d
+from fastcontact.kernels.nearest_first import RUN, queue
 from fastcontact.kernels.projection3d import Domain, Facets
-from fastcontact.kernels.search3d import RUN, Answer, scratch
+from fastcontact.kernels.search3d import Answer
 from fastcontact.parallel import portions, shared
 
 Array = NDArray[np.float64]
@@ -110,39 +111,33 @@ def flat_triangles(n_nodes: int) -> NDArray[np.intp]:
 
 
 def _on_lines(points: Array, corners: Array) -> Closest:
-    hull = corners if corners.shape[1] == 2 else _PARABOLA @ corners
-    low, high = hull.min(axis=1), hull.max(axis=1)
-    bounds = low.min(axis=0), high.max(axis=0)
+    n, bounds = len(points), facets3d.bounds(corners)
     numbers = packed_tree.curve_order(np.ascontiguousarray(corners[:, 0]), *bounds)
-    tree, sorted_corners = packed_tree.pack(low[numbers], high[numbers]), corners[numbers]
-    order, n = packed_tree.curve_order(points, *bounds), len(points)
-    facet, xi, normal, overhang = np.empty(n, np.intp), np.empty(n), np.empty((n, 2)), np.empty(n)
-
-    def search(part: tuple[int, int]) -> None:
-        room = np.empty(search2d.ROOM, np.int64), np.empty(search2d.ROOM), np.empty(packed_tree.WIDTH)
-        search2d.closest_facets(points, order, *part, sorted_corners, tree, numbers, room, facet, xi, normal, overhang)
-
-    shared(search, portions(n))
-    if facet.min(initial=0) < 0:
-        _refuse(points[facet < 0], facet[facet < 0], corners)
-    s = xi[:, None]
-    linear, quadratic = [0.5 * (1 - s), 0.5 * (1 + s)], [0.5 * s * (s - 1), 0.5 * s * (s + 1), 1 - s * s]
-    shape = np.hstack(linear if corners.shape[1] == 2 else quadratic)
-    position = np.einsum("nk,nkd->nd", shape, corners[facet])
-    return Closest(facet, s, normal, overhang, position, np.linalg.norm(points - position, axis=1))
+    lines, low, high = np.empty(corners.shape), np.empty((len(corners), 2)), np.empty((len(corners), 2))
+    search2d.prepare(corners, numbers, lines, low, high)
+    tree, order = packed_tree.pack(low, high), packed_tree.curve_order(points, *bounds)
+    answer = search2d.Answer(
+        np.empty(n, np.intp), np.empty((n, 1)), np.empty((n, 2)), np.empty(n), np.empty((n, 2)), np.empty(n)
+    )
+    shared(
+        lambda part: search2d.closest_facets(points, order, *part, lines, tree, numbers, answer, queue(2)),
+        _runs(n),
+    )
+    if answer.facet.min(initial=0) < 0:
+        _refuse(points[answer.facet < 0], answer.facet[answer.facet < 0], corners)
+    return Closest(*answer)
 
 
 def _on_faces(points: Array, corners: Array) -> Closest:
     nodes, sides, to_terms, to_hull, weights = _tables(corners.shape[1])
     n, size = len(points), len(corners)
     bounds = facets3d.bounds(corners)
-    # Seen from their midst: far from the origin, rounding would be coarser than the steps of a converged projection.
     midst = 0.5 * (bounds[0] + bounds[1])
     numbers = packed_tree.curve_order(np.ascontiguousarray(corners[:, 0]), *bounds)
-    facets = Facets(np.empty(corners.shape), np.empty(corners.shape), np.empty(size), np.empty(size), numbers)
+    facets = Facets(np.empty(corners.shape), midst, np.empty(size), np.empty(size), numbers, corners)
     low, high = np.empty((size, 3)), np.empty((size, 3))
     shared(
-        lambda part: facets3d.prepare(corners, *part, midst, to_terms, to_hull, weights, facets, low, high),
+        lambda part: facets3d.prepare(facets, *part, to_terms, to_hull, weights, low, high),
         portions(size),
     )
     tree, domain = packed_tree.pack(low, high), Domain(nodes, flat_triangles(len(nodes)), sides)
@@ -152,7 +147,7 @@ def _on_faces(points: Array, corners: Array) -> Closest:
         np.empty(n, np.int8),
     )  # fmt: skip
     shared(
-        lambda part: search3d.closest_facets(points, order, *part, midst, facets, domain, tree, answer, scratch()),
+        lambda part: search3d.closest_facets(points, order, *part, facets, domain, tree, answer, queue(3)),
         _runs(n),
     )
     wrong = np.flatnonzero(answer.status != search3d.CONVERGED)

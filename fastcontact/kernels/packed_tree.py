@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact._jit import kernel
+from fastcontact.kernels.eight_boxes_code import WIDTH
 
-WIDTH = 8
 # Sorting takes three or four passes over digits of so many bits.
 DIGIT, PASSES = 12, 4
 BLOCK = 256
@@ -181,8 +181,10 @@ def pack(low, high):
             first[node] = start
             for k in range(min(WIDTH, end - start)):
                 for d in range(dim):
-                    boxes[node, d, k] = boxes[start + k, d].min()
-                    boxes[node, dim + d, k] = boxes[start + k, dim + d].max()
+                    a, b = np.inf, -np.inf
+                    for child in range(WIDTH):
+                        a, b = min(a, boxes[start + k, d, child]), max(b, boxes[start + k, dim + d, child])
+                    boxes[node, d, k], boxes[node, dim + d, k] = a, b
             node += 1
         begin, end = end, node
     return Tree(boxes, first)

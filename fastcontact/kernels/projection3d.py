@@ -22,16 +22,19 @@ Array = NDArray[np.float64]
 class Facets(NamedTuple):
     """Facets as the search wants them, in the order of its tree.
 
-    Polynomials and nodes (n_facets, m, 3). How far each strays at most from the flat triangles between its nodes. Up to
+    Polynomials (n_facets, m, 3), seen from their midst (3,): far from it, rounding would be coarser than the steps of a
+    converged projection. How far each strays at most from the flat triangles between its nodes. Up to
     where a minimum is the only one: with four nodes the bound of `straight3d.room`, with more the square of a distance below
-    which half the squared distance is a convex function on the domain. Their numbers elsewhere.
+    which half the squared distance is a convex function on the domain. Their numbers elsewhere, and in that order their nodes
+    (n_facets, m, 3), which few projections ask for: seen from the old origin.
     """
 
     terms: Array
-    nodes: Array
+    midst: Array
     bend: Array
     convex: Array
     numbers: NDArray[np.intp]
+    nodes: Array
 
 
 class Domain(NamedTuple):
@@ -46,6 +49,12 @@ class Domain(NamedTuple):
 def vector(vectors, f, k):
     """Return vector `k` of facet `f` (n_facets, m, 3)."""
     return vectors[f, k, 0], vectors[f, k, 1], vectors[f, k, 2]
+
+
+@inlined_kernel
+def node(facets, f, k):
+    """Return node `k` of facet `f`, seen from the midst."""
+    return minus(vector(facets.nodes, facets.numbers[f], k), (facets.midst[0], facets.midst[1], facets.midst[2]))
 
 
 @kernel
@@ -221,11 +230,11 @@ def project(facets, f, domain, point, reach):
     With more than four nodes, what it finds within `convex` is the only minimum. Else it starts again wherever a closer
     point might hide. The distance is infinite where even a squared distance of `reach` is out of reach.
     """
-    terms, corners, bend = facets.terms, facets.nodes, facets.bend[f]
+    terms, bend = facets.terms, facets.bend[f]
     nodes, triangles, sides = domain
     s, t, flat = 0.0, 0.0, np.inf
     for k in range(triangles.shape[0]):
-        a, b, square = _on_triangle(corners, f, nodes, triangles, k, point)
+        a, b, square = _on_triangle(facets, f, nodes, triangles, k, point)
         if square < flat:
             s, t, flat = a, b, square
     if max(np.sqrt(flat) - bend, 0.0) ** 2 > reach:
@@ -236,14 +245,14 @@ def project(facets, f, domain, point, reach):
     if converged and terms.shape[1] > 4 and 2.0 * best < facets.convex[f]:
         return s, t, best, True
     for k in range(triangles.shape[0] if bend > 0.0 else 0):
-        a, b, square = _on_triangle(corners, f, nodes, triangles, k, point)
+        a, b, square = _on_triangle(facets, f, nodes, triangles, k, point)
         if square > (np.sqrt(2.0 * best) + bend) ** 2 or abs(a - tried_s) + abs(b - tried_t) < 1e-3:
             continue
         a, b, good = descend(terms, f, a, b, sides, point)
         value = half_square(terms, f, a, b, point)
         if value < best:
             s, t, best, converged = a, b, value, good
-    side = minus(vector(corners, f, 1), vector(corners, f, 0))
+    side = minus(node(facets, f, 1), node(facets, f, 0))
     # Near the centres of curvature the distance has several minima on one triangle: start from every node too.
     for k in range(nodes.shape[0] if np.sqrt(2.0 * best) * 16.0 * bend > dot(side, side) else 0):
         a, b, good = descend(terms, f, nodes[k, 0], nodes[k, 1], sides, point)
@@ -254,11 +263,11 @@ def project(facets, f, domain, point, reach):
 
 
 @kernel
-def _on_triangle(corners, f, nodes, triangles, k, point):
+def _on_triangle(facets, f, nodes, triangles, k, point):
     """Return (s, t) on facet `f` of the point of its flat triangle `k` closest to `point`, and its squared distance."""
     a, b, c = triangles[k, 0], triangles[k, 1], triangles[k, 2]
-    origin = vector(corners, f, a)
-    p, q, r = minus(vector(corners, f, b), origin), minus(vector(corners, f, c), origin), minus(point, origin)
+    origin = node(facets, f, a)
+    p, q, r = minus(node(facets, f, b), origin), minus(node(facets, f, c), origin), minus(point, origin)
     v, w = on_flat(r, p, q)
     u, away = 1.0 - v - w, rest(r, p, q, (0.0, 0.0, 0.0), v, w)
     s = u * nodes[a, 0] + v * nodes[b, 0] + w * nodes[c, 0]

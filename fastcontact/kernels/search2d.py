@@ -1,19 +1,67 @@
 """Closest facet to a point in 2D: projection on line facets (narrow phase) through a tree of boxes.
 
 Facets are straight (2 nodes) or quadratic (3 nodes, the middle last); ``corners`` below is (n_facets, n_nodes, 2).
-The tree is that of `packed_tree`.
+The tree is that of `packed_tree`; points come in runs, as in `search3d`.
 """
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from fastcontact._jit import inlined_kernel, kernel
 from fastcontact.kernels.borrowing import borrowed
-from fastcontact.kernels.packed_tree import WIDTH, leaves
+from fastcontact.kernels.nearest_first import (
+    FAR,
+    RUN,
+    farthest,
+    found_front,
+    left,
+    nearest,
+    opened,
+    started,
+    taken,
+    whole_front,
+)
+from fastcontact.kernels.packed_tree import leaves
 
 # Squared distances to boxes and facets are rounded.
 ROUNDING = 1.0 + 1e-14
-# Length of the list of boxes still to look into, for trees of up to 2^60 facets.
-ROOM = 20 * WIDTH
+Array = NDArray[np.float64]
+
+
+class Answer(NamedTuple):
+    """What is found for points.
+
+    Number of the facet (n,), or -1 where a point is not finite; place in [-1, 1] (n, 1); unit outward normal there (n, 2);
+    how far the point stands out beyond the end of its facet, in facet lengths, 0 within (n,); projection (n, 2); distance
+    (n,).
+    """
+
+    facet: NDArray[np.intp]
+    xi: Array
+    normal: Array
+    overhang: Array
+    position: Array
+    distance: Array
+
+
+@kernel
+def prepare(corners, numbers, sorted_corners, low, high):
+    """Fill the corners and the boxes (n_facets, 2) of facets in the order of their `numbers`."""
+    corners, numbers, sorted_corners, low, high = borrowed((corners, numbers, sorted_corners, low, high))
+    for i in range(len(numbers)):
+        f = numbers[i]
+        for d in range(2):
+            p, q = corners[f, 0, d], corners[f, 1, d]
+            sorted_corners[i, 0, d], sorted_corners[i, 1, d] = p, q
+            low[i, d], high[i, d] = min(p, q), max(p, q)
+            if corners.shape[1] == 3:
+                middle = corners[f, 2, d]
+                sorted_corners[i, 2, d] = middle
+                # With its ends, the corner of the polygon that holds a parabola (Bezier).
+                control = 2.0 * middle - 0.5 * (p + q)
+                low[i, d], high[i, d] = min(low[i, d], control), max(high[i, d], control)
 
 
 @inlined_kernel
@@ -65,85 +113,79 @@ def _project(corners, f, x, y):
 
 
 @kernel
-def closest_facets(points, points_order, begin, end, corners, tree, numbers, scratch, facet, xi, normal, overhang):
+def closest_facets(points, order, begin, end, corners, tree, numbers, answer, queue):
     """Project points on their closest facets; of equally close facets on the one with the lowest number.
 
     Parameters
     ----------
-    points : (n, 2), points_order : (n,)
-        Points, and the order to go through them, along a curve: the facet of the last one is near the next.
+    points : (n, 2), order : (n,)
+        Points, and the order to go through them, along a curve: those of a run lie near together.
     begin, end : int
-        Which of that order.
+        Which of that order; the first a multiple of `RUN`.
     corners : (n_facets, n_nodes, 2), tree : Tree, numbers : (n_facets,)
         Facets in the order of the tree, and their numbers.
-    scratch : (stack (ROOM,) of int64, bound (ROOM,), away (WIDTH,))
+    answer : Answer
+        Filled in place.
+    queue : Queue
         Overwritten.
-    facet : (n,), xi : (n,), normal : (n, 2), overhang : (n,)
-        Filled in place: number of the facet, or -1 where a point is not finite; place in [-1, 1]; unit outward normal there;
-        how far the point stands out beyond the end of its facet, in facet lengths, 0 within.
     """
-    points, points_order, corners, numbers = borrowed((points, points_order, corners, numbers))
-    facet, xi, normal, overhang = borrowed((facet, xi, normal, overhang))
-    tree, scratch = borrowed(tree), borrowed(scratch)
-    stack, bound, away = scratch
-    n_leaves, last = leaves(len(numbers)), -1
-    for place in range(begin, end):
-        i = points_order[place]
-        x, y = points[i, 0], points[i, 1]
-        facet[i] = -1
-        if not (np.isfinite(x) and np.isfinite(y)):
-            continue
-        best, found, best_s = np.inf, last, 0.0
-        if last >= 0:
-            best_s, best = _project(corners, last, x, y)
-        reach = ROUNDING * best
-        stack[0], bound[0], top = len(tree.boxes) - 1, 0.0, 1
-        while top > 0:
-            top -= 1
-            node = stack[top]
-            if bound[top] > reach:
+    points, order, corners, numbers = borrowed((points, order, corners, numbers))
+    tree, answer, queue = borrowed(tree), borrowed(answer), borrowed(queue)
+    n_leaves, n_nodes = leaves(len(numbers)), len(tree.first)
+    for run in range(begin, end, RUN):
+        run_end = min(run + RUN, end)
+        middle, count = (run + run_end) // 2, whole_front(queue, tree, (0.0, 0.0))
+        for slot in range(run_end - run):
+            # The one in the middle comes first.
+            i = order[middle if slot == 0 else run + slot - 1 if run + slot <= middle else run + slot]
+            x, y = points[i, 0], points[i, 1]
+            answer.facet[i] = -1
+            if not np.isfinite(x + y):
                 continue
-            if node >= 0:
-                top = _pushed_children(tree, n_leaves, node, x, y, reach, stack, bound, away, top)
+            best, found, best_s, reach = np.inf, -1, 0.0, FAR
+            n = started(queue, count, (x, y))
+            while n > 0:
+                chunk, away = nearest(queue, n)
+                if away > reach:
+                    n = left(n)
+                    continue
+                child = taken(queue, chunk, away, count)
+                if child < n_nodes:
+                    n = opened(queue, n, tree, n_leaves, child, (x, y))
+                    continue
+                f = child - n_nodes
+                s, d = _project(corners, f, x, y)
+                if d < best or (d == best and numbers[f] < numbers[found]):
+                    best, found, best_s = d, f, s
+                    reach = ROUNDING * best
+            if found < 0:  # only collapsed facets
                 continue
-            f = -1 - node
-            s, d = _project(corners, f, x, y)
-            if d < best or (d == best and numbers[f] < numbers[found]):
-                best, found, best_s = d, f, s
-                reach = ROUNDING * best
-        last = found
-        if found < 0:  # only collapsed facets
-            continue
-        facet[i], xi[i] = numbers[found], best_s
-        px, py, tx, ty, _, _ = _curve(corners, found, best_s)
-        length = np.sqrt(tx * tx + ty * ty)
-        normal[i, 0], normal[i, 1] = ty / length, -tx / length
-        along = ((x - px) * tx + (y - py) * ty) / (length * length)
-        overhang[i] = 0.0
-        if best_s == 1.0 and along > 0.0:
-            overhang[i] = 0.5 * along
-        elif best_s == -1.0 and along < 0.0:
-            overhang[i] = -0.5 * along
+            if slot == 0:
+                radius = np.sqrt(best) + 2.0 * farthest(points, order, run, run_end, i)
+                count = found_front(queue, tree, n_leaves, (x, y), radius)
+            answer.facet[i] = numbers[found]
+            _write(answer, i, corners, found, best_s, x, y)
 
 
 @inlined_kernel
-def _pushed_children(tree, n_leaves, node, x, y, reach, stack, bound, away, top):
-    """Put the children of a node on the list that are within reach, facets with numbers below zero; return its length.
-
-    Those of one node are sorted, with the nearest on top.
-    """
-    boxes, bottom = tree.boxes[node], top
-    for k in range(boxes.shape[1]):
-        dx = max(boxes[0, k] - x, x - boxes[2, k], 0.0)
-        dy = max(boxes[1, k] - y, y - boxes[3, k], 0.0)
-        away[k] = dx * dx + dy * dy
-    for k in range(boxes.shape[1]):
-        if away[k] <= reach and away[k] < np.inf:
-            at = top
-            while at > bottom and bound[at - 1] < away[k]:
-                stack[at], bound[at] = stack[at - 1], bound[at - 1]
-                at -= 1
-            child = tree.first[node] + k
-            stack[at], bound[at] = -1 - child if node < n_leaves else child, away[k]
-            top += 1
-    return top
+def _write(answer, i, corners, f, s, x, y):
+    """Fill the answer for point `i`, at (x, y), but for the number of the facet `f`."""
+    px, py, tx, ty, _, _ = _curve(corners, f, s)
+    square = tx * tx + ty * ty
+    length, along = np.sqrt(square), ((x - px) * tx + (y - py) * ty) / square
+    answer.xi[i, 0], answer.normal[i, 0], answer.normal[i, 1] = s, ty / length, -tx / length
+    outward = along if s == 1.0 else -along if s == -1.0 else 0.0
+    answer.overhang[i] = max(0.5 * outward, 0.0)
+    # As a mean of the nodes, which at an end is that node to the last bit.
+    a, b, c = 0.5 * (1.0 - s), 0.5 * (1.0 + s), 0.0
+    if corners.shape[1] == 3:
+        a, b, c = -s * a, s * b, 1.0 - s * s
+    square = 0.0
+    for d in range(2):
+        place = a * corners[f, 0, d] + b * corners[f, 1, d]
+        if corners.shape[1] == 3:
+            place += c * corners[f, 2, d]
+        answer.position[i, d] = place
+        gap = (x if d == 0 else y) - place
+        square += gap * gap
+    answer.distance[i] = np.sqrt(square)

@@ -97,10 +97,11 @@ def on_bilinear(r, a, b, c, reach):
     if not determinant > PARALLEL * aa * bb:
         return 0.0, 0.0, np.nan
     s, t = (bb * ar - ab * br) / determinant, (aa * br - ab * ar) / determinant
-    # Beyond a parallelogram by so much in its plane, and the facet strays from it by |c| at most.
-    beyond = max((abs(s) - 1.0) * np.sqrt(determinant / bb), (abs(t) - 1.0) * np.sqrt(determinant / aa))
-    if beyond > reach + np.sqrt(cc):
-        return s, t, np.inf
+    if abs(s) > 1.0 or abs(t) > 1.0:
+        # Beyond a parallelogram by so much in its plane, and the facet strays from it by |c| at most.
+        beyond = max((abs(s) - 1.0) * np.sqrt(determinant / bb), (abs(t) - 1.0) * np.sqrt(determinant / aa))
+        if beyond > reach + np.sqrt(cc):
+            return s, t, np.inf
     # The second time from inside, where the first step left the facet for good although the minimum lies in it.
     for _ in range(2):
         s, t, stationary = _stationary(aa, ab, bb, ac, bc, cc, ar, br, cr, s, t)
@@ -155,27 +156,6 @@ def _on_sides(r, a, b, c, aa, ab, bb, ac, bc, cc, ar, br, cr):
         if square < best:
             best, best_s, best_t = square, s, t
     return best_s, best_t, best
-
-
-@kernel
-def above(r, a, b, c, triangle):
-    """Return the squared distance from `r` to some point of a facet, often the closest: an upper bound.
-
-    Below the perpendicular on the plane of a and b, if that meets the facet, else moved in along the coordinates.
-    """
-    aa, ab, bb, ar, br = dot(a, a), dot(a, b), dot(b, b), dot(a, r), dot(b, r)
-    determinant = aa * bb - ab * ab
-    s, t = 0.0, 0.0
-    if determinant > PARALLEL * aa * bb:
-        s, t = (bb * ar - ab * br) / determinant, (aa * br - ab * ar) / determinant
-    if triangle:
-        s, t = max(s, 0.0), max(t, 0.0)
-        total = max(s + t, 1.0)
-        s, t = s / total, t / total
-    else:
-        s, t = min(max(s, -1.0), 1.0), min(max(t, -1.0), 1.0)
-    v = rest(r, a, b, c, s, t)
-    return dot(v, v)
 
 
 @kernel
