@@ -10,6 +10,7 @@ from scipy.sparse import bsr_array, csc_array, csr_array
 
 from fastcontact.errors import ModelError
 from fastcontact.linear._compliance import ComplianceCache, multipliers, reduced
+from fastcontact.linear._condensed import LoadedInverse
 from fastcontact.linear._known_loads import KnownLoads
 from fastcontact.linear._solver import Counters, Monitor
 from fastcontact.linear._symmetric import SymmetricFactors
@@ -42,6 +43,7 @@ class FactorSolver:
         self.counters = Counters()
         self.n = 0
         self._symmetric: SymmetricFactors | None = None
+        self.last: Indices | None = None
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({f'{self.n} unknowns' if self.n else 'not prepared'})"
@@ -89,6 +91,15 @@ class FactorSolver:
         if self._symmetric is not None and involved is not None:
             self.last, self._inverse = involved, self._symmetric.last_inverse()
             self.compliance.give(self.last, self._inverse)
+
+    @property
+    def condenses(self) -> bool:
+        """See `LinearSolver`."""
+        return self.last is not None
+
+    def condensed(self, free: Array) -> LoadedInverse | None:
+        """Return the problem of the unknowns `last`, whose displacements without constraints are among `free` (n,)."""
+        return LoadedInverse(self._inverse, free[self.last]) if self.last is not None else None
 
     def _solution(self, F: Array) -> Array:
         return self._solve(F) if self._symmetric is None else self._symmetric.solve(F)
@@ -153,6 +164,9 @@ class LoadedFactor:
         if moved is None:
             return self._solver.back_substitute(self._f + force)
         return self._free + self._solver.extend(moved) if force.any() else self._free.copy()
+
+    def condensed(self) -> LoadedInverse | None:
+        return self._solver.condensed(self._free)
 
     def _moved(self, force: Array) -> Array | None:
         """Return what a force moves the unknowns `last` by; None where it acts on others, too."""

@@ -54,6 +54,13 @@ class Loaded(Protocol):
         """Return ``K^-1 (f + force)`` (n,); `u` is what `near` or `solve` found for it."""
         ...
 
+    def condensed(self) -> Loaded | None:
+        """Return the same problem for the unknowns that equations may involve alone, where the solver condenses to those.
+
+        They are the unknowns `involved` of `LinearSolver.prepare`, in their order, in all vectors and columns.
+        """
+        ...
+
 
 class LinearSolver(Protocol):
     """Solves ``K u = f`` under linear equations, for one K and many right-hand sides and sets of equations.
@@ -64,11 +71,14 @@ class LinearSolver(Protocol):
         Relative accuracy of the solutions.
     iterative : bool
         Whether less accurate solutions cost less.
+    condenses : bool
+        Whether, as prepared, the solver knows the compliance of the unknowns that equations may involve.
     counters : Counters
     """
 
     tolerance: float
     iterative: bool
+    condenses: bool
     counters: Counters
 
     def prepare(self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None) -> None:

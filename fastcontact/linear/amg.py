@@ -54,6 +54,7 @@ class Amg:
 
     name = "amg"
     iterative = True
+    condenses = False
 
     def __init__(self, tolerance: float = 1e-10, precision: str = "single") -> None:
         if precision not in ("single", "double"):
@@ -293,6 +294,9 @@ class _Loaded:
 
     def everywhere(self, force: Array, u: Array | None = None) -> Array:
         return self.near(force, None) if u is None else u
+
+    def condensed(self) -> None:
+        return None
 
     def _unloaded(self) -> Array:
         """Return the displacement without contact forces."""
