@@ -70,6 +70,11 @@ def forward(start: Indices, values: Array, first: Offsets, begin: Offsets, rows:
     for s in range(len(first) - 1):
         low, high = first[s], first[s + 1]
         below = begin[s + 1] - begin[s]
+        j = low
+        while j < high and x[j] == 0.0:  # loads are often few
+            j += 1
+        if j == high:
+            continue
         moved[:below] = 0.0
         for j in range(low, high):
             xj = x[j]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dpotri
 from scipy.sparse import csc_array
 
 from fastcontact.kernels import triangular
@@ -65,8 +65,9 @@ class SymmetricFactors:
     def last_inverse(self) -> Array:
         """Return the rows and columns `last` of ``K^-1``, in the order of `last`."""
         at = np.sort(self._place[self._last])
-        half = solve_triangular(self._trailing, np.eye(len(at)), lower=True, unit_diagonal=True)
-        inverse = half.T @ (half / self._d[at, None])
+        cholesky = self._trailing * np.sqrt(self._d[at])
+        inverse, _ = dpotri(cholesky, lower=True)
+        inverse = np.tril(inverse) + np.tril(inverse, -1).T
         order = np.searchsorted(at, self._place[self._last])
         return np.ascontiguousarray(inverse[np.ix_(order, order)])
 

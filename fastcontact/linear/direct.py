@@ -9,7 +9,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from fastcontact.errors import ModelError
 from fastcontact.linear._factor import FactorSolver, singular
-from fastcontact.linear._order import fill_reducing
+from fastcontact.linear._order import fill_reducing, reordered
 from fastcontact.linear._symmetric import SymmetricFactors
 
 Array = NDArray[np.float64]
@@ -40,13 +40,19 @@ class Direct(FactorSolver):
 
     def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors:
         order = fill_reducing(K, last)
-        lu = _factorised(csc_array(K.tocsc()[order][:, order]), "NATURAL")
+        lu = _factorised(reordered(K, order), "NATURAL")
         if not np.array_equal(lu.perm_r, lu.perm_c):
             raise ModelError("the stiffness matrix needed pivoting: it is not positive definite")
         # SuperLU may reorder independent branches of the elimination, which leaves what depends on what as it is.
         place = np.empty(len(order), np.intp)
         place[order] = lu.perm_c
-        return SymmetricFactors(lu.L, lu.U.diagonal(), place, last)
+        return SymmetricFactors(lu.L, _diagonal(lu.U), place, last)
+
+
+def _diagonal(U: csc_array) -> Array:
+    """Return the diagonal (n,) of SuperLU's upper factor, whose columns end with it."""
+    assert np.array_equal(U.indices[U.indptr[1:] - 1], np.arange(U.shape[0]))
+    return U.data[U.indptr[1:] - 1]
 
 
 def _factorised(matrix: csc_array, order: str) -> SuperLU:

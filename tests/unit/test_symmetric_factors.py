@@ -12,7 +12,7 @@ from fastcontact.assembly import stiffness
 from fastcontact.criteria import Criteria
 from fastcontact.kernels import triangular
 from fastcontact.linear._known_loads import KnownLoads
-from fastcontact.linear._order import fill_reducing
+from fastcontact.linear._order import fill_reducing, reordered
 from fastcontact.system import supports_apart
 
 FACTORED = ["direct", "cholmod"]
@@ -160,3 +160,21 @@ def test_a_ramp_costs_one_factorisation_and_a_solution_a_step(forma04):
     assert analysis.solver.counters.setups == 1
     # One for the loads of all steps, and one for what each step's contact forces do inside the bodies.
     assert analysis.solver.counters.iterations == 1 + 5
+
+
+def test_a_symmetric_matrix_is_reordered_by_rows_and_columns():
+    K, top = supported()
+    order = fill_reducing(K, top)
+    found = reordered(K, order)
+    np.testing.assert_array_equal(found.toarray(), K.toarray()[np.ix_(order, order)])
+
+
+def test_forward_substitution_passes_over_supernodes_without_load():
+    L = lower(40, 0.05, 3)
+    first, begin, rows = np.empty(41, np.int64), np.empty(41, np.int64), L.indices.copy()
+    count = triangular.supernodes(L.indptr, rows, first, begin)
+    for at in range(40):
+        x = np.zeros(40)
+        x[at] = 2.0
+        triangular.forward(L.indptr, L.data, first[: count + 1], begin[: count + 1], rows[: begin[count]], x)
+        np.testing.assert_allclose(L.toarray() @ x, 2.0 * np.eye(40)[at], atol=1e-13)
