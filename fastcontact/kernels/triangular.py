@@ -64,7 +64,25 @@ def unit_diagonal(start: Indices, values: Array, d: Array) -> None:
 
 
 @kernel
-def forward(start: Indices, values: Array, first: Offsets, begin: Offsets, rows: Indices, x: Array) -> None:
+def block(
+    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Indices, wanted: Offsets, out: Array
+) -> None:
+    """Fill `out` (m, m), zero before, with the rows and columns of L that `wanted` (n,) numbers; -1 stands for the others."""
+    for s in range(len(first) - 1):
+        high = first[s + 1]
+        for j in range(first[s], high):
+            if wanted[j] < 0:
+                continue
+            for i in range(j, high):
+                if wanted[i] >= 0:
+                    out[wanted[i], wanted[j]] = values[start[j] + i - j]
+            for k in range(begin[s], begin[s + 1]):
+                if wanted[rows[k]] >= 0:
+                    out[wanted[rows[k]], wanted[j]] = values[start[j] + high - j + k - begin[s]]
+
+
+@kernel
+def forward(start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Indices, x: Array) -> None:
     """Replace x (n,) by ``L^-1 x``."""
     moved = np.empty(len(x))
     for s in range(len(first) - 1):
@@ -90,7 +108,7 @@ def forward(start: Indices, values: Array, first: Offsets, begin: Offsets, rows:
 
 @summing_kernel
 def backward(
-    start: Indices, values: Array, first: Offsets, begin: Offsets, rows: Indices, given: NDArray[np.bool_], x: Array
+    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Indices, given: NDArray[np.bool_], x: Array
 ) -> None:
     """Replace x (n,) by the solution of ``L.T y = x`` in which the entries `given` (n,) keep their values.
 

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array
 
-from fastcontact.errors import ModelError
 from fastcontact.linear._compliance import ComplianceCache, multipliers, reduced
 from fastcontact.linear._condensed import LoadedInverse
 from fastcontact.linear._known_loads import KnownLoads
@@ -19,7 +18,6 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 # Beyond this many unknowns last, their dense block costs more than the solutions it saves.
 LAST_UP_TO = 4000
-SINGULAR = "the stiffness matrix is singular: support the rigid-body motions of every body"
 
 
 class FactorSolver:
@@ -174,8 +172,3 @@ class LoadedFactor:
         if last is None or np.count_nonzero(force) != np.count_nonzero(force[last]):
             return None
         return self._solver.response(force[last])
-
-
-def singular() -> ModelError:
-    """Return the error for a matrix that cannot be factorised."""
-    return ModelError(SINGULAR)

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, tril
 
 from fastcontact.kernels import triangular
-from fastcontact.linear._factor import FactorSolver, singular
+from fastcontact.linear._factor import FactorSolver
 from fastcontact.linear._order import fill_reducing
-from fastcontact.linear._symmetric import SymmetricFactors
+from fastcontact.linear._singular import singular
+from fastcontact.linear._symmetric import SymmetricFactors, by_supernodes
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -45,7 +46,7 @@ class Cholmod(FactorSolver):
         L = csc_array((values, rows.astype(np.intc), start.astype(np.intc)), shape=(self.n, self.n))
         d = np.empty(self.n)
         triangular.unit_diagonal(L.indptr, L.data, d)
-        return SymmetricFactors(L, d, place, last)
+        return SymmetricFactors(by_supernodes(L), d, place, last)
 
 
 def _matrix(K: csc_array) -> tuple[Any, Any]:
