@@ -18,7 +18,7 @@ Offsets = NDArray[np.int64]
 
 
 @kernel
-def supernodes(start: Indices, rows: Indices, first: Offsets, begin: Offsets) -> int:
+def supernodes(start: Offsets, rows: Offsets, first: Offsets, begin: Offsets) -> int:
     """Find the supernodes of L with row numbers `rows` (nnz,), sorted; return how many.
 
     `first` and `begin` (n + 1,) are filled; the rows that they share are moved to the front of `rows`.
@@ -41,7 +41,7 @@ def supernodes(start: Indices, rows: Indices, first: Offsets, begin: Offsets) ->
 
 
 @kernel
-def _continues(start: Indices, rows: Indices, j: int) -> bool:
+def _continues(start: Offsets, rows: Offsets, j: int) -> bool:
     """Return whether column j has the rows of column j - 1 without the first."""
     before, now = start[j - 1] + 1, start[j]
     length = start[j + 1] - now
@@ -54,7 +54,7 @@ def _continues(start: Indices, rows: Indices, j: int) -> bool:
 
 
 @kernel
-def unit_diagonal(start: Indices, values: Array, d: Array) -> None:
+def unit_diagonal(start: Offsets, values: Array, d: Array) -> None:
     """Turn the factor L of ``L L.T``, the diagonal first in every column, into that of ``L D L.T``; fill d (n,)."""
     for j in range(len(d)):
         pivot = values[start[j]]

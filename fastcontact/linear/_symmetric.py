@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotri
-from scipy.sparse import csc_array
 
 from fastcontact.kernels import triangular
 
@@ -25,13 +24,13 @@ class Shape(NamedTuple):
     rows: NDArray[np.int32]
 
 
-def by_supernodes(L: csc_array) -> Shape:
-    """Return L, whose row numbers are sorted and overwritten, with those of columns of equal structure kept once."""
-    n = L.shape[0]
-    first, begin = np.empty(n + 1, np.int64), np.empty(n + 1, np.int64)
-    count = triangular.supernodes(L.indptr, L.indices, first, begin)
-    rows = L.indices[: begin[count]].copy()
-    return Shape(L.indptr.astype(np.int64), L.data, first[: count + 1].copy(), begin[: count + 1].copy(), rows)
+def by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Array) -> Shape:
+    """Return L given by columns, row numbers sorted, with those of columns of equal structure once; `rows` is overwritten."""
+    first, begin = np.empty(len(start), np.int64), np.empty(len(start), np.int64)
+    count = triangular.supernodes(start, rows, first, begin)
+    return Shape(
+        start, values, first[: count + 1].copy(), begin[: count + 1].copy(), rows[: begin[count]].astype(np.intc)
+    )
 
 
 class SymmetricFactors:

@@ -28,7 +28,7 @@ def apart(seed):
 
 
 MATRICES = [
-    *(positive(n, density, seed) for n, density in [(1, 0.0), (9, 0.0), (30, 0.05), (60, 0.04), (40, 1.0)] for seed in (0, 1)),
+    *(positive(n, density, seed) for n, density in [(1, 0), (9, 0), (30, 0.05), (60, 0.04), (40, 1)] for seed in (0, 1)),
     apart(5),
 ]  # fmt: skip
 
