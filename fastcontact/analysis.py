@@ -459,7 +459,10 @@ class Analysis:
 
     def _balance(self, contact_force: Array, index: int, history: list[dict[str, Any]]) -> Array:
         """Return the reactions (n_dofs,) and check that all other degrees of freedom are in balance."""
-        reaction, residual = self.system.balance(self.K @ self.u - contact_force - self.external)
+        out = self.K @ self.u
+        out -= contact_force
+        out -= self.external
+        reaction, residual = self.system.balance(out)
         force = max(largest(forces) for forces in (reaction, contact_force, self.external))
         self.largest_force = max(self.largest_force, force)
         bound = max(self.criteria.relative * force, self.criteria.absolute or 0.0)
