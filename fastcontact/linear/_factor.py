@@ -61,7 +61,7 @@ class FactorSolver:
         raise NotImplementedError
 
     def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors | None:
-        """Factorise K (n, n) with the unknowns `last` (m,) last; None from solvers that cannot.
+        """Factorise K (n, n) with the unknowns `last` (m,) last; None from solvers that cannot, or do better without.
 
         Raises
         ------
@@ -79,14 +79,14 @@ class FactorSolver:
             If K is singular.
         """
         self.n, self._symmetric, self.last = K.shape[0], None, None
-        if involved is not None and 0 < len(involved) <= LAST_UP_TO:
+        if involved is not None and len(involved) <= LAST_UP_TO:
             self._symmetric = self._with_last(K, involved)
         if self._symmetric is None:
             self._factorise(K.tocsc())
         self.counters.setups += 1
         self.compliance = ComplianceCache(self.n, self._solution)
         self.known_loads = KnownLoads()
-        if self._symmetric is not None and involved is not None:
+        if self._symmetric is not None and involved is not None and len(involved):
             self.last, self._inverse = involved, self._symmetric.last_inverse()
             self.compliance.give(self.last, self._inverse)
 

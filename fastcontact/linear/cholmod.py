@@ -34,9 +34,11 @@ class Cholmod(FactorSolver):
     def _solve(self, F: Array) -> Array:
         return _solved(self._factor, F)
 
-    def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors:
+    def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors | None:
         from kvxopt import cholmod, matrix
 
+        if not len(last):
+            return None
         A = _matrix(K.tocsr())  # its rows are its columns
         factor = _analysed(A, matrix(fill_reducing(K, last)))
         _factorised(A, factor)

@@ -19,7 +19,8 @@ Indices = NDArray[np.intp]
 class Direct(FactorSolver):
     """Cholesky factors with the contact unknowns last; see `FactorSolver`.
 
-    Where no unknowns need be last, SuperLU in symmetric mode, minimum-degree ordering of A + A.T.
+    Where so many may be in contact that many right-hand sides have to be solved for, SuperLU in symmetric mode,
+    minimum-degree ordering of A + A.T.
     """
 
     name = "direct"

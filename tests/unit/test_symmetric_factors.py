@@ -119,6 +119,19 @@ def test_contact_takes_its_compliance_and_all_displacements_from_the_factors(nam
     assert solver.counters.iterations == before + 1
 
 
+@pytest.mark.parametrize("name", FACTORED)
+def test_without_contact_there_is_nothing_to_condense_to(name):
+    if name not in linear.SOLVERS:
+        pytest.skip(f"{name} is not installed")
+    K, _ = supported()
+    solver = linear.make(name, dim=3, n_dofs=K.shape[0])
+    solver.prepare(K, np.empty((K.shape[0], 0)), np.empty(0, np.intp))
+    f = np.random.default_rng(3).normal(size=K.shape[0])
+    assert not solver.condenses
+    assert solver.load(f).condensed() is None
+    np.testing.assert_allclose(K @ solver.load(f).everywhere(np.zeros(len(f))), f, atol=1e-12)
+
+
 def test_forces_elsewhere_cost_a_solution():
     K, _, solver = prepared()
     force = np.random.default_rng(4).normal(size=K.shape[0])
