@@ -24,15 +24,6 @@ class Shape(NamedTuple):
     rows: NDArray[np.int32]
 
 
-def by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Array) -> Shape:
-    """Return L given by columns, row numbers sorted, with those of columns of equal structure once; `rows` is overwritten."""
-    first, begin = np.empty(len(start), np.int64), np.empty(len(start), np.int64)
-    count = triangular.supernodes(start, rows, first, begin)
-    return Shape(
-        start, values, first[: count + 1].copy(), begin[: count + 1].copy(), rows[: begin[count]].astype(np.intc)
-    )
-
-
 class SymmetricFactors:
     """L and D.
 

@@ -12,7 +12,7 @@ from fastcontact.kernels import triangular
 from fastcontact.linear._factor import FactorSolver
 from fastcontact.linear._order import fill_reducing
 from fastcontact.linear._singular import singular
-from fastcontact.linear._symmetric import SymmetricFactors, by_supernodes
+from fastcontact.linear._symmetric import Shape, SymmetricFactors
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -48,7 +48,16 @@ class Cholmod(FactorSolver):
         start, rows, values = (np.asarray(part).ravel() for part in cholmod.getfactor(factor).CCS)
         d = np.empty(self.n)
         triangular.unit_diagonal(start, values, d)
-        return SymmetricFactors(by_supernodes(start, rows, values), d, place, last)
+        return SymmetricFactors(_by_supernodes(start, rows, values), d, place, last)
+
+
+def _by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Array) -> Shape:
+    """Return L given by columns, row numbers sorted, with those of columns of equal structure once; `rows` is overwritten."""
+    first, begin = np.empty(len(start), np.int64), np.empty(len(start), np.int64)
+    count = triangular.supernodes(start, rows, first, begin)
+    return Shape(
+        start, values, first[: count + 1].copy(), begin[: count + 1].copy(), rows[: begin[count]].astype(np.intc)
+    )
 
 
 def _matrix(K: csc_array | csr_array) -> Any:
