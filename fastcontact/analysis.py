@@ -25,6 +25,7 @@ from fastcontact.model import Model, combined, multiplier
 from fastcontact.ramp import Ramp, linear_ramp
 from fastcontact.results import StepResult
 from fastcontact.rigid_motions import free_motions, generalised, resisting, stopped_at
+from fastcontact.scope import Everything, Scope, Surfaces
 from fastcontact.springs import ground_force, stiffened
 from fastcontact.system import System
 
@@ -83,6 +84,7 @@ class Analysis:
         if self.floating is not None:
             involved = np.union1d(involved, self.floating.dofs)
         self.solver.prepare(matrix, self.system.unknowns_of(modes), involved)
+        self.scope = self._scope(involved)
         self.shape = (driven.n_dofs // model.mesh.dim, model.mesh.dim)
         self.u = np.zeros(driven.n_dofs)
         self.external = np.zeros(driven.n_dofs)
@@ -104,6 +106,12 @@ class Analysis:
         moved = self.model.mesh.n_points + np.arange(len(self.driven))
         return (np.concatenate([points, moved])[:, None].astype(np.intp) * dim + np.arange(dim)).ravel()
 
+    def _scope(self, involved: NDArray[np.intp]) -> Scope:
+        """Return the displacements that a pairing finds; those of a step follow when its contact forces are known."""
+        if self.pairs and self.floating is None and self.solver.condenses:
+            return Surfaces(self.system, self.surface_dofs, involved)
+        return Everything(self.system, self.surface_dofs)
+
     @property
     def displacement(self) -> Array:
         """Displacements (n_points, dim) of the points of the mesh [length]."""
@@ -123,8 +131,9 @@ class Analysis:
         self.external = self._external(instant)
         self.largest_force = max(self.largest_force, largest(self.external))
         self.before = self.u
+        self.u = self.scope.begin(self.u, lift)
         for side in self.pairs.values():
-            side.before = self.u.reshape(self.shape)
+            side.before = self.before.reshape(self.shape)
         self._move_sides(instant)
         self.settled = None
         self.rubbing = None
@@ -197,12 +206,12 @@ class Analysis:
         self, loaded: linear.Loaded, lift: Array, history: list[dict[str, Any]]
     ) -> tuple[Constraints, active_set.State]:
         """Alternate pairing and active-set solution until both stand still; update `u` and `active`."""
-        criteria = self.criteria
+        criteria, scope, loaded = self.criteria, self.scope, self.scope.loaded(loaded)
         fixed_updates = 0 if criteria.keep_pairing else criteria.geometry_updates
         in_loop = fixed_updates is None and any(pair.geometry_in_loop for pair in self.pairs.values())
         in_loop = in_loop and self.floating is None
         limit = criteria.max_geometry_updates if fixed_updates is None else fixed_updates
-        accelerated, known = Anderson(MIXED, self.surface_dofs, self.solver.iterative), None
+        accelerated, known = Anderson(MIXED, scope.compared, self.solver.iterative), None
         tolerance = self.solver.tolerance
         start, last_active = self.u, dict(self.active)
         moved_by_lift = largest(lift)
@@ -227,10 +236,11 @@ class Analysis:
                 state, u = self._inequalities(loaded, constraints, lift, active, limit_now, tolerance)
             else:
                 state, u = self._floating(loaded, constraints, lift, active, history)
-            change = largest_difference(u, self.u)
+            before = scope.of(self.u)
+            self.u = scope.put(self.u, u)
+            change = largest_difference(u, before)
             # Rigid motions of bodies that only contact holds do not count.
-            size = max(largest(state.u), moved_by_lift)
-            before, self.u = self.u, u
+            size = max(scope.size(state.u), moved_by_lift)
             self._remember(state)
             history.append(
                 {
@@ -253,13 +263,14 @@ class Analysis:
                 known = state.active if state.settled else None
                 if loose or not same:
                     accelerated.restart()
-                self.u = accelerated.mixed(before, u)
+                if not loose:  # a loose solution stands still where it is not right yet
+                    self.u = scope.put(self.u, accelerated.mixed(before, u))
             if extended and update == EXTENDED_UPDATES:
                 # Nodes that flip between facets may do so for ever from one start and not from another.
                 self.u, self.active = start, last_active
                 accelerated.restart()
         if fixed_updates is None:
-            history[-1]["nodes"] = self._most_moved(u - before)
+            history[-1]["nodes"] = self._most_moved(scope.put(np.zeros_like(self.u), u - before))
             raise ConvergenceError(
                 f"the contact geometry did not settle in {limit} updates: the displacement still changes by "
                 f"{history[-1]['displacement_change']:.1e} of its largest component, most at "
@@ -317,21 +328,21 @@ class Analysis:
         self, loaded: linear.Loaded, constraints: Constraints, lift: Array, active: Mask, limit: int,
         tolerance: float = 0.0,
     ) -> tuple[active_set.State, Array]:  # fmt: skip
-        """Solve in the unknowns that supports and relations leave; return the state and all displacements."""
+        """Solve in the unknowns that supports and relations leave; return the state and the scope's displacements."""
         noise, gap_tolerance = self._noise(lift, tolerance)
-        B, gap0 = self.system.rows(constraints.B, constraints.gap0, lift)
+        B, gap0 = self.scope.rows(constraints.B, constraints.gap0, lift)
         usable = np.diff(B.indptr) > 0
         state: active_set.State
         if constraints.tangents:
             drift = constraints.drift if constraints.drift is not None else np.zeros((len(constraints.tangents), 1))
             rest = [own - T @ self.before for T, own in zip(constraints.tangents, drift, strict=True)]
-            pairs = [self.system.rows(T, slip, lift) for T, slip in zip(constraints.tangents, rest, strict=True)]
+            pairs = [self.scope.rows(T, slip, lift) for T, slip in zip(constraints.tangents, rest, strict=True)]
             state = friction.solve(
                 loaded, B, tuple(T for T, _ in pairs), gap0, np.stack([slip for _, slip in pairs]),
                 constraints.friction if constraints.friction is not None else np.zeros(len(gap0)), usable,
                 compliance=constraints.compliance, directions=constraints.directions, closed=active,
                 held=constraints.held, softness=constraints.softness, loose=constraints.loose, guess=self.rubbing,
-                elsewhere=self.system.unknowns(self.u, lift), tolerance=max(tolerance, self.solver.tolerance),
+                elsewhere=self.scope.unknowns(self.u, lift), tolerance=max(tolerance, self.solver.tolerance),
                 patience=self._newton_steps(limit, tolerance),
             )  # fmt: skip
             self.rubbing = state
@@ -339,9 +350,9 @@ class Analysis:
             state = active_set.solve(
                 loaded, B, gap0, usable, active=active, compliance=constraints.normal_compliance, held=constraints.held,
                 gap_tolerance=gap_tolerance, multiplier_tolerance=noise,
-                max_iterations=limit, guess=self.system.unknowns(self.u, lift), tolerance=tolerance,
+                max_iterations=limit, guess=self.scope.unknowns(self.u, lift), tolerance=tolerance,
             )  # fmt: skip
-        return state, self.system.displacement(state.u, lift)
+        return state, self.scope.displacement(state.u, lift)
 
     def _newton_steps(self, limit: int, tolerance: float) -> int | None:
         """Return after how many steps friction may be left unsettled; None where it may not."""
@@ -352,7 +363,7 @@ class Analysis:
     def _noise(self, lift: Array, tolerance: float) -> tuple[float, float]:
         """Return the relative accuracy of a solution, and the absolute one of its gaps [length]."""
         noise = max(10 * self.solver.tolerance, tolerance if self.solver.iterative else 0.0)
-        scale = largest(lift) + largest(self.u)
+        scale = self.scope.scale(self.u, lift)
         return noise, max(noise * (scale or self.expected), self.round_off)
 
     def _floating(
@@ -458,7 +469,10 @@ class Analysis:
 
     def _balance(self, contact_force: Array, index: int, history: list[dict[str, Any]]) -> Array:
         """Return the reactions (n_dofs,) and check that all other degrees of freedom are in balance."""
-        reaction, residual = self.system.balance(self.K @ self.u - contact_force - self.external)
+        out = self.K @ self.u
+        out -= contact_force
+        out -= self.external
+        reaction, residual = self.system.balance(out)
         force = max(largest(forces) for forces in (reaction, contact_force, self.external))
         self.largest_force = max(self.largest_force, force)
         bound = max(self.criteria.relative * force, self.criteria.absolute or 0.0)

@@ -51,8 +51,9 @@ def one_blas_thread() -> AbstractContextManager[object]:
 
 def portions(count: int) -> list[tuple[int, int]]:
     """Return ranges of nearly equal size that cover 0 to `count`: one a thread, or one for little work."""
-    n = min(_jit.threads(), MOST) if count >= WORTHWHILE else 1
-    ends = np.linspace(0, count, n + 1).astype(int).tolist()
+    if count < WORTHWHILE:
+        return [(0, count)]
+    ends = np.linspace(0, count, min(_jit.threads(), MOST) + 1).astype(int).tolist()
     return list(itertools.pairwise(ends))
 
 

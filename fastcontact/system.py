@@ -34,7 +34,10 @@ class Stiffness:
     parts: tuple[bsr_array, ...]
 
     def __matmul__(self, u: Array) -> Array:
-        return np.asarray(sum(part @ u for part in self.parts))
+        total = np.asarray(self.parts[0] @ u)
+        for part in self.parts[1:]:
+            total += part @ u
+        return total
 
 
 class System:

@@ -155,7 +155,7 @@ def by_cholmod(matrix):
 
     from fastcontact.linear.cholmod import _matrix
 
-    A, _ = _matrix(matrix)
+    A = _matrix(matrix)
 
     def factors():
         factor = cholmod.symbolic(A)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 
 from fastcontact.contact.line_projection import along_line_normals
 from fastcontact.contact.projection import along_normals, interpolated, nodal_normals, places
@@ -113,10 +113,8 @@ def _allowed(primary: Surface, found: Closest, projection_tolerance: float) -> A
     """
     if found.position.shape[1] == 3:
         return projection_tolerance
-    ends = places(primary, found.facet, found.xi).local[:, :2]
-    count = np.bincount(np.concatenate([block.local[:, :2].ravel() for block in primary.blocks]))
-    end = np.where(found.xi[:, 0] > 0.0, ends[:, 1], ends[:, 0])
-    return np.where(count[end] > 1, max(projection_tolerance, FOLDED), projection_tolerance)
+    inside = primary.inner_ends[found.facet, (found.xi[:, 0] > 0.0).astype(np.intp)]
+    return np.where(inside, max(projection_tolerance, FOLDED), projection_tolerance)
 
 
 def filled_up(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
@@ -201,6 +199,7 @@ def rows_along(
         nodes, weights = np.hstack([nodes, facing.nodes]), np.hstack([weights, -facing.shape])
     values = weights[:, :, None] * direction[rows][:, None, :]
     columns = nodes[:, :, None] * dim + np.arange(dim)
-    row = np.broadcast_to(rows[:, None, None], values.shape)
-    size = (len(candidates.nodes), n_dofs)
-    return csr_array(coo_array((values.ravel(), (row.ravel(), columns.ravel())), shape=size).tocsr())
+    start = np.concatenate([[0], np.cumsum(pairing.paired) * (nodes.shape[1] * dim)])
+    found = csr_array((values.ravel(), columns.ravel(), start), shape=(len(candidates.nodes), n_dofs))
+    found.sum_duplicates()
+    return found

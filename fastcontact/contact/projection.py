@@ -50,6 +50,8 @@ class Places:
 
 def places(side: Surface, facet: Indices, xi: Array) -> Places:
     """Return the points of `side` at the reference coordinates `xi` (n, dim - 1) of facets (n,)."""
+    if len(side.blocks) == 1:
+        return _of_block(side.blocks[0], facet, xi)
     width = max(block.facets.shape[1] for block in side.blocks)
     n = len(facet)
     found = Places(
@@ -61,13 +63,17 @@ def places(side: Surface, facet: Indices, xi: Array) -> Places:
     first = 0
     for block in side.blocks:
         mine = np.flatnonzero((facet >= first) & (facet < first + len(block.facets)))
-        rows, k, element = facet[mine] - first, block.facets.shape[1], elements.get(block.element)
+        own, k = _of_block(block, facet[mine] - first, xi[mine]), block.facets.shape[1]
         columns = np.minimum(np.arange(width), k - 1)
-        found.nodes[mine], found.local[mine] = block.facets[rows][:, columns], block.local[rows][:, columns]
-        found.shape[mine, :k] = element.shape(xi[mine])
-        found.gradient[mine, :k] = element.gradient(xi[mine])
+        found.nodes[mine], found.local[mine] = own.nodes[:, columns], own.local[:, columns]
+        found.shape[mine, :k], found.gradient[mine, :k] = own.shape, own.gradient
         first += len(block.facets)
     return found
+
+
+def _of_block(block: FacetBlock, rows: Indices, xi: Array) -> Places:
+    element = elements.get(block.element)
+    return Places(block.facets[rows], block.local[rows], element.shape(xi), element.gradient(xi))
 
 
 def nodal_normals(side: Surface, coordinates: Array) -> Array:

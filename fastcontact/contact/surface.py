@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +90,12 @@ class Surface:
                 "formulation does not take: use 'continuous' or 'node_to_segment', or mesh the surface with one kind"
             )
         return self.blocks[0]
+
+    @cached_property
+    def inner_ends(self) -> NDArray[np.bool_]:
+        """Which ends (n_facets, 2) of lines meet another line."""
+        ends = np.concatenate([block.local[:, :2] for block in self.blocks])
+        return np.asarray(np.bincount(ends.ravel())[ends] > 1)
 
     def corners(self, coordinates: Array) -> list[Array]:
         """Return the nodes (n_facets, n_nodes, dim) of each block at nodal `coordinates` (n_points, dim)."""

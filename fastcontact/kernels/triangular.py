@@ -18,7 +18,7 @@ Offsets = NDArray[np.int64]
 
 
 @kernel
-def supernodes(start: Indices, rows: Indices, first: Offsets, begin: Offsets) -> int:
+def supernodes(start: Offsets, rows: Offsets, first: Offsets, begin: Offsets) -> int:
     """Find the supernodes of L with row numbers `rows` (nnz,), sorted; return how many.
 
     `first` and `begin` (n + 1,) are filled; the rows that they share are moved to the front of `rows`.
@@ -41,7 +41,7 @@ def supernodes(start: Indices, rows: Indices, first: Offsets, begin: Offsets) ->
 
 
 @kernel
-def _continues(start: Indices, rows: Indices, j: int) -> bool:
+def _continues(start: Offsets, rows: Offsets, j: int) -> bool:
     """Return whether column j has the rows of column j - 1 without the first."""
     before, now = start[j - 1] + 1, start[j]
     length = start[j + 1] - now
@@ -54,7 +54,7 @@ def _continues(start: Indices, rows: Indices, j: int) -> bool:
 
 
 @kernel
-def unit_diagonal(start: Indices, values: Array, d: Array) -> None:
+def unit_diagonal(start: Offsets, values: Array, d: Array) -> None:
     """Turn the factor L of ``L L.T``, the diagonal first in every column, into that of ``L D L.T``; fill d (n,)."""
     for j in range(len(d)):
         pivot = values[start[j]]
@@ -64,12 +64,35 @@ def unit_diagonal(start: Indices, values: Array, d: Array) -> None:
 
 
 @kernel
-def forward(start: Indices, values: Array, first: Offsets, begin: Offsets, rows: Indices, x: Array) -> None:
+def block(
+    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Indices, wanted: Offsets, out: Array
+) -> None:
+    """Fill `out` (m, m), zero before, with the rows and columns of L that `wanted` (n,) numbers; -1 stands for the others."""
+    for s in range(len(first) - 1):
+        high = first[s + 1]
+        for j in range(first[s], high):
+            if wanted[j] < 0:
+                continue
+            for i in range(j, high):
+                if wanted[i] >= 0:
+                    out[wanted[i], wanted[j]] = values[start[j] + i - j]
+            for k in range(begin[s], begin[s + 1]):
+                if wanted[rows[k]] >= 0:
+                    out[wanted[rows[k]], wanted[j]] = values[start[j] + high - j + k - begin[s]]
+
+
+@kernel
+def forward(start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Indices, x: Array) -> None:
     """Replace x (n,) by ``L^-1 x``."""
     moved = np.empty(len(x))
     for s in range(len(first) - 1):
         low, high = first[s], first[s + 1]
         below = begin[s + 1] - begin[s]
+        j = low
+        while j < high and x[j] == 0.0:  # loads are often few
+            j += 1
+        if j == high:
+            continue
         moved[:below] = 0.0
         for j in range(low, high):
             xj = x[j]
@@ -85,7 +108,7 @@ def forward(start: Indices, values: Array, first: Offsets, begin: Offsets, rows:
 
 @summing_kernel
 def backward(
-    start: Indices, values: Array, first: Offsets, begin: Offsets, rows: Indices, given: NDArray[np.bool_], x: Array
+    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Indices, given: NDArray[np.bool_], x: Array
 ) -> None:
     """Replace x (n,) by the solution of ``L.T y = x`` in which the entries `given` (n,) keep their values.
 

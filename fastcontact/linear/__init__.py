@@ -29,7 +29,7 @@ def make(
     Parameters
     ----------
     name : str
-        ``"direct"`` (SuperLU, always there), ``"cholmod"`` or ``"pardiso"`` (direct too, where their packages are
+        ``"direct"`` (always there), ``"cholmod"`` or ``"pardiso"`` (direct too, where their packages are
         installed), ``"amg"`` or ``"auto"``: direct for 2D and small 3D problems, multigrid beyond. Multigrid needs
         more iterations where parts are thin or materials nearly incompressible.
     dim, n_dofs : int

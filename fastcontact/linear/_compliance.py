@@ -100,7 +100,11 @@ def reduced(cache: ComplianceCache, R: csr_array) -> Array:
 
 def multipliers(cache: ComplianceCache, B: csr_array, wanted: Array, C: Array | None) -> Array:
     """Return the multipliers (m,) with ``(B K^-1 B.T + C) multiplier = wanted``; C (m, m) may be None."""
-    flexibility = reduced(cache, B)
+    return balanced(reduced(cache, B), wanted, C)
+
+
+def balanced(flexibility: Array, wanted: Array, C: Array | None) -> Array:
+    """Return the multipliers (m,) with ``(flexibility + C) multiplier = wanted``; `flexibility` (m, m) is overwritten."""
     if C is not None:
         flexibility += C
     try:

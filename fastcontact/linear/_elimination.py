@@ -20,12 +20,18 @@ Indices = NDArray[np.intp]
 SMALLEST = 0.25
 # Equations whose inverse is larger, in units of their entries, repeat each other but for round-off.
 SINGULAR = 1e12
-_REPEATED = (
-    "active contact constraints repeat each other, so that an iterative solver cannot eliminate them: leave out one of "
-    "two contacts on the same nodes, or use the direct solver"
-)
 # Beyond so many equations without unknowns of their own a dense factorisation costs more than it gains.
 DENSE_UP_TO = 400
+
+
+class RepeatedError(ConvergenceError):
+    """Equations repeat each other."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "active contact constraints repeat each other, so that an iterative solver cannot eliminate them: leave out one "
+            "of two contacts on the same nodes, or use the direct solver"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +99,7 @@ def eliminate(B: csr_array, c: Array, through: csr_array | None = None, groups: 
 
     Raises
     ------
-    ConvergenceError
+    RepeatedError
         If equations repeat each other, so that there is no unknown to eliminate for each.
     """
     B = csr_array(B, copy=True)
@@ -159,6 +165,8 @@ def _matched(B: csr_array) -> Indices:
     """Return the unknown assigned to each row."""
     if B.shape[0] <= DENSE_UP_TO:
         columns = np.unique(B.indices)
+        if len(columns) < B.shape[0]:
+            raise RepeatedError()
         *_, order = qr(B[:, columns].toarray(), mode="r", pivoting=True)
         return np.asarray(columns[order[: B.shape[0]]], np.intp)
     largest = np.abs(B.data).max()
@@ -166,7 +174,7 @@ def _matched(B: csr_array) -> Indices:
     try:
         row, pivots = min_weight_full_bipartite_matching(cost)
     except ValueError:
-        raise ConvergenceError(_REPEATED) from None
+        raise RepeatedError() from None
     return np.asarray(pivots[np.argsort(row)], np.intp)
 
 
@@ -183,9 +191,9 @@ def _block_inverse(A: csr_array) -> csr_array:
         try:
             inverse = np.linalg.inv(block)
         except np.linalg.LinAlgError:
-            raise ConvergenceError(_REPEATED) from None
+            raise RepeatedError() from None
         if not np.abs(block).max() * np.abs(inverse).max() < SINGULAR:
-            raise ConvergenceError(_REPEATED)
+            raise RepeatedError()
         rows.append(np.repeat(members, len(members)))
         cols.append(np.tile(members, len(members)))
         values.append(inverse.ravel())

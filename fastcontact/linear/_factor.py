@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array
 
-from fastcontact.errors import ModelError
 from fastcontact.linear._compliance import ComplianceCache, multipliers, reduced
+from fastcontact.linear._condensed import LoadedInverse
 from fastcontact.linear._known_loads import KnownLoads
 from fastcontact.linear._solver import Counters, Monitor
 from fastcontact.linear._symmetric import SymmetricFactors
@@ -18,7 +18,6 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 # Beyond this many unknowns last, their dense block costs more than the solutions it saves.
 LAST_UP_TO = 4000
-SINGULAR = "the stiffness matrix is singular: support the rigid-body motions of every body"
 
 
 class FactorSolver:
@@ -43,6 +42,7 @@ class FactorSolver:
         self.counters = Counters()
         self.n = 0
         self._symmetric: SymmetricFactors | None = None
+        self.last: Indices | None = None
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({f'{self.n} unknowns' if self.n else 'not prepared'})"
@@ -62,7 +62,7 @@ class FactorSolver:
         raise NotImplementedError
 
     def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors | None:
-        """Factorise K (n, n) with the unknowns `last` (m,) last; None from solvers that cannot.
+        """Factorise K (n, n) with the unknowns `last` (m,) last; None from solvers that cannot, or do better without.
 
         Raises
         ------
@@ -80,16 +80,25 @@ class FactorSolver:
             If K is singular.
         """
         self.n, self._symmetric, self.last = K.shape[0], None, None
-        if involved is not None and 0 < len(involved) <= LAST_UP_TO:
+        if involved is not None and len(involved) <= LAST_UP_TO:
             self._symmetric = self._with_last(K, involved)
         if self._symmetric is None:
             self._factorise(K.tocsc())
         self.counters.setups += 1
         self.compliance = ComplianceCache(self.n, self._solution)
         self.known_loads = KnownLoads()
-        if self._symmetric is not None and involved is not None:
+        if self._symmetric is not None and involved is not None and len(involved):
             self.last, self._inverse = involved, self._symmetric.last_inverse()
             self.compliance.give(self.last, self._inverse)
+
+    @property
+    def condenses(self) -> bool:
+        """See `LinearSolver`."""
+        return self.last is not None
+
+    def condensed(self, free: Array) -> LoadedInverse | None:
+        """Return the problem of the unknowns `last`, whose displacements without constraints are among `free` (n,)."""
+        return LoadedInverse(self._inverse, free[self.last]) if self.last is not None else None
 
     def _solution(self, F: Array) -> Array:
         return self._solve(F) if self._symmetric is None else self._symmetric.solve(F)
@@ -155,14 +164,12 @@ class LoadedFactor:
             return self._solver.back_substitute(self._f + force)
         return self._free + self._solver.extend(moved) if force.any() else self._free.copy()
 
+    def condensed(self) -> LoadedInverse | None:
+        return self._solver.condensed(self._free)
+
     def _moved(self, force: Array) -> Array | None:
         """Return what a force moves the unknowns `last` by; None where it acts on others, too."""
         last = self._solver.last
         if last is None or np.count_nonzero(force) != np.count_nonzero(force[last]):
             return None
         return self._solver.response(force[last])
-
-
-def singular() -> ModelError:
-    """Return the error for a matrix that cannot be factorised."""
-    return ModelError(SINGULAR)

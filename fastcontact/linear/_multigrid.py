@@ -117,6 +117,10 @@ class Multigrid:
             If the residual does not fall below the tolerance.
         """
         cg, old = self._cg, self._tied
+        scale = self._scale(f, elimination)
+        if scale == 0.0:  # nothing moves anything
+            self._solved = None
+            return np.zeros_like(f)
         goes_on = guess is not None and f is self._solved and np.array_equal(guess, cg.x)
         self.tie(elimination)
         if goes_on:
@@ -125,7 +129,6 @@ class Multigrid:
             cg.x[:] = 0.0 if guess is None else guess
             self._begin(f, elimination)
         self._solved = f
-        scale = self._scale(f, elimination)
         enough = max(self.tolerance, tolerance or 0.0) * scale
         made = raised = 0
         while cg.norm > enough:

@@ -54,6 +54,13 @@ class Loaded(Protocol):
         """Return ``K^-1 (f + force)`` (n,); `u` is what `near` or `solve` found for it."""
         ...
 
+    def condensed(self) -> Loaded | None:
+        """Return the same problem for the unknowns that equations may involve alone, where the solver condenses to those.
+
+        They are the unknowns `involved` of `LinearSolver.prepare`, in their order, in all vectors and columns.
+        """
+        ...
+
 
 @dataclass(frozen=True, eq=False)
 class Drag:
@@ -106,12 +113,15 @@ class LinearSolver(Protocol):
     ----------
     tolerance : float
         Relative accuracy of the solutions.
+    condenses : bool
+        Whether, as prepared, the solver knows the compliance of the unknowns that equations may involve.
     counters : Counters
     gave_up : str
         Why another way of solving took over; empty where none did.
     """
 
     tolerance: float
+    condenses: bool
     counters: Counters
     gave_up: str
 

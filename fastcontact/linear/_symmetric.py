@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
-from scipy.sparse import csc_array
+from scipy.linalg.lapack import dpotri
 
 from fastcontact.kernels import triangular
 
@@ -13,13 +14,23 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
+class Shape(NamedTuple):
+    """L (n, n) by columns, row numbers once for all columns of a supernode; see `kernels.triangular`."""
+
+    start: NDArray[np.int64]
+    values: Array
+    first: NDArray[np.int64]
+    begin: NDArray[np.int64]
+    rows: NDArray[np.int32]
+
+
 class SymmetricFactors:
-    """L and D, row numbers kept once for all columns of a supernode.
+    """L and D.
 
     Parameters
     ----------
-    L : csc_array (n, n)
-        Lower triangular with a unit diagonal, row numbers sorted; they are overwritten.
+    L : Shape
+        Lower triangular (n, n) with a unit diagonal.
     d : ndarray (n,)
         Diagonal of D.
     place : ndarray of int (n,)
@@ -28,27 +39,17 @@ class SymmetricFactors:
         Unknowns that are eliminated after all others: no column of theirs in L has a row of another one.
     """
 
-    def __init__(self, L: csc_array, d: Array, place: Indices, last: Indices) -> None:
+    def __init__(self, L: Shape, d: Array, place: Indices, last: Indices) -> None:
         self.n = len(d)
-        self.nnz = L.nnz
-        self._d, self._place, self._last = d, place, last
+        self.nnz = len(L.values)
+        self._L, self._d, self._place, self._last = L, d, place, last
         self._given = np.zeros(self.n, bool)
         self._given[place[last]] = True
-        at = np.sort(place[last])
-        self._trailing = L[:, at][at].toarray()
-        self._start, self._values = L.indptr, L.data
-        first, begin = np.empty(self.n + 1, np.int64), np.empty(self.n + 1, np.int64)
-        count = triangular.supernodes(L.indptr, L.indices, first, begin)
-        self._first, self._begin = first[: count + 1].copy(), begin[: count + 1].copy()
-        self._rows = L.indices[: begin[count]].copy()
 
     @property
     def nbytes(self) -> int:
         """Memory of the factors [bytes]."""
-        return sum(array.nbytes for array in (*self._shape(), self._d, self._place, self._trailing, self._given))
-
-    def _shape(self) -> tuple[NDArray[np.int32], Array, NDArray[np.int64], NDArray[np.int64], NDArray[np.int32]]:
-        return self._start, self._values, self._first, self._begin, self._rows
+        return sum(array.nbytes for array in (*self._L, self._d, self._place, self._given))
 
     def solve(self, F: Array) -> Array:
         """Return ``K^-1 F`` for right-hand sides (n,) or (n, k)."""
@@ -57,16 +58,19 @@ class SymmetricFactors:
         X[self._place] = F
         columns = np.ascontiguousarray(X.reshape(self.n, -1).T)
         for x in columns:
-            triangular.forward(*self._shape(), x)
+            triangular.forward(*self._L, x)
             x /= self._d
-            triangular.backward(*self._shape(), nothing, x)
+            triangular.backward(*self._L, nothing, x)
         return np.ascontiguousarray(columns.T).reshape(X.shape)[self._place]
 
     def last_inverse(self) -> Array:
         """Return the rows and columns `last` of ``K^-1``, in the order of `last`."""
         at = np.sort(self._place[self._last])
-        half = solve_triangular(self._trailing, np.eye(len(at)), lower=True, unit_diagonal=True)
-        inverse = half.T @ (half / self._d[at, None])
+        wanted, trailing = np.full(self.n, -1), np.zeros((len(at), len(at)))
+        wanted[at] = np.arange(len(at))
+        triangular.block(*self._L, wanted, trailing)
+        inverse, _ = dpotri(trailing * np.sqrt(self._d[at]), lower=True)
+        inverse = np.tril(inverse) + np.tril(inverse, -1).T
         order = np.searchsorted(at, self._place[self._last])
         return np.ascontiguousarray(inverse[np.ix_(order, order)])
 
@@ -74,5 +78,5 @@ class SymmetricFactors:
         """Return the displacement (n,) under forces on the unknowns `last` alone, which move by u (m,)."""
         x = np.zeros(self.n)
         x[self._place[self._last]] = u
-        triangular.backward(*self._shape(), self._given, x)
+        triangular.backward(*self._L, self._given, x)
         return x[self._place]

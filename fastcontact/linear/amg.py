@@ -17,7 +17,7 @@ from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear._compliance import multipliers, reduced
-from fastcontact.linear._elimination import Elimination, eliminate
+from fastcontact.linear._elimination import Elimination, RepeatedError, eliminate
 from fastcontact.linear._multigrid import Multigrid, StallError
 from fastcontact.linear._solver import Drag, Loaded, Monitor
 from fastcontact.linear.direct import Direct
@@ -40,6 +40,7 @@ class Amg(Multigrid):
     """
 
     name = "amg"
+    condenses = False
 
     def __init__(self, tolerance: float = 1e-10, precision: str = "single") -> None:
         super().__init__(tolerance, precision)
@@ -131,9 +132,13 @@ class _Iterated:
     ) -> tuple[Array, Array]:  # fmt: skip
         solver = self._solver
         if C is None or not B.shape[0]:
-            elimination = eliminate(B, c) if B.shape[0] else None
-            u = solver.solution(self._f, elimination, guess, monitor, tolerance)
-            return u, solver.multiplier(elimination, u, self._f)
+            try:
+                elimination = eliminate(B, c) if B.shape[0] else None
+            except RepeatedError as repeated:
+                log.info("%s: their compliance is formed", repeated)
+            else:
+                u = solver.solution(self._f, elimination, guess, monitor, tolerance)
+                return u, solver.multiplier(elimination, u, self._f)
         multiplier = multipliers(solver.compliance, B, c - B @ self._unloaded(), C)
         return solver.solution(self._f + B.T @ multiplier, None, guess), multiplier
 
@@ -159,6 +164,9 @@ class _Iterated:
 
     def everywhere(self, force: Array, u: Array | None = None) -> Array:
         return self.near(force, None) if u is None else u
+
+    def condensed(self) -> None:
+        return None
 
     def _unloaded(self) -> Array:
         """Return the displacement without contact forces."""
@@ -194,6 +202,9 @@ class _Loaded:
 
     def everywhere(self, force: Array, u: Array | None = None) -> Array:
         return self._found(lambda loaded: loaded.everywhere(force, u))
+
+    def condensed(self) -> None:
+        return None
 
     def _found(self, by: Callable[[Loaded], Any]) -> Any:
         """Return what a call gives; where multigrid stalls, what factors give."""

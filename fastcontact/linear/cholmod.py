@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, csc_array, tril
+from scipy.sparse import bsr_array, csc_array, csr_array
 
 from fastcontact.kernels import triangular
-from fastcontact.linear._factor import FactorSolver, singular
+from fastcontact.linear._factor import FactorSolver
 from fastcontact.linear._order import fill_reducing
-from fastcontact.linear._symmetric import SymmetricFactors
+from fastcontact.linear._singular import singular
+from fastcontact.linear._symmetric import Shape, SymmetricFactors
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -25,36 +26,48 @@ class Cholmod(FactorSolver):
     name = "cholmod"
 
     def _factorise(self, K: csc_array) -> None:
-        A, lower = _matrix(K)
+        A = _matrix(K)
         self._factor = _analysed(A)
-        _factorised(A, self._factor, lower)
+        _factorised(A, self._factor)
+        _solved(self._factor, np.ones(self.n))
 
     def _solve(self, F: Array) -> Array:
         return _solved(self._factor, F)
 
-    def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors:
+    def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors | None:
         from kvxopt import cholmod, matrix
 
-        A, lower = _matrix(K.tocsc())
+        if not len(last):
+            return None
+        A = _matrix(K.tocsr())  # its rows are its columns
         factor = _analysed(A, matrix(fill_reducing(K, last)))
-        _factorised(A, factor, lower)
+        _factorised(A, factor)
         # CHOLMOD may reorder independent branches of the elimination, which leaves what depends on what as it is.
         place = np.empty(self.n, np.intp)
         place[_order(factor, self.n)] = np.arange(self.n)
         start, rows, values = (np.asarray(part).ravel() for part in cholmod.getfactor(factor).CCS)
-        L = csc_array((values, rows.astype(np.intc), start.astype(np.intc)), shape=(self.n, self.n))
         d = np.empty(self.n)
-        triangular.unit_diagonal(L.indptr, L.data, d)
-        return SymmetricFactors(L, d, place, last)
+        triangular.unit_diagonal(start, values, d)
+        return SymmetricFactors(_by_supernodes(start, rows, values), d, place, last)
 
 
-def _matrix(K: csc_array) -> tuple[Any, Any]:
-    """Return the lower triangle of K as CHOLMOD takes it, and as it is."""
+def _by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Array) -> Shape:
+    """Return L given by columns, row numbers sorted, with those of columns of equal structure once; `rows` is overwritten."""
+    first, begin = np.empty(len(start), np.int64), np.empty(len(start), np.int64)
+    count = triangular.supernodes(start, rows, first, begin)
+    return Shape(
+        start, values, first[: count + 1].copy(), begin[: count + 1].copy(), rows[: begin[count]].astype(np.intc)
+    )
+
+
+def _matrix(K: csc_array | csr_array) -> Any:
+    """Return the lower triangle of the symmetric matrix K as CHOLMOD takes it."""
     from kvxopt import matrix, spmatrix
 
-    lower = tril(K, format="coo")
-    rows, columns = (matrix(index.astype(np.int64)) for index in (lower.row, lower.col))
-    return spmatrix(matrix(lower.data), rows, columns, K.shape), lower
+    columns = np.repeat(np.arange(K.shape[0]), np.diff(K.indptr))
+    lower = K.indices >= columns
+    rows, columns = matrix(K.indices[lower].astype(np.int64)), matrix(columns[lower])
+    return spmatrix(matrix(K.data[lower]), rows, columns, K.shape)
 
 
 def _analysed(A: Any, order: Any = None) -> Any:
@@ -72,13 +85,11 @@ def _analysed(A: Any, order: Any = None) -> Any:
         cholmod.options.update(before)
 
 
-def _factorised(A: Any, factor: Any, lower: Any) -> None:
-    """Factorise A; small matrices are factorised past a zero pivot, which a solution finds."""
+def _factorised(A: Any, factor: Any) -> None:
     from kvxopt import cholmod
 
     try:
         cholmod.numeric(A, factor)
-        _solved(factor, np.ones(lower.shape[0]))
     except ArithmeticError as error:
         raise singular() from error
 
@@ -87,7 +98,10 @@ def _solved(factor: Any, F: Array, system: int = 0) -> Array:
     from kvxopt import cholmod, matrix
 
     X = matrix(np.asfortranarray(F.reshape(len(F), -1)))
-    cholmod.solve(factor, X, sys=system)
+    try:
+        cholmod.solve(factor, X, sys=system)
+    except ArithmeticError as error:  # small matrices are factorised past a zero pivot, which a solution finds
+        raise singular() from error
     return np.array(X, order="C").reshape(F.shape)
 
 

@@ -1,4 +1,4 @@
-"""Direct solver by SuperLU, always there: one sparse factorisation serves the whole analysis."""
+"""Direct solver that is always there: one sparse factorisation serves the whole analysis."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from fastcontact.errors import ModelError
-from fastcontact.linear._factor import FactorSolver, singular
-from fastcontact.linear._order import fill_reducing
+from fastcontact.linear._cholesky import factors
+from fastcontact.linear._factor import FactorSolver
+from fastcontact.linear._singular import singular
 from fastcontact.linear._symmetric import SymmetricFactors
 
 Array = NDArray[np.float64]
@@ -17,15 +17,19 @@ Indices = NDArray[np.intp]
 
 
 class Direct(FactorSolver):
-    """SuperLU in symmetric mode, minimum-degree ordering of A + A.T; see `FactorSolver`."""
+    """Cholesky factors with the contact unknowns last; see `FactorSolver`.
+
+    Where so many may be in contact that many right-hand sides have to be solved for, SuperLU in symmetric mode,
+    minimum-degree ordering of A + A.T.
+    """
 
     name = "direct"
 
     def __repr__(self) -> str:
         if not self.n:
-            return "Direct(SuperLU, not prepared)"
-        entries = self._symmetric.nnz if self._symmetric is not None else self._lu.nnz
-        return f"Direct(SuperLU, {self.n} unknowns, {entries} entries, {self.nbytes / 1e6:.1f} MB)"
+            return "Direct(not prepared)"
+        kind, entries = ("Cholesky", self._symmetric.nnz) if self._symmetric is not None else ("SuperLU", self._lu.nnz)
+        return f"Direct({kind}, {self.n} unknowns, {entries} entries, {self.nbytes / 1e6:.1f} MB)"
 
     @property
     def nbytes(self) -> int:
@@ -33,25 +37,18 @@ class Direct(FactorSolver):
         return self._symmetric.nbytes if self._symmetric is not None else 12 * int(self._lu.nnz)
 
     def _factorise(self, K: csc_array) -> None:
-        self._lu = _factorised(K, "MMD_AT_PLUS_A")
+        self._lu = _factorised(K)
 
     def _solve(self, F: Array) -> Array:
         return self._lu.solve(F)
 
     def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors:
-        order = fill_reducing(K, last)
-        lu = _factorised(csc_array(K.tocsc()[order][:, order]), "NATURAL")
-        if not np.array_equal(lu.perm_r, lu.perm_c):
-            raise ModelError("the stiffness matrix needed pivoting: it is not positive definite")
-        # SuperLU may reorder independent branches of the elimination, which leaves what depends on what as it is.
-        place = np.empty(len(order), np.intp)
-        place[order] = lu.perm_c
-        return SymmetricFactors(lu.L, lu.U.diagonal(), place, last)
+        return factors(K, last)
 
 
-def _factorised(matrix: csc_array, order: str) -> SuperLU:
+def _factorised(matrix: csc_array) -> SuperLU:
     try:
-        return splu(matrix, permc_spec=order, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     except RuntimeError as error:
         raise singular() from error
 

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_matrix, triu
 
-from fastcontact.linear._factor import FactorSolver, singular
+from fastcontact.linear._factor import FactorSolver
+from fastcontact.linear._singular import singular
 
 Array = NDArray[np.float64]
 # Pardiso's name of symmetric positive definite matrices, of which it takes the upper triangle.

@@ -107,7 +107,7 @@ def stuck(patch):
 
 
 def indefinite():
-    K = bsr_array(np.array([[0.0, 1.0], [1.0, 0.0]]), blocksize=(1, 1))
+    K = bsr_array(np.array([[1.0, 2.0], [2.0, 1.0]]), blocksize=(1, 1))
     Direct(tolerance=1e-10)._with_last(K, np.array([1]))
 
 
@@ -197,7 +197,7 @@ CALLS = [
     ("a case copied to a full disk", copied_to_a_full_disk, fc.errors.FileError, r"cannot write '.*b\.toml': No space left on device"),
     ("facets that cannot be cut", distorted_facets, fc.ContactError, r"the facets near \[.*\] and \[.*\] are too distorted to be cut: improve the mesh there"),
     ("multigrid without iterations", stuck, fc.ConvergenceError, r"."),
-    ("a stiffness that needs pivoting", indefinite, fc.ModelError, r"the stiffness matrix needed pivoting: it is not positive definite"),
+    ("a stiffness that is not positive definite", indefinite, fc.ModelError, r"the stiffness matrix is not positive definite: check the material and the cells"),
     ("no triangulation is found", no_triangulation, fc.MeshError, r"no triangulation with edges up to .* at the pole and .* far from it was found: change a size a little, or let it grow"),
     ("triangles that leave a hole", lambda: _triangulate._checked(np.zeros((3, 3), int), 10, 8), fc.MeshError, r"the triangulation has 3 triangles where 10 fill the outline"),
     ("a maker of no known finer meshes", no_finer_meshes, fc.errors.CaseError, r"it is not known how the generator 'rings' makes finer meshes: name its arguments in \[study\] as halve = \[\.\.\.\] or double = \[\.\.\.\]"),

@@ -127,6 +127,14 @@ def test_a_singular_matrix_is_refused(name):
         solver.prepare(bsr_array(np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(2)), blocksize=(2, 2)), np.ones((4, 1)))
 
 
+@pytest.mark.parametrize("name", [name for name in linear.SOLVERS if name != "amg"])
+def test_a_singular_matrix_is_refused_with_unknowns_last(name):
+    solver = linear.make(name, dim=2, n_dofs=4)
+    K = bsr_array(np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(2)), blocksize=(2, 2))
+    with pytest.raises(ModelError, match="singular: support the rigid-body motions"):
+        solver.prepare(K, np.ones((4, 1)), np.array([2, 3]))
+
+
 @pytest.mark.parametrize("name", ["direct", "amg"])
 def test_a_solver_says_that_it_is_not_prepared(name):
     assert "not prepared" in repr(linear.make(name, dim=2, n_dofs=10, tolerance=1e-8))

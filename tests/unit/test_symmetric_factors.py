@@ -12,7 +12,7 @@ from fastcontact.assembly import stiffness
 from fastcontact.criteria import Criteria
 from fastcontact.kernels import triangular
 from fastcontact.linear._known_loads import KnownLoads
-from fastcontact.linear._order import fill_reducing
+from fastcontact.linear._order import fill_reducing, reordered
 from fastcontact.system import supports_apart
 
 FACTORED = ["direct", "cholmod"]
@@ -119,6 +119,19 @@ def test_contact_takes_its_compliance_and_all_displacements_from_the_factors(nam
     assert solver.counters.iterations == before + 1
 
 
+@pytest.mark.parametrize("name", FACTORED)
+def test_without_contact_there_is_nothing_to_condense_to(name):
+    if name not in linear.SOLVERS:
+        pytest.skip(f"{name} is not installed")
+    K, _ = supported()
+    solver = linear.make(name, dim=3, n_dofs=K.shape[0])
+    solver.prepare(K, np.empty((K.shape[0], 0)), np.empty(0, np.intp))
+    f = np.random.default_rng(3).normal(size=K.shape[0])
+    assert not solver.condenses
+    assert solver.load(f).condensed() is None
+    np.testing.assert_allclose(K @ solver.load(f).everywhere(np.zeros(len(f))), f, atol=1e-12)
+
+
 def test_forces_elsewhere_cost_a_solution():
     K, _, solver = prepared()
     force = np.random.default_rng(4).normal(size=K.shape[0])
@@ -160,3 +173,21 @@ def test_a_ramp_costs_one_factorisation_and_a_solution_a_step(forma04):
     assert analysis.solver.counters.setups == 1
     # One for the loads of all steps, and one for what each step's contact forces do inside the bodies.
     assert analysis.solver.counters.iterations == 1 + 5
+
+
+def test_a_symmetric_matrix_is_reordered_by_rows_and_columns():
+    K, top = supported()
+    order = fill_reducing(K, top)
+    found = reordered(K, order)
+    np.testing.assert_array_equal(found.toarray(), K.toarray()[np.ix_(order, order)])
+
+
+def test_forward_substitution_passes_over_supernodes_without_load():
+    L = lower(40, 0.05, 3)
+    first, begin, rows = np.empty(41, np.int64), np.empty(41, np.int64), L.indices.copy()
+    count = triangular.supernodes(L.indptr, rows, first, begin)
+    for at in range(40):
+        x = np.zeros(40)
+        x[at] = 2.0
+        triangular.forward(L.indptr, L.data, first[: count + 1], begin[: count + 1], rows[: begin[count]], x)
+        np.testing.assert_allclose(L.toarray() @ x, 2.0 * np.eye(40)[at], atol=1e-13)

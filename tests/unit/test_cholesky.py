@@ -1,0 +1,148 @@
+"""Cholesky factors of sparse matrices: their shape against elimination by hand, their numbers against NumPy's."""
+
+import numpy as np
+import pytest
+from scipy.linalg import ldl
+from scipy.sparse import block_diag, bsr_array, csc_array
+
+from fastcontact.errors import ModelError
+from fastcontact.kernels import cholesky, elimination_tree, triangular
+from fastcontact.linear import _cholesky
+
+EXACT = np.array([4]), np.array([0.0, 0.0])
+JOINED = np.array([4, 16]), np.array([1.0, 0.6, 0.3])
+
+
+def positive(n, density, seed):
+    """A sparse symmetric positive definite matrix."""
+    rng = np.random.default_rng(seed)
+    A = np.where(rng.random((n, n)) < density, rng.normal(size=(n, n)), 0.0)
+    A = A + A.T
+    return csc_array(A + np.diag(np.abs(A).sum(axis=1) + 1.0))
+
+
+def apart(seed):
+    """One of several pieces, some of them a single unknown."""
+    pieces = [positive(n, 0.2, seed + n) for n in (1, 12, 1, 9, 1)]
+    return csc_array(block_diag(pieces))
+
+
+MATRICES = [
+    *(positive(n, density, seed) for n, density in [(1, 0), (9, 0), (30, 0.05), (60, 0.04), (40, 1)] for seed in (0, 1)),
+    apart(5),
+]  # fmt: skip
+
+
+def filled(A):
+    """The pattern of the factor, column after column."""
+    pattern = A.toarray() != 0.0
+    for j in range(len(pattern)):
+        below = np.flatnonzero(pattern[j + 1 :, j]) + j + 1
+        pattern[np.ix_(below, below)] = True
+    return np.tril(pattern)
+
+
+def tree(A):
+    n = A.shape[0]
+    parent, order, count = (np.empty(n, np.intc) for _ in range(3))
+    elimination_tree.parents(A.indptr, A.indices, parent)
+    elimination_tree.postordered(parent, order)
+    elimination_tree.counts(A.indptr, A.indices, parent, order, count)
+    return parent, order, count
+
+
+@pytest.mark.parametrize("A", MATRICES)
+def test_tree_and_counts_are_those_of_elimination(A):
+    L = filled(A)
+    parent, order, count = tree(A)
+    below = [np.flatnonzero(L[j + 1 :, j]) + j + 1 for j in range(len(L))]
+    np.testing.assert_array_equal(parent, [rows[0] if len(rows) else -1 for rows in below])
+    np.testing.assert_array_equal(count, L.sum(axis=0))
+    np.testing.assert_array_equal(np.sort(order), np.arange(len(L)))
+
+
+@pytest.mark.parametrize("A", MATRICES)
+def test_subtrees_stand_together_in_postorder(A):
+    parent, order, _ = tree(A)
+    place = np.argsort(order)
+    size = np.ones(len(order), int)
+    for j in np.flatnonzero(parent >= 0):  # ascending: children before parents
+        size[parent[j]] += size[j]
+    for j in np.flatnonzero(parent >= 0):
+        assert place[parent[j]] - size[parent[j]] < place[j] < place[parent[j]]
+
+
+@pytest.mark.parametrize("A", MATRICES)
+@pytest.mark.parametrize("rule", [EXACT, JOINED], ids=["exact", "joined"])
+def test_supernodes_hold_every_entry_and_no_more_zeros_than_asked(A, rule, monkeypatch):
+    n, late = A.shape[0], np.arange(A.shape[0]) > 0.7 * A.shape[0]
+    monkeypatch.setattr(_cholesky, "WIDTHS", rule[0])
+    monkeypatch.setattr(_cholesky, "SHARES", rule[1])
+    found = _cholesky._tree(A)
+    first, begin, rows = _cholesky._supernodes(A, found, late[found.order])
+    L = filled(A[found.order][:, found.order])
+    shown = np.zeros((n, n), bool)
+    for s in range(len(first) - 1):
+        own, below = np.arange(first[s], first[s + 1]), rows[begin[s] : begin[s + 1]]
+        assert (np.diff(below) > 0).all()
+        assert len(set(late[found.order][own])) == 1
+        shown[np.ix_(own, own)] = np.tri(len(own), dtype=bool)
+        shown[np.ix_(below, own)] = True
+    assert (shown >= L).all()
+    if rule is EXACT:
+        np.testing.assert_array_equal(shown, L)
+
+
+@pytest.mark.parametrize("size", [1, 2, 47, 48, 49, 130])
+@pytest.mark.parametrize("share", [0.3, 1.0])
+def test_fronts_are_eliminated_as_by_hand(size, share):
+    A = positive(size, 1.0, size).toarray()
+    width = max(1, int(share * size))
+    F, expected = np.triu(A), A.copy()
+    for j in range(width):
+        row = expected[j, j + 1 :] / expected[j, j]
+        expected[j + 1 :, j + 1 :] -= np.outer(row, expected[j, j + 1 :])
+        expected[j, j + 1 :] = row
+    room = (np.empty(count * size) for count in (cholesky.PANEL, cholesky.PANEL, cholesky.ROWS))
+    assert cholesky._eliminated(F, width, *room) == -1
+    np.testing.assert_allclose(np.triu(F), np.triu(expected), atol=1e-13 * np.abs(A).max())
+
+
+@pytest.mark.parametrize("A", [*MATRICES, positive(300, 0.3, 7)])
+@pytest.mark.parametrize("m", [0, 1, 7])
+def test_factors_are_those_of_the_matrix(A, m):
+    n = A.shape[0]
+    last = np.sort(np.random.default_rng(m).permutation(n)[:m])
+    made = _cholesky.factors(bsr_array(A, blocksize=(1, 1)), last)
+    L, wanted = np.zeros((n, n)), np.arange(n)
+    triangular.block(*made._L, wanted, L)
+    order = np.argsort(made._place)
+    dense = A.toarray()[np.ix_(order, order)]
+    np.testing.assert_allclose((L * made._d) @ L.T, dense, atol=1e-13 * np.abs(dense).max())
+    np.testing.assert_allclose(L, ldl(dense, lower=True)[0], atol=1e-13)
+    late = np.zeros(n, bool)
+    late[made._place[last]] = True
+    assert not L[np.ix_(~late, late)].any()
+    np.testing.assert_allclose(A @ made.solve(np.ones(n)), np.ones(n), atol=1e-12)
+    inverse = np.linalg.inv(A.toarray())[np.ix_(last, last)]
+    np.testing.assert_allclose(made.last_inverse(), inverse, atol=1e-13)
+
+
+def test_factors_have_the_same_bits_again():
+    K = bsr_array(positive(300, 0.05, 7), blocksize=(2, 2))
+    one, other = (_cholesky.factors(K, np.arange(5)) for _ in range(2))
+    for a, b in zip((*one._L, one._d), (*other._L, other._d), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "message"),
+    [
+        ([[1.0, -1.0], [-1.0, 1.0]], "singular: support the rigid-body motions"),
+        ([[1.0, 2.0], [2.0, 1.0]], "not positive definite"),
+        ([[np.nan, 0.0], [0.0, 1.0]], "not positive definite"),
+    ],
+)
+def test_what_is_not_positive_definite_is_refused(matrix, message):
+    with pytest.raises(ModelError, match=message):
+        _cholesky.factors(bsr_array(np.array(matrix), blocksize=(1, 1)), np.array([1]))

@@ -1,0 +1,132 @@
+"""Pairings that find the displacements of contact surfaces alone: what they say is what all displacements say."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+
+import fastcontact as fc
+from fastcontact import linear
+from fastcontact.analysis import Analysis
+from fastcontact.criteria import Criteria
+from fastcontact.scope import Everything, Surfaces
+
+
+def started(related=False, friction=0.0, name="direct"):
+    if name not in linear.SOLVERS:
+        pytest.skip(f"{name} is not installed")
+    mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), radial_sizes=(3.0, 9.0), segments=3)
+    model = fc.Model(mesh, kinematics="axisymmetric")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model.fix("A1A2", "x")
+    model.prescribe("A1B1", y=2.0)
+    if related:
+        model.couple("CONT2", "y")
+    model.prescribe("A2B2", y=-2.0)
+    model.add_contact("c", secondary="CONT1", primary="CONT2", formulation="node_to_segment", friction=friction)
+    return Analysis(model, name, 1e-14, Criteria(geometry=1e-8), fc.linear_ramp(2))
+
+
+class NotCondensing:
+    """A solver that is asked for all displacements every time."""
+
+    def __init__(self, solver):
+        self._solver = solver
+        self.condenses = False
+
+    def __getattr__(self, name):
+        return getattr(self._solver, name)
+
+
+@pytest.fixture(params=[False, True], ids=["supports", "relations"])
+def both(request):
+    analysis = started(request.param)
+    everything = Everything(analysis.system, analysis.surface_dofs)
+    surfaces = analysis.scope
+    assert isinstance(surfaces, Surfaces)
+    return analysis, everything, surfaces
+
+
+def obeying(analysis, seed=1):
+    """Random displacements that obey supports and relations, and what these prescribe."""
+    lift = analysis._lift(0.7)
+    v = np.where(analysis.system.free, np.random.default_rng(seed).normal(size=len(lift)), 0.0)
+    return analysis.system.displacement(v, lift), lift
+
+
+def test_rows_are_those_for_all_unknowns(both):
+    analysis, everything, surfaces = both
+    u, lift = obeying(analysis)
+    surfaces.begin(u, lift)
+    part = analysis.pairs["c"].conditions(np.zeros((len(u) // 2, 2)))
+    B, offset = everything.rows(part.B, part.gap0, lift)
+    own, offset_too = surfaces.rows(part.B, part.gap0, lift)
+    np.testing.assert_array_equal(offset_too, offset)
+    v = everything.unknowns(u, lift)
+    np.testing.assert_allclose(own @ surfaces.unknowns(u, lift), B @ v, atol=1e-14)
+    np.testing.assert_array_equal(np.diff(own.indptr) > 0, np.diff(B.indptr) > 0)
+    assert own.data.all()
+
+
+def test_displacements_and_sizes_are_those_of_all(both):
+    analysis, everything, surfaces = both
+    u, lift = obeying(analysis)
+    copy = surfaces.begin(u, lift)
+    assert copy is not u
+    v = surfaces.unknowns(u, lift)
+    np.testing.assert_allclose(surfaces.displacement(v, lift), surfaces.of(u), atol=1e-14)
+    assert surfaces.scale(u, lift) == everything.scale(u, lift)
+    assert surfaces.size(v) == everything.size(everything.unknowns(u, lift))
+    assert surfaces.size(100.0 + v) == (100.0 + v).max()
+    changed = surfaces.put(copy, surfaces.of(u) + 100.0)
+    dofs = analysis.surface_dofs
+    np.testing.assert_array_equal(changed[dofs], u[dofs] + 100.0)
+    np.testing.assert_array_equal(np.delete(changed, dofs), np.delete(u, dofs))
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("name", ["direct", "cholmod"])
+def test_steps_end_where_those_of_all_displacements_end(name, friction):
+    analysis, other = started(friction=friction, name=name), started(friction=friction, name=name)
+    other.scope = Everything(other.system, other.surface_dofs)
+    for index, instant in enumerate(analysis.ramp.instants, start=1):
+        result, expected = analysis.step(index, instant), other.step(index, instant)
+        scale = np.abs(expected.displacement).max()
+        np.testing.assert_allclose(result.displacement, expected.displacement, atol=1e-8 * scale)
+        assert result.iterations["geometry_updates"] == expected.iterations["geometry_updates"]
+        sizes = [entry["displacement_change"] for entry in result.iterations["history"][1:]]
+        same = [entry["displacement_change"] for entry in expected.iterations["history"][1:]]
+        np.testing.assert_allclose(sizes, same, atol=1e-9)
+
+
+def test_solvers_without_a_compliance_find_all_displacements():
+    analysis = started()
+    analysis.solver = NotCondensing(analysis.solver)
+    assert isinstance(analysis._scope(analysis.solver.last), Everything)
+
+
+def test_the_condensed_problem_is_that_of_all_unknowns():
+    analysis = started()
+    solver, rng = analysis.solver, np.random.default_rng(3)
+    n, k = len(analysis.u), len(solver.last)
+    loaded = solver.load(rng.normal(size=n))
+    condensed = loaded.condensed()
+    assert condensed.condensed() is condensed
+    dense = np.zeros((5, n))
+    dense[:, solver.last] = np.where(rng.random((5, k)) < 0.2, rng.normal(size=(5, k)), 0.0)
+    B, own, c, C = csr_array(dense), csr_array(dense[:, solver.last]), rng.normal(size=5), np.eye(5)
+    for compliance in (None, C):
+        u, multiplier = loaded.solve(B, c, compliance)
+        v, same = condensed.solve(own, c, compliance)
+        np.testing.assert_allclose(same, multiplier, rtol=1e-9)
+        np.testing.assert_allclose(v, u[solver.last], atol=1e-10 * np.abs(u).max())
+    free, none = condensed.solve(own[:0], c[:0])
+    np.testing.assert_array_equal(free, loaded.solve(B[:0], c[:0])[0][solver.last])
+    assert not len(none)
+    for found, expected in zip(condensed.reduce(own), loaded.reduce(B), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-10 * np.abs(expected).max())
+    force = rng.normal(size=k)
+    near = condensed.near(force, None)
+    everywhere = np.zeros(n)
+    everywhere[solver.last] = force
+    np.testing.assert_allclose(near, loaded.near(everywhere, None)[solver.last], atol=1e-10 * np.abs(near).max())
+    np.testing.assert_array_equal(condensed.everywhere(force), near)
