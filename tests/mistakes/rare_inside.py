@@ -28,11 +28,11 @@ from fastcontact.floating import Floating
 from fastcontact.generate import _triangulate
 from fastcontact.generate.transform import renamed
 from fastcontact.io import _hdf5, _meshio, med, result_reader
-from fastcontact.linear import _elimination, amg
+from fastcontact.linear import _elimination, _multigrid, amg
 from fastcontact.linear.direct import Direct
 from fastcontact.system import System
 
-REPEATED = re.escape(_elimination._REPEATED)
+REPEATED = re.escape(str(_elimination.RepeatedError()))
 
 
 def refusing(number):
@@ -102,7 +102,8 @@ def distorted_facets(patch):
 
 
 def stuck(patch):
-    patch.setattr(amg, "MAX_ITERATIONS", 0)
+    patch.setattr(_multigrid, "MAX_ITERATIONS", 0)
+    patch.setattr(amg, "FACTORS_UP_TO", {2: 0})
     solved(blocks(), linear_solver="amg")
 
 
@@ -184,9 +185,10 @@ CALLS = [
     ("values of points beyond the mesh", profile_beyond_the_mesh, fc.errors.FileError, r"profile 'P' names point 9 of 4: write the file anew"),
     ("parts of a file that do not fit", parts_that_do_not_fit, fc.errors.FileError, r"the parts of '.*a\.vtk' do not fit together: check the file, or convert it to \.med"),
     ("a result that may not be read", unreadable, fc.errors.FileError, r"a\.vtkhdf' may not be read: ask its owner for the permission"),
-    ("equations on the same unknown", repeated_equations, fc.ConvergenceError, REPEATED),
-    ("equations that are equal", lambda: _elimination._block_inverse(csr_array(np.ones((2, 2)))), fc.ConvergenceError, REPEATED),
-    ("equations that are nearly equal", lambda: _elimination._block_inverse(csr_array([[1.0, 1.0], [1.0, 1.0 + 1e-14]])), fc.ConvergenceError, REPEATED),
+    ("equations on the same unknown", repeated_equations, _elimination.RepeatedError, REPEATED),
+    ("equations that are equal", lambda: _elimination._block_inverse(csr_array(np.ones((2, 2)))), _elimination.RepeatedError, REPEATED),
+    ("more equations than unknowns", lambda: _elimination._matched(csr_array(np.ones((2, 1)))), _elimination.RepeatedError, REPEATED),
+    ("equations that are nearly equal", lambda: _elimination._block_inverse(csr_array([[1.0, 1.0], [1.0, 1.0 + 1e-14]])), _elimination.RepeatedError, REPEATED),
     ("forces out of balance", out_of_balance, fc.ConvergenceError, r"step 1: the out-of-balance force 1e\+09 stays above .* \(1e-06 of the largest force\): use the direct solver or a smaller tolerance"),
     ("springs that stay stretched", not_slack, fc.ConvergenceError, r"contact does not hold .*: after \d+ positions tried, a force of .* is still missing for equilibrium under a load of 10\. Add a support, or use more load steps"),
     ("benchmarks without checkout", no_checkout, fc.errors.FastcontactError, r"the benchmarks need the source checkout, and there is no '.*': install it with pip install -e"),

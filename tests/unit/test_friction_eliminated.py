@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.sparse import csr_array, random_array
+from scipy.sparse import csr_array, random_array, vstack
 
 import fastcontact as fc
 from fastcontact import friction, linear
@@ -144,6 +144,33 @@ def test_where_multigrid_stalls_factors_take_over_and_say_so(monkeypatch):
         rest = fc.solve(model, ramp, linear_solver="amg", resume=states[:2])
     np.testing.assert_array_equal(rest[-1].displacement, found[-1].displacement)
     assert rest[-1].warnings == found[-1].warnings
+
+
+def test_factors_that_took_over_solve_friction_on_its_compliance(monkeypatch):
+    monkeypatch.setattr(_multigrid, "MAX_ITERATIONS", 3)
+    exact = fc.solve(rubbing(), fc.linear_ramp(3), linear_solver="direct")[-1]
+    with pytest.warns(fc.FastcontactWarning, match="multigrid gave up"):
+        found = fc.solve(rubbing(), fc.linear_ramp(3), linear_solver="amg")[-1]
+    assert np.abs(found.displacement - exact.displacement).max() < 1e-8 * np.abs(exact.displacement).max()
+
+
+def test_constraints_that_repeat_each_other_are_solved_on_their_compliance(caplog):
+    """Two contacts on the same nodes: their forces share what one alone would carry."""
+    caplog.set_level("INFO", "fastcontact")
+    model = rubbing(mu=0.0)
+    once = fc.solve(model, fc.linear_ramp(1), linear_solver="amg")[-1]
+    analysis = Analysis(model, "amg", 1e-10, Criteria())
+    constraints = analysis.pairs["pair"].constraints(np.zeros_like(model.mesh.points))
+    rows = np.flatnonzero(once.contact["pair"].active)[:2]
+    n = model.n_dofs
+    B, offset = analysis.system.rows(constraints.B[rows], constraints.gap0[rows], np.zeros(n))
+    f = np.where(analysis.system.free, 1.0, 0.0)
+    alone, multiplier = analysis.solver.load(f).solve(B, -offset)
+    twice = csr_array(vstack([B, B], format="csr"))
+    both, shared = analysis.solver.load(f).solve(twice, -np.r_[offset, offset])
+    assert "repeat each other" in caplog.text
+    np.testing.assert_allclose(both, alone, atol=1e-7 * np.abs(alone).max())
+    np.testing.assert_allclose(shared[:2] + shared[2:], multiplier, rtol=1e-6)
 
 
 def test_a_matrix_too_large_for_factors_stays_an_error(monkeypatch):
