@@ -7,8 +7,10 @@ from the keyboard, likewise.
 from __future__ import annotations
 
 import argparse
+import gc
 import importlib
 import logging
+import os
 import pkgutil
 import sys
 from collections.abc import Mapping, Sequence
@@ -90,4 +92,10 @@ def _history(history: Sequence[Mapping[str, Any]], shown: int = 10) -> list[str]
 
 def entry_point() -> None:
     """Run the command line and exit with its code."""
-    sys.exit(main())
+    # Threads of BLAS spin between the small products here; loops of our own have those of Numba.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # What imports make stays, and is not looked through for cycles time and again, least of all at the end.
+    gc.set_threshold(100_000, 50, 50)
+    code = main()
+    gc.freeze()
+    sys.exit(code)
