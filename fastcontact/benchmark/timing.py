@@ -60,7 +60,7 @@ def measured(subject: ModuleType, size: int, repeats: int = REPEATS) -> dict[str
     # In turn, so that a machine that slows down does so for all works alike.
     runs: list[dict[str, tuple[float, float]]] = []
     begin = cpu_seconds()
-    while len(runs) < repeats or (1 < repeats and len(runs) < MOST_REPEATS and cpu_seconds() - begin < SHORT):
+    while len(runs) < repeats or (repeats > 1 and len(runs) < MOST_REPEATS and cpu_seconds() - begin < SHORT):
         runs.append({name: once(work) for name, work in works.items()})
     found = {}
     for name in works:
