@@ -16,8 +16,6 @@ from fastcontact.kernels import solid
 from fastcontact.mesh import Mesh
 
 Array = NDArray[np.float64]
-# Numbers in a page of memory.
-PAGE = 512
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,13 +81,11 @@ def stiffness(
     """
     pattern = pattern or sparsity(mesh)
     data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))
-    if parallel.portions(max(map(len, mesh.solids.values()), default=0))[1:]:
-        data.reshape(-1)[::PAGE] = 0.0  # threads that are the first to touch a page of memory wait for each other
     loops = solid.loops(mesh.dim)
     for name, block in mesh.solids.items():
         tables = elements.get(name).tables
 
-        owner, parts = parallel.owners(block, mesh.n_points)
+        owner, parts = owners(block, mesh.n_points)
 
         def add(
             part: int, name: str = name, block: NDArray[np.int32] = block, tables: Any = tables, owner: Any = owner
@@ -110,6 +106,19 @@ def stiffness(
             )
     size = mesh.n_points * mesh.dim
     return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
+
+
+def owners(cells: NDArray[np.int32], n_points: int) -> tuple[NDArray[np.uint8], int]:
+    """Return the part (n_points,) that each point belongs to, and the number of parts.
+
+    A point belongs to the first portion of the cells that has it, so that a part's rows are those of its own cells but for
+    a seam.
+    """
+    owner = np.zeros(n_points, np.uint8)
+    found = parallel.portions(*cells.shape)
+    if len(found) > 1:
+        pattern_kernels.first_parts(cells, np.array([0, *(end for _, end in found)]), owner)
+    return owner, len(found)
 
 
 def rigid_modes(points: Array, kinematics: str) -> Array:

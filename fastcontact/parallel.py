@@ -14,14 +14,13 @@ from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact import _jit
 
 Result = TypeVar("Result")
 Part = TypeVar("Part")
-# With fewer cells the start of threads costs more than they save.
-WORTHWHILE = 20_000
+# With fewer cells, of so many nodes, the start of threads costs more than they save.
+WORTHWHILE, NODES = 20_000, 4
 MOST = 255
 
 
@@ -49,24 +48,12 @@ def one_blas_thread() -> AbstractContextManager[object]:
     return limited
 
 
-def portions(count: int) -> list[tuple[int, int]]:
-    """Return ranges of nearly equal size that cover 0 to `count`: one a thread, or one for little work."""
-    if count < WORTHWHILE:
+def portions(count: int, nodes: int = NODES) -> list[tuple[int, int]]:
+    """Return ranges of nearly equal size that cover 0 to `count`: one a thread, or one for little work.
+
+    What is done for each of `count` cells grows with their number of `nodes`.
+    """
+    if count * nodes < WORTHWHILE * NODES:
         return [(0, count)]
     ends = np.linspace(0, count, min(_jit.threads(), MOST) + 1).astype(int).tolist()
     return list(itertools.pairwise(ends))
-
-
-def owners(cells: NDArray[np.int32], n_points: int) -> tuple[NDArray[np.uint8], int]:
-    """Return the part (n_points,) that each point belongs to, and the number of parts.
-
-    A point belongs to the first portion of the cells that has it, so that a part's rows are those of its own cells but for
-    a seam.
-    """
-    owner = np.zeros(n_points, np.uint8)
-    found = portions(len(cells))
-    for part in range(len(found) - 1, 0, -1):
-        owner[cells[slice(*found[part])]] = part
-    if len(found) > 1:
-        owner[cells[slice(*found[0])]] = 0
-    return owner, len(found)

@@ -33,7 +33,7 @@ def stress_at_points(
                 displacement, out[part],
             )  # fmt: skip
 
-        parallel.shared(fill, parallel.portions(len(block)))
+        parallel.shared(fill, parallel.portions(*block.shape))
         values[name] = out
     return values
 

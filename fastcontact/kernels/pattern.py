@@ -74,3 +74,15 @@ def slots_of(cells, indptr, indices):
                         high = middle
                 slots[c, a, b] = low
     return slots
+
+
+@kernel
+def first_parts(cells, ends, owner):
+    """Fill `owner` (n_points,), given as zeros, with the first of the parts of the cells that has each point.
+
+    Part p consists of the cells ``ends[p]`` to ``ends[p + 1] - 1``.
+    """
+    for part in range(len(ends) - 2, -1, -1):
+        for c in range(ends[part], ends[part + 1]):
+            for a in range(cells.shape[1]):
+                owner[cells[c, a]] = part

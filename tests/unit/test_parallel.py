@@ -23,7 +23,7 @@ def test_ranges_cover_everything_once(threads, count):
     assert len(found) == count
     assert [k for low, high in found for k in range(low, high)] == list(range(20))
     cells = np.random.default_rng(count).integers(0, 50, (40, 4)).astype(np.int32)
-    owner, parts = parallel.owners(cells, 60)
+    owner, parts = assembly.owners(cells, 60)
     assert parts == count
     low = [k for k, (first, last) in enumerate(parallel.portions(40)) for _ in range(first, last)]
     for point in range(50):
@@ -33,6 +33,13 @@ def test_ranges_cover_everything_once(threads, count):
 
 def test_little_work_is_not_shared():
     assert parallel.portions(parallel.WORTHWHILE - 1) == [(0, parallel.WORTHWHILE - 1)]
+
+
+def test_a_fifth_of_the_cells_is_worthwhile_with_five_times_the_nodes(monkeypatch):
+    monkeypatch.setattr(_jit, "threads", lambda: 2)
+    enough = parallel.WORTHWHILE // 5
+    assert len(parallel.portions(enough - 1, 5 * parallel.NODES)) == 1
+    assert len(parallel.portions(enough, 5 * parallel.NODES)) == 2
 
 
 @pytest.mark.parametrize("element", ["tri3", "tri6", "quad4", "quad8", "tet4", "tet10", "hex8", "hex20", "wedge6"])
