@@ -17,8 +17,8 @@ KNOWN = tuple(name for _, name, _ in pkgutil.iter_modules(__path__) if not name.
 SOLVERS = tuple(name for name in KNOWN if name not in OPTIONAL or importlib.util.find_spec(OPTIONAL[name][0]))
 # Above these sizes a multigrid solution is cheaper than a factorisation (measured, see bench/README.md). The second where
 # constraints need columns of K^-1, which factors give at once and multigrid one solution each.
-DIRECT_UP_TO = {2: 1_000_000, 3: 15_000}
-DIRECT_WITH_COLUMNS_UP_TO = {2: 1_000_000, 3: 60_000}
+DIRECT_UP_TO = {2: 3_000_000, 3: 15_000}
+DIRECT_WITH_COLUMNS_UP_TO = {2: 3_000_000, 3: 150_000}
 
 
 def make(

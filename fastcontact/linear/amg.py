@@ -25,7 +25,7 @@ from fastcontact.linear.direct import Direct
 log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
 # Unknowns up to which factors take over, by the number of components of a displacement.
-FACTORS_UP_TO = {1: 1_000_000, 2: 1_000_000, 3: 100_000}
+FACTORS_UP_TO = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
 
 
 class Amg(Multigrid):

@@ -70,7 +70,10 @@ def test_auto_chooses_by_dimension_and_size():
     assert linear.make("auto", dim=2, n_dofs=1000).name == "direct"
     assert linear.make("auto", dim=3, n_dofs=1_000_000).name == "amg"
     assert linear.make("auto", dim=3, n_dofs=40_000).name == "amg"
-    assert linear.make("auto", dim=3, n_dofs=40_000, columns=True).name == "direct"
+    assert linear.make("auto", dim=2, n_dofs=2_000_000).name == "direct"
+    assert linear.make("auto", dim=2, n_dofs=4_000_000).name == "amg"
+    assert linear.make("auto", dim=3, n_dofs=140_000, columns=True).name == "direct"
+    assert linear.make("auto", dim=3, n_dofs=160_000, columns=True).name == "amg"
 
 
 @pytest.mark.parametrize(
