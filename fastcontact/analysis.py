@@ -34,7 +34,8 @@ Mask = NDArray[np.bool_]
 
 # One active-set iteration per pairing is cheapest near the solution but may cycle; after so many, settle the set first.
 SEMISMOOTH_UPDATES = 8
-# Pairings after which an iterative solver starts again from the last step instead of the extrapolated state.
+# Pairings after which an iterative solver starts again from the last step instead of the extrapolated state, and errors of
+# whole solutions are taken for what they are.
 EXTENDED_UPDATES = 25
 # Relative residual of the first solution of a step by an iterative solver, and of later ones in units of the relative
 # change of the displacement and of the last residual: more accuracy than the pairing itself has is lost.
@@ -254,7 +255,10 @@ class Analysis:
                 history[-1]["nodes"] = self._nearest_nodes(np.flatnonzero(state.active != state.wanted))
                 raise ConvergenceError(self._cycling(state, history[-1]["nodes"], constraints), history)
             # Iterative solvers leave a noise of their tolerance; asking for less would never end.
-            enough = max(max(criteria.geometry, self.solver.tolerance) * size, self.round_off)
+            accuracy = max(criteria.geometry, self.solver.tolerance)
+            if update >= EXTENDED_UPDATES:
+                accuracy = max(accuracy, self.solver.error)
+            enough = max(accuracy * size, self.round_off)
             if fixed_updates is None and state.settled and change <= enough and not loose:
                 return constraints, state
             if fixed_updates is None:

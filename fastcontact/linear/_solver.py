@@ -116,6 +116,9 @@ class LinearSolver(Protocol):
     condenses : bool
         Whether, as prepared, the solver knows the compliance of the unknowns that equations may involve.
     counters : Counters
+    error : float
+        By how much solutions for nearly the same right-hand side may differ, in units of their largest component, however
+        small `tolerance` is.
     gave_up : str
         Why another way of solving took over; empty where none did.
     """
@@ -123,6 +126,7 @@ class LinearSolver(Protocol):
     tolerance: float
     condenses: bool
     counters: Counters
+    error: float
     gave_up: str
 
     @property

@@ -41,6 +41,7 @@ class Amg(Multigrid):
 
     name = "amg"
     condenses = False
+    error = 0.0
 
     def __init__(self, tolerance: float = 1e-10, precision: str = "single") -> None:
         super().__init__(tolerance, precision)
