@@ -220,6 +220,6 @@ def _neighbours(side: Surface, facet: Indices, rows: Indices) -> tuple[Indices, 
     start = np.concatenate([[0], np.cumsum(sizes)])
     incidence = csr_array((np.ones(len(nodes)), nodes, start), shape=(side.n_facets, len(side.points)))
     shared = csr_array(incidence[facet[rows]] @ incidence.T).tocoo()
-    row, other = rows[shared.coords[0]], shared.coords[1].astype(np.intp)
+    row, other = rows[shared.row], shared.col.astype(np.intp)
     apart = other != facet[row]
     return row[apart], other[apart]
