@@ -154,6 +154,16 @@ def test_factors_that_took_over_solve_friction_on_its_compliance(monkeypatch):
     assert np.abs(found.displacement - exact.displacement).max() < 1e-8 * np.abs(exact.displacement).max()
 
 
+def test_nothing_is_eliminated_once_factors_have_taken_over():
+    analysis = Analysis(rubbing(), "amg", 1e-10, Criteria())
+    n = analysis.model.n_dofs
+    analysis.solver.give_up(_multigrid.StallError("stalled"))
+    none = csr_array((0, n))
+    with pytest.raises(ConvergenceError, match="factors give the compliance of friction"):
+        analysis.solver.load(np.zeros(n)).oblique(none, np.empty(0), np.empty(0, np.int64), np.zeros(n), 1e-10)
+    assert "gave up" in repr(analysis.solver)
+
+
 def test_constraints_that_repeat_each_other_are_solved_on_their_compliance(caplog):
     """Two contacts on the same nodes: their forces share what one alone would carry."""
     caplog.set_level("INFO", "fastcontact")
