@@ -27,6 +27,26 @@ def rubbing(formulation="node_to_segment", mu=0.3):
     return model
 
 
+def test_small_blocks_slide_in_any_direction():
+    """Pressed, then dragged along both axes: sliding turns."""
+    lower, upper = fc.generate.box(divisions=(3, 3, 2)), fc.generate.box(divisions=(2, 2, 2), origin=(0.0, 0.0, 1.0))
+    named = [
+        body.replace(
+            cell_groups={f"{name}_{group}": cells for group, cells in body.cell_groups.items()}, point_groups={}
+        )
+        for name, body in (("L", lower), ("U", upper))
+    ]
+    model = fc.Model(fc.generate.union(*named), "3d")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("L_ZMIN", "xyz")
+    model.prescribe("U_ZMAX", z=-1e-2, ramp=[(0, 0), (0.5, 1), (1, 1)])
+    model.prescribe("U_ZMAX", x=2e-2, y=8e-3, ramp=[(0, 0), (0.5, 0.1), (1, 1)])
+    model.add_contact("pair", secondary="U_ZMIN", primary="L_ZMAX", formulation="node_to_segment", friction=0.3)
+    exact, found = (fc.solve(model, fc.linear_ramp(4), linear_solver=name)[-1] for name in ("direct", "amg"))
+    assert np.abs(found.displacement - exact.displacement).max() < 1e-8 * 2e-2
+    assert not found.contact["pair"].sticking.all()
+
+
 @pytest.mark.parametrize("formulation", ["node_to_segment", "mortar"])
 @pytest.mark.parametrize("mu", [0.1, 0.7])
 def test_elimination_and_compliance_agree_and_no_column_is_asked_for(formulation, mu):
