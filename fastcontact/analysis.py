@@ -231,7 +231,7 @@ class Analysis:
             constraints = stacked([self.driven.constraints(name, parts[name], positions[name]) for name in parts])
             in_loop = in_loop and update < SEMISMOOTH_UPDATES
             active = self._initially_active(parts, displacement, extended and update == 0)
-            loose = self.solver.iterative and tolerance > self.solver.tolerance
+            loose = self._loose(tolerance)
             limit_now = 1 if in_loop else criteria.max_active_set_iterations
             if self.floating is None:
                 state, u = self._inequalities(loaded, constraints, lift, active, limit_now, tolerance)
@@ -358,11 +358,15 @@ class Analysis:
             )  # fmt: skip
         return state, self.scope.displacement(state.u, lift)
 
+    def _loose(self, tolerance: float) -> bool:
+        """Return whether a solution to this relative residual is not the last one of a step."""
+        return self.solver.iterative and tolerance > self.solver.tolerance
+
     def _newton_steps(self, limit: int, tolerance: float) -> int | None:
         """Return after how many steps friction may be left unsettled; None where it may not."""
         if limit == 1:
             return 1
-        return LOOSE_NEWTON if self.solver.iterative and tolerance > self.solver.tolerance else None
+        return LOOSE_NEWTON if self._loose(tolerance) else None
 
     def _noise(self, lift: Array, tolerance: float) -> tuple[float, float]:
         """Return the relative accuracy of a solution, and the absolute one of its gaps [length]."""

@@ -65,11 +65,13 @@ def solve(
         # At least once, for forces and displacement to start from are not in balance.
         y, gaps = problem.step(y, gaps, *state)
         found = newton(problem, y, gaps, max(EXACT, ENOUGH * tolerance), None if patience is None else patience - 1)
+        if not found.settled and patience is None:
+            return None
         if found.y is not problem.reached:  # between two steps: displacements are known at their ends
             problem.step(found.y, found.gaps, found.closed, found.sticking)
     except ConvergenceError:
         return None
-    return (problem.u, problem.unscaled(found)) if found.settled or patience is not None else None
+    return problem.u, problem.unscaled(found)
 
 
 class Eliminated:

@@ -120,7 +120,7 @@ def supernodes(
         Tree and entries of columns that are numbered as in `postordered`.
     given : ndarray of bool (n,)
         No run has columns of both kinds.
-    widths, shares : ndarray (k,)
+    widths : ndarray (k,), shares : ndarray (k + 1,)
         Runs that follow each other in the tree become one where zeros are at most a share of its entries: which one, the
         first of the widths ascending that is no smaller than that of the run says. The last share is that of all wider ones.
     first, below : ndarray of int (n + 1,)

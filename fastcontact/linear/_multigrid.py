@@ -74,6 +74,7 @@ class Multigrid:
         self.K = Matrix(K.indptr, K.indices, K.data.reshape(-1), (0,) * size, (0,) * size)
         self._cg = ConjugateGradients(K.shape[0])
         self._residuals: ConjugateResiduals | None = None
+        self._diagonal: Array | None = None
         self._solved: Array | None = None  # the right-hand side that iterate and residual belong to
         self._build()
         self.compliance = ComplianceCache(K.shape[0], self._solve_many)
@@ -162,7 +163,9 @@ class Multigrid:
 
     def diagonal(self) -> Array:
         """Return the diagonal (n,) of K."""
-        return np.asarray(self._given[0].diagonal())
+        if self._diagonal is None:  # friction asks for it in every pairing, other contact never
+            self._diagonal = np.asarray(self._given[0].diagonal())
+        return self._diagonal
 
     def _strengthen(self, times: int) -> None:
         """Make the preconditioner positive definite again: with higher bounds, at last in double precision."""

@@ -296,17 +296,18 @@ def test_what_was_regularised_is_kept_in_result_files(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore:the loads strain the model by about 3e-15")
-def test_a_load_lost_in_round_off_is_told_in_numbers():
+def test_a_load_lost_in_round_off_is_told_in_numbers(request):
     """A millionth of a newton over a gap of 30 mm: the deformations are below the accuracy of the coordinates.
 
     What an iteration leaves is larger still, so that the contact does not close.
     """
+    iterative = request.config.getoption("--linear-solver") == "amg"
     mesh = fc.generate.half_spheres("tri3", size=8.0)
     springs, gap = (
         r"springs that regularise .* still carry \d\.\de-0\d of the load",
         r"never closed: the smallest gap is \d",
     )
-    with pytest.warns(fc.FastcontactWarning, match=f"{springs}|{gap}"):
+    with pytest.warns(fc.FastcontactWarning, match=gap if iterative else springs):
         one_step(driven_by_force(mesh, "node_to_segment", 1e-6, gap=30.0))
 
 
