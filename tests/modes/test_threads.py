@@ -1,4 +1,4 @@
-"""The same bits with one and with two threads: displacement, stress and contact force of whole runs."""
+"""The same bits with one and with two threads, ours and those of BLAS: displacement, stress, contact force of whole runs."""
 
 import json
 
@@ -8,6 +8,7 @@ from starting import finished, start
 
 @pytest.mark.parametrize("runs", [("plane", "friction"), ("solid",)])
 def test_one_and_two_threads_find_the_same_bits(runs):
-    found = [json.loads(finished(start("whole_runs.py", *runs, NUMBA_NUM_THREADS=n))[0]) for n in "12"]
+    threads = [dict.fromkeys(("NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), n) for n in "12"]
+    found = [json.loads(finished(start("whole_runs.py", *runs, **environment))[0]) for environment in threads]
     assert found[0] == found[1]
     assert all(size > 0.0 for run in found[0].values() for size in run["sizes"])
