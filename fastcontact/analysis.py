@@ -53,6 +53,7 @@ class Analysis:
     obstacles that forces drive, and `active` (m,) hold the current state.
     """
 
+    @parallel.on_one_blas_thread
     def __init__(
         self, model: Model, linear_solver: str, linear_tolerance: float, criteria: Criteria, ramp: Ramp | None = None,
         linear_precision: str | None = None,
@@ -118,16 +119,13 @@ class Analysis:
         """Displacements (n_points, dim) of the points of the mesh [length]."""
         return self.u[: self.model.n_dofs].reshape(-1, self.model.mesh.dim)
 
-    def step(self, index: int, instant: float) -> StepResult:
-        """Solve for the loads at `instant` and return the state; see `solving.solve`."""
-        with parallel.one_blas_thread():
-            return self._step(index, instant)
-
     def loaded(self, instant: float) -> bool:
         """Return whether loads or prescribed displacements are there at an instant."""
         return bool(self._external(instant).any() or self._lift(instant).any())
 
-    def _step(self, index: int, instant: float) -> StepResult:
+    @parallel.on_one_blas_thread
+    def step(self, index: int, instant: float) -> StepResult:
+        """Solve for the loads at `instant` and return the state; see `solving.solve`."""
         lift = self._lift(instant)
         self.external = self._external(instant)
         self.largest_force = max(self.largest_force, largest(self.external))

@@ -10,8 +10,8 @@ import itertools
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
-from functools import lru_cache
-from typing import Any, TypeVar
+from functools import lru_cache, wraps
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from fastcontact import _jit
 
 Result = TypeVar("Result")
 Part = TypeVar("Part")
+Given = ParamSpec("Given")
 # With fewer cells, of so many nodes, the start of threads costs more than they save.
 WORTHWHILE, NODES = 20_000, 4
 MOST = 255
@@ -45,6 +46,17 @@ def one_blas_thread() -> AbstractContextManager[object]:
     Also, the number of its threads decides the order of its sums, and so the last bits of a result.
     """
     limited: AbstractContextManager[object] = _libraries().limit(limits=1, user_api="blas")
+    return limited
+
+
+def on_one_blas_thread(function: Callable[Given, Result]) -> Callable[Given, Result]:
+    """Let a function run under `one_blas_thread`."""
+
+    @wraps(function)
+    def limited(*args: Given.args, **kwargs: Given.kwargs) -> Result:
+        with one_blas_thread():
+            return function(*args, **kwargs)
+
     return limited
 
 

@@ -20,6 +20,7 @@ from fastcontact.criteria import Criteria
 from fastcontact.errors import ModelError
 from fastcontact.fingerprint import different, fingerprint
 from fastcontact.model import Model
+from fastcontact.parallel import on_one_blas_thread
 from fastcontact.ramp import Ramp, table_value
 from fastcontact.results import StepResult
 
@@ -76,6 +77,7 @@ def taken(analysis: Analysis, case: dict[str, Any]) -> dict[str, Any]:
     return state
 
 
+@on_one_blas_thread
 def put_back(analysis: Analysis, step: StepResult) -> None:
     """Let a fresh analysis go on after `step`, which `check` has found to fit."""
     state = step.restart

@@ -10,7 +10,6 @@ from fastcontact.analysis import Analysis
 from fastcontact.criteria import Criteria
 from fastcontact.errors import warn
 from fastcontact.model import Model
-from fastcontact.parallel import one_blas_thread
 from fastcontact.ramp import Ramp, linear_ramp
 from fastcontact.results import StepResult
 
@@ -83,12 +82,11 @@ def solve(
     doubtful = plausibility.doubts(model)
     for text in doubtful if not steps else ():
         warn(text)
-    with one_blas_thread():
-        analysis = Analysis(model, linear_solver, linear_tolerance, criteria, ramp, linear_precision)
-        if steps:
-            restart.put_back(analysis, steps[-1])
-            begin = steps[-1].load_factor
+    analysis = Analysis(model, linear_solver, linear_tolerance, criteria, ramp, linear_precision)
     analysis.touched = {name: True for step in steps for name, found in step.contact.items() if found.active.any()}
+    if steps:
+        restart.put_back(analysis, steps[-1])
+        begin = steps[-1].load_factor
     for index, instant in enumerate(instants, start=steps[-1].index + 1 if steps else 1):
         step = step_control.advance(analysis, index, begin, instant, criteria.max_halvings)
         found = doubts.at_the_end(analysis, step) if instant == instants[-1] else []
