@@ -7,7 +7,14 @@ from __future__ import annotations
 
 import importlib
 import logging
+import os
 from typing import TYPE_CHECKING, Any
+
+# Threads that wait for work sleep. Spinning is the default of GNU's OpenMP, and costs ten times the CPU time as soon as other
+# processes want the same cores; threads of OpenBLAS spin a tenth of a second after each call. Both libraries look once: as
+# the first parallel kernel runs, and as NumPy or SciPy are first imported.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
 
 __version__ = "0.1.0"
 logging.getLogger(__name__).addHandler(logging.NullHandler())  # nothing on screen unless someone listens
@@ -40,7 +47,7 @@ if TYPE_CHECKING:
     from fastcontact.model import Model
     from fastcontact.ramp import Ramp, linear_ramp
     from fastcontact.results import ContactResult, StepResult
-    from fastcontact.solving import solve
+    from fastcontact.solving import solve, solve_steps
     from fastcontact.topology import ordered_line
 
 _MODULES = ("analytic", "generate", "obstacles", "plot", "recovery", "topology")
@@ -77,6 +84,7 @@ _HOME = {
     "read_med_field": "io.med",
     "read_mesh": "io.mesh_files",
     "solve": "solving",
+    "solve_steps": "solving",
     "write_agr": "io.xmgrace",
     "write_csv": "io.tables",
     "write_med_results": "io.med",
@@ -121,6 +129,7 @@ __all__ = [
     "read_mesh",
     "recovery",
     "solve",
+    "solve_steps",
     "topology",
     "write_agr",
     "write_csv",

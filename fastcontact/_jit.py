@@ -12,10 +12,6 @@ import os
 from collections.abc import Callable
 from typing import Any
 
-# Threads that wait for each other sleep: spinning, the default of GNU's OpenMP, costs ten times the CPU time as soon as
-# other processes want the same cores. The library reads this once, when the first parallel kernel runs.
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")
-
 import numba
 
 from fastcontact.errors import FastcontactError

@@ -510,8 +510,7 @@ class Analysis:
         mesh, kinematics = self.model.mesh, self.model.kinematics
         u = self.displacement
         self._place_obstacles(self.u)
-        at_points = recovery.stress_at_points(mesh, kinematics, self.moduli, self.material, u)
-        stress = recovery.nodal_average(mesh, at_points)
+        stress = recovery.nodal_stress(mesh, kinematics, self.moduli, self.material, u)
         von_mises = recovery.von_mises(stress)
         contact, first = {}, 0
         for name, pair in self.pairs.items():

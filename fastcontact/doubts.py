@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 STRAIN = 0.1
 # Rotation [radian] beyond which they are: half its square is the strain that they leave out.
 ROTATION = 0.3
+# Cells looked at together: copies of all of them would cost as much memory as the mesh.
+AT_A_TIME = 10_000
 # Elements across the radius of a contact that resolve its pressure.
 ACROSS = 4
 # Change of the displacement by the last of a fixed number of geometry updates, relative to its largest component.
@@ -114,13 +116,20 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
     for name, block in mesh.solids.items():
         element = elements.get(name)
         dN = element.gradient(element.nodes[: element.n_corners].mean(axis=0)[None])[0]
-        J = np.einsum("cnd,nk->cdk", mesh.points[block], dN)
-        H = np.einsum("cnd,nk->cdk", displacement[block], dN) @ np.linalg.inv(J)
-        size = np.sqrt(0.5 * ((0.5 * (H - H.transpose(0, 2, 1))) ** 2).sum(axis=(1, 2)))
-        row = int(np.argmax(size))
-        if size[row] > angle:
-            angle, place = float(size[row]), mesh.points[block[row]].mean(axis=0)
+        for first in range(0, len(block), AT_A_TIME):
+            cells = block[first : first + AT_A_TIME]
+            size = _rotations(mesh.points[cells], displacement[cells], dN)
+            row = int(np.argmax(size))
+            if size[row] > angle:
+                angle, place = float(size[row]), mesh.points[cells[row]].mean(axis=0)
     return angle, place
+
+
+def _rotations(points: Array, displacement: Array, dN: Array) -> Array:
+    """Return the rotation (n_cells,) of cells (n_cells, n_nodes, dim) where shape functions have gradients dN."""
+    J = np.einsum("cnd,nk->cdk", points, dN)
+    H = np.einsum("cnd,nk->cdk", displacement, dN) @ np.linalg.inv(J)
+    return np.asarray(np.sqrt(0.5 * ((0.5 * (H - H.transpose(0, 2, 1))) ** 2).sum(axis=(1, 2))))
 
 
 def _lost(name: str, contact: ContactResult, touched: bool, loaded: bool) -> list[str]:

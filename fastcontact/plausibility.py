@@ -17,6 +17,7 @@ from fastcontact.energy import integration_rule
 from fastcontact.loads import BodyForce, Load, Pressure, Traction, Value, evaluated, facets_of
 from fastcontact.mesh import Mesh
 from fastcontact.mesh_quality import poorest_cell
+from fastcontact.parallel import on_one_blas_thread
 
 if TYPE_CHECKING:
     from fastcontact.model import Model
@@ -49,6 +50,7 @@ INTEGRAL, STIFFNESS = 1e-3, 5e-2
 COINCIDENT = 1e-9
 
 
+@on_one_blas_thread
 def doubts(model: Model) -> list[str]:
     """Return what is doubtful about a model that `Model.check` has found complete."""
     found = _moduli(model) + _named_units(model) + _proportions(model)
@@ -165,11 +167,15 @@ def _stiffness(mesh: Mesh) -> list[str]:
 
 
 def _traces(corners: Array, element: Element, xi: Array, weights: Array) -> Array:
-    """Return the integral (n_cells,) of the squared gradients of all shape functions of cells (n_cells, n_nodes, dim)."""
+    """Return the integral (n_cells,) of the squared gradients of all shape functions of cells (n_cells, n_nodes, dim).
+
+    Their sum is that of ``dN.T (J.T J)^-1 dN`` over the nodes, so that no gradient is formed.
+    """
     dN = element.gradient(xi)
-    J = np.einsum("qnk,cnd->cqdk", dN, corners)
-    gradient = np.einsum("qnk,cqkd->cqnd", dN, np.linalg.inv(J))
-    return np.asarray((np.einsum("cqnd,cqnd->cq", gradient, gradient) * np.abs(np.linalg.det(J))) @ weights)
+    J = np.einsum("qnk,cnd->cqdk", dN, corners, optimize=True)
+    metric = np.linalg.inv(J.transpose(0, 1, 3, 2) @ J)
+    squares = np.einsum("qnk,qnl->qkl", dN, dN)
+    return np.asarray(((metric * squares).sum(axis=(2, 3)) * np.abs(np.linalg.det(J))) @ weights)
 
 
 def _some(cells: NDArray[Any]) -> NDArray[Any]:

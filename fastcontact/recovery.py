@@ -11,6 +11,8 @@ from fastcontact.mesh import Mesh
 
 Array = NDArray[np.float64]
 Materials = dict[str, NDArray[np.int32]]
+# Stresses at the points of so many cells are there at a time while nodal ones are formed [bytes].
+BATCH = 16_000_000
 
 
 def stress_at_points(
@@ -21,21 +23,67 @@ def stress_at_points(
     By solid element. Components xx, yy, zz, xy (then yz, xz in 3D); axisymmetric: rr, yy, hoop, ry. Arguments as in
     `assembly.stiffness`, with the displacement (n_points, dim) [length].
     """
-    loops, values = solid.loops(mesh.dim), {}
+    loops, values = _Loops(mesh, kinematics, moduli, material, displacement), {}
     for name, block in mesh.solids.items():
-        N, dN, weights = elements.get(name).tables
-        out = np.empty((len(block), len(weights), moduli.shape[1]))
+        values[name] = loops.room(name, len(block))
+        loops.fill(name, 0, values[name])
+    return values
 
-        def fill(rows: tuple[int, int], name: str = name, N: Array = N, dN: Array = dN, out: Array = out) -> None:
-            part = slice(*rows)
-            loops.stress(
-                mesh.points, mesh.cells[name][part], N, dN, moduli, material[name][part], kinematics == "axisymmetric",
-                displacement, out[part],
+
+def nodal_stress(mesh: Mesh, kinematics: str, moduli: Array, material: Materials, displacement: Array) -> Array:
+    """Return the stress (n_points, n_components) at the nodes, `nodal_average` of `stress_at_points`, in little memory."""
+    loops, average = _Loops(mesh, kinematics, moduli, material, displacement), _Average(mesh, moduli.shape[1])
+    for name, block in mesh.solids.items():
+        room = loops.room(name, 1)
+        room = loops.room(name, min(len(block), BATCH // room.nbytes + 1))
+        for first in range(0, len(block), len(room)):
+            values = room[: len(block) - first]
+            loops.fill(name, first, values)
+            average.add(name, first, values)
+    return average.result()
+
+
+class _Loops:
+    """Stresses at the points of some cells: parameters of `stress_at_points`."""
+
+    def __init__(self, mesh: Mesh, kinematics: str, moduli: Array, material: Materials, displacement: Array) -> None:
+        self._mesh, self._axisymmetric = mesh, kinematics == "axisymmetric"
+        self._moduli, self._material, self._displacement = moduli, material, displacement
+
+    def room(self, name: str, count: int) -> Array:
+        """Return an array for the stresses of `count` cells of an element."""
+        return np.empty((count, len(elements.get(name).tables[2]), self._moduli.shape[1]))
+
+    def fill(self, name: str, first: int, out: Array) -> None:
+        """Fill `out` (n_cells, n_q, n_components) with the stresses of the cells from `first` on, shared by threads."""
+        mesh, cells = self._mesh, self._mesh.cells[name]
+        N, dN, _ = elements.get(name).tables
+
+        def part(rows: tuple[int, int]) -> None:
+            own = slice(first + rows[0], first + rows[1])
+            solid.loops(mesh.dim).stress(
+                mesh.points, cells[own], N, dN, self._moduli, self._material[name][own], self._axisymmetric,
+                self._displacement, out[slice(*rows)],
             )  # fmt: skip
 
-        parallel.shared(fill, parallel.portions(*block.shape))
-        values[name] = out
-    return values
+        parallel.shared(part, parallel.portions(len(out), cells.shape[1]))
+
+
+class _Average:
+    """The plain average, at each node, of the stresses that its cells have there."""
+
+    def __init__(self, mesh: Mesh, components: int) -> None:
+        self._mesh, self._total, self._count = mesh, np.zeros((mesh.n_points, components)), np.zeros(mesh.n_points)
+
+    def add(self, name: str, first: int, values: Array) -> None:
+        """Add those of the cells from `first` on, given at points (n_cells, n_q, n_components)."""
+        cells = self._mesh.cells[name][first : first + len(values)]
+        # Good for any dimension and number of components.
+        solid2d.add_nodal(cells, elements.get(name).extrapolation, values, self._total, self._count)
+
+    def result(self) -> Array:
+        """Return it (n_points, n_components); zero where there is no cell."""
+        return self._total / np.maximum(self._count, 1.0)[:, None]
 
 
 def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:
@@ -53,12 +101,10 @@ def nodal_average(mesh: Mesh, at_points: dict[str, Array]) -> Array:
 
     As SIEF_NOEU of code_aster. Points without a solid cell get zero.
     """
-    components = next(iter(at_points.values())).shape[2]
-    total, count = np.zeros((mesh.n_points, components)), np.zeros(mesh.n_points)
+    average = _Average(mesh, next(iter(at_points.values())).shape[2])
     for name, values in at_points.items():
-        # Good for any dimension and number of components.
-        solid2d.add_nodal(mesh.cells[name], elements.get(name).extrapolation, values, total, count)
-    return total / np.maximum(count, 1.0)[:, None]
+        average.add(name, 0, values)
+    return average.result()
 
 
 def internal_force(mesh: Mesh, kinematics: str, at_points: dict[str, Array]) -> Array:

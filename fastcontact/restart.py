@@ -94,12 +94,12 @@ def put_back(analysis: Analysis, step: StepResult) -> None:
         _to_extrapolation(analysis.extrapolation, state["extrapolation"], analysis.u)
 
 
-def remaining(ramp: Ramp, done: Sequence[StepResult]) -> list[float]:
-    """Return the instants of a ramp after the steps done so far."""
-    if not len(done):
+def remaining(ramp: Ramp, last: StepResult | None) -> list[float]:
+    """Return the instants of a ramp after the last step so far, all of them where there is none."""
+    if last is None:
         return list(ramp.instants)
-    last = done[-1].load_factor
-    return [t for t in ramp.instants if t > last and abs(t - last) > SAME_INSTANT * max(abs(t), abs(last))]
+    end = last.load_factor
+    return [t for t in ramp.instants if t > end and abs(t - end) > SAME_INSTANT * max(abs(t), abs(end))]
 
 
 def _history(table: Sequence[Sequence[float]], end: float, other: Sequence[Sequence[float]]) -> list[float]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 from fastcontact import doubts, plausibility, restart, step_control
 from fastcontact.analysis import Analysis
@@ -42,7 +43,8 @@ def solve(
     criteria : Criteria, optional
         Convergence criteria and the handling of the geometry.
     on_step : callable, optional
-        Called with every new `StepResult` as soon as its step has converged, e.g. ``ResultWriter.write``.
+        Called with every new `StepResult` as soon as its step has converged, e.g. ``ResultWriter.write``. To keep only
+        some of the steps in memory, see `solve_steps`.
     resume : sequence of StepResult
         Steps of the same case to go on after: what `solve` returned, ``open_results(path)`` or ``ResultWriter.done``;
         none by default. The analysis goes on with the instants of the ramp after the last of them and ends as if it had
@@ -70,34 +72,80 @@ def solve(
         or rotations leave the range of linear kinematics, or a fixed number of geometry updates was too small. The
         results of the first and of the last step keep the texts.
     """
-    ramp, criteria = ramp or linear_ramp(), criteria or Criteria()
-    case = restart.identity(model, ramp, criteria)
-    steps, begin = list(resume), ramp.table[0][0]
-    if steps:
-        restart.check(steps[-1], case)
-    instants = restart.remaining(ramp, steps)
-    if not instants:
-        return steps
-    model.check(ramp)
-    doubtful = plausibility.doubts(model)
-    for text in doubtful if not steps else ():
-        warn(text)
-    analysis = Analysis(model, linear_solver, linear_tolerance, criteria, ramp, linear_precision)
-    analysis.touched = {name: True for step in steps for name, found in step.contact.items() if found.active.any()}
-    if steps:
-        restart.put_back(analysis, steps[-1])
-        begin = steps[-1].load_factor
-    for index, instant in enumerate(instants, start=steps[-1].index + 1 if steps else 1):
-        step = step_control.advance(analysis, index, begin, instant, criteria.max_halvings)
-        found = doubts.at_the_end(analysis, step) if instant == instants[-1] else []
-        for text in found:
-            warn(text)
-        told = (*doubtful * (index == 1), *found)
-        step = replace(step, warnings=told, restart=restart.taken(analysis, case))
-        begin = instant
+    steps = list(resume)
+    for step in solve_steps(
+        model, ramp, linear_solver=linear_solver, linear_tolerance=linear_tolerance, linear_precision=linear_precision,
+        criteria=criteria, resume=steps,
+    ):  # fmt: skip
         if on_step is not None:
             on_step(step)
         if steps and steps[-1].restart is not None:
             steps[-1] = replace(steps[-1], restart=None)
         steps.append(step)
     return steps
+
+
+def solve_steps(
+    model: Model,
+    ramp: Ramp | None = None,
+    *,
+    linear_solver: str = "auto",
+    linear_tolerance: float = 1e-10,
+    linear_precision: str | None = None,
+    criteria: Criteria | None = None,
+    resume: Sequence[StepResult] = (),
+) -> Iterator[StepResult]:
+    """Solve a model step by step: a new step is computed when it is asked for, and none is kept.
+
+    Of a long analysis `solve` returns all steps, 80 bytes a point and step in 2D, 120 in 3D. Here what the caller keeps
+    stays in memory, and an analysis may be ended at any step. Parameters, errors and warnings are those of `solve`; a
+    wrong model is told at once.
+
+    Returns
+    -------
+    iterator of StepResult
+        The new steps, each with its `restart`.
+
+    Examples
+    --------
+    >>> for step in solve_steps(model):  # doctest: +SKIP
+    ...     out.write(step)
+    """
+    ramp, criteria = ramp or linear_ramp(), criteria or Criteria()
+    case = restart.identity(model, ramp, criteria)
+    last = resume[-1] if len(resume) else None
+    if last is not None:
+        restart.check(last, case)
+    instants = restart.remaining(ramp, last)
+    if not instants:
+        return iter(())
+    model.check(ramp)
+    solver = (linear_solver, linear_tolerance, linear_precision)
+    touched = {name: True for step in resume for name, found in step.contact.items() if found.active.any()}
+    return _marched(model, ramp, criteria, solver, instants, case, last, touched)
+
+
+def _marched(
+    model: Model, ramp: Ramp, criteria: Criteria, solver: tuple[str, float, str | None], instants: list[float],
+    case: dict[str, Any], last: StepResult | None, touched: dict[str, bool],
+) -> Iterator[StepResult]:  # fmt: skip
+    """Yield the steps at `instants`, the first of them after `last`; `touched` are the pairs that closed before."""
+    doubtful = plausibility.doubts(model)
+    for text in doubtful if last is None else ():
+        warn(text)
+    linear_solver, tolerance, precision = solver
+    analysis = Analysis(model, linear_solver, tolerance, criteria, ramp, precision)
+    analysis.touched = touched
+    begin, before = ramp.table[0][0], 0
+    if last is not None:
+        restart.put_back(analysis, last)
+        begin, before, last = last.load_factor, last.index, None
+    for index, instant in enumerate(instants, start=before + 1):
+        step = step_control.advance(analysis, index, begin, instant, criteria.max_halvings)
+        found = doubts.at_the_end(analysis, step) if instant == instants[-1] else []
+        for text in found:
+            warn(text)
+        told = (*doubtful * (index == 1), *found)
+        yield replace(step, warnings=told, restart=restart.taken(analysis, case))
+        del step
+        begin = instant

@@ -26,10 +26,14 @@ def versions() -> dict[str, str]:
 
 
 def summarise(
-    case: Case, steps: Sequence[StepResult], timings: Mapping[str, float], warnings: Sequence[str]
+    case: Case,
+    last: StepResult,
+    steps: Sequence[Mapping[str, Any]],
+    timings: Mapping[str, float],
+    warnings: Sequence[str],
 ) -> dict[str, Any]:
-    """Return the summary of a run, with the state of its last step; plain numbers, strings, lists and dictionaries."""
-    mesh, last = case.mesh, steps[-1]
+    """Return the summary of a run, given its last step and `of_step` of all: numbers, strings, lists and dictionaries."""
+    mesh = case.mesh
     top = int(np.argmax(last.von_mises))
     penalties = {pair.name: pair.options.get("penalty") for pair in case.model.contact}
     return {
@@ -38,7 +42,7 @@ def summarise(
         "units": dict(case.units),
         "mesh": {"n_points": mesh.n_points, "n_cells": mesh.n_cells},
         "n_dofs": case.model.n_dofs,
-        "steps": [_step(step) for step in steps],
+        "steps": list(steps),
         "contact": {name: _contact(contact, penalties.get(name)) for name, contact in last.contact.items()},
         "probes": {name: _probe(last, point) for name, point in case.probes.items()},
         "von_mises_max": {"value": float(last.von_mises[top]), "at": mesh.points[top].tolist()},
@@ -55,7 +59,8 @@ def summarise(
     }
 
 
-def _step(step: StepResult) -> dict[str, Any]:
+def of_step(step: StepResult) -> dict[str, Any]:
+    """Return what the summary tells of every step: its load factor and how it was solved."""
     counts = ("geometry_updates", "active_set_iterations", "linear_iterations")
     found = {"load_factor": step.load_factor, **{name: step.iterations[name] for name in counts}}
     if "substeps" in step.iterations:

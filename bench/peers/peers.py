@@ -71,6 +71,8 @@ PEERS = (
          "pip install -e .", parallel=True),
     Peer("again", "the same again", "fastcontact_api.py", ("forma04", "half", "octant"), "fastcontact", (OWN,),
          "pip install -e .", options=("again",), parallel=True),
+    Peer("multigrid", "with multigrid", "fastcontact_api.py", ("half",), "fastcontact", (OWN,), "pip install -e .",
+         options=("amg",), parallel=True),
     Peer("getfem", "GetFEM", "getfem_bricks.py", ("forma04",), "getfem", (SYSTEM, OWN), "apt-get install python3-getfem"),
     Peer("getfem-deformed", "GetFEM, deformed", "getfem_bricks.py", ("forma04",), "getfem", (SYSTEM, OWN),
          "apt-get install python3-getfem", options=("deformed",)),

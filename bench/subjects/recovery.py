@@ -4,7 +4,7 @@ import numpy as np
 
 import fastcontact as fc
 from fastcontact.assembly import sparsity, stiffness
-from fastcontact.recovery import nodal_average, stress_at_points
+from fastcontact.recovery import nodal_stress
 
 SIZES = (3_000, 30_000, 100_000)
 
@@ -17,6 +17,6 @@ def works(size):
     u = 1e-3 * mesh.points**2
     assert np.isfinite(u).all()
     return model.n_dofs, {
-        "nodal stress": lambda: nodal_average(mesh, stress_at_points(mesh, "3d", moduli, material, u)),
+        "nodal stress": lambda: nodal_stress(mesh, "3d", moduli, material, u),
         "assembly, values": lambda: stiffness(mesh, "3d", moduli, material, pattern),
     }

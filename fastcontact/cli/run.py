@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     from fastcontact.case import read_case
     from fastcontact.io.result_writer import ResultWriter
     from fastcontact.restart import remaining
-    from fastcontact.solving import solve
+    from fastcontact.solving import solve_steps
 
     started = time.perf_counter()
     if options.threads is not None:
@@ -58,23 +58,21 @@ def run(options: argparse.Namespace) -> int:
         with ResultWriter(output, case.model, case_text=case.text, cell_fields=fields, resume=options.resume) as writer:
             done = writer.done
             _check_same(case, done, output)
-            total = len(done) + len(remaining(case.ramp, done))
+            last, steps = done[-1] if done else None, [summary.of_step(step) for step in done]
+            total = len(done) + len(remaining(case.ramp, last))
             progress = Progress(total, show=sys.stderr.isatty() and not options.quiet, done=len(done))
-
-            def on_step(step: Any) -> None:
-                writer.write(_estimated(case.model, step) if fields else step)
-                progress.step(step)
-
             try:
-                steps = solve(
+                for last in solve_steps(
                     case.model,
                     case.ramp,
                     linear_solver=options.linear or case.linear_solver,
                     linear_tolerance=case.linear_tolerance,
                     criteria=case.criteria,
-                    on_step=on_step,
                     resume=done,
-                )
+                ):
+                    writer.write(_estimated(case.model, last) if fields else last)
+                    progress.step(last)
+                    steps.append(summary.of_step(last))
             except (ConvergenceError, KeyboardInterrupt) as error:
                 error.add_note(_kept(output, writer.n_steps))
                 if options.json:  # in place of the summary of an earlier run
@@ -85,14 +83,15 @@ def run(options: argparse.Namespace) -> int:
                 progress.close()
     texts = list(dict.fromkeys([*(text for step in done for text in step.warnings), *caught]))
     solved = time.perf_counter()
+    assert last is not None  # a ramp without instants is refused
     timings = {"read": read - started, "solve": solved - read, "cpu": time.process_time()}
-    numbers = summary.summarise(case, steps, timings, texts)
+    numbers = summary.summarise(case, last, steps, timings, texts)
     if options.json:
         _write_json(options.json, numbers)
     if options.plot:
         from fastcontact.cli._pictures import profile_picture
 
-        profile_picture(case, steps[-1], options.plot)
+        profile_picture(case, last, options.plot)
     for text in texts:
         if text not in caught:  # of the steps that were there already
             print(f"warning: {text}", file=sys.stderr)

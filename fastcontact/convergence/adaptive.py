@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import time
 import warnings
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +25,7 @@ from fastcontact.errors import CaseError, FastcontactWarning, unknown
 from fastcontact.generate import Forest, circles, linearised, to_quadratic
 from fastcontact.mesh import Mesh
 from fastcontact.results import StepResult
-from fastcontact.solving import solve
+from fastcontact.solving import solve_steps
 
 Array = NDArray[np.float64]
 # Cells that carry this part of the error are refined: a larger part makes fewer, larger steps (Doerfler, 1996).
@@ -224,10 +225,11 @@ def _solved(
     with warnings.catch_warnings():
         if before:  # said once
             warnings.simplefilter("ignore", FastcontactWarning)
-        last = solve(
+        steps = solve_steps(
             found.model, found.ramp, linear_solver=case.linear_solver, linear_tolerance=case.linear_tolerance,
             criteria=case.criteria,
-        )[-1]  # fmt: skip
+        )  # fmt: skip
+        last = deque(steps, maxlen=1).pop()
     error = estimate_error(found.model, last)
     values = quantities.measure(found, last, chosen.pair)
     if quantity not in values:

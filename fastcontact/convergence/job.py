@@ -9,6 +9,7 @@ import json
 import time
 import traceback
 import warnings
+from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +24,7 @@ from fastcontact.convergence.settings import Combination, Settings
 from fastcontact.errors import FastcontactError, FastcontactWarning
 from fastcontact.mesh import Mesh
 from fastcontact.pair_terms import TERMS
-from fastcontact.solving import solve
+from fastcontact.solving import solve_steps
 
 # Changes when the measured numbers or the stored form change.
 SCHEMA = 1
@@ -156,13 +157,14 @@ def _solved(job: Job) -> dict[str, Any]:
         warnings.simplefilter("always", FastcontactWarning)
         mesh = job.base if job.recipe is None else make_mesh(job.recipe, job.base)
         case = build_case(job.data, name=job.name, mesh=mesh)
-        last = solve(
+        steps = solve_steps(
             case.model,
             case.ramp,
             linear_solver=case.linear_solver,
             linear_tolerance=case.linear_tolerance,
             criteria=case.criteria,
-        )[-1]
+        )
+        last = deque(steps, maxlen=1).pop()
     texts = [str(entry.message) for entry in caught if issubclass(entry.category, FastcontactWarning)]
     values = quantities.measure(case, last, job.pair)
     theories = case.theories.get(job.pair or "", {})

@@ -66,6 +66,18 @@ def test_assembly_and_recovery_give_the_same_bits_for_any_number_of_threads(thre
     assert len(set(found)) == 1
 
 
+@pytest.mark.parametrize("batch", [0, 1000, 10**9])
+def test_nodal_stresses_are_the_average_whatever_is_computed_at_a_time(batch, monkeypatch):
+    monkeypatch.setattr(recovery, "BATCH", batch)
+    model = fc.Model(fc.generate.block_on_block("quad4"), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    mesh, (moduli, material) = model.mesh, model.material_numbers()
+    u = np.random.default_rng(3).random(mesh.points.shape)
+    given = (mesh, "plane_strain", moduli, material, u)
+    expected = recovery.nodal_average(mesh, recovery.stress_at_points(*given))
+    np.testing.assert_array_equal(recovery.nodal_stress(*given), expected)
+
+
 def test_a_degenerate_cell_is_named_by_its_lowest_number_whatever_the_threads(threads):
     mesh = fc.generate.block((1.0, 1.0), (6, 6), "quad4")
     points = mesh.points.copy()

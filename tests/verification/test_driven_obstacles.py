@@ -11,7 +11,7 @@ from fastcontact import obstacles
 from fastcontact.case import read_case
 from fastcontact.generate import block, box, quarter_disc
 from fastcontact.model import AGAINST_OBSTACLES
-from fastcontact.summary import lines, summarise
+from fastcontact.summary import lines, of_step, summarise
 
 
 def block_under_a_ball(kinematics, element="quad4", centre=3.0, **options):
@@ -207,7 +207,7 @@ def test_from_case_file_to_result_file(tmp_path):
     moved.add_obstacle("plane", secondary="CONT1", obstacle=plane, motion=down)
     there = fc.solve(moved, fc.linear_ramp(1))[-1].contact["plane"]
     assert there.force[1] == pytest.approx(-2.0e5, rel=1e-8)
-    summary = json.loads(json.dumps(summarise(case, steps, {}, [])))
+    summary = json.loads(json.dumps(summarise(case, steps[-1], [of_step(step) for step in steps], {}, [])))
     assert summary["contact"]["plane"]["obstacle_displacement"] == contact.obstacle_displacement.tolist()
     assert any("obstacle 'plane' stands (0, -" in line for line in lines(summary))
     with fc.open_results(tmp_path / "r.vtkhdf") as results:

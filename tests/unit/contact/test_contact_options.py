@@ -8,7 +8,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.case import build_case, read_case
-from fastcontact.summary import lines, summarise
+from fastcontact.summary import lines, of_step, summarise
 
 CASE = """
 kinematics = "plane_strain"
@@ -114,11 +114,11 @@ def test_the_summary_tells_the_penetration(tmp_path):
     path.write_text(CASE + "penalty = 1e5\n")
     case = read_case(path)
     steps = fc.solve(case.model, case.ramp)
-    summary = summarise(case, steps, {}, [])
+    summary = summarise(case, steps[-1], [of_step(step) for step in steps], {}, [])
     pressure = 0.02 / (10 * 0.91e-3 + 1e-5)
     assert summary["contact"]["pair"]["penetration"] == pytest.approx(pressure / 1e5, rel=1e-8)
     assert summary["contact"]["pair"]["penalty"] == 1e5
     assert any(f"penetrates by up to {pressure / 1e5:.4g}" in line for line in lines(summary))
-    stiff = summarise(case_with(""), fc.solve(case_with("").model, case.ramp), {}, [])
+    stiff = summarise(case_with(""), fc.solve(case_with("").model, case.ramp)[-1], [], {}, [])
     assert stiff["contact"]["pair"]["penetration"] < 1e-15
     assert stiff["contact"]["pair"]["penalty"] is None

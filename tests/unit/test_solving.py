@@ -1,0 +1,61 @@
+"""Steps one at a time: computed when asked for, kept by nobody, the same as all at once."""
+
+import gc
+import itertools
+import weakref
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.analysis import Analysis
+
+
+@pytest.fixture
+def model():
+    found = fc.Model(fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3), "axisymmetric")
+    found.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    found.fix("A1A2", "x")
+    found.prescribe("A2B2", y=-0.5)
+    found.prescribe("A1B1", y=+0.5)
+    found.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="node_to_segment")
+    return found
+
+
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
+def test_the_same_steps_as_all_at_once(model):
+    expected = fc.solve(model, fc.linear_ramp(4))
+    found = list(fc.solve_steps(model, fc.linear_ramp(4)))
+    assert [step.index for step in found] == [1, 2, 3, 4]
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(one.displacement, other.displacement)
+        np.testing.assert_array_equal(one.stress, other.stress)
+    assert found[-1].warnings == expected[-1].warnings
+
+
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
+def test_any_step_can_be_gone_on_from(model):
+    first = next(fc.solve_steps(model, fc.linear_ramp(3)))
+    rest = list(fc.solve_steps(model, fc.linear_ramp(3), resume=[first]))
+    assert [step.index for step in rest] == [2, 3]
+    np.testing.assert_array_equal(rest[-1].displacement, fc.solve(model, fc.linear_ramp(3))[-1].displacement)
+    assert list(fc.solve_steps(model, fc.linear_ramp(3), resume=rest[-1:])) == []
+
+
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
+def test_nothing_is_computed_before_it_is_asked_for_and_nothing_is_kept(model, monkeypatch):
+    computed = []
+    step = Analysis.step
+    monkeypatch.setattr(Analysis, "step", lambda self, *given: (computed.append(given[0]), step(self, *given))[1])
+    steps = fc.solve_steps(model, fc.linear_ramp(4))
+    assert computed == []
+    kept = [weakref.ref(step) for step in itertools.islice(steps, 2)]
+    assert computed == [1, 2]
+    gc.collect()
+    assert [reference() for reference in kept] == [None, None]
+
+
+def test_a_wrong_model_is_told_at_the_call(model):
+    wrong = fc.Model(model.mesh, "axisymmetric")
+    with pytest.raises(fc.ModelError, match="material"):
+        fc.solve_steps(wrong)
