@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,14 @@ from fastcontact.kernels import solid
 from fastcontact.mesh import Mesh
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+class Owners(NamedTuple):
+    """Parts that points (n_points,) belong to, and for each part the range of the cells that it works on."""
+
+    owner: NDArray[np.uint8]
+    cells: list[tuple[int, int]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +41,14 @@ class Sparsity:
     indptr: NDArray[np.int32]
     indices: NDArray[np.int32]
     slots: dict[str, NDArray[np.int32]]
+    _owners: dict[tuple[str, int], Owners] = field(default_factory=dict, repr=False)
+
+    def owners(self, mesh: Mesh, name: str) -> Owners:
+        """Return how threads share the assembly of an element, found once for every number of them."""
+        key = name, len(parallel.portions(*mesh.cells[name].shape))
+        if key not in self._owners:
+            self._owners[key] = owners(mesh.cells[name], mesh.n_points)
+        return self._owners[key]
 
 
 def sparsity(mesh: Mesh) -> Sparsity:
@@ -84,20 +100,20 @@ def stiffness(
     loops = solid.loops(mesh.dim)
     for name, block in mesh.solids.items():
         tables = elements.get(name).tables
-
-        owner, parts = owners(block, mesh.n_points)
+        owner, parts = pattern.owners(mesh, name)
 
         def add(
-            part: int, name: str = name, block: NDArray[np.int32] = block, tables: Any = tables, owner: Any = owner
-        ) -> int:
-            return int(
-                loops.add_stiffness(
-                    mesh.points, block, *tables, moduli, material[name], kinematics == "axisymmetric",
-                    pattern.slots[name], owner, part, data,
-                )
+            part: int, name: str = name, block: NDArray[np.int32] = block, tables: Any = tables, owner: Any = owner,
+            parts: Any = parts,
+        ) -> int:  # fmt: skip
+            rows = slice(*parts[part])
+            bad = loops.add_stiffness(
+                mesh.points, block[rows], *tables, moduli, material[name][rows], kinematics == "axisymmetric",
+                pattern.slots[name][rows], owner, part, data,
             )  # fmt: skip
+            return int(bad) if bad < 0 else int(bad) + rows.start
 
-        found = parallel.shared(add, range(parts))
+        found = parallel.shared(add, range(len(parts)))
         bad = min((number for number in found if number >= 0), default=-1)
         if bad >= 0:
             where = mesh.points[block[bad]].mean(axis=0)
@@ -108,17 +124,28 @@ def stiffness(
     return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
 
 
-def owners(cells: NDArray[np.int32], n_points: int) -> tuple[NDArray[np.uint8], int]:
-    """Return the part (n_points,) that each point belongs to, and the number of parts.
+def owners(cells: NDArray[np.int32], n_points: int) -> Owners:
+    """Return which part each point belongs to, and the cells that each part works on.
 
     A point belongs to the first portion of the cells that has it, so that a part's rows are those of its own cells but for
-    a seam.
+    a seam. Portions are chosen so that parts work on the same number of cells, those at their seams included.
     """
-    owner = np.zeros(n_points, np.uint8)
-    found = parallel.portions(*cells.shape)
-    if len(found) > 1:
-        pattern_kernels.first_parts(cells, np.array([0, *(end for _, end in found)]), owner)
-    return owner, len(found)
+    portions = parallel.portions(*cells.shape)
+    if len(portions) == 1:
+        return Owners(np.zeros(n_points, np.uint8), portions)
+    ends = np.array([0, *(end for _, end in portions)])
+    work = _owners(cells, n_points, ends)[1]
+    beside = work - np.diff(ends)
+    ends[1:-1] = np.cumsum(np.maximum(work.mean() - beside, 0.0))[:-1]
+    return _owners(cells, n_points, np.minimum(ends, len(cells)))[0]
+
+
+def _owners(cells: NDArray[np.int32], n_points: int, ends: Indices) -> tuple[Owners, Indices]:
+    """Return what belongs to the portions of the cells that begin and end at `ends`, and how many cells each works on."""
+    owner = np.full(n_points, parallel.MOST, np.uint8)
+    last, work = np.zeros((2, len(ends) - 1), np.int64)
+    pattern_kernels.first_parts(cells, ends, parallel.MOST, owner, last, work)
+    return Owners(owner, list(zip(ends[:-1].tolist(), np.maximum(last, ends[:-1]).tolist(), strict=True))), work
 
 
 def rigid_modes(points: Array, kinematics: str) -> Array:

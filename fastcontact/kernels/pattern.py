@@ -77,12 +77,18 @@ def slots_of(cells, indptr, indices):
 
 
 @kernel
-def first_parts(cells, ends, owner):
-    """Fill `owner` (n_points,), given as zeros, with the first of the parts of the cells that has each point.
+def first_parts(cells, ends, nobody, owner, last, work):
+    """Fill `owner` (n_points,), given as `nobody`, with the first of the parts of the cells that has each point.
 
-    Part p consists of the cells ``ends[p]`` to ``ends[p + 1] - 1``.
+    Part p consists of the cells ``ends[p]`` to ``ends[p + 1] - 1``; ``work[p]`` cells have a point that it owns, none of
+    them from ``last[p]`` on. Both (n_parts,) are given as zeros.
     """
-    for part in range(len(ends) - 2, -1, -1):
+    for part in range(len(ends) - 1):
         for c in range(ends[part], ends[part + 1]):
             for a in range(cells.shape[1]):
-                owner[cells[c, a]] = part
+                if owner[cells[c, a]] == nobody:
+                    owner[cells[c, a]] = part
+                first = owner[cells[c, a]]
+                if last[first] <= c:
+                    last[first] = c + 1
+                    work[first] += 1

@@ -22,13 +22,33 @@ def test_ranges_cover_everything_once(threads, count):
     found = parallel.portions(20)
     assert len(found) == count
     assert [k for low, high in found for k in range(low, high)] == list(range(20))
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 40])
+def test_every_point_has_an_owner_that_sees_all_its_cells(threads, count):
+    threads(count)
     cells = np.random.default_rng(count).integers(0, 50, (40, 4)).astype(np.int32)
     owner, parts = assembly.owners(cells, 60)
-    assert parts == count
-    low = [k for k, (first, last) in enumerate(parallel.portions(40)) for _ in range(first, last)]
+    assert len(parts) == count
     for point in range(50):
         having = np.flatnonzero((cells == point).any(axis=1))
-        assert not len(having) or owner[point] == low[having[0]]
+        if len(having):
+            low, high = parts[owner[point]]
+            assert low <= having[0] <= having[-1] < high
+
+
+@pytest.mark.parametrize("element", ["hex8", "tet4"])
+def test_parts_work_on_equally_many_cells(threads, element):
+    mesh = fc.generate.box((1.0, 1.0, 1.0), (24, 24, 24), element)
+    cells = mesh.cells[element]
+    for count in (2, 3):
+        threads(count)
+        owner, parts = assembly.owners(cells, mesh.n_points)
+        work = [np.any(owner[cells] == part, axis=1).sum() for part in range(count)]
+        assert max(work) < 1.01 * min(work)
+        assert all(
+            np.any(owner[cells[low:high]] == part, axis=1).sum() == work[part] for part, (low, high) in enumerate(parts)
+        )
 
 
 def test_little_work_is_not_shared():
