@@ -19,7 +19,6 @@ from fastcontact.criteria import Criteria
 from fastcontact.errors import ConvergenceError
 from fastcontact.extrapolation import Extrapolation
 from fastcontact.floating import SLACK, Floating, Settled
-from fastcontact.kernels.multigrid import largest_row_sum
 from fastcontact.kernels.norms import largest, largest_difference
 from fastcontact.model import Model, combined, multiplier
 from fastcontact.ramp import Ramp, linear_ramp
@@ -27,7 +26,7 @@ from fastcontact.results import StepResult
 from fastcontact.rigid_motions import free_motions, generalised, resisting, stopped_at
 from fastcontact.scope import Everything, Scope, Surfaces
 from fastcontact.springs import ground_force, stiffened
-from fastcontact.system import System
+from fastcontact.system import Stiffness, System
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -76,16 +75,18 @@ class Analysis:
         K = stiffened(stiffness(model.mesh, model.kinematics, self.moduli, self.material), model.springs)
         relations = driven.relations(model.relations)
         self.system = System(driven.stiffness(K), driven.supported(supported).ravel(), relations, driven.loose)
-        self.K = self.system.K
         self.surface_dofs = self._surface_dofs()
         involved = self.system.involved(self.surface_dofs)
         motions = driven.motions(free_motions(model.mesh, model.kinematics, supported, model.holding_rows()))
         self.floating = Floating(motions, self.system, involved) if len(motions) else None
-        matrix = self.floating.with_springs(self.system.matrix) if self.floating else self.system.matrix
+        matrix = self.system.matrix if self.floating is None else self.floating.with_springs(self.system.matrix)
         modes = driven.near_nullspace(near_nullspace(model))
         if self.floating is not None:
             involved = np.union1d(involved, self.floating.dofs)
-        self.solver.prepare(matrix, self.system.unknowns_of(modes), involved)
+        del K  # the solver may take its room
+        kept = self.solver.prepare(matrix, self.system.unknowns_of(modes), involved, own=True)
+        if matrix is self.system.matrix:
+            self.system.keep(kept)
         self.scope = self._scope(involved)
         self.shape = (driven.n_dofs // model.mesh.dim, model.mesh.dim)
         self.u = np.zeros(driven.n_dofs)
@@ -118,6 +119,11 @@ class Analysis:
     def displacement(self) -> Array:
         """Displacements (n_points, dim) of the points of the mesh [length]."""
         return self.u[: self.model.n_dofs].reshape(-1, self.model.mesh.dim)
+
+    @property
+    def K(self) -> Stiffness:
+        """Stiffness of all displacements; see `System`."""
+        return self.system.K
 
     def loaded(self, instant: float) -> bool:
         """Return whether loads or prescribed displacements are there at an instant."""
@@ -498,9 +504,7 @@ class Analysis:
 
     def _force_round_off(self) -> float:
         """Return how far internal forces may be off by round-off and the tolerance of the linear solver [force]."""
-        row_sums = sum(
-            largest_row_sum(K.indptr, K.indices, K.data.reshape(-1), self.u, K.blocksize[0]) for K in self.K.parts
-        )
+        row_sums = self.K.largest_row_sum(self.u)
         return max(max(1e-13, self.solver.tolerance) * 10 * row_sums, SLACK * self.largest_force)
 
     def _result(

@@ -82,8 +82,9 @@ class _Average:
         solid2d.add_nodal(cells, elements.get(name).extrapolation, values, self._total, self._count)
 
     def result(self) -> Array:
-        """Return it (n_points, n_components); zero where there is no cell."""
-        return self._total / np.maximum(self._count, 1.0)[:, None]
+        """Return it (n_points, n_components), once; zero where there is no cell."""
+        self._total /= np.maximum(self._count, 1.0)[:, None]
+        return self._total
 
 
 def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 from fastcontact.errors import ModelError
+from fastcontact.kernels.multigrid import largest_row_sum
 from fastcontact.kernels.norms import largest
 from fastcontact.relations import Elimination, Relation, eliminate, stacked_rows
 
@@ -26,18 +28,30 @@ CONFLICT = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Stiffness:
-    """A stiffness matrix as the sum of `parts` (n, n): the linear solver's, and what supports took out of it.
+    """A stiffness matrix as the sum of `parts` (n, n): that of the linear solver, and what supports took out of it.
 
     Two matrices that differ in the rows and columns of supports alone need not be kept both.
     """
 
-    parts: tuple[bsr_array, ...]
+    parts: tuple[Any, ...]
 
     def __matmul__(self, u: Array) -> Array:
         total = np.asarray(self.parts[0] @ u)
         for part in self.parts[1:]:
             total += part @ u
         return total
+
+    def largest_row_sum(self, u: Array) -> float:
+        """Return the largest entry of ``|K| |u|``, added up over the parts: what cancels in ``K u``."""
+        return sum(_largest_row_sum(part, u) for part in self.parts)
+
+
+def _largest_row_sum(K: Any, u: Array) -> float:
+    if isinstance(K, csr_array):
+        return float((abs(K) @ np.abs(u)).max(initial=0.0))
+    if not isinstance(K, bsr_array):
+        return float(K.largest_row_sum(u))
+    return float(largest_row_sum(K.indptr, K.indices, K.data.reshape(-1), u, K.blocksize[0]))
 
 
 class System:
@@ -89,6 +103,12 @@ class System:
             self.free &= (condensed.diagonal() > 0) | loose  # not points that relations tie to nothing but each other
             self.matrix = supports_apart(condensed, ~self.free)[0]
         self._no_unknowns = np.flatnonzero(~self.free)
+
+    def keep(self, matrix: Any) -> None:
+        """Take what the linear solver made of `matrix`, whose room it may have taken, in its place: ``matrix @ v``."""
+        if self.K.parts[0] is self.matrix:
+            self.K = Stiffness((matrix, *self.K.parts[1:]))
+        self.matrix = matrix
 
     def lift(self, prescribed: Array, values: Array) -> Array:
         """Return t for the prescribed displacements (n,) and the right-hand sides (m,) of the relations.
@@ -201,15 +221,15 @@ class ConstrainedMotion:
         return self.relations[int(np.searchsorted(ends, row, side="right"))].name
 
 
-def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, bsr_array]:
+def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
     """Take the rows and columns of supported degrees of freedom out of K (n, n), which is changed in place.
 
     Returns
     -------
     matrix : bsr_array (n, n)
         K without them, their diagonal kept.
-    taken : bsr_array (n, n)
-        What K was, minus `matrix`: few blocks.
+    taken : csr_array (n, n)
+        What K was, minus `matrix`: few numbers.
     """
     K = _with_diagonal(K)
     size = K.blocksize[0]
@@ -229,7 +249,9 @@ def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, bsr_array]:
         after[held, k, k] = np.where(kept > 0, kept, typical)
     K.data[touched] = after
     indptr = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=len(K.indptr) - 1))])
-    return K, bsr_array((before - after, column, indptr), shape=K.shape)
+    taken = bsr_array((before - after, column, indptr), shape=K.shape).tocsr()
+    taken.eliminate_zeros()  # two thirds where planes of symmetry hold one component in three
+    return K, taken.copy()
 
 
 def _with_diagonal(K: bsr_array) -> bsr_array:

@@ -1,12 +1,14 @@
 """Set-up of a multigrid hierarchy: the graph of a matrix, smoothed prolongators and Galerkin products.
 
-Block matrices as in `multigrid`, block sizes as tuples of zeros too. Rows are computed one by one in a fixed order.
+Block matrices as in `multigrid`, block sizes as tuples of zeros too; numbers that are needed exactly as in `halves`. Rows
+are computed one by one in a fixed order.
 """
 
 import numpy as np
 from numba import prange
 
 from fastcontact._jit import kernel, parallel_kernel
+from fastcontact.kernels.halves import entry
 
 # Block rows that one thread takes at a time; in Galerkin products the number of parts, each with its own work space.
 CHUNK = 512
@@ -134,7 +136,7 @@ def _smooth_row(
             at += 1
         for r in range(m):
             for t in range(m):
-                factor = data[(k * m + r) * m + t]
+                factor = entry(data, (k * m + r) * m + t)
                 for c in range(n):
                     sums[(at * m + r) * n + c] += factor * tentative[(j * m + t) * n + c]
     for at in range(count):
@@ -255,7 +257,7 @@ def _galerkin_row(
             base = place[indices[k]] * m * n
             for t in range(m):
                 for r in range(m):
-                    factor = data[(k * m + t) * m + r]  # A_ji = A_ij.T
+                    factor = entry(data, (k * m + t) * m + r)  # A_ji = A_ij.T
                     for c in range(n):
                         products[base + r * n + c] += factor * P[own + t * n + c]
     for e in range(n_near):

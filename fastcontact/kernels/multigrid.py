@@ -28,7 +28,7 @@ def _dot(a, at, step, x, j, length):
 
 
 @kernel
-def _part(share, z, i):
+def part(share, z, i):
     """Return ``share z[i]``; z need not be set where the share is zero."""
     return share * z[i] if share != 0.0 else share
 
@@ -44,9 +44,9 @@ def _multiply(low, high, indptr, indices, data, x, factor, share, z, y, rows, co
                 s0 += _dot(data, at, 1, x, j, cols)
                 s1 += _dot(data, at + n, 1, x, j, cols)
                 s2 += _dot(data, at + 2 * n, 1, x, j, cols)
-            y[3 * i] = _part(share, z, 3 * i) + factor * s0
-            y[3 * i + 1] = _part(share, z, 3 * i + 1) + factor * s1
-            y[3 * i + 2] = _part(share, z, 3 * i + 2) + factor * s2
+            y[3 * i] = part(share, z, 3 * i) + factor * s0
+            y[3 * i + 1] = part(share, z, 3 * i + 1) + factor * s1
+            y[3 * i + 2] = part(share, z, 3 * i + 2) + factor * s2
         elif m == 6:
             s0 = s1 = s2 = s3 = s4 = s5 = x[0] * 0
             for k in range(indptr[i], indptr[i + 1]):
@@ -57,18 +57,18 @@ def _multiply(low, high, indptr, indices, data, x, factor, share, z, y, rows, co
                 s3 += _dot(data, at + 3 * n, 1, x, j, cols)
                 s4 += _dot(data, at + 4 * n, 1, x, j, cols)
                 s5 += _dot(data, at + 5 * n, 1, x, j, cols)
-            y[6 * i] = _part(share, z, 6 * i) + factor * s0
-            y[6 * i + 1] = _part(share, z, 6 * i + 1) + factor * s1
-            y[6 * i + 2] = _part(share, z, 6 * i + 2) + factor * s2
-            y[6 * i + 3] = _part(share, z, 6 * i + 3) + factor * s3
-            y[6 * i + 4] = _part(share, z, 6 * i + 4) + factor * s4
-            y[6 * i + 5] = _part(share, z, 6 * i + 5) + factor * s5
+            y[6 * i] = part(share, z, 6 * i) + factor * s0
+            y[6 * i + 1] = part(share, z, 6 * i + 1) + factor * s1
+            y[6 * i + 2] = part(share, z, 6 * i + 2) + factor * s2
+            y[6 * i + 3] = part(share, z, 6 * i + 3) + factor * s3
+            y[6 * i + 4] = part(share, z, 6 * i + 4) + factor * s4
+            y[6 * i + 5] = part(share, z, 6 * i + 5) + factor * s5
         else:
             for r in range(m):
                 s = x[0] * 0
                 for k in range(indptr[i], indptr[i + 1]):
                     s += _dot(data, k * (m * n) + r * n, 1, x, indices[k] * n, cols)
-                y[m * i + r] = _part(share, z, m * i + r) + factor * s
+                y[m * i + r] = part(share, z, m * i + r) + factor * s
 
 
 @parallel_kernel

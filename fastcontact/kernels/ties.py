@@ -4,12 +4,14 @@ Pivots p follow ``u_p = tie_p u``. On the finest level this is done by `multigri
 next coarser matrix changes from ``P.T K P`` to ``W.T K W`` with ``W = P + E``, where E has rows for the pivots only,
 ``E_p = tie_p P - P_p``; with ``H = K[pivots] P + K[pivots, pivots] E / 2`` the change is ``E.T H + H.T E``.
 
-Rows of E and H are lists of segments: ``start`` (m + 1,), ``columns`` the coarse nodes, ``values`` (n_segments * n,).
+Numbers of K come as in `halves`. Rows of E and H are lists of segments: ``start`` (m + 1,), ``columns`` the coarse nodes,
+``values`` (n_segments * n,).
 """
 
 import numpy as np
 
 from fastcontact._jit import kernel
+from fastcontact.kernels.halves import entry
 
 
 @kernel
@@ -61,7 +63,7 @@ def tied_prolongator(pivots, tstart, tcolumns, tie, start, columns, P, size, n, 
 
 
 @kernel
-def tied_products(pivots, number, indptr, indices, K, unit, start, columns, P, estart, ecolumns, E, size, n, n_coarse):
+def tied_products(pivots, number, indptr, indices, K, start, columns, P, estart, ecolumns, E, size, n, n_coarse):
     """Return (start, columns, values) of H; `number` (n_fine,) is the number of each pivot and -1 elsewhere."""
     m = pivots.shape[0]
     seen, place = np.full(n_coarse, -1, np.int64), np.empty(n_coarse, np.int64)
@@ -96,7 +98,7 @@ def tied_products(pivots, number, indptr, indices, K, unit, start, columns, P, e
             for k in range(indptr[i], indptr[i + 1]):
                 j = indices[k]
                 for b in range(size):
-                    stiffness = unit * K[(k * size + a) * size + b]
+                    stiffness = entry(K, (k * size + a) * size + b)
                     if stiffness == 0.0:
                         continue
                     _add_row(j * size + b, stiffness, size, n, start, columns, P, place, values)
@@ -182,7 +184,7 @@ def coarse_change(estart, ecolumns, E, hstart, hcolumns, H, local, n_local, cols
 
 
 @kernel
-def tied_diagonal(pivots, number, tstart, tcolumns, tie, indptr, indices, K, unit, local, blocks, size):
+def tied_diagonal(pivots, number, tstart, tcolumns, tie, indptr, indices, K, local, blocks, size):
     """Turn diagonal `blocks` (n_local * size * size,) of K into those of ``T.T K T``.
 
     `local` (n_nodes,) numbers the nodes that pivots or what they follow belong to.
@@ -192,7 +194,7 @@ def tied_diagonal(pivots, number, tstart, tcolumns, tie, indptr, indices, K, uni
         for k in range(indptr[i], indptr[i + 1]):
             j = indices[k]
             for b in range(size):
-                stiffness = unit * K[(k * size + a) * size + b]
+                stiffness = entry(K, (k * size + a) * size + b)
                 if stiffness == 0.0:
                     continue
                 q = number[j * size + b]
@@ -213,22 +215,22 @@ def tied_diagonal(pivots, number, tstart, tcolumns, tie, indptr, indices, K, uni
 
 
 @kernel
-def forces_at(pivots, indptr, indices, K, size, u, f, out):
-    """Fill `out` (m,) with ``(K u - f)[pivots]``."""
+def forces_at(pivots, indptr, indices, K, factor, size, u, f, out):
+    """Fill `out` (m,) with ``(factor K u - f)[pivots]``."""
     for p in range(pivots.shape[0]):
         i, a = pivots[p] // size, pivots[p] % size
         s = 0.0
         for k in range(indptr[i], indptr[i + 1]):
             for b in range(size):
-                s += K[(k * size + a) * size + b] * u[indices[k] * size + b]
-        out[p] = s - f[pivots[p]]
+                s += entry(K, (k * size + a) * size + b) * u[indices[k] * size + b]
+        out[p] = factor * s - f[pivots[p]]
 
 
 @kernel
-def forces_of(pivots, values, indptr, indices, K, size, out):
-    """Add ``K[:, pivots] values`` for a symmetric K to `out` (n,)."""
+def forces_of(pivots, values, indptr, indices, K, factor, size, out):
+    """Add ``factor K[:, pivots] values`` for a symmetric K to `out` (n,)."""
     for p in range(pivots.shape[0]):
         i, a = pivots[p] // size, pivots[p] % size
         for k in range(indptr[i], indptr[i + 1]):
             for b in range(size):
-                out[indices[k] * size + b] += K[(k * size + a) * size + b] * values[p]
+                out[indices[k] * size + b] += factor * entry(K, (k * size + a) * size + b) * values[p]

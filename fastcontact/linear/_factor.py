@@ -75,8 +75,10 @@ class FactorSolver:
         """
         return None
 
-    def prepare(self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None) -> None:
-        """Factorise K; see `LinearSolver.prepare`.
+    def prepare(
+        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, own: bool = False
+    ) -> bsr_array:
+        """Factorise K, and leave it as it is; see `LinearSolver.prepare`.
 
         Raises
         ------
@@ -96,6 +98,7 @@ class FactorSolver:
         if self._symmetric is not None and involved is not None and len(involved):
             self.last, self._inverse = involved, self._symmetric.last_inverse()
             self.compliance.give(self.last, self._inverse)
+        return K
 
     def _error(self, K: bsr_array) -> float:
         """Return by how much, in its largest component, a second solution corrects the first one.

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 from scipy.sparse import bsr_array, csr_matrix
 
-from fastcontact.kernels import galerkin, krylov, multigrid
+from fastcontact.kernels import galerkin, multigrid
 from fastcontact.linear._coarse import Coarse
+from fastcontact.linear._matrix import Matrix
 
 Array = NDArray[np.float64]
 Values = NDArray[Any]
@@ -31,36 +32,6 @@ LANCZOS_STEPS = 8
 SAFETY = 1.08
 SMOOTHED = 1 / 24
 DEGREE = 3
-
-
-@dataclass(eq=False)
-class Matrix:
-    """A block matrix, flat: see `kernels.multigrid`."""
-
-    indptr: Indices
-    indices: Indices
-    data: Values
-    rows: tuple[int, ...]
-    cols: tuple[int, ...]
-
-    @property
-    def nbytes(self) -> int:
-        """Memory [bytes]."""
-        return self.indptr.nbytes + self.indices.nbytes + self.data.nbytes
-
-    def multiply(self, x: Values, y: Values) -> None:
-        """Fill `y` with ``A x``."""
-        kind = x.dtype.type
-        multigrid.multiply(
-            self.indptr, self.indices, self.data, x, kind(1.0), kind(0.0), y, y, self.rows, self.cols
-        )  # fmt: skip
-
-    def combine(self, factor: float, x: Values, share: float, z: Values, y: Values) -> None:
-        """Fill `y` with ``share z + factor A x``."""
-        kind = x.dtype.type
-        multigrid.multiply(
-            self.indptr, self.indices, self.data, x, kind(factor), kind(share), z, y, self.rows, self.cols
-        )  # fmt: skip
 
 
 @dataclass(eq=False)
@@ -156,22 +127,16 @@ class Hierarchy:
 
     Parameters
     ----------
-    K : bsr_array (n, n)
-        Square blocks.
+    A : Matrix
+        Square blocks. Its `data` are in the precision of the cycle; the set-up is done in double precision.
     modes : ndarray (n, n_modes)
         Displacements that cost little energy: zero at supported unknowns.
-    precision : {"single", "double"}
-        Of the cycle; the set-up is done in double precision.
     """
 
-    def __init__(self, K: bsr_array, modes: Array, precision: str = "single") -> None:
-        self.dtype: DTypeLike = np.float32 if precision == "single" else np.float64
-        self.n = K.shape[0]
+    def __init__(self, A: Matrix, modes: Array) -> None:
+        self.dtype: DTypeLike = A.data.dtype
+        self.n = (len(A.indptr) - 1) * len(A.rows)
         self.levels: list[Level] = []
-        size = K.blocksize[0]
-        # Numbers of any unit system fit single precision when the largest stiffness is about one.
-        self.unit = 0.5 ** np.round(np.log2(K.diagonal().max())) if precision == "single" else 1.0
-        A = Matrix(K.indptr, K.indices, K.data.reshape(-1), (0,) * size, (0,) * size)
         while True:
             level = self._level(A)
             self.levels.append(level)
@@ -179,18 +144,14 @@ class Hierarchy:
             if coarser is None:
                 break
             level.P, level.R, A, modes = coarser
-        self.coarse = Coarse(_scipy(A) * self.unit)
+        self.coarse = Coarse(_scipy(A))
         self._free_bounds = [level.bound for level in self.levels]
         self.set_bounds()
 
     def _level(self, A: Matrix) -> Level:
         size = len(A.rows)
-        data = A.data
-        if self.dtype != np.float64:
-            data = np.empty(len(A.data), self.dtype)
-            krylov.scaled(self.unit, A.data, data)
-        own = Matrix(A.indptr, A.indices, data, A.rows, A.cols)
-        diagonal = galerkin.diagonal_blocks(A.indptr, A.indices, data, size)
+        own = Matrix(A.indptr, A.indices, A.data.astype(self.dtype, copy=False), A.rows, A.cols)
+        diagonal = galerkin.diagonal_blocks(A.indptr, A.indices, own.data, size)
         inverse = np.empty_like(diagonal)
         multigrid.invert_blocks(diagonal, size, inverse)
         level = Level(own, diagonal, inverse, 1.0)
@@ -215,13 +176,13 @@ class Hierarchy:
         aggregate[member] = aggregates.indices
         tentative = np.zeros((n, size * n_modes))
         tentative[member] = T.data.reshape(len(member), -1)
-        omega = self.unit * 4.0 / 3.0 / (level.bound / SAFETY)
+        omega = 4.0 / 3.0 / (level.bound / SAFETY)
         cols = (0,) * n_modes
         indptr = galerkin.count_prolongator(A.indptr, A.indices, aggregate)
         # In the precision of the cycle from the start: the coarse matrix is then the exact product of what is used.
         blocks = np.empty(int(indptr[-1]) * size * n_modes, self.dtype)
         columns = galerkin.smooth_prolongator(
-            A.indptr, A.indices, A.data, level.inverse, aggregate, tentative.ravel(), omega, indptr, blocks, A.rows, cols
+            A.indptr, A.indices, A.exact, level.inverse, aggregate, tentative.ravel(), omega, indptr, blocks, A.rows, cols
         )  # fmt: skip
         del tentative, T
         index = galerkin.transposed(indptr, columns, n_coarse)
@@ -298,7 +259,7 @@ def product(A: Matrix, P: Matrix, index: tuple[Indices, Indices, Indices]) -> Ma
     columns = np.empty(indptr[-1], np.int32)
     out = np.zeros(int(indptr[-1]) * len(P.cols) ** 2)
     galerkin.galerkin(
-        A.indptr, A.indices, A.data, P.indptr, P.indices, P.data, *index, indptr, int(near.max(initial=0)),
+        A.indptr, A.indices, A.exact, P.indptr, P.indices, P.data, *index, indptr, int(near.max(initial=0)),
         columns, out, P.rows, P.cols,
     )  # fmt: skip
     return Matrix(indptr, columns, out, P.cols, P.cols)
@@ -342,4 +303,5 @@ def _scipy(A: Matrix) -> Any:
     """Return a matrix as SciPy's compressed columns."""
     size = len(A.rows)
     n = (len(A.indptr) - 1) * size
-    return bsr_array((A.data.reshape(-1, size, size), A.indices, A.indptr), shape=(n, n)).tocsc()
+    data = np.sum([part.astype(float) for part in A.exact], axis=0)
+    return bsr_array((data.reshape(-1, size, size), A.indices, A.indptr), shape=(n, n)).tocsc()

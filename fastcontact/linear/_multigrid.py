@@ -15,12 +15,13 @@ from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._jit import check_threads
 from fastcontact.errors import ConvergenceError, ModelError
-from fastcontact.kernels import krylov, ties
+from fastcontact.kernels import krylov
 from fastcontact.linear import _oblique
 from fastcontact.linear._compliance import ComplianceCache
 from fastcontact.linear._elimination import Elimination
 from fastcontact.linear._gcr import ConjugateResiduals
-from fastcontact.linear._hierarchy import Hierarchy, Matrix
+from fastcontact.linear._hierarchy import Hierarchy
+from fastcontact.linear._matrix import Given
 from fastcontact.linear._pcg import ConjugateGradients
 from fastcontact.linear._solver import Counters, Monitor
 from fastcontact.linear._ties import Ties
@@ -67,28 +68,33 @@ class Multigrid:
         """Memory of the hierarchy and the work space, without K [bytes]."""
         return self.hierarchy.nbytes + self._cg.nbytes + (self._residuals.nbytes if self._residuals is not None else 0)
 
-    def build(self, K: bsr_array, rigid_modes: Array) -> None:
-        """Build the hierarchy of K (n, n); `rigid_modes` (n, k) cost it little."""
-        size = K.blocksize[0]
-        self._given = K, rigid_modes
-        self.K = Matrix(K.indptr, K.indices, K.data.reshape(-1), (0,) * size, (0,) * size)
-        self._cg = ConjugateGradients(K.shape[0])
+    def build(self, K: bsr_array, rigid_modes: Array, own: bool = False) -> None:
+        """Build the hierarchy of K (n, n), whose room it may `own`; `rigid_modes` (n, k) cost it little."""
+        n = K.shape[0]
+        self.K = Given(K, self.precision, own)
+        self._modes = rigid_modes.astype(np.float32)  # if they are needed again: single precision is enough
+        self._cg = ConjugateGradients(n)
         self._residuals: ConjugateResiduals | None = None
         self._diagonal: Array | None = None
         self._solved: Array | None = None  # the right-hand side that iterate and residual belong to
-        self._build()
-        self.compliance = ComplianceCache(K.shape[0], self._solve_many)
+        self._build(rigid_modes)
+        self.compliance = ComplianceCache(n, self._solve_many)
 
-    def _build(self) -> None:
+    def _build(self, rigid_modes: Array) -> None:
         check_threads()
-        K, rigid_modes = self._given
-        for old in ("_ties", "hierarchy"):  # two hierarchies at a time need not be remembered
-            self.__dict__.pop(old, None)
-        self.hierarchy = Hierarchy(K, rigid_modes, self.precision)
-        self._ties = Ties(self.hierarchy, self.K)
+        self.hierarchy = Hierarchy(self.K.scaled, rigid_modes)
+        self._ties = Ties(self.hierarchy, self.K.scaled)
         self._tied: Elimination | None = None  # the equations that hold, and those that the hierarchy was tied for
         self._tied_as: Elimination | None = None
         self.counters.setups += 1
+
+    def build_in(self, precision: str) -> None:
+        """Build the hierarchy again, in another precision."""
+        self.precision = precision
+        for old in ("_ties", "hierarchy"):  # two hierarchies at a time need not be remembered
+            self.__dict__.pop(old, None)
+        self.K.change(precision)
+        self._build(self._modes.astype(float))
 
     def _solve_many(self, F: Array) -> Array:
         return np.column_stack([self.solution(np.ascontiguousarray(f), None, None) for f in F.T])
@@ -164,7 +170,7 @@ class Multigrid:
     def diagonal(self) -> Array:
         """Return the diagonal (n,) of K."""
         if self._diagonal is None:  # friction asks for it in every pairing, other contact never
-            self._diagonal = np.asarray(self._given[0].diagonal())
+            self._diagonal = self.K.diagonal()
         return self._diagonal
 
     def _strengthen(self, times: int) -> None:
@@ -173,8 +179,8 @@ class Multigrid:
             self.hierarchy.raise_bounds(RAISE)
             return
         log.info("multigrid: single precision is not enough for this matrix, the cycle goes on in double precision")
-        self.precision, tied = "double", self._tied
-        self._build()
+        tied = self._tied
+        self.build_in("double")
         self.tie(tied)
 
     def _stuck(self, left: float, made: int) -> str:
@@ -195,36 +201,32 @@ class Multigrid:
 
     def _go_on(self, f: Array, old: Elimination | None, new: Elimination | None) -> None:
         """Let the iterate obey other equations: its residual changes near the pivots only."""
-        cg, K = self._cg, self.K
+        cg = self._cg
         if old is not None:
             old.release(cg.r, -self._forces(old, cg.x, f))
         if new is not None:
             before = cg.x[new.pivots]
             new.complete(cg.x, new.t)
             moved = before - cg.x[new.pivots]
-            ties.forces_of(new.pivots, moved, K.indptr, K.indices, K.data, len(K.rows), cg.r)
+            self.K.add_forces_of(new.pivots, moved, cg.r)
             new.condense(cg.r)
         cg.start()
 
     def _forces(self, elimination: Elimination, u: Array, f: Array) -> Array:
         """Return ``(K u - f)[pivots]``."""
-        K = self.K
-        out = np.empty(len(elimination.pivots))
-        ties.forces_at(elimination.pivots, K.indptr, K.indices, K.data, len(K.rows), u, f, out)
-        return out
+        return self.K.forces_at(elimination.pivots, u, f)
 
     def _scale(self, f: Array, elimination: Elimination | None) -> float:
         """Return the size of the right-hand side, forces that impose the equations included."""
         square = self._cg.dot(f, f)
         if elimination is not None and elimination.t.any():
             forces = np.zeros(len(f))
-            K = self.K
-            ties.forces_of(elimination.pivots, elimination.t, K.indptr, K.indices, K.data, len(K.rows), forces)
+            self.K.add_forces_of(elimination.pivots, elimination.t, forces)
             square += self._cg.dot(forces, forces)
         return float(np.sqrt(square))
 
     def _multiply(self, p: Array, q: Array) -> None:
-        self.K.multiply(p, q)
+        self.K.combine(1.0, p, 0.0, q, q)
         if self._tied is not None:
             self._tied.condense(q)
 
@@ -233,7 +235,7 @@ class Multigrid:
         top = self.hierarchy.levels[0]
         krylov.scaled(1.0 / norm, r, top.b)
         self.hierarchy.cycle()
-        krylov.scaled(norm * self.hierarchy.unit, top.x, z)
+        krylov.scaled(norm * self.K.unit, top.x, z)
         if self._tied is not None:
             self._tied.complete(z)
 

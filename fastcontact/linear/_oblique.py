@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear._elimination import Elimination
 from fastcontact.linear._gcr import ConjugateResiduals
-from fastcontact.linear._hierarchy import Matrix
+from fastcontact.linear._matrix import Given
 from fastcontact.linear._solver import Counters
 
 Array = NDArray[np.float64]
@@ -26,7 +26,7 @@ MAX_ITERATIONS = 300
 class Preconditioned(Protocol):
     """What a multigrid solver lends."""
 
-    K: Matrix
+    K: Given
     counters: Counters
 
     def tie(self, elimination: Elimination | None) -> None:
@@ -65,7 +65,7 @@ def solve(
     K, r = solver.K, iteration.r
 
     def multiply(p: Array, q: Array) -> None:
-        K.multiply(p, q)
+        K.combine(1.0, p, 0.0, q, q)
         if springs is not None:
             q += springs @ p
         elimination.condense(q)

@@ -15,6 +15,14 @@ Array = NDArray[np.float64]
 Monitor = Callable[[Array, Array, float], bool]
 
 
+class Product(Protocol):
+    """A symmetric matrix K (n, n) as far as products go."""
+
+    def __matmul__(self, u: Array) -> Any:
+        """Return ``K u`` (n,)."""
+        ...
+
+
 @dataclass
 class Counters:
     """Work done since `prepare`: factorisations or hierarchies built, and solutions or iterations."""
@@ -134,10 +142,13 @@ class LinearSolver(Protocol):
         """Whether less accurate solutions cost less."""
         ...
 
-    def prepare(self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None) -> None:
+    def prepare(
+        self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, own: bool = False
+    ) -> Product:
         """Take the symmetric positive definite matrix K (n, n) and displacements (n, n_modes) that cost it little.
 
-        `involved` are the unknowns that equations may involve, a hint.
+        `involved` are the unknowns that equations may involve, a hint. A solver that may `own` K may take the room of its
+        numbers; K is then no matrix any more. What is returned multiplies as K did.
         """
         ...
 

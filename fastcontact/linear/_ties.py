@@ -15,7 +15,8 @@ from scipy.sparse import bsr_array, csr_array, diags_array
 
 from fastcontact.kernels import galerkin, multigrid, ties
 from fastcontact.linear._elimination import Elimination
-from fastcontact.linear._hierarchy import Hierarchy, Level, Matrix, product
+from fastcontact.linear._hierarchy import Hierarchy, Level, product
+from fastcontact.linear._matrix import Matrix
 
 Array = NDArray[np.float64]
 Values = NDArray[Any]
@@ -63,12 +64,12 @@ class Ties:
     Parameters
     ----------
     hierarchy : Hierarchy
-    K : Matrix
-        The finest matrix in double precision, not scaled.
+    A : Matrix
+        Its finest matrix.
     """
 
-    def __init__(self, hierarchy: Hierarchy, K: Matrix) -> None:
-        self.hierarchy, self.K = hierarchy, K
+    def __init__(self, hierarchy: Hierarchy, A: Matrix) -> None:
+        self.hierarchy, self.A = hierarchy, A
         self._kept: list[tuple[Level, NDArray[np.intp], Values]] = []
 
     def tie(self, elimination: Elimination | None) -> None:
@@ -132,27 +133,27 @@ class Ties:
         return number
 
     def _tie_diagonal(self, top: Level, elimination: Elimination) -> None:
-        size, K, tie = len(top.A.rows), self.K, elimination.tie
+        size, A, tie = len(top.A.rows), self.A, elimination.tie
         nodes = np.unique(np.concatenate([elimination.pivots, tie.indices]) // size).astype(np.intp)
         local = np.full(top.n // size, -1, np.int32)
         local[nodes] = np.arange(len(nodes))
         blocks = top.diagonal.reshape(-1, size**2)[nodes].astype(float).ravel()
         ties.tied_diagonal(
-            elimination.pivots, self._number(elimination), tie.indptr, tie.indices, tie.data, K.indptr, K.indices,
-            K.data, self.hierarchy.unit, local, blocks, size,
+            elimination.pivots, self._number(elimination), tie.indptr, tie.indices, tie.data, A.indptr, A.indices,
+            A.exact, local, blocks, size,
         )  # fmt: skip
         self._renew(top, nodes, blocks.reshape(-1, size**2))
 
     def _first_change(self, top: Level, elimination: Elimination) -> tuple[NDArray[np.intp], Matrix]:
         """Return the nodes of the first coarse level whose rows change, and the change on them."""
-        P, K, tie = top.P, self.K, elimination.tie
+        P, A, tie = top.P, self.A, elimination.tie
         assert P is not None
         size, n, n_coarse = len(P.rows), len(P.cols), self.hierarchy.levels[1].n // len(P.cols)
         E = ties.tied_prolongator(
             elimination.pivots, tie.indptr, tie.indices, tie.data, P.indptr, P.indices, P.data, size, n, n_coarse
         )
         H = ties.tied_products(
-            elimination.pivots, self._number(elimination), K.indptr, K.indices, K.data, self.hierarchy.unit,
+            elimination.pivots, self._number(elimination), A.indptr, A.indices, A.exact,
             P.indptr, P.indices, P.data, *E, size, n, n_coarse,
         )  # fmt: skip
         nodes = np.unique(np.concatenate([E[1], H[1]])).astype(np.intp)

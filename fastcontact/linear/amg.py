@@ -19,7 +19,7 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.linear._compliance import multipliers, reduced
 from fastcontact.linear._elimination import Elimination, RepeatedError, eliminate
 from fastcontact.linear._multigrid import Multigrid, StallError
-from fastcontact.linear._solver import Drag, Loaded, Monitor
+from fastcontact.linear._solver import Drag, Loaded, Monitor, Product
 from fastcontact.linear.direct import Direct
 
 log = logging.getLogger("fastcontact")
@@ -60,10 +60,13 @@ class Amg(Multigrid):
         """See `LinearSolver`; not any more once factors have taken over."""
         return self.instead is None
 
-    def prepare(self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None) -> None:
+    def prepare(
+        self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, own: bool = False
+    ) -> Product:
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
-        self.build(K, rigid_modes)
+        self.build(K, rigid_modes, own)
         self._involved, self.instead, self.gave_up = involved, None, ""
+        return self.K if own else K
 
     def load(self, f: Array) -> Loaded:
         """Return the prepared matrix with right-hand side `f`."""
@@ -86,8 +89,7 @@ class Amg(Multigrid):
             self._take_factors(memory["instead"]["why"]).remember(memory["instead"])
             return
         if memory["precision"] != self.precision:
-            self.precision = memory["precision"]
-            self._build()
+            self.build_in(memory["precision"])
         self.compliance.ask_again(memory["asked"])
         self.tie(memory["tied"] and _tied_again(memory["tied"], self.hierarchy.n))
         self.hierarchy.bounds = memory["bounds"]
@@ -100,8 +102,7 @@ class Amg(Multigrid):
         StallError
             If the matrix is too large for that.
         """
-        K, _ = self._given
-        if K.shape[0] > FACTORS_UP_TO[K.blocksize[0]]:
+        if self.K.shape[0] > FACTORS_UP_TO[self.K.blocksize[0]]:
             raise stalled
         self._take_factors(f"multigrid gave up and factors took over, which cost more time and memory: {stalled}")
 
@@ -109,7 +110,7 @@ class Amg(Multigrid):
         log.warning("%s", why)
         self.gave_up, self.instead = why, Direct()
         self.instead.counters = self.counters
-        self.instead.prepare(*self._given, self._involved)
+        self.instead.prepare(self.K.restored(), self._modes.astype(float), self._involved)
         return self.instead
 
 

@@ -14,7 +14,8 @@ from fastcontact.errors import ModelError
 from fastcontact.kernels import galerkin, krylov, multigrid
 from fastcontact.linear._coarse import Coarse
 from fastcontact.linear._elimination import eliminate
-from fastcontact.linear._hierarchy import Hierarchy, Matrix, chebyshev, largest_eigenvalue, product
+from fastcontact.linear._hierarchy import Hierarchy, chebyshev, largest_eigenvalue, product
+from fastcontact.linear._matrix import Matrix
 from fastcontact.linear._pcg import ConjugateGradients
 from fastcontact.linear._ties import Ties
 from fastcontact.linear.amg import Amg
@@ -137,7 +138,7 @@ def test_vector_kernels_are_those_of_numpy():
 
 def test_galerkin_products_and_prolongators_are_those_of_scipy():
     K, modes, _, _ = problem((9, 8, 8))
-    hierarchy = Hierarchy(K, modes, "double")
+    hierarchy = Hierarchy(matrix_of(K), modes)
     assert len(hierarchy.levels) >= 2
     top, below = hierarchy.levels[:2]
     P = scipy_of(top.P)
@@ -151,7 +152,7 @@ def test_rigid_motions_of_a_free_body_are_interpolated_without_error():
     moduli = np.asarray([fc.LinearElastic(E=1000.0, nu=0.3).moduli("3d")])
     K = stiffness(mesh, "3d", moduli, {"hex8": np.zeros(len(mesh.cells["hex8"]), np.int64)})
     modes = rigid_modes(mesh.points, "3d")
-    P = scipy_of(Hierarchy(K, modes, "double").levels[0].P)
+    P = scipy_of(Hierarchy(matrix_of(K), modes).levels[0].P)
     coarse = np.linalg.lstsq(P.toarray(), modes, rcond=None)[0]
     assert np.abs(P @ coarse - modes).max() < 1e-10
 
@@ -169,7 +170,7 @@ def test_a_galerkin_product_of_other_blocks():
 
 def test_the_spectrum_is_bounded_and_chebyshev_stays_small_on_its_upper_part():
     K, modes, _, _ = problem()
-    level = Hierarchy(K, modes, "double").levels[0]
+    level = Hierarchy(matrix_of(K), modes).levels[0]
     inverse = bsr_array((level.inverse.reshape(-1, 3, 3), np.arange(level.n // 3), np.arange(level.n // 3 + 1)))
     exact = np.linalg.eigvals((inverse @ K).toarray()).real.max()
     assert largest_eigenvalue(level) <= exact * (1 + 1e-10)
@@ -208,7 +209,7 @@ def contact_rows(fixed, count=6):
 
 def test_ties_change_the_levels_to_those_of_the_eliminated_matrix_and_back():
     K, modes, _, fixed = problem((9, 8, 8))
-    hierarchy = Hierarchy(K, modes, "double")
+    hierarchy = Hierarchy(matrix_of(K), modes)
     ties = Ties(hierarchy, matrix_of(K))
     elimination, T = tied(contact_rows(fixed), len(fixed))
     before = [level.inverse.copy() for level in hierarchy.levels]

@@ -1,0 +1,123 @@
+"""The matrix that multigrid solves with: its numbers in two halves, in the room they had, multiply as they did."""
+
+import numpy as np
+import pytest
+from scipy.sparse import bsr_array
+
+import fastcontact as fc
+from fastcontact import linear
+from fastcontact.analysis import Analysis
+from fastcontact.criteria import Criteria
+from fastcontact.kernels import halves
+from fastcontact.linear._matrix import Given
+
+EXACT = 2.0**-47  # of halves, in units of the largest number of a row
+
+
+def matrix(n, size, scale=1.0, seed=0):
+    """Return a symmetric matrix (n size, n size) of a chain with a few more connections."""
+    rng = np.random.default_rng(seed)
+    full = np.zeros((n, size, n, size))
+    for i in range(n):
+        for j in {i, (i + 1) % n, (3 * i) % n}:
+            block = rng.normal(size=(size, size)) * 10.0 ** rng.uniform(-6, 6)
+            full[i, :, j] += block
+            full[j, :, i] += block.T
+    full = full.reshape(n * size, n * size)
+    full[np.diag_indices_from(full)] = np.abs(full).sum(axis=1)
+    return bsr_array(bsr_array(scale * full, blocksize=(size, size)))
+
+
+def test_halves_are_the_nearest_number_and_the_rest():
+    numbers = np.random.default_rng(1).normal(size=1001) * 10.0 ** np.random.default_rng(2).uniform(-12, 3, 1001)
+    first, second = np.empty((2, 1001), np.float32)
+    halves.split(0.25, numbers, first, second)
+    np.testing.assert_array_equal(first, (0.25 * numbers).astype(np.float32))
+    np.testing.assert_array_equal(second, (0.25 * numbers - first).astype(np.float32))
+    joined = np.empty(1001)
+    halves.join(4.0, (first, second), joined)
+    np.testing.assert_allclose(joined, numbers, rtol=2.0**-48)
+    halves.join(1.0, (numbers,), joined)
+    np.testing.assert_array_equal(joined, numbers)
+
+
+def test_the_second_half_may_take_the_place_of_the_numbers():
+    numbers = np.random.default_rng(1).normal(size=999)
+    expected, first, second = np.empty(999, np.float32), np.empty(999, np.float32), numbers.view(np.float32)[:999]
+    halves.split(1.0, numbers.copy(), first, expected)
+    halves.split(1.0, numbers, first, second)
+    np.testing.assert_array_equal(second, expected)
+
+
+@pytest.mark.parametrize("own", [False, True])
+@pytest.mark.parametrize("precision", ["single", "double"])
+@pytest.mark.parametrize(("n", "size"), [(7, 1), (40, 2), (30, 3), (1100, 3)])
+def test_products_are_those_of_the_matrix(n, size, precision, own):
+    K = matrix(n, size, scale=3e7)
+    dense, rng = K.toarray(), np.random.default_rng(3)
+    given = Given(K.copy(), precision, own)
+    u, f = rng.normal(size=(2, n * size))
+    size_of_rows = np.abs(dense) @ np.abs(u)
+    np.testing.assert_array_less(np.abs(given @ u - dense @ u), EXACT * size_of_rows)
+    out = np.full(n * size, np.nan)
+    given.combine(-2.0, u, 0.0, out, out)
+    np.testing.assert_array_less(np.abs(out + 2.0 * dense @ u), 2.0 * EXACT * size_of_rows)
+    given.combine(0.5, u, 3.0, f, out)
+    np.testing.assert_array_less(np.abs(out - 3.0 * f - 0.5 * dense @ u), EXACT * (size_of_rows + np.abs(f)))
+    np.testing.assert_allclose(given.diagonal(), K.diagonal(), rtol=EXACT)
+    np.testing.assert_allclose(given.largest_row_sum(u), size_of_rows.max(), rtol=1e-6)
+    some = np.array([0, n * size // 2, n * size - 1])
+    np.testing.assert_array_less(
+        np.abs(given.forces_at(some, u, f) - (dense @ u - f)[some]), EXACT * (size_of_rows + np.abs(f))[some]
+    )
+    forces = f.copy()
+    given.add_forces_of(some, np.ones(3), forces)
+    expected = f + dense[:, some].sum(axis=1)
+    np.testing.assert_array_less(
+        np.abs(forces - expected), EXACT * (np.abs(dense[:, some]).sum(axis=1) + np.abs(f)) + 1e-300
+    )
+    np.testing.assert_allclose(given.restored().toarray(), dense, rtol=EXACT)
+    given.change("double" if precision == "single" else "single")
+    np.testing.assert_allclose(given.restored().toarray(), dense, rtol=2 * EXACT)
+
+
+def test_a_matrix_that_is_owned_gives_its_room_away():
+    K = matrix(50, 3)
+    K = bsr_array((K.data.copy(), K.indices, K.indptr), shape=K.shape)
+    n = K.data.size
+    given = Given(K, "single", own=True)
+    assert K.nnz == 0
+    assert not (K @ np.ones(150)).any()
+    owner = given.scaled.rest
+    while isinstance(owner.base, np.ndarray):
+        owner = owner.base
+    assert owner.nbytes <= 4 * n + 8
+    assert given.scaled.data.nbytes == 4 * n
+
+
+def test_numbers_that_somebody_else_holds_stay_where_they_are():
+    K = matrix(50, 3)
+    dense, held = K.toarray(), K.data
+    given = Given(K, "single", own=True)
+    np.testing.assert_allclose(given.restored().toarray(), dense, rtol=EXACT)
+    owner = held if held.base is None else held.base
+    assert owner.nbytes == 8 * given.scaled.data.size  # no memory was taken from under it
+
+
+def test_an_analysis_knows_the_stiffness_that_its_solver_owns(forma04):
+    model = forma04(fc.generate.half_spheres("tri3", size=6.0))
+    one, other = (Analysis(model, name, 1e-10, Criteria()) for name in ("direct", "amg"))
+    assert isinstance(one.system.matrix, bsr_array)
+    assert isinstance(other.system.matrix, Given)
+    u = np.random.default_rng(0).normal(size=model.n_dofs)
+    expected = one.K @ u
+    assert np.abs(other.K @ u - expected).max() < 1e-13 * one.K.largest_row_sum(u)
+    np.testing.assert_allclose(other.K.largest_row_sum(u), one.K.largest_row_sum(u), rtol=1e-6)
+
+
+def test_a_solver_leaves_a_matrix_that_it_does_not_own():
+    K = matrix(60, 2)
+    before = K.toarray()
+    solver = linear.make("amg", dim=2, n_dofs=120, tolerance=1e-10)
+    assert solver.prepare(K, np.tile(np.eye(2), (60, 1))) is K
+    np.testing.assert_array_equal(K.toarray(), before)
