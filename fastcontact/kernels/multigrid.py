@@ -2,8 +2,7 @@
 
 A block matrix comes as ``indptr`` (n_rows + 1,), ``indices`` (n_blocks,) and ``data`` (n_blocks * m * n,), its blocks
 one after the other, row by row. The block size comes as two tuples of zeros, ``rows`` of length m and ``cols`` of
-length n: lengths of tuples are known to the compiler, which unrolls the loops over them. Views of blocks inside the
-loops would cost four times as much.
+length n: lengths of tuples are known to the compiler. Views of blocks inside the loops would cost four times as much.
 
 Every row is summed by one thread in a fixed order, so results are the same for any number of threads.
 """
@@ -12,6 +11,7 @@ import numpy as np
 from numba import prange
 
 from fastcontact._jit import kernel, parallel_kernel
+from fastcontact.kernels.block_rows import product
 
 # Block rows that one thread takes at a time, and up to how many rows waking another thread costs more than it saves.
 CHUNK = 256
@@ -34,52 +34,26 @@ def part(share, z, i):
 
 
 @kernel
-def _multiply(low, high, indptr, indices, data, x, factor, share, z, y, rows, cols):
-    m, n = len(rows), len(cols)
+def _multiply(low, high, indptr, indices, numbers, x, factor, share, z, y, rows, cols):
+    m = len(rows)
     for i in range(low, high):
-        if m == 3:
-            s0 = s1 = s2 = x[0] * 0
-            for k in range(indptr[i], indptr[i + 1]):
-                at, j = k * (m * n), indices[k] * n
-                s0 += _dot(data, at, 1, x, j, cols)
-                s1 += _dot(data, at + n, 1, x, j, cols)
-                s2 += _dot(data, at + 2 * n, 1, x, j, cols)
-            y[3 * i] = part(share, z, 3 * i) + factor * s0
-            y[3 * i + 1] = part(share, z, 3 * i + 1) + factor * s1
-            y[3 * i + 2] = part(share, z, 3 * i + 2) + factor * s2
-        elif m == 6:
-            s0 = s1 = s2 = s3 = s4 = s5 = x[0] * 0
-            for k in range(indptr[i], indptr[i + 1]):
-                at, j = k * (m * n), indices[k] * n
-                s0 += _dot(data, at, 1, x, j, cols)
-                s1 += _dot(data, at + n, 1, x, j, cols)
-                s2 += _dot(data, at + 2 * n, 1, x, j, cols)
-                s3 += _dot(data, at + 3 * n, 1, x, j, cols)
-                s4 += _dot(data, at + 4 * n, 1, x, j, cols)
-                s5 += _dot(data, at + 5 * n, 1, x, j, cols)
-            y[6 * i] = part(share, z, 6 * i) + factor * s0
-            y[6 * i + 1] = part(share, z, 6 * i + 1) + factor * s1
-            y[6 * i + 2] = part(share, z, 6 * i + 2) + factor * s2
-            y[6 * i + 3] = part(share, z, 6 * i + 3) + factor * s3
-            y[6 * i + 4] = part(share, z, 6 * i + 4) + factor * s4
-            y[6 * i + 5] = part(share, z, 6 * i + 5) + factor * s5
-        else:
-            for r in range(m):
-                s = x[0] * 0
-                for k in range(indptr[i], indptr[i + 1]):
-                    s += _dot(data, k * (m * n) + r * n, 1, x, indices[k] * n, cols)
-                y[m * i + r] = part(share, z, m * i + r) + factor * s
+        sums = product(indices, numbers, x, indptr[i], indptr[i + 1], rows, cols)
+        for r in range(m):
+            y[m * i + r] = part(share, z, m * i + r) + factor * sums[r]
 
 
 @parallel_kernel
-def multiply(indptr, indices, data, x, factor, share, z, y, rows, cols):
-    """Fill `y` (n_rows * m,) with ``share z + factor A x``; z and y may be the same array."""
+def multiply(indptr, indices, numbers, x, factor, share, z, y, rows, cols):
+    """Fill `y` (n_rows * m,) with ``share z + factor A x``; z and y may be the same array.
+
+    The `numbers` of A come as a tuple, whole or in halves: see `halves`.
+    """
     n = indptr.shape[0] - 1
     if n <= ALONE:
-        _multiply(0, n, indptr, indices, data, x, factor, share, z, y, rows, cols)
+        _multiply(0, n, indptr, indices, numbers, x, factor, share, z, y, rows, cols)
         return
     for c in prange((n + CHUNK - 1) // CHUNK):
-        _multiply(c * CHUNK, min(n, (c + 1) * CHUNK), indptr, indices, data, x, factor, share, z, y, rows, cols)
+        _multiply(c * CHUNK, min(n, (c + 1) * CHUNK), indptr, indices, numbers, x, factor, share, z, y, rows, cols)
 
 
 @kernel

@@ -42,17 +42,15 @@ class Matrix:
         return self.indptr.nbytes + self.indices.nbytes + self.data.nbytes
 
     def multiply(self, x: Values, y: Values) -> None:
-        """Fill `y` with ``A x``, in the precision of x and `data`."""
-        kind = x.dtype.type
-        multigrid.multiply(
-            self.indptr, self.indices, self.data, x, kind(1.0), kind(0.0), y, y, self.rows, self.cols
-        )  # fmt: skip
+        """Fill `y` with ``A x``."""
+        self.combine(1.0, x, 0.0, y, y)
 
     def combine(self, factor: float, x: Values, share: float, z: Values, y: Values) -> None:
-        """Fill `y` with ``share z + factor A x``, in the precision of x and `data`."""
+        """Fill `y` with ``share z + factor A x``, in the precision of x."""
         kind = x.dtype.type
+        numbers = (self.data,) if x.dtype == self.data.dtype else self.exact
         multigrid.multiply(
-            self.indptr, self.indices, self.data, x, kind(factor), kind(share), z, y, self.rows, self.cols
+            self.indptr, self.indices, numbers, x, kind(factor), kind(share), z, y, self.rows, self.cols
         )  # fmt: skip
 
 
@@ -102,11 +100,7 @@ class Given:
 
     def combine(self, factor: float, x: Array, share: float, z: Array, y: Array) -> None:
         """Fill `y` with ``share z + factor K x``."""
-        A = self.scaled
-        if A.rest is None:
-            A.combine(factor, x, share, z, y)
-        else:
-            halves.multiply(A.indptr, A.indices, A.data, A.rest, x, factor / self.unit, share, z, y, A.rows)
+        self.scaled.combine(factor / self.unit, x, share, z, y)
 
     def __matmul__(self, u: Array) -> Array:
         out = np.empty(len(u))
