@@ -7,8 +7,8 @@ are computed one by one in a fixed order.
 import numpy as np
 from numba import prange
 
-from fastcontact._jit import inlined_kernel, kernel, parallel_kernel
-from fastcontact.kernels.halves import entry
+from fastcontact._jit import kernel, parallel_kernel
+from fastcontact.kernels.block_products import add_product, add_transposed
 
 # Block rows that one thread takes at a time; in Galerkin products the number of parts, each with its own work space.
 CHUNK = 512
@@ -134,11 +134,7 @@ def _smooth_row(
         at = 0
         while found[at] != aggregate[j]:
             at += 1
-        for r in range(m):
-            for t in range(m):
-                factor = entry(data, (k * m + r) * m + t)
-                for c in range(n):
-                    sums[(at * m + r) * n + c] += factor * tentative[(j * m + t) * n + c]
+        add_product(sums, at * m * n, data, k * m * m, tentative, j * m * n, rows, rows, cols)
     for at in range(count):
         base = (start[i] + at) * m * n
         columns[start[i] + at] = found[at]
@@ -223,39 +219,6 @@ def count_galerkin(indptr, indices, start, columns, tstart, torigin, count, near
             )
 
 
-@inlined_kernel
-def _add(to, at, factor, row, low, length):
-    """Add a multiple of a row. Six numbers are all read before one is written, so that they can be taken in vectors."""
-    if len(length) == 6:
-        s0 = to[at] + factor * row[low]
-        s1 = to[at + 1] + factor * row[low + 1]
-        s2 = to[at + 2] + factor * row[low + 2]
-        s3 = to[at + 3] + factor * row[low + 3]
-        s4 = to[at + 4] + factor * row[low + 4]
-        s5 = to[at + 5] + factor * row[low + 5]
-        to[at], to[at + 1], to[at + 2], to[at + 3], to[at + 4], to[at + 5] = s0, s1, s2, s3, s4, s5
-    else:
-        for c in range(len(length)):
-            to[at + c] += factor * row[low + c]
-
-
-@inlined_kernel
-def _add_three(to, at, a0, a1, a2, rows, length):
-    """Add multiples of three rows: one load and store for all."""
-    if len(length) == 6:
-        s0 = to[at] + a0 * rows[0] + a1 * rows[6] + a2 * rows[12]
-        s1 = to[at + 1] + a0 * rows[1] + a1 * rows[7] + a2 * rows[13]
-        s2 = to[at + 2] + a0 * rows[2] + a1 * rows[8] + a2 * rows[14]
-        s3 = to[at + 3] + a0 * rows[3] + a1 * rows[9] + a2 * rows[15]
-        s4 = to[at + 4] + a0 * rows[4] + a1 * rows[10] + a2 * rows[16]
-        s5 = to[at + 5] + a0 * rows[5] + a1 * rows[11] + a2 * rows[17]
-        to[at], to[at + 1], to[at + 2], to[at + 3], to[at + 4], to[at + 5] = s0, s1, s2, s3, s4, s5
-    else:
-        n = len(length)
-        for c in range(n):
-            to[at + c] += a0 * rows[c] + a1 * rows[n + c] + a2 * rows[2 * n + c]
-
-
 @kernel
 def _galerkin_row(
     row,
@@ -263,7 +226,6 @@ def _galerkin_row(
     n_near,
     place,
     products,
-    block,
     indptr,
     indices,
     data,
@@ -287,30 +249,13 @@ def _galerkin_row(
         products[e] = 0.0
     for e in range(tstart[row], tstart[row + 1]):
         i, own = torigin[e], tslot[e] * m * n
-        for c in range(m * n):
-            block[c] = P[own + c]
-        for k in range(indptr[i], indptr[i + 1]):
-            base, at = place[indices[k]] * m * n, k * m * m
-            for r in range(m):  # A_ji = A_ij.T
-                if m == 3:
-                    a0, a1, a2 = entry(data, at + r), entry(data, at + m + r), entry(data, at + 2 * m + r)
-                    _add_three(products, base + r * n, a0, a1, a2, block, cols)
-                else:
-                    for t in range(m):
-                        _add(products, base + r * n, entry(data, at + t * m + r), block, t * n, cols)
+        for k in range(indptr[i], indptr[i + 1]):  # A_ji = A_ij.T
+            add_transposed(products, place[indices[k]] * m * n, data, k * m * m, P, own, rows, rows, cols)
     for e in range(n_near):
         j, base = near[e], e * m * n
         for k in range(start[j], start[j + 1]):
-            to = (low + places[columns[k]]) * n * n
-            for c in range(m * n):
-                block[c] = P[k * m * n + c]
-            for r in range(n):
-                if m == 3:
-                    a0, a1, a2 = products[base + r], products[base + n + r], products[base + 2 * n + r]
-                    _add_three(out, to + r * n, a0, a1, a2, block, cols)
-                else:
-                    for t in range(m):
-                        _add(out, to + r * n, products[base + t * n + r], block, t * n, cols)
+            block = (low + places[columns[k]]) * n * n
+            add_transposed(out, block, (products,), base, P, k * m * n, cols, rows, cols)
 
 
 @parallel_kernel
@@ -327,7 +272,7 @@ def galerkin(
         seen, near = np.full(n, -1, np.int32), np.empty(n, np.int32)
         seen_coarse, found = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
         place, places = np.empty(n, np.int32), np.empty(n_coarse, np.int32)
-        products, block = np.empty(largest * m * size), np.empty(m * size)
+        products = np.empty(largest * m * size)
         for row in range(part * n_coarse // PARTS, (part + 1) * n_coarse // PARTS):
             n_near, n_found = _reach(
                 row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, found
@@ -342,7 +287,6 @@ def galerkin(
                 n_near,
                 place,
                 products,
-                block,
                 indptr,
                 indices,
                 data,

@@ -11,7 +11,7 @@ import numpy as np
 from numba import prange
 
 from fastcontact._jit import kernel, parallel_kernel
-from fastcontact.kernels.block_rows import product
+from fastcontact.kernels.block_products import row_times
 
 # Block rows that one thread takes at a time, and up to how many rows waking another thread costs more than it saves.
 CHUNK = 256
@@ -37,7 +37,7 @@ def part(share, z, i):
 def _multiply(low, high, indptr, indices, numbers, x, factor, share, z, y, rows, cols):
     m = len(rows)
     for i in range(low, high):
-        sums = product(indices, numbers, x, indptr[i], indptr[i + 1], rows, cols)
+        sums = row_times(indices, numbers, x, indptr[i], indptr[i + 1], rows, cols)
         for r in range(m):
             y[m * i + r] = part(share, z, m * i + r) + factor * sums[r]
 

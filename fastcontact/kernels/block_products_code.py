@@ -1,0 +1,213 @@
+"""What Numba is told to write for `block_products`: each function here runs while a kernel is compiled, none in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+# Numbers in a vector: four in double precision are what most processors have, and blocks have three or six columns.
+WIDTH = 4
+
+
+class Piece(NamedTuple):
+    """A part of a row of a block: `used` numbers from column `column` on, taken with those beside in vectors of `width`."""
+
+    column: int
+    width: int
+    used: int
+
+
+def row_times(_context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end: Any, rows: Any, cols: Any) -> Any:
+    """Return the types of `block_products.row_times`, and what writes it."""
+    from numba.core import types
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        from numba.core import cgutils
+
+        row = _Row(context, builder, signature, args)
+        step = args[3].type(1)
+        with cgutils.for_range_slice(builder, args[3], args[4], step, args[3].type, inc=True) as (k, _):
+            row.add_block(k)
+        return context.make_tuple(builder, signature.return_type, row.sums())
+
+    sums = types.UniTuple(x.dtype, len(rows))
+    return sums(indices, numbers, x, types.intp, types.intp, rows, cols), code
+
+
+def add_product(
+    _context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, rows: Any, inner: Any, cols: Any
+) -> Any:
+    """Return the types of `block_products.add_product`, and what writes it."""
+    return _added(lambda r, t, _m, k: r * k + t, to, left, right, rows, inner, cols)
+
+
+def add_transposed(
+    _context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, rows: Any, inner: Any, cols: Any
+) -> Any:
+    """Return the types of `block_products.add_transposed`, and what writes it."""
+    return _added(lambda r, t, m, _k: t * m + r, to, left, right, rows, inner, cols)
+
+
+def _added(place: Callable[[int, int, int, int], int], to: Any, left: Any, right: Any, *sizes: Any) -> Any:
+    """Return the types of a product that is added, and what writes it, given where the left factor has (row, inner)."""
+    from numba.core import types
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        m, k, n = (len(size) for size in sizes)
+        write, pieces = _Writer(context, builder, signature.args[0].dtype), _pieces(n)
+        out, right = (write.start(signature.args[number], args[number]) for number in (0, 4))
+        left = write.starts(signature.args[2], args[2])
+        other = [
+            [write.numbers([right], args[5], t * n + piece.column, piece.width) for piece in pieces] for t in range(k)
+        ]
+        for r in range(m):
+            factors = [write.numbers(left, args[3], place(r, t, m, k), 1) for t in range(k)]
+            for p, piece in enumerate(pieces):
+                total = write.numbers([out], args[1], r * n + piece.column, piece.width)
+                for t in range(k):
+                    total = write.plus(total, write.everywhere(factors[t], piece.width), other[t][p])
+                builder.store(total, write.where(out, args[1], r * n + piece.column, piece.width), align=8)
+        return context.get_dummy_value()
+
+    return types.none(to, types.intp, left, types.intp, right, types.intp, *sizes), code
+
+
+class _Writer:
+    """Writes loads of vectors, and what is done with them, in the precision `kind`."""
+
+    def __init__(self, context: Any, builder: Any, kind: Any) -> None:
+        from llvmlite import ir
+
+        self.context, self.builder = context, builder
+        self.real, self.lane = context.get_value_type(kind), ir.IntType(32)
+
+    def start(self, kind: Any, array: Any) -> Any:
+        """Return the address of the first number of an array."""
+        from numba.np.arrayobj import make_array
+
+        return make_array(kind)(self.context, self.builder, array).data
+
+    def starts(self, kinds: Any, arrays: Any) -> list[Any]:
+        """Return the addresses of the first numbers of a tuple of arrays."""
+        return [self.start(kind, self.builder.extract_value(arrays, k)) for k, kind in enumerate(kinds)]
+
+    def where(self, start: Any, at: Any, column: int, width: int) -> Any:
+        """Return the address of a vector: that of a number, counted from `at`."""
+        place = self.builder.gep(start, [self.builder.add(at, at.type(column))])
+        return self.builder.bitcast(place, self.kind(start.type.pointee, width).as_pointer())
+
+    def numbers(self, starts: list[Any], at: Any, column: int, width: int) -> Any:
+        """Return a vector of what begins at `starts`, the halves of each number added."""
+        from llvmlite import ir
+
+        parts = [
+            self.builder.load(
+                self.where(start, at, column, width), align=4 if start.type.pointee == ir.FloatType() else 8
+            )
+            for start in starts
+        ]
+        if parts[0].type != self.kind(self.real, width):
+            parts = [self.builder.fpext(part, self.kind(self.real, width)) for part in parts]
+        return parts[0] if len(parts) == 1 else self.builder.fadd(*parts)
+
+    def plus(self, total: Any, one: Any, other: Any) -> Any:
+        """Return a total and a product, which may be rounded at once."""
+        product = self.builder.fmul(one, other, flags=("contract",))
+        return self.builder.fadd(total, product, flags=("contract",))
+
+    def everywhere(self, number: Any, width: int) -> Any:
+        """Return a vector with the same number everywhere."""
+        from llvmlite import ir
+
+        if width == 1:
+            return number
+        one = ir.Constant(ir.VectorType(number.type, width), ir.Undefined)
+        return self.shuffled(self.builder.insert_element(one, number, self.lane(0)), [0] * width)
+
+    def shuffled(self, vector: Any, lanes: list[int]) -> Any:
+        """Return a vector of lanes of another one."""
+        from llvmlite import ir
+
+        order = ir.Constant(ir.VectorType(self.lane, len(lanes)), lanes)
+        return self.builder.shuffle_vector(vector, vector, order)
+
+    def kind(self, number: Any, width: int) -> Any:
+        """Return the type of a vector."""
+        from llvmlite import ir
+
+        return number if width == 1 else ir.VectorType(number, width)
+
+    def zeros(self, width: int) -> Any:
+        """Return a vector of zeros."""
+        from llvmlite import ir
+
+        return ir.Constant(self.kind(self.real, width), 0.0 if width == 1 else [0.0] * width)
+
+
+class _Row(_Writer):
+    """Writes the loop over the blocks of a row; a sum for every row of the blocks and lane of a vector.
+
+    With three columns a vector has one number too many. In the last row of a block it is the one before the row, in others
+    the one behind, so that nothing is read beside the block.
+    """
+
+    def __init__(self, context: Any, builder: Any, signature: Any, args: Any) -> None:
+        from numba.core import cgutils
+
+        super().__init__(context, builder, signature.args[2].dtype)
+        self.offset = args[3].type
+        self.m, self.n = len(signature.args[5]), len(signature.args[6])
+        self.indices, self.x = (self.start(signature.args[k], args[k]) for k in (0, 2))
+        self.data = self.starts(signature.args[1], args[1])
+        self.shifted = self.n == 3 and self.m > 1
+        self.pieces = [Piece(0, WIDTH, 3)] if self.shifted else _pieces(self.n)
+        self.totals = [
+            [cgutils.alloca_once_value(builder, self.zeros(piece.width)) for piece in self.pieces]
+            for _ in range(self.m)
+        ]
+
+    def add_block(self, k: Any) -> None:
+        """Add the product of block `k` with what it meets of x."""
+        builder, m, n = self.builder, self.m, self.n
+        j = builder.mul(builder.sext(builder.load(builder.gep(self.indices, [k])), self.offset), self.offset(n))
+        at = builder.mul(k, self.offset(m * n))
+        meets = self._three(j) if self.shifted else [self.numbers([self.x], j, p.column, p.width) for p in self.pieces]
+        behind = [self.shuffled(meets[0], [0, 0, 1, 2])] if self.shifted else meets
+        for r in range(m):
+            last = self.shifted and r == m - 1
+            for piece, total, x in zip(self.pieces, self.totals[r], behind if last else meets, strict=True):
+                numbers = self.numbers(self.data, at, r * n + piece.column - last, piece.width)
+                builder.store(self.plus(builder.load(total), numbers, x), total)
+
+    def sums(self) -> list[Any]:
+        """Return the sum of every row of the blocks."""
+        return [self._sum(totals, int(self.shifted and r == self.m - 1)) for r, totals in enumerate(self.totals)]
+
+    def _sum(self, totals: list[Any], first: int) -> Any:
+        """Return the sum of the lanes that count, from the first on."""
+        lanes = []
+        for piece, total in zip(self.pieces, totals, strict=True):
+            vector = self.builder.load(total)
+            if piece.width == 1:
+                lanes.append(vector)
+            else:
+                lanes += [self.builder.extract_element(vector, self.lane(first + c)) for c in range(piece.used)]
+        found = lanes[0]
+        for lane in lanes[1:]:
+            found = self.builder.fadd(found, lane)
+        return found
+
+    def _three(self, j: Any) -> list[Any]:
+        """Return three numbers of x and any fourth, without a look beyond them."""
+        pair = self.shuffled(self.numbers([self.x], j, 0, 2), [0, 1, 0, 1])
+        return [self.builder.insert_element(pair, self.numbers([self.x], j, 2, 1), self.lane(2))]
+
+
+def _pieces(n: int) -> list[Piece]:
+    """Return the pieces of n columns: as many whole vectors as there are, half a one, a single number."""
+    found, column = [], 0
+    for width in (WIDTH, WIDTH // 2, 1):
+        while n - column >= width:
+            found.append(Piece(column, width, width))
+            column += width
+    return found
