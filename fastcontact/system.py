@@ -51,7 +51,7 @@ def _largest_row_sum(K: Any, u: Array) -> float:
         return float((abs(K) @ np.abs(u)).max(initial=0.0))
     if not isinstance(K, bsr_array):
         return float(K.largest_row_sum(u))
-    return float(largest_row_sum(K.indptr, K.indices, K.data.reshape(-1), u, K.blocksize[0]))
+    return float(largest_row_sum(K.indptr, K.indices, (K.data.reshape(-1),), u, (0,) * K.blocksize[0]))
 
 
 class System:

@@ -25,6 +25,14 @@ def row_times_one_by_one(
     return tuple(np.einsum("kmn,kn->m", blocks, x.reshape(-1, n)[indices[begin:end]]))
 
 
+def row_sizes_one_by_one(
+    indices: Any, numbers: tuple[Any, ...], x: Any, begin: int, end: int, rows: tuple[int, ...], cols: tuple[int, ...]
+) -> tuple[Any, ...]:
+    """Return what `row_sizes` does, in NumPy."""
+    positive = tuple(np.abs(part) for part in numbers)
+    return row_times_one_by_one(indices, positive, np.abs(x), begin, end, rows, cols)
+
+
 def add_product_one_by_one(
     to: Any, at: int, left: tuple[Any, ...], first: int, right: Any, second: int, rows: tuple[int, ...],
     inner: tuple[int, ...], cols: tuple[int, ...],
@@ -49,6 +57,8 @@ def add_transposed_one_by_one(
 # follow each other in `numbers`, whole or in halves (see `halves`); `indices` are their columns. The block size comes as the
 # lengths of two tuples.
 row_times = numba.extending.intrinsic(block_products_code.row_times) if compiled() else row_times_one_by_one
+# Returns the sums of the absolute values of all products.
+row_sizes = numba.extending.intrinsic(block_products_code.row_sizes) if compiled() else row_sizes_one_by_one
 # Adds ``A B`` to the block m x n in double precision that begins at to[at]: A (m, k) begins at left[first], whole or in
 # halves, B (k, n) at right[second]. The sizes m, k and n come as the lengths of tuples.
 add_product = numba.extending.intrinsic(block_products_code.add_product) if compiled() else add_product_one_by_one

@@ -11,7 +11,7 @@ import numpy as np
 from numba import prange
 
 from fastcontact._jit import kernel, parallel_kernel
-from fastcontact.kernels.block_products import row_times
+from fastcontact.kernels.block_products import row_sizes, row_times
 
 # Block rows that one thread takes at a time, and up to how many rows waking another thread costs more than it saves.
 CHUNK = 256
@@ -57,18 +57,24 @@ def multiply(indptr, indices, numbers, x, factor, share, z, y, rows, cols):
 
 
 @kernel
-def largest_row_sum(indptr, indices, data, x, size):
-    """Return the largest entry of ``|A| |x|``: the size of the numbers that cancel each other in ``A x``."""
+def _largest_row_sum(low, high, indptr, indices, numbers, x, rows):
     largest = 0.0
-    for i in range(indptr.shape[0] - 1):
-        for a in range(size):
-            s = 0.0
-            for k in range(indptr[i], indptr[i + 1]):
-                at, j = (k * size + a) * size, indices[k] * size
-                for b in range(size):
-                    s += abs(data[at + b] * x[j + b])
-            largest = max(largest, s)
+    for i in range(low, high):
+        sums = row_sizes(indices, numbers, x, indptr[i], indptr[i + 1], rows, rows)
+        for r in range(len(rows)):
+            largest = max(largest, sums[r])
     return largest
+
+
+@parallel_kernel
+def largest_row_sum(indptr, indices, numbers, x, rows):
+    """Return the largest entry of ``|A| |x|``: the size of the numbers that cancel each other in ``A x``."""
+    n = indptr.shape[0] - 1
+    parts = (n + CHUNK - 1) // CHUNK
+    largest = np.zeros(parts)
+    for c in prange(parts):
+        largest[c] = _largest_row_sum(c * CHUNK, min(n, (c + 1) * CHUNK), indptr, indices, numbers, x, rows)
+    return largest.max()
 
 
 @kernel

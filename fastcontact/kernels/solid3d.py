@@ -231,31 +231,56 @@ def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric,
 
 @kernel
 def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, out):
-    """Fill `out` (n_cells, n_q, 6) with the stress xx, yy, zz, xy, yz, xz at the points of the table dN."""
+    """Fill `out` (n_cells, n_q, 6) with the stress xx, yy, zz, xy, yz, xz at the points of the table dN.
+
+    Position and displacement are differentiated along the cell together, and no gradients of shape functions are formed.
+    """
     n_cells, n_nodes = cells.shape
-    slopes = _transposed(dN)
-    x, u, gradient = np.empty((3, n_nodes)), np.empty((3, n_nodes)), np.empty((3, n_nodes))
-    strain = np.empty(6)
+    slopes, local = _transposed(dN), np.empty((n_nodes, 6))
     for c in range(n_cells):
-        _gather(points, cells, c, x)
-        _gather(displacement, cells, c, u)
-        m = material[c]
+        for a in range(n_nodes):
+            p = cells[c, a]
+            for i in range(3):
+                local[a, i], local[a, 3 + i] = points[p, i], displacement[p, i]
+        D = moduli[material[c]]
         for q in range(dN.shape[0]):
-            _map(x, slopes, q, gradient)
-            strain[:] = 0.0
+            xr = yr = zr = ur = vr = wr = 0.0
+            xs = ys = zs = us = vs = ws = 0.0
+            xt = yt = zt = ut = vt = wt = 0.0
             for a in range(n_nodes):
-                gx, gy, gz = gradient[0, a], gradient[1, a], gradient[2, a]
-                strain[0] += gx * u[0, a]
-                strain[1] += gy * u[1, a]
-                strain[2] += gz * u[2, a]
-                strain[3] += gy * u[0, a] + gx * u[1, a]
-                strain[4] += gz * u[1, a] + gy * u[2, a]
-                strain[5] += gz * u[0, a] + gx * u[2, a]
+                r, s, t = slopes[q, 0, a], slopes[q, 1, a], slopes[q, 2, a]
+                xr += r * local[a, 0]
+                yr += r * local[a, 1]
+                zr += r * local[a, 2]
+                ur += r * local[a, 3]
+                vr += r * local[a, 4]
+                wr += r * local[a, 5]
+                xs += s * local[a, 0]
+                ys += s * local[a, 1]
+                zs += s * local[a, 2]
+                us += s * local[a, 3]
+                vs += s * local[a, 4]
+                ws += s * local[a, 5]
+                xt += t * local[a, 0]
+                yt += t * local[a, 1]
+                zt += t * local[a, 2]
+                ut += t * local[a, 3]
+                vt += t * local[a, 4]
+                wt += t * local[a, 5]
+            # Cofactors of the Jacobian: the derivatives of r, s and t in x, y and z, times its determinant.
+            rx, ry, rz = ys * zt - zs * yt, zs * xt - xs * zt, xs * yt - ys * xt
+            sx, sy, sz = zr * yt - yr * zt, xr * zt - zr * xt, yr * xt - xr * yt
+            tx, ty, tz = yr * zs - zr * ys, zr * xs - xr * zs, xr * ys - yr * xs
+            inverse = 1.0 / (xr * rx + yr * ry + zr * rz)
+            exx = (rx * ur + sx * us + tx * ut) * inverse
+            eyy = (ry * vr + sy * vs + ty * vt) * inverse
+            ezz = (rz * wr + sz * ws + tz * wt) * inverse
+            gxy = (ry * ur + sy * us + ty * ut + rx * vr + sx * vs + tx * vt) * inverse
+            gyz = (rz * vr + sz * vs + tz * vt + ry * wr + sy * ws + ty * wt) * inverse
+            gxz = (rx * wr + sx * ws + tx * wt + rz * ur + sz * us + tz * ut) * inverse
             for i in range(6):
-                value = 0.0
-                for j in range(6):
-                    value += moduli[m, i, j] * strain[j]
-                out[c, q, i] = value
+                normal = D[i, 0] * exx + D[i, 1] * eyy + D[i, 2] * ezz
+                out[c, q, i] = normal + D[i, 3] * gxy + D[i, 4] * gyz + D[i, 5] * gxz
 
 
 @kernel

@@ -128,7 +128,7 @@ class Given:
     def largest_row_sum(self, u: Array) -> float:
         """Return the largest entry of ``|K| |u|``."""
         A = self.scaled
-        return float(multigrid.largest_row_sum(A.indptr, A.indices, A.data, u, len(A.rows))) / self.unit
+        return float(multigrid.largest_row_sum(A.indptr, A.indices, (A.data,), u, A.rows)) / self.unit
 
 
 def _in_halves(K: bsr_array, unit: float, own: bool) -> tuple[Values, Values]:
