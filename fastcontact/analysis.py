@@ -83,7 +83,6 @@ class Analysis:
         modes = driven.near_nullspace(near_nullspace(model))
         if self.floating is not None:
             involved = np.union1d(involved, self.floating.dofs)
-        del K  # the solver may take its room
         kept = self.solver.prepare(matrix, self.system.unknowns_of(modes), involved, own=True)
         if matrix is self.system.matrix:
             self.system.keep(kept)

@@ -77,19 +77,21 @@ class Given:
 
     def __init__(self, K: bsr_array, precision: str, own: bool = False) -> None:
         self.shape, self.blocksize = K.shape, K.blocksize
-        self.unit = 1.0
-        size = (0,) * K.blocksize[0]
+        self._take(K, precision, own)
+
+    def _take(self, K: bsr_array, precision: str, own: bool) -> None:
+        indptr, indices, size = K.indptr, K.indices, (0,) * K.blocksize[0]
         if precision == "double":
-            self.scaled = Matrix(K.indptr, K.indices, K.data.reshape(-1), size, size)
+            self.unit = 1.0
+            self.scaled = Matrix(indptr, indices, K.data.reshape(-1), size, size)
             return
         self.unit = float(0.5 ** np.round(np.log2(K.diagonal().max())))
-        indptr, indices = K.indptr, K.indices
         first, second = _in_halves(K, self.unit, own)
         self.scaled = Matrix(indptr, indices, first, size, size, second)
 
     def change(self, precision: str) -> None:
         """Keep the numbers for a cycle in another precision."""
-        self.__init__(self.restored(), precision, own=True)  # type: ignore[misc]
+        self._take(self.restored(), precision, own=True)
 
     def restored(self) -> bsr_array:
         """Return K as it was given, but for round-off."""
