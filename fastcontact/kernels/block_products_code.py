@@ -180,7 +180,10 @@ class _Row(_Writer):
     def add_block(self, k: Any) -> None:
         """Add the product of block `k` with what it meets of x."""
         builder, m, n = self.builder, self.m, self.n
-        j = builder.mul(builder.sext(builder.load(builder.gep(self.indices, [k])), self.offset), self.offset(n))
+        column = builder.load(builder.gep(self.indices, [k]))
+        if column.type != self.offset:
+            column = builder.sext(column, self.offset)
+        j = builder.mul(column, self.offset(n))
         at = builder.mul(k, self.offset(m * n))
         meets = self._three(j) if self.shifted else [self.numbers([self.x], j, p.column, p.width) for p in self.pieces]
         behind = [self.shuffled(meets[0], [0, 0, 1, 2])] if self.shifted else meets
