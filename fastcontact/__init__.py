@@ -11,8 +11,8 @@ import os
 from typing import TYPE_CHECKING, Any
 
 # Threads that wait for work sleep. Spinning is the default of GNU's OpenMP, and costs ten times the CPU time as soon as other
-# processes want the same cores; threads of OpenBLAS spin a tenth of a second after each call. Both libraries look once: as
-# the first parallel kernel runs, and as NumPy or SciPy are first imported.
+# processes want the same cores; threads of OpenBLAS spin, too, a tenth of a second as they are made. Both libraries look
+# once: as the first parallel kernel runs, and as NumPy or SciPy are first imported.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
 

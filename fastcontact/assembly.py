@@ -41,7 +41,7 @@ class Sparsity:
     indptr: NDArray[np.int32]
     indices: NDArray[np.int32]
     slots: dict[str, NDArray[np.int32]]
-    _owners: dict[tuple[str, int], Owners] = field(default_factory=dict, repr=False)
+    _owners: dict[tuple[str, int], Owners] = field(default_factory=dict, init=False, repr=False)
 
     def owners(self, mesh: Mesh, name: str) -> Owners:
         """Return how threads share the assembly of an element, found once for every number of them."""

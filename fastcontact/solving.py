@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from fastcontact import doubts, plausibility, restart, step_control
@@ -120,32 +121,31 @@ def solve_steps(
     if not instants:
         return iter(())
     model.check(ramp)
-    solver = (linear_solver, linear_tolerance, linear_precision)
+    prepare = partial(Analysis, model, linear_solver, linear_tolerance, criteria, ramp, linear_precision)
     touched = {name: True for step in resume for name, found in step.contact.items() if found.active.any()}
-    return _marched(model, ramp, criteria, solver, instants, case, last, touched)
+    return _marched(model, prepare, instants, case, last, touched)
 
 
 def _marched(
-    model: Model, ramp: Ramp, criteria: Criteria, solver: tuple[str, float, str | None], instants: list[float],
-    case: dict[str, Any], last: StepResult | None, touched: dict[str, bool],
+    model: Model, prepare: Callable[[], Analysis], instants: list[float], case: dict[str, Any], last: StepResult | None,
+    touched: dict[str, bool],
 ) -> Iterator[StepResult]:  # fmt: skip
     """Yield the steps at `instants`, the first of them after `last`; `touched` are the pairs that closed before."""
     doubtful = plausibility.doubts(model)
     for text in doubtful if last is None else ():
         warn(text)
-    linear_solver, tolerance, precision = solver
-    analysis = Analysis(model, linear_solver, tolerance, criteria, ramp, precision)
+    analysis = prepare()
     analysis.touched = touched
-    begin, before = ramp.table[0][0], 0
+    begin, before = analysis.ramp.table[0][0], 0
     if last is not None:
         restart.put_back(analysis, last)
-        begin, before, last = last.load_factor, last.index, None
+        begin, before, last = last.load_factor, last.index, None  # kept no longer
     for index, instant in enumerate(instants, start=before + 1):
-        step = step_control.advance(analysis, index, begin, instant, criteria.max_halvings)
+        step = step_control.advance(analysis, index, begin, instant, analysis.criteria.max_halvings)
         found = doubts.at_the_end(analysis, step) if instant == instants[-1] else []
         for text in found:
             warn(text)
         told = (*doubtful * (index == 1), *found)
         yield replace(step, warnings=told, restart=restart.taken(analysis, case))
-        del step
+        del step  # before the next one is computed
         begin = instant

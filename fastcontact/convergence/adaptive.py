@@ -229,7 +229,7 @@ def _solved(
             found.model, found.ramp, linear_solver=case.linear_solver, linear_tolerance=case.linear_tolerance,
             criteria=case.criteria,
         )  # fmt: skip
-        last = deque(steps, maxlen=1).pop()
+        last = deque(steps, maxlen=1).pop()  # none of the others is kept
     error = estimate_error(found.model, last)
     values = quantities.measure(found, last, chosen.pair)
     if quantity not in values:

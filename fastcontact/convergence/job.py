@@ -164,7 +164,7 @@ def _solved(job: Job) -> dict[str, Any]:
             linear_tolerance=case.linear_tolerance,
             criteria=case.criteria,
         )
-        last = deque(steps, maxlen=1).pop()
+        last = deque(steps, maxlen=1).pop()  # none of the others is kept
     texts = [str(entry.message) for entry in caught if issubclass(entry.category, FastcontactWarning)]
     values = quantities.measure(case, last, job.pair)
     theories = case.theories.get(job.pair or "", {})

@@ -1,7 +1,6 @@
 """Products of small blocks with vectors and with each other, in the vectors of the processor.
 
-The compiler makes single numbers of a loop over small blocks: twice the time where the matrix comes from memory, three times
-where it lies in the cache. Indices are not checked here.
+The compiler makes single numbers of a loop over small blocks, which takes twice the time. Indices are not checked here.
 """
 
 from __future__ import annotations

@@ -5,12 +5,8 @@ single precision is enough. Kernels take them as a tuple (first, second), or (nu
 """
 
 import numpy as np
-from numba import prange
 
-from fastcontact._jit import inlined_kernel, kernel, parallel_kernel
-
-# Numbers that one thread takes at a time.
-CHUNK = 4096
+from fastcontact._jit import inlined_kernel, kernel
 
 
 @inlined_kernel
@@ -30,10 +26,8 @@ def split(factor, numbers, first, second):
         second[k] = number - np.float64(first[k])
 
 
-@parallel_kernel
+@kernel
 def join(factor, numbers, out):
     """Fill `out` with ``factor numbers``."""
-    n = out.shape[0]
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        for k in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            out[k] = factor * entry(numbers, k)
+    for k in range(out.shape[0]):
+        out[k] = factor * entry(numbers, k)

@@ -19,16 +19,16 @@ ALONE = 1024
 
 
 @kernel
-def _dot(a, at, step, x, j, length):
-    """Return the sum of ``a[at + c step] x[j + c]``."""
+def _dot(a, at, x, j, length):
+    """Return the sum of ``a[at + c] x[j + c]``."""
     s = a[at] * x[j]
     for c in range(1, len(length)):
-        s += a[at + c * step] * x[j + c]
+        s += a[at + c] * x[j + c]
     return s
 
 
 @kernel
-def part(share, z, i):
+def _part(share, z, i):
     """Return ``share z[i]``; z need not be set where the share is zero."""
     return share * z[i] if share != 0.0 else share
 
@@ -39,7 +39,7 @@ def _multiply(low, high, indptr, indices, numbers, x, factor, share, z, y, rows,
     for i in range(low, high):
         sums = row_times(indices, numbers, x, indptr[i], indptr[i + 1], rows, cols)
         for r in range(m):
-            y[m * i + r] = part(share, z, m * i + r) + factor * sums[r]
+            y[m * i + r] = _part(share, z, m * i + r) + factor * sums[r]
 
 
 @parallel_kernel
@@ -82,7 +82,7 @@ def _relax(low, high, inverse, r, first, second, d, x, rows):
     m = len(rows)
     for i in range(low, high):
         for a in range(m):
-            step = second * _dot(inverse, (m * i + a) * m, 1, r, m * i, rows)
+            step = second * _dot(inverse, (m * i + a) * m, r, m * i, rows)
             if first != 0.0:
                 step += first * d[m * i + a]
                 x[m * i + a] += step
@@ -96,7 +96,7 @@ def _relax_on(low, high, inverse, r, second, d, x, rows):
     m = len(rows)
     for i in range(low, high):
         for a in range(m):
-            step = second * _dot(inverse, (m * i + a) * m, 1, r, m * i, rows)
+            step = second * _dot(inverse, (m * i + a) * m, r, m * i, rows)
             d[m * i + a] = step
             x[m * i + a] += step
 

@@ -12,7 +12,7 @@ from fastcontact.kernels import cholesky, elimination_tree
 from fastcontact.linear._order import fill_reducing, reordered
 from fastcontact.linear._singular import indefinite, singular
 from fastcontact.linear._symmetric import Shape, SymmetricFactors
-from fastcontact.parallel import one_blas_thread
+from fastcontact.parallel import on_one_blas_thread
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -22,6 +22,7 @@ WIDTHS, SHARES = np.array([4, 16, 48]), np.array([0.8, 0.5, 0.1, 0.05])
 ROUND_OFF = 1e-10
 
 
+@on_one_blas_thread
 def factors(K: bsr_array, last: Indices) -> SymmetricFactors:
     """Return the factors of the symmetric matrix K (n, n) with the unknowns `last` (m,) last.
 
@@ -41,10 +42,9 @@ def factors(K: bsr_array, last: Indices) -> SymmetricFactors:
     start = np.concatenate([[0], np.cumsum(np.repeat(nodes.first[1:] + below, width) - np.arange(n))])
     values, d = np.empty(start[-1]), np.empty(n)
     sizes = cholesky.room(tree.parent, nodes.first, nodes.begin)
-    with one_blas_thread():
-        bad = cholesky.factorise(
-            A.indptr, A.indices, A.data, tree.order, tree.place, tree.parent, *nodes, sizes, start, values, d
-        )
+    bad = cholesky.factorise(
+        A.indptr, A.indices, A.data, tree.order, tree.place, tree.parent, *nodes, sizes, start, values, d
+    )
     if bad >= 0:
         raise singular() if abs(d[bad]) <= ROUND_OFF * A.diagonal()[tree.order[bad]] else indefinite()
     place = np.empty(n, np.intp)

@@ -16,10 +16,14 @@ Monitor = Callable[[Array, Array, float], bool]
 
 
 class Product(Protocol):
-    """A symmetric matrix K (n, n) as far as products go."""
+    """What a solver that owns a matrix K (n, n) returns in its place."""
 
-    def __matmul__(self, u: Array) -> Any:
+    def __matmul__(self, u: Array) -> Array:
         """Return ``K u`` (n,)."""
+        ...
+
+    def largest_row_sum(self, u: Array) -> float:
+        """Return the largest entry of ``|K| |u|``."""
         ...
 
 
@@ -144,11 +148,11 @@ class LinearSolver(Protocol):
 
     def prepare(
         self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, own: bool = False
-    ) -> Product:
+    ) -> bsr_array | Product:
         """Take the symmetric positive definite matrix K (n, n) and displacements (n, n_modes) that cost it little.
 
         `involved` are the unknowns that equations may involve, a hint. A solver that may `own` K may take the room of its
-        numbers; K is then no matrix any more. What is returned multiplies as K did.
+        numbers; K is then no matrix any more, and what is returned takes its place. Otherwise that is K.
         """
         ...
 

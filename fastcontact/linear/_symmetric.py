@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotri
 
 from fastcontact.kernels import triangular
+from fastcontact.parallel import on_one_blas_thread
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -63,6 +64,7 @@ class SymmetricFactors:
             triangular.backward(*self._L, nothing, x)
         return np.ascontiguousarray(columns.T).reshape(X.shape)[self._place]
 
+    @on_one_blas_thread
     def last_inverse(self) -> Array:
         """Return the rows and columns `last` of ``K^-1``, in the order of `last`."""
         at = np.sort(self._place[self._last])

@@ -62,7 +62,7 @@ class Amg(Multigrid):
 
     def prepare(
         self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, own: bool = False
-    ) -> Product:
+    ) -> bsr_array | Product:
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
         self.build(K, rigid_modes, own)
         self._involved, self.instead, self.gave_up = involved, None, ""
