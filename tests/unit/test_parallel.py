@@ -30,11 +30,13 @@ def test_every_point_has_an_owner_that_sees_all_its_cells(threads, count):
     cells = np.random.default_rng(count).integers(0, 50, (40, 4)).astype(np.int32)
     owner, parts = assembly.owners(cells, 60)
     assert len(parts) == count
+    begins = [*(low for low, _ in parts), len(cells)]
     for point in range(50):
         having = np.flatnonzero((cells == point).any(axis=1))
         if len(having):
             low, high = parts[owner[point]]
             assert low <= having[0] <= having[-1] < high
+            assert having[0] < begins[owner[point] + 1]  # nobody has an earlier one
 
 
 @pytest.mark.parametrize("element", ["hex8", "tet4"])
