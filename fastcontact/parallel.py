@@ -26,11 +26,12 @@ MOST = 255
 
 
 def shared(work: Callable[[Part], Result], parts: Sequence[Part]) -> list[Result]:
-    """Return the results of `work` on every part, each in a thread of its own."""
+    """Return the results of `work` on every part, the first in this thread, the others each in one of their own."""
     if len(parts) == 1:
         return [work(parts[0])]
-    with ThreadPoolExecutor(len(parts)) as pool:
-        return list(pool.map(work, parts))
+    with ThreadPoolExecutor(len(parts) - 1) as pool:
+        others = pool.map(work, parts[1:])
+        return [work(parts[0]), *others]
 
 
 @lru_cache(maxsize=1)

@@ -199,6 +199,46 @@ def _add_general(g, tensors, m, products, block, slots, c, mine, flat):
 
 
 @kernel
+def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, gradient, flat):
+    """Add the blocks of a linear tetrahedron for Lame's constants: its gradients (4, 3) are constant.
+
+    `volume` is that of the reference cell. Returns whether the Jacobian is positive. Loops over four nodes, known to the
+    compiler, take half the time of `_integrate_products` and `_add_isotropic`.
+    """
+    first = cells[c, 0]
+    x0, y0, z0 = points[first, 0], points[first, 1], points[first, 2]
+    r, s, t = cells[c, 1], cells[c, 2], cells[c, 3]
+    xr, yr, zr = points[r, 0] - x0, points[r, 1] - y0, points[r, 2] - z0
+    xs, ys, zs = points[s, 0] - x0, points[s, 1] - y0, points[s, 2] - z0
+    xt, yt, zt = points[t, 0] - x0, points[t, 1] - y0, points[t, 2] - z0
+    gradient[1, 0], gradient[1, 1], gradient[1, 2] = ys * zt - zs * yt, zs * xt - xs * zt, xs * yt - ys * xt
+    gradient[2, 0], gradient[2, 1], gradient[2, 2] = zr * yt - yr * zt, xr * zt - zr * xt, yr * xt - xr * yt
+    gradient[3, 0], gradient[3, 1], gradient[3, 2] = yr * zs - zr * ys, zr * xs - xr * zs, xr * ys - yr * xs
+    det = xr * gradient[1, 0] + yr * gradient[1, 1] + zr * gradient[1, 2]
+    if not det > 0.0:
+        return False
+    for i in range(3):
+        gradient[0, i] = -(gradient[1, i] + gradient[2, i] + gradient[3, i])
+    weight = volume / det  # gradients are cofactors over det, the volume is that of the reference cell times det
+    for b in range(4):
+        gx, gy, gz = weight * gradient[b, 0], weight * gradient[b, 1], weight * gradient[b, 2]
+        for a in range(b + 1):
+            x, y, z = gradient[a, 0], gradient[a, 1], gradient[a, 2]
+            xx, yy, zz, xy, xz, yz = x * gx, y * gy, z * gz, x * gy, x * gz, y * gz
+            yx, zx, zy = y * gx, z * gx, z * gy
+            trace, both = shear * (xx + yy + zz), coupling + shear
+            k01, k02, k12 = coupling * xy + shear * yx, coupling * xz + shear * zx, coupling * yz + shear * zy
+            k10, k20, k21 = coupling * yx + shear * xy, coupling * zx + shear * xz, coupling * zy + shear * yz
+            if a == b:  # equal but for round-off; K is symmetric to the last bit
+                k10, k20, k21 = k01, k02, k12
+            _add_block(
+                flat, mine[a], mine[b], slots[c, a, b], slots[c, b, a],
+                both * xx + trace, k01, k02, k10, both * yy + trace, k12, k20, k21, both * zz + trace,
+            )  # fmt: skip
+    return True
+
+
+@kernel
 def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric, slots, owner, part, data):
     """Add element stiffness blocks to `data` (n_blocks, 3, 3), in the rows of nodes with ``owner[node] == part``.
 
@@ -213,15 +253,21 @@ def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric,
         isotropic[m] = _is_isotropic(moduli[m])
     x, gradient = np.empty((3, n_nodes)), np.empty((3, n_nodes))
     g, products, block = np.empty((6, n_nodes, n_nodes)), np.empty(9), np.empty(9)
-    mine = np.empty(n_nodes, np.bool_)
+    mine, corners, volume = np.empty(n_nodes, np.bool_), np.empty((4, 3)), weights.sum()
     flat = data.reshape(-1)
     for c in range(n_cells):
         if not _owned(cells, c, owner, part, mine):
             continue
+        m = material[c]
+        if n_nodes == 4 and isotropic[m]:
+            if not _add_tetrahedron(
+                points, cells, c, volume, moduli[m, 0, 1], moduli[m, 3, 3], slots, mine, corners, flat
+            ):
+                return c
+            continue
         _gather(points, cells, c, x)
         if not _integrate_products(x, slopes, weights, gradient, g):
             return c
-        m = material[c]
         if isotropic[m]:
             _add_isotropic(g, moduli[m, 0, 1], moduli[m, 3, 3], slots, c, mine, flat)
         else:

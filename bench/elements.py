@@ -1,0 +1,107 @@
+"""Assembly and stress recovery by element, in one thread and in two: ``python bench/elements.py [ELEMENT ...] [--runs 9]``.
+
+Millions of cells a second, best of the runs, which take turns. Assembly fills a matrix of known pattern; recovery gives
+stresses at the nodes from those in the cells, their average included. ``first touch`` is the time the operating system
+takes to hand out the memory of the matrix, in that of the assembly by one thread: several threads take no less of it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import fastcontact as fc
+from fastcontact._jit import set_threads
+from fastcontact.assembly import sparsity, stiffness
+from fastcontact.recovery import nodal_stress
+
+# Cells along an edge of the square or cube.
+MESHES = {"quad4": 400, "tri6": 250, "tet4": 36, "hex8": 44, "hex20": 20}
+COLUMNS = (
+    "element",
+    "cells",
+    "assembly, 1 thread",
+    "2 threads",
+    "ratio",
+    "first touch",
+    "recovery, 1 thread",
+    "2 threads",
+)
+
+
+def mesh_of(element: str) -> fc.Mesh:
+    n = MESHES[element]
+    if element in ("quad4", "tri6"):
+        return fc.generate.block((1.0, 1.0), (n, n), element, origin=(1.0, 0.0))
+    return fc.generate.box((1.0, 1.0, 1.0), (n, n, n), element)
+
+
+def works(mesh: fc.Mesh) -> tuple[Callable[[], Any], Callable[[], Any]]:
+    """Return the assembly and the recovery of a mesh."""
+    kinematics = "axisymmetric" if mesh.dim == 2 else "3d"
+    model = fc.Model(mesh, kinematics)
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    moduli, material = model.material_numbers()
+    pattern, u = sparsity(mesh), np.random.default_rng(0).normal(size=mesh.points.shape)
+    return (
+        lambda: stiffness(mesh, kinematics, moduli, material, pattern),
+        lambda: nodal_stress(mesh, kinematics, moduli, material, u),
+    )
+
+
+def touched(nbytes: int) -> Any:
+    """Return fresh memory of so many bytes, written to once a page."""
+    room = np.zeros(nbytes // 8)
+    room[::512] = 1.0
+    return room
+
+
+def seconds(work: Callable[[], Any]) -> float:
+    start = time.perf_counter()
+    result = work()
+    passed = time.perf_counter() - start
+    del result
+    return passed
+
+
+def measured(element: str, runs: int) -> tuple[str, ...]:
+    """Return a row of the table; both threads must give the same bits."""
+    mesh = mesh_of(element)
+    assemble, recover = works(mesh)
+    set_threads(1)
+    alone = assemble().data, recover()
+    set_threads(2)
+    if not (np.array_equal(assemble().data, alone[0]) and np.array_equal(recover(), alone[1])):
+        raise SystemExit(f"{element}: the number of threads changes the result")
+    nbytes, best = alone[0].nbytes, {}
+    del alone
+    for _ in range(runs):
+        for count in (1, 2):
+            set_threads(count)
+            for name, work in (("assembly", assemble), ("recovery", recover)):
+                best[name, count] = min(best.get((name, count), np.inf), seconds(work))
+        best["touch", 1] = min(best.get(("touch", 1), np.inf), seconds(lambda: touched(nbytes)))
+    cells = len(mesh.cells[element])
+    a1, a2, r1, r2 = (best[key] for key in (("assembly", 1), ("assembly", 2), ("recovery", 1), ("recovery", 2)))
+    rate = [f"{1e-6 * cells / value:.3g}" for value in (a1, a2, r1, r2)]
+    return element, str(cells), rate[0], rate[1], f"{a1 / a2:.2f}", f"{best['touch', 1] / a1:.0%}", rate[2], rate[3]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("elements", nargs="*", metavar="ELEMENT", help=f"of {', '.join(MESHES)} (default: all)")
+    parser.add_argument("--runs", type=int, default=9, help="runs of each (9)")
+    options = parser.parse_args()
+    if unknown := set(options.elements) - set(MESHES):
+        parser.error(f"no mesh for {', '.join(sorted(unknown))}: known are {', '.join(MESHES)}")
+    print(" | ".join(COLUMNS))
+    for element in options.elements or MESHES:
+        print(" | ".join(measured(element, options.runs)), flush=True)
+
+
+if __name__ == "__main__":
+    main()
