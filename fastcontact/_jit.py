@@ -14,6 +14,7 @@ from typing import Any
 
 import numba
 
+from fastcontact import _kernel_cache
 from fastcontact.errors import FastcontactError
 
 log = logging.getLogger("fastcontact")
@@ -55,7 +56,7 @@ def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = 
     options: dict[str, Any] = {"fastmath": fastmath, "parallel": parallel, "nogil": True, "error_model": "numpy"}
     options["inline"] = inline
     try:
-        return _watching(numba.njit(cache=True, **options)(function), function)
+        return _kernel_cache.kept(numba.njit(cache=True, **options)(function), function)
     except RuntimeError as error:  # numba: "cannot cache function ...: no locator available for file ..."
         if "cannot cache" not in str(error):
             raise
@@ -64,33 +65,6 @@ def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = 
             _cache_reported = True
             log.info("no writable folder for compiled kernels (set NUMBA_CACHE_DIR): compiling in every process")
         return numba.njit(cache=False, **options)(function)
-
-
-def _watching(compiled_kernel: Any, function: Callable[..., Any]) -> Any:
-    """Let the disk cache notice changes in the other files whose kernels this one may call; Numba looks at its own only."""
-    files: set[str] = set()
-    _gather(function, files)
-    cache = getattr(getattr(compiled_kernel, "_cache", None), "_cache_file", None)
-    if cache is not None and len(files) > 1:
-        stats = [os.stat(file) for file in sorted(files)]
-        cache._source_stamp = [(stat.st_mtime, stat.st_size) for stat in stats]
-    return compiled_kernel
-
-
-def _gather(function: Callable[..., Any], files: set[str]) -> None:
-    """Add the file of a function and those of the kernels that it and they may call."""
-    file = function.__code__.co_filename
-    if file not in files:
-        files.add(file)
-        for other in list(function.__globals__.values()):
-            part = _written(other)
-            if part is not None:
-                _gather(part, files)
-
-
-def _written(part: Any) -> Any:
-    """Return the function from which a kernel, or a part that is written for each kernel anew, is compiled; else None."""
-    return getattr(part, "py_func", None) or getattr(part, "_defn", None)
 
 
 def _notice_fork() -> None:

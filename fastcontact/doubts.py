@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from fastcontact import elements, recovery
 from fastcontact.analysis import Analysis
+from fastcontact.cofactors import inverses
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.result import deep
 from fastcontact.contact.surface import Surface
@@ -128,7 +129,7 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
 def _rotations(points: Array, displacement: Array, dN: Array) -> Array:
     """Return the rotation (n_cells,) of cells (n_cells, n_nodes, dim) where shape functions have gradients dN."""
     J = np.einsum("cnd,nk->cdk", points, dN)
-    H = np.einsum("cnd,nk->cdk", displacement, dN) @ np.linalg.inv(J)
+    H = np.einsum("cnd,nk->cdk", displacement, dN) @ inverses(J)[0]
     return np.asarray(np.sqrt(0.5 * ((0.5 * (H - H.transpose(0, 2, 1))) ** 2).sum(axis=(1, 2))))
 
 

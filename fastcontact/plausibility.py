@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact import elements, quadrature
+from fastcontact.cofactors import inverses
 from fastcontact.elements import Element
 from fastcontact.energy import integration_rule
 from fastcontact.loads import BodyForce, Load, Pressure, Traction, Value, evaluated, facets_of
@@ -167,15 +168,14 @@ def _stiffness(mesh: Mesh) -> list[str]:
 
 
 def _traces(corners: Array, element: Element, xi: Array, weights: Array) -> Array:
-    """Return the integral (n_cells,) of the squared gradients of all shape functions of cells (n_cells, n_nodes, dim).
-
-    Their sum is that of ``dN.T (J.T J)^-1 dN`` over the nodes, so that no gradient is formed.
-    """
+    """Return the integral (n_cells,) of the squared gradients of all shape functions of cells (n_cells, n_nodes, dim)."""
     dN = element.gradient(xi)
-    J = np.einsum("qnk,cnd->cqdk", dN, corners, optimize=True)
-    metric = np.linalg.inv(J.transpose(0, 1, 3, 2) @ J)
+    J = np.einsum("qnk,cnd->qkdc", dN, corners, optimize=True)
+    inverse, determinant = inverses(np.moveaxis(J, 3, 1))
+    # Their sum over the nodes is that of the slopes' products with those of r, s and t: no gradient is formed.
+    metric = inverse.transpose(0, 1, 3, 2) @ inverse
     squares = np.einsum("qnk,qnl->qkl", dN, dN)
-    return np.asarray(((metric * squares).sum(axis=(2, 3)) * np.abs(np.linalg.det(J))) @ weights)
+    return np.asarray((np.einsum("qckl,qkl->qc", metric, squares) * np.abs(determinant)).T @ weights)
 
 
 def _some(cells: NDArray[Any]) -> NDArray[Any]:
