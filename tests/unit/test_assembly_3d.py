@@ -115,6 +115,16 @@ def with_field(mesh, field):
     return model, np.setdiff1d(np.arange(mesh.n_points), outer)
 
 
+@pytest.mark.parametrize("element", SOLIDS)
+def test_the_loop_names_the_first_cell_that_is_inside_out(element):
+    mesh = patch(element, (2, 1, 1))
+    block = mesh.cells[element].copy()
+    block[1:3] = block[1:3][:, elements.get(element).reversed]
+    turned = mesh.replace(cells={element: block}, cell_groups={})
+    with pytest.raises(fc.MeshError, match=f"cell 1 of {element} near .* inside out"):
+        assembled(turned)
+
+
 # Exact solutions -----------------------------------------------------------------------------------------------------
 
 
