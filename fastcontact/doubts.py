@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from fastcontact import elements, recovery
 from fastcontact.analysis import Analysis
-from fastcontact.cofactors import inverses
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.result import deep
 from fastcontact.contact.surface import Surface
+from fastcontact.kernels import rotations
 from fastcontact.mesh import Mesh
 from fastcontact.overlap import penetration
 from fastcontact.results import ContactResult, StepResult
@@ -22,8 +22,6 @@ Array = NDArray[np.float64]
 STRAIN = 0.1
 # Rotation [radian] beyond which they are: half its square is the strain that they leave out.
 ROTATION = 0.3
-# Cells looked at together: copies of all of them would cost as much memory as the mesh.
-AT_A_TIME = 10_000
 # Elements across the radius of a contact that resolve its pressure.
 ACROSS = 4
 # Change of the displacement by the last of a fixed number of geometry updates, relative to its largest component.
@@ -113,24 +111,14 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
 
     That of linear kinematics, half the curl of the displacement (n_points, dim).
     """
-    angle, place = 0.0, np.zeros(mesh.dim)
+    square, place = 0.0, np.zeros(mesh.dim)
     for name, block in mesh.solids.items():
         element = elements.get(name)
         dN = element.gradient(element.nodes[: element.n_corners].mean(axis=0)[None])[0]
-        for first in range(0, len(block), AT_A_TIME):
-            cells = block[first : first + AT_A_TIME]
-            size = _rotations(mesh.points[cells], displacement[cells], dN)
-            row = int(np.argmax(size))
-            if size[row] > angle:
-                angle, place = float(size[row]), mesh.points[cells[row]].mean(axis=0)
-    return angle, place
-
-
-def _rotations(points: Array, displacement: Array, dN: Array) -> Array:
-    """Return the rotation (n_cells,) of cells (n_cells, n_nodes, dim) where shape functions have gradients dN."""
-    J = np.einsum("cnd,nk->cdk", points, dN)
-    H = np.einsum("cnd,nk->cdk", displacement, dN) @ inverses(J)[0]
-    return np.asarray(np.sqrt(0.5 * ((0.5 * (H - H.transpose(0, 2, 1))) ** 2).sum(axis=(1, 2))))
+        most, row = rotations.largest(mesh.points, displacement, block, dN)
+        if most > square:
+            square, place = most, mesh.points[block[row]].mean(axis=0)
+    return float(square**0.5), place
 
 
 def _lost(name: str, contact: ContactResult, touched: bool, loaded: bool) -> list[str]:
