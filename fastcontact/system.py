@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 from fastcontact.errors import ModelError
+from fastcontact.kernels import supports
 from fastcontact.kernels.multigrid import largest_row_sum
 from fastcontact.kernels.norms import largest
 from fastcontact.relations import Elimination, Relation, eliminate, stacked_rows
@@ -232,26 +233,16 @@ def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
         What K was, minus `matrix`: few numbers.
     """
     K = _with_diagonal(K)
-    size = K.blocksize[0]
-    supported = fixed.reshape(-1, size)
-    block_row = np.repeat(np.arange(len(K.indptr) - 1), np.diff(K.indptr))
-    some: Mask = np.asarray(supported.any(axis=1))
-    touched = np.flatnonzero(some[block_row] | some[K.indices])
-    row, column, before = block_row[touched], K.indices[touched], K.data[touched]
-    after = before.copy()
-    after[supported[row][:, :, None] | supported[column][:, None, :]] = 0.0
     diagonal = K.diagonal()
-    typical = diagonal.max(initial=1.0)
-    on_diagonal = np.flatnonzero(row == column)
-    for k in range(size):
-        held = on_diagonal[supported[row[on_diagonal], k]]
-        kept = diagonal[row[held] * size + k]
-        after[held, k, k] = np.where(kept > 0, kept, typical)
-    K.data[touched] = after
-    indptr = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=len(K.indptr) - 1))])
-    taken = bsr_array((before - after, column, indptr), shape=K.shape).tocsr()
-    taken.eliminate_zeros()  # two thirds where planes of symmetry hold one component in three
-    return K, taken.copy()
+    kept = np.where(diagonal > 0, diagonal, diagonal.max(initial=1.0))
+    supported = fixed.reshape(-1, K.blocksize[0])
+    given = K.indptr, K.indices, K.data, supported, supported.any(axis=1), kept
+    start = np.empty(K.shape[0] + 1, np.int32)
+    supports.take_out(*given, start, np.empty(0, np.int32), np.empty(0))
+    columns, taken = np.empty(start[-1], np.int32), np.empty(start[-1])
+    if len(taken):
+        supports.take_out(*given, start, columns, taken)
+    return K, csr_array((taken, columns, start), shape=K.shape)
 
 
 def _with_diagonal(K: bsr_array) -> bsr_array:

@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from fastcontact import elements
 from fastcontact.errors import MeshError
+from fastcontact.kernels import outer
 from fastcontact.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -144,17 +145,15 @@ def outer_facets(mesh: Mesh) -> Mapping[str, Indices]:
         element = elements.get(name)
         for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
             found.setdefault(facet_element, []).append(block[:, list(facet)])
-    outer = {name: _single(np.concatenate(blocks)) for name, blocks in found.items()}
-    return MappingProxyType({name: facets for name, facets in outer.items() if len(facets)})
+    kept = {name: _single(np.concatenate(blocks), mesh.n_points) for name, blocks in found.items()}
+    return MappingProxyType({name: facets for name, facets in kept.items() if len(facets)})
 
 
-def _single(facets: Indices) -> Indices:
+def _single(facets: Indices, n_points: int) -> Indices:
     """Return the facets whose nodes no other facet has, in the order given."""
-    keys = np.sort(facets, axis=1)
-    order = np.lexsort(keys.T)
-    differs = (keys[order[1:]] != keys[order[:-1]]).any(axis=1)
-    alone = np.concatenate([[True], differs]) & np.concatenate([differs, [True]])
-    kept = np.ascontiguousarray(facets[np.sort(order[alone])])
+    alone = np.empty(len(facets), bool)
+    outer.alone(facets, n_points, alone)
+    kept = facets[alone]
     kept.setflags(write=False)
     return kept
 

@@ -1,0 +1,22 @@
+"""Facets of one cell only, against Python's sorted tuples."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fastcontact.kernels import outer
+
+
+@pytest.mark.parametrize("n_nodes", [2, 3, 4, 8])
+@given(seed=st.integers(0, 2**32 - 1), n_points=st.integers(1, 9), n=st.integers(1, 40))
+def test_facets_are_alone_whose_nodes_no_other_one_has(n_nodes, seed, n_points, n):
+    # Nodes may come twice, as in cells that are collapsed.
+    facets = np.random.default_rng(seed).integers(n_points, size=(n, n_nodes)).astype(np.int32)
+    found = np.empty(n, bool)
+    outer.alone(facets, n_points, found)
+    keys = [tuple(sorted(facet)) for facet in facets.tolist()]
+    count = Counter(keys)
+    assert found.tolist() == [count[key] == 1 for key in keys]
