@@ -5,9 +5,11 @@ Public names load when first used, so that ``import fastcontact`` costs next to 
 
 from __future__ import annotations
 
+import gc
 import importlib
 import logging
 import os
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 # Threads that wait for work sleep. Spinning is the default of GNU's OpenMP, and costs ten times the CPU time as soon as other
@@ -138,11 +140,22 @@ __all__ = [
 ]
 
 
+def _imported(module: str) -> ModuleType:
+    """Import a module; what imports make stays, and Python need not look through it for cycles time and again."""
+    looking = gc.isenabled()
+    gc.disable()
+    try:
+        return importlib.import_module(f"{__name__}.{module}")
+    finally:
+        if looking:
+            gc.enable()
+
+
 def __getattr__(name: str) -> Any:
     if name in _HOME:
-        value = getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
+        value = getattr(_imported(_HOME[name]), name)
     elif name in _MODULES:
-        value = importlib.import_module(f"{__name__}.{name}")
+        value = _imported(name)
     else:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
     globals()[name] = value

@@ -11,16 +11,19 @@ from __future__ import annotations
 import dataclasses
 import logging
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lstsq
 from scipy.sparse import csr_array, vstack
 
-from fastcontact import coulomb, friction_eliminated
 from fastcontact.active_set import Compliance
 from fastcontact.linear import Loaded, Oblique
 from fastcontact.slip_directions import aligning, idle, own_compliance
+
+if TYPE_CHECKING:
+    from fastcontact import coulomb
 
 log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
@@ -168,6 +171,8 @@ def _eliminated(
     patience: int | None,
 ) -> FrictionalEquilibrium | None:  # fmt: skip
     """Solve without a compliance, see `friction_eliminated`; None where that fails."""
+    from fastcontact import friction_eliminated
+
     u = np.zeros(rows[0].shape[1]) if elsewhere is None else elsewhere
     solved = friction_eliminated.solve(
         loaded, rows, free, friction, usable, closed=closed & usable, held=held, forces=forces, u=u, tolerance=tolerance,
@@ -227,6 +232,8 @@ def _among(
 
 def _coulomb(F: Array, free: Array, friction: Array, closed: Mask, held: Mask, start: Array | None) -> coulomb.Forces:
     """Solve the problem on the compliance F, from which the equations of `held` constraints are eliminated first."""
+    from fastcontact import coulomb
+
     if not held.any():
         return coulomb.solve(F, free, friction, closed, start)
     index = np.arange(free.size).reshape(free.shape)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,9 @@ from fastcontact.linear._compliance import multipliers, reduced
 from fastcontact.linear._elimination import Elimination, RepeatedError, eliminate
 from fastcontact.linear._multigrid import Multigrid, StallError
 from fastcontact.linear._solver import Drag, Loaded, Monitor, Product
-from fastcontact.linear.direct import Direct
+
+if TYPE_CHECKING:
+    from fastcontact.linear.direct import Direct
 
 log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
@@ -107,6 +109,8 @@ class Amg(Multigrid):
         self._take_factors(f"multigrid gave up and factors took over, which cost more time and memory: {stalled}")
 
     def _take_factors(self, why: str) -> Direct:
+        from fastcontact.linear.direct import Direct
+
         log.warning("%s", why)
         self.gave_up, self.instead = why, Direct()
         self.instead.counters = self.counters

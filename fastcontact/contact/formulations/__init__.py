@@ -7,13 +7,32 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+from collections.abc import Iterator, Mapping
 
 from fastcontact.contact.formulations._formulation import Formulation
 
-FORMULATIONS: dict[str, type[Formulation]] = {
-    name: importlib.import_module(f"{__name__}.{name}").FORMULATION
-    for _, name, _ in pkgutil.iter_modules(__path__)
-    if not name.startswith("_")
-}
+
+class _Formulations(Mapping[str, type[Formulation]]):
+    """The formulations by name, each imported when it is asked for: most models have one."""
+
+    _names = tuple(name for _, name, _ in pkgutil.iter_modules(__path__) if not name.startswith("_"))
+
+    def __getitem__(self, name: str) -> type[Formulation]:
+        if name not in self._names:
+            raise KeyError(name)
+        found: type[Formulation] = importlib.import_module(f"{__name__}.{name}").FORMULATION
+        return found
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
+FORMULATIONS: Mapping[str, type[Formulation]] = _Formulations()
 
 __all__ = ["FORMULATIONS", "Formulation"]
