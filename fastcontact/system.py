@@ -17,7 +17,7 @@ from scipy.sparse import bsr_array, csr_array, diags_array
 
 from fastcontact.errors import ModelError
 from fastcontact.kernels import supports
-from fastcontact.kernels.multigrid import largest_row_sum
+from fastcontact.kernels.multigrid import row_sums
 from fastcontact.kernels.norms import largest
 from fastcontact.relations import Elimination, Relation, eliminate, stacked_rows
 
@@ -52,7 +52,9 @@ def _largest_row_sum(K: Any, u: Array) -> float:
         return float((abs(K) @ np.abs(u)).max(initial=0.0))
     if not isinstance(K, bsr_array):
         return float(K.largest_row_sum(u))
-    return float(largest_row_sum(K.indptr, K.indices, (K.data.reshape(-1),), u, (0,) * K.blocksize[0]))
+    out = np.empty(K.shape[0])
+    row_sums(K.indptr, K.indices, (K.data.reshape(-1),), u, (0,) * K.blocksize[0], out)
+    return float(out.max(initial=0.0))
 
 
 class System:

@@ -57,24 +57,19 @@ def multiply(indptr, indices, numbers, x, factor, share, z, y, rows, cols):
 
 
 @kernel
-def _largest_row_sum(low, high, indptr, indices, numbers, x, rows):
-    largest = 0.0
+def _row_sums(low, high, indptr, indices, numbers, x, rows, out):
     for i in range(low, high):
         sums = row_sizes(indices, numbers, x, indptr[i], indptr[i + 1], rows, rows)
         for r in range(len(rows)):
-            largest = max(largest, sums[r])
-    return largest
+            out[len(rows) * i + r] = sums[r]
 
 
 @parallel_kernel
-def largest_row_sum(indptr, indices, numbers, x, rows):
-    """Return the largest entry of ``|A| |x|``: the size of the numbers that cancel each other in ``A x``."""
+def row_sums(indptr, indices, numbers, x, rows, out):
+    """Fill `out` (n,) with ``|A| |x|``: the size of the numbers that cancel each other in ``A x``."""
     n = indptr.shape[0] - 1
-    parts = (n + CHUNK - 1) // CHUNK
-    largest = np.zeros(parts)
-    for c in prange(parts):
-        largest[c] = _largest_row_sum(c * CHUNK, min(n, (c + 1) * CHUNK), indptr, indices, numbers, x, rows)
-    return largest.max()
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        _row_sums(c * CHUNK, min(n, (c + 1) * CHUNK), indptr, indices, numbers, x, rows, out)
 
 
 @kernel

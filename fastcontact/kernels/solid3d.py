@@ -253,7 +253,9 @@ def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric,
         isotropic[m] = _is_isotropic(moduli[m])
     x, gradient = np.empty((3, n_nodes)), np.empty((3, n_nodes))
     g, products, block = np.empty((6, n_nodes, n_nodes)), np.empty(9), np.empty(9)
-    mine, corners, volume = np.empty(n_nodes, np.bool_), np.empty((4, 3)), weights.sum()
+    mine, corners, volume = np.empty(n_nodes, np.bool_), np.empty((4, 3)), 0.0
+    for weight in weights:
+        volume += weight
     flat = data.reshape(-1)
     for c in range(n_cells):
         if not _owned(cells, c, owner, part, mine):
