@@ -1,42 +1,30 @@
-"""Kernels on disk: told when a file they depend on has changed, and loaded without what only compiling needs.
-
-Numba looks at a kernel's own file alone, and before it loads one it makes its compiler ready and reads the kernel's
-intermediate code, in case another is compiled that calls it. Here files of called kernels count, too, and both of the
-others wait until something is compiled. The second half knows Numba from the inside: it is for the releases it was tried
-with, and where it fails, Numba loads the kernel.
-"""
+"""Kernels on disk: told when a file they depend on has changed; Numba looks at a kernel's own file alone."""
 
 from __future__ import annotations
 
-import logging
 import os
 from collections.abc import Callable
 from typing import Any
 
-import llvmlite.binding as llvm
 import numba
-from numba.core.caching import CompileResultCacheImpl, FunctionCache
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import compile_result
-from numba.core.runtime import rtsys
 
-log = logging.getLogger("fastcontact")
-
-# The first release that was tried, and the first one that was not.
+# Releases of Numba that `_kernel_loading` was tried with: from the first to before the second.
 TRIED = (0, 60), (0, 69)
 
 
 def kept(kernel: Any, function: Callable[..., Any]) -> Any:
-    """Return a kernel with a cache on disk, made ready for both."""
+    """Return a kernel, made from a function, whose cache on disk knows all its files and loads it in less time."""
     cache = getattr(kernel, "_cache", None)
-    if isinstance(cache, FunctionCache):
+    if hasattr(cache, "_cache_file"):
         _watch(cache, function)
         if TRIED[0] <= numba.version_info.short < TRIED[1]:
-            cache.__class__, cache._impl.__class__ = _Cache, _Kernels
+            from fastcontact import _kernel_loading
+
+            _kernel_loading.quicken(cache)
     return kernel
 
 
-def _watch(cache: FunctionCache, function: Callable[..., Any]) -> None:
+def _watch(cache: Any, function: Callable[..., Any]) -> None:
     files: set[str] = set()
     _gather(function, files)
     if len(files) > 1:
@@ -58,61 +46,3 @@ def _gather(function: Callable[..., Any], files: set[str]) -> None:
 def _written(part: Any) -> Any:
     """Return the function from which a kernel, or a part that is written for each kernel anew, is compiled; else None."""
     return getattr(part, "py_func", None) or getattr(part, "_defn", None)
-
-
-class _Cache(FunctionCache):
-    """A cache whose kernels are loaded without the tables of what may be compiled."""
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return a kernel from disk, None if it is not there."""
-        try:
-            rtsys.initialize(target_context)
-            with self._guard_against_spurious_io_errors():
-                return self._load_overload(sig, target_context)
-            return None  # an error of the file system was passed over
-        except Exception as error:
-            log.debug("a kernel is loaded by Numba's own way: %r", error)
-            self._impl.__class__ = CompileResultCacheImpl
-            return super().load_overload(sig, target_context)
-
-
-class _Kernels(CompileResultCacheImpl):
-    """What is kept of kernels, made into kernels again without reading their intermediate code."""
-
-    def rebuild(self, target_context: Any, payload: Any) -> Any:
-        """Return a kernel: `CompileResult._rebuild`, with a library of its own."""
-        state, description, environment, signature, objectmode, lifted, annotation, reload, environments = payload
-        for start in reload or ():
-            start()
-        library = _Library(target_context.codegen(), state[0])
-        library.take(state, [description.llvm_func_name, description.llvm_cpython_wrapper_name])
-        found = compile_result(
-            target_context=target_context, typing_context=target_context.typing_context, library=library,
-            environment=environment, entry_point=target_context.get_executable(library, description, environment),
-            fndesc=description, type_annotation=annotation, signature=signature, objectmode=objectmode, lifted=lifted,
-            reload_init=reload, referenced_envs=environments,
-        )  # fmt: skip
-        for other in environments:
-            library.codegen.set_env(other.env_name, other)
-        return found
-
-
-class _Library(JITCodeLibrary):
-    """Machine code whose intermediate code is read when another kernel is compiled that calls this one."""
-
-    _intermediate = b""
-
-    def take(self, state: tuple[str, str, tuple[bytes, bytes]], names: list[str]) -> None:
-        """Take what Numba wrote (name, kind, code), in which the functions `names` are called from outside."""
-        _, kind, (machine, self._intermediate) = state
-        if kind != "object":
-            raise ValueError(f"code of another kind: {kind}")
-        self.enable_object_caching()
-        self._set_compiled_object(machine)
-        self._finalize_final_module()
-        self._codegen._engine._defined_symbols.update(names)
-
-    def _get_module_for_linking(self) -> Any:
-        if self._intermediate:
-            self._shared_module, self._intermediate = llvm.parse_bitcode(self._intermediate), b""
-        return super()._get_module_for_linking()

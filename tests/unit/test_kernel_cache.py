@@ -75,10 +75,10 @@ def test_a_kernel_on_disk_can_be_called_by_one_that_is_compiled(written):
 
 @pytest.mark.parametrize(
     "change",
-    ["_kernel_cache.TRIED = (0, 1), (0, 2)", "_kernel_cache._Kernels.rebuild = lambda *given: 1 / 0"],
+    ["_kernel_cache.TRIED = (0, 1), (0, 2)", "_kernel_loading._Kernels.rebuild = lambda *given: 1 / 0"],
     ids=["another release", "an error"],
 )
 def test_numba_loads_the_kernel_where_ours_does_not(written, change):
     said = f"print(callee.part(1.0), sum(callee.part.stats.cache_hits.values()), {COMPILER!r} in sys.modules)"
-    question = f"import sys; from fastcontact import _kernel_cache; {change}; import callee; {said}"
+    question = f"import sys; from fastcontact import _kernel_cache, _kernel_loading; {change}; import callee; {said}"
     assert answers(written, question) == ["2.0", "1", "True"]
