@@ -2,7 +2,7 @@
 
 Millions of cells a second, best of the runs, which take turns. Assembly fills a matrix of known pattern; recovery gives
 stresses at the nodes from those in the cells, their average included. ``first touch`` is the time the operating system
-takes to hand out the memory of the matrix, in that of the assembly by one thread: several threads take no less of it.
+takes to hand out the memory of the matrix, in that of the assembly by one thread: several threads take hardly less of it.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ log = logging.getLogger("fastcontact")
 
 
 def quicken(cache: Any) -> None:
-    """Let a cache load kernels so."""
+    """Let a cache load its kernels by `_Cache` and `_Kernels`."""
     cache.__class__, cache._impl.__class__ = _Cache, _Kernels
 
 
@@ -36,7 +36,7 @@ class _Cache(FunctionCache):
             return None  # an error of the file system was passed over
         except Exception as error:
             log.debug("a kernel is loaded by Numba's own way: %r", error)
-            self._impl.__class__ = CompileResultCacheImpl
+            self._impl.__class__ = CompileResultCacheImpl  # from now on; the compiler is ready then, and once is enough
             return super().load_overload(sig, target_context)
 
 
@@ -75,6 +75,13 @@ class _Library(JITCodeLibrary):
         self._set_compiled_object(machine)
         self._finalize_final_module()
         self._codegen._engine._defined_symbols.update(names)
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return the address of a function; those seldom called from outside are known from the intermediate code."""
+        engine = self._codegen._engine
+        if self._intermediate and not engine.is_symbol_defined(name):
+            engine._load_defined_symbols(self._get_module_for_linking())
+        return int(super().get_pointer_to_function(name))
 
     def _get_module_for_linking(self) -> Any:
         if self._intermediate:

@@ -111,7 +111,7 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
 
     That of linear kinematics, half the curl of the displacement (n_points, dim).
     """
-    square, place = 0.0, np.zeros(mesh.dim)
+    square, place, displacement = 0.0, np.zeros(mesh.dim), np.ascontiguousarray(displacement)
     for name, block in mesh.solids.items():
         element = elements.get(name)
         dN = element.gradient(element.nodes[: element.n_corners].mean(axis=0)[None])[0]

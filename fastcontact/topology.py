@@ -151,9 +151,9 @@ def outer_facets(mesh: Mesh) -> Mapping[str, Indices]:
 
 def _single(facets: Indices, n_points: int) -> Indices:
     """Return the facets whose nodes no other facet has, in the order given."""
-    alone = np.empty(len(facets), bool)
+    facets, alone = np.ascontiguousarray(facets), np.empty(len(facets), bool)
     outer.alone(facets, n_points, alone)
-    kept = facets[alone]
+    kept = np.ascontiguousarray(facets[alone])
     kept.setflags(write=False)
     return kept
 

@@ -159,22 +159,34 @@ def _add_block(flat, at_upper, at_lower, upper, lower, k00, k01, k02, k10, k11, 
 
 
 @kernel
+def _add_isotropic_block(flat, pair, at_upper, at_lower, upper, lower, coupling, shear, g):
+    """Add the block of two nodes for Lame's constants: K_ij = lambda g_ij + mu g_ji + mu g_kk delta_ij.
+
+    `pair` says whether the nodes differ; g comes as xx, yy, zz, xy, xz, yz, yx, zx, zy.
+    """
+    xx, yy, zz, xy, xz, yz, yx, zx, zy = g
+    trace, both = shear * (xx + yy + zz), coupling + shear
+    k01, k02, k12 = coupling * xy + shear * yx, coupling * xz + shear * zx, coupling * yz + shear * zy
+    k10, k20, k21 = coupling * yx + shear * xy, coupling * zx + shear * xz, coupling * zy + shear * yz
+    if not pair:  # equal but for round-off; K is symmetric to the last bit
+        k10, k20, k21 = k01, k02, k12
+    _add_block(
+        flat, at_upper, at_lower, upper, lower,
+        both * xx + trace, k01, k02, k10, both * yy + trace, k12, k20, k21, both * zz + trace,
+    )  # fmt: skip
+
+
+@kernel
 def _add_isotropic(g, coupling, shear, slots, c, mine, flat):
-    """Add the blocks of a cell for Lame's constants: K_ij = lambda g_ij + mu g_ji + mu g_kk delta_ij."""
+    """Add the blocks of a cell for Lame's constants, given the integrals of `_integrate_products`."""
     for b in range(g.shape[1]):
         for a in range(b + 1):
-            xx, yy, zz = g[0, a, b], g[3, a, b], g[5, a, b]
-            xy, xz, yz = g[1, a, b], g[2, a, b], g[4, a, b]
-            yx, zx, zy = g[1, b, a], g[2, b, a], g[4, b, a]
-            trace, both = shear * (xx + yy + zz), coupling + shear
-            k01, k02, k12 = coupling * xy + shear * yx, coupling * xz + shear * zx, coupling * yz + shear * zy
-            k10, k20, k21 = coupling * yx + shear * xy, coupling * zx + shear * xz, coupling * zy + shear * yz
-            if a == b:  # equal but for round-off; K is symmetric to the last bit
-                k10, k20, k21 = k01, k02, k12
-            _add_block(
-                flat, mine[a], mine[b], slots[c, a, b], slots[c, b, a],
-                both * xx + trace, k01, k02, k10, both * yy + trace, k12, k20, k21, both * zz + trace,
+            products = (
+                g[0, a, b], g[3, a, b], g[5, a, b], g[1, a, b], g[2, a, b], g[4, a, b], g[1, b, a], g[2, b, a], g[4, b, a],
             )  # fmt: skip
+            _add_isotropic_block(
+                flat, a != b, mine[a], mine[b], slots[c, a, b], slots[c, b, a], coupling, shear, products
+            )
 
 
 @kernel
@@ -224,17 +236,10 @@ def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, gra
         gx, gy, gz = weight * gradient[b, 0], weight * gradient[b, 1], weight * gradient[b, 2]
         for a in range(b + 1):
             x, y, z = gradient[a, 0], gradient[a, 1], gradient[a, 2]
-            xx, yy, zz, xy, xz, yz = x * gx, y * gy, z * gz, x * gy, x * gz, y * gz
-            yx, zx, zy = y * gx, z * gx, z * gy
-            trace, both = shear * (xx + yy + zz), coupling + shear
-            k01, k02, k12 = coupling * xy + shear * yx, coupling * xz + shear * zx, coupling * yz + shear * zy
-            k10, k20, k21 = coupling * yx + shear * xy, coupling * zx + shear * xz, coupling * zy + shear * yz
-            if a == b:  # equal but for round-off; K is symmetric to the last bit
-                k10, k20, k21 = k01, k02, k12
-            _add_block(
-                flat, mine[a], mine[b], slots[c, a, b], slots[c, b, a],
-                both * xx + trace, k01, k02, k10, both * yy + trace, k12, k20, k21, both * zz + trace,
-            )  # fmt: skip
+            products = x * gx, y * gy, z * gz, x * gy, x * gz, y * gz, y * gx, z * gx, z * gy
+            _add_isotropic_block(
+                flat, a != b, mine[a], mine[b], slots[c, a, b], slots[c, b, a], coupling, shear, products
+            )
     return True
 
 

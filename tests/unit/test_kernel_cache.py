@@ -82,3 +82,10 @@ def test_numba_loads_the_kernel_where_ours_does_not(written, change):
     said = f"print(callee.part(1.0), sum(callee.part.stats.cache_hits.values()), {COMPILER!r} in sys.modules)"
     question = f"import sys; from fastcontact import _kernel_cache, _kernel_loading; {change}; import callee; {said}"
     assert answers(written, question) == ["2.0", "1", "True"]
+
+
+def test_functions_seldom_called_from_outside_are_found_too(written):
+    # The wrapper for C is one, which Numba asks for where kernels are arguments.
+    result = "callee.part.overloads[callee.part.signatures[0]]"
+    address = f"{result}.library.get_pointer_to_function({result}.fndesc.llvm_cfunc_wrapper_name)"
+    assert answers(written, f"import callee; callee.part(1.0); print({address} != 0)") == ["True"]

@@ -20,3 +20,13 @@ def test_facets_are_alone_whose_nodes_no_other_one_has(n_nodes, seed, n_points, 
     keys = [tuple(sorted(facet)) for facet in facets.tolist()]
     count = Counter(keys)
     assert found.tolist() == [count[key] == 1 for key in keys]
+
+
+def test_facets_round_one_node_take_no_longer_than_others():
+    # Pairs of them would be 1e11, a minute and more.
+    n = 500_000
+    rim = np.arange(1, n + 1, dtype=np.int32)
+    facets = np.column_stack([np.zeros(n, np.int32), np.concatenate([rim[: n // 2], rim[: n // 2]])])
+    found = np.empty(n, bool)
+    outer.alone(facets, n + 1, found)
+    assert not found.any()
