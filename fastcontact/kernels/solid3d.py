@@ -8,7 +8,7 @@ so that the loops of both dimensions are called alike.
 
 import numpy as np
 
-from fastcontact._jit import kernel
+from fastcontact._jit import inlined_kernel, kernel
 
 
 @kernel
@@ -158,7 +158,7 @@ def _add_block(flat, at_upper, at_lower, upper, lower, k00, k01, k02, k10, k11, 
         flat[v + 8] += k22
 
 
-@kernel
+@inlined_kernel
 def _add_isotropic_block(flat, pair, at_upper, at_lower, upper, lower, coupling, shear, g):
     """Add the block of two nodes for Lame's constants: K_ij = lambda g_ij + mu g_ji + mu g_kk delta_ij.
 
