@@ -77,18 +77,18 @@ def measured(element: str, runs: int) -> tuple[str, ...]:
     set_threads(2)
     if not (np.array_equal(assemble().data, alone[0]) and np.array_equal(recover(), alone[1])):
         raise SystemExit(f"{element}: the number of threads changes the result")
-    nbytes, best = alone[0].nbytes, {}
+    nbytes, touch, best = alone[0].nbytes, np.inf, {}
     del alone
     for _ in range(runs):
         for count in (1, 2):
             set_threads(count)
             for name, work in (("assembly", assemble), ("recovery", recover)):
                 best[name, count] = min(best.get((name, count), np.inf), seconds(work))
-        best["touch", 1] = min(best.get(("touch", 1), np.inf), seconds(lambda: touched(nbytes)))
+        touch = min(touch, seconds(lambda: touched(nbytes)))
     cells = len(mesh.cells[element])
     a1, a2, r1, r2 = (best[key] for key in (("assembly", 1), ("assembly", 2), ("recovery", 1), ("recovery", 2)))
     rate = [f"{1e-6 * cells / value:.3g}" for value in (a1, a2, r1, r2)]
-    return element, str(cells), rate[0], rate[1], f"{a1 / a2:.2f}", f"{best['touch', 1] / a1:.0%}", rate[2], rate[3]
+    return element, str(cells), rate[0], rate[1], f"{a1 / a2:.2f}", f"{touch / a1:.0%}", rate[2], rate[3]
 
 
 def main() -> None:

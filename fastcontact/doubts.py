@@ -10,7 +10,7 @@ from fastcontact.analysis import Analysis
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.result import deep
 from fastcontact.contact.surface import Surface
-from fastcontact.kernels import rotations
+from fastcontact.kernels import solid
 from fastcontact.mesh import Mesh
 from fastcontact.overlap import penetration
 from fastcontact.results import ContactResult, StepResult
@@ -114,8 +114,10 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
     square, place, displacement = 0.0, np.zeros(mesh.dim), np.ascontiguousarray(displacement)
     for name, block in mesh.solids.items():
         element = elements.get(name)
-        dN = element.gradient(element.nodes[: element.n_corners].mean(axis=0)[None])[0]
-        most, row = rotations.largest(mesh.points, displacement, block, dN)
+        centre = element.nodes[: element.n_corners].mean(axis=0)[None]
+        most, row = solid.loops(mesh.dim).largest_rotation(
+            mesh.points, block, element.shape(centre), element.gradient(centre), displacement
+        )
         if most > square:
             square, place = most, mesh.points[block[row]].mean(axis=0)
     return float(square**0.5), place

@@ -139,6 +139,27 @@ def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, o
 
 
 @kernel
+def largest_rotation(points, cells, N, dN, displacement):
+    """Return the square of the largest rotation [radian^2] of a cell at the first point of the tables N, dN, and its number.
+
+    Half the curl of the displacement (n_points, 2); the number is -1 where no cell rotates.
+    """
+    n_cells, n_nodes = cells.shape
+    gradient = np.empty((n_nodes, 2))
+    largest, number = 0.0, -1
+    for c in range(n_cells):
+        _map(points, cells[c], N, dN, 0, gradient)
+        curl = 0.0
+        for a in range(n_nodes):
+            p = cells[c, a]
+            curl += gradient[a, 0] * displacement[p, 1] - gradient[a, 1] * displacement[p, 0]
+        square = 0.25 * curl * curl
+        if square > largest:
+            largest, number = square, c
+    return largest, number
+
+
+@kernel
 def add_nodal(cells, extrapolation, at_points, total, count):
     """Extrapolate quadrature values to the nodes of each cell and add them up per node, in place.
 

@@ -22,8 +22,8 @@ def test_facets_are_alone_whose_nodes_no_other_one_has(n_nodes, seed, n_points, 
     assert found.tolist() == [count[key] == 1 for key in keys]
 
 
-def test_facets_round_one_node_take_no_longer_than_others():
-    # Pairs of them would be 1e11, a minute and more.
+def test_half_a_million_facets_round_one_node():
+    # Were pairs of them compared, 1e11 would be: minutes.
     n = 500_000
     rim = np.arange(1, n + 1, dtype=np.int32)
     facets = np.column_stack([np.zeros(n, np.int32), np.concatenate([rim[: n // 2], rim[: n // 2]])])
