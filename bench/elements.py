@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 import fastcontact as fc
-from fastcontact._jit import set_threads
-from fastcontact.assembly import sparsity, stiffness
-from fastcontact.recovery import nodal_stress
+from fastcontact._jit.decorators import set_threads
+from fastcontact.elasticity.recovery import nodal_stress
+from fastcontact.elasticity.stiffness import sparsity, stiffness
 
 # Cells along an edge of the square or cube.
 MESHES = {"quad4": 400, "tri6": 250, "tet4": 36, "hex8": 44, "hex20": 20}

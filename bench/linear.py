@@ -25,12 +25,12 @@ import numpy as np
 from scipy.sparse import csr_array
 
 import fastcontact as fc
-from fastcontact.analysis import Analysis, near_nullspace
-from fastcontact.criteria import Criteria
-from fastcontact.extrapolation import Extrapolation
-from fastcontact.kernels import krylov
-from fastcontact.linear import _hierarchy
-from fastcontact.linear.amg import Amg
+from fastcontact.analysis.analysis import Analysis, near_nullspace
+from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.extrapolation import Extrapolation
+from fastcontact.linear.krylov import krylov_kernels
+from fastcontact.linear.multigrid import hierarchy
+from fastcontact.linear.solvers.amg import Amg
 
 
 def timed(work: Any) -> tuple[Any, float, float]:
@@ -43,8 +43,8 @@ def timed(work: Any) -> tuple[Any, float, float]:
 def triad() -> float:
     """Return the bandwidth of a core [GB per CPU second], ``p = z + beta p`` on long vectors, median of nine."""
     z, p = np.ones(20_000_000), np.ones(20_000_000)
-    krylov.turn(0.5, z, p)
-    return float(np.median([24e-9 * len(z) / timed(lambda: krylov.turn(0.5, z, p))[1] for _ in range(9)]))
+    krylov_kernels.turn(0.5, z, p)
+    return float(np.median([24e-9 * len(z) / timed(lambda: krylov_kernels.turn(0.5, z, p))[1] for _ in range(9)]))
 
 
 def material(model: fc.Model) -> fc.Model:
@@ -88,7 +88,7 @@ def sphere(dofs: int) -> fc.Model:
 
 def bytes_per_iteration(solver: Amg) -> int:
     """Return what one iteration must read of matrices at least: K once, levels and prolongators as the cycle does."""
-    own = 2 * _hierarchy.DEGREE * sum(level.A.nbytes + level.inverse.nbytes for level in solver.hierarchy.levels[:-1])
+    own = 2 * hierarchy.DEGREE * sum(level.A.nbytes + level.inverse.nbytes for level in solver.hierarchy.levels[:-1])
     across = sum(A.nbytes for level in solver.hierarchy.levels for A in (level.P, level.R) if A is not None)
     K = solver.K.scaled
     return K.nbytes + (0 if K.rest is None else K.rest.nbytes) + own + across

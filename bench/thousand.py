@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 import fastcontact as fc
-from fastcontact.case import build_case
+from fastcontact.cases.case import build_case
 
 WARM = 50
 MOST_GROWTH = 1.0  # MB

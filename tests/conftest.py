@@ -8,7 +8,7 @@ import pytest
 from hypothesis import settings
 
 import fastcontact as fc
-from fastcontact import linear
+from fastcontact.linear import choice as linear
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"

@@ -3,7 +3,7 @@
 import numpy as np
 
 import fastcontact as fc
-from fastcontact.assembly import sparsity, stiffness
+from fastcontact.elasticity.stiffness import sparsity, stiffness
 
 SIZES = (3_000, 30_000, 100_000)
 

@@ -14,11 +14,12 @@ from scipy.sparse import bsr_array, csr_array
 from scipy.sparse.linalg import splu
 
 import fastcontact as fc
-from fastcontact import _jit, linear
-from fastcontact.analysis import Analysis, near_nullspace
-from fastcontact.benchmark import peak_bytes
-from fastcontact.criteria import Criteria
+from fastcontact._jit import decorators as _jit
+from fastcontact.analysis.analysis import Analysis, near_nullspace
+from fastcontact.analysis.criteria import Criteria
 from fastcontact.errors import FastcontactError, unknown
+from fastcontact.linear import choice as linear
+from fastcontact.studies.benchmark.timing import peak_bytes
 
 SIZES = (1_500, 10_000, 40_000)
 TOLERANCE = 1e-8
@@ -161,7 +162,7 @@ def by_cholmod(matrix):
     """Order and factors in CHOLMOD's own order, without turning SciPy's matrix into one of its own."""
     from kvxopt import cholmod
 
-    from fastcontact.linear.cholmod import _matrix
+    from fastcontact.linear.solvers.cholmod import _matrix
 
     A = _matrix(matrix)
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 import fastcontact as fc
-from fastcontact import linear
-from fastcontact.analysis import Analysis, near_nullspace
-from fastcontact.criteria import Criteria
+from fastcontact.analysis.analysis import Analysis, near_nullspace
+from fastcontact.analysis.criteria import Criteria
+from fastcontact.linear import choice as linear
 
 SIZES = (1_500, 6_000, 20_000)
 

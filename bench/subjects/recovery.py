@@ -3,8 +3,8 @@
 import numpy as np
 
 import fastcontact as fc
-from fastcontact.assembly import sparsity, stiffness
-from fastcontact.recovery import nodal_stress
+from fastcontact.elasticity.recovery import nodal_stress
+from fastcontact.elasticity.stiffness import sparsity, stiffness
 
 SIZES = (3_000, 30_000, 100_000)
 

@@ -6,7 +6,7 @@ Ours include the tree over the facets, the queries do not: building theirs is to
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fastcontact.search import closest
+from fastcontact.contact.search.closest import closest
 
 SIZES = (1_000, 10_000, 100_000)
 

@@ -7,7 +7,6 @@ from the keyboard, likewise.
 from __future__ import annotations
 
 import argparse
-import gc
 import importlib
 import logging
 import os
@@ -16,8 +15,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import fastcontact
-from fastcontact import cli
+from fastcontact._version import __version__
 from fastcontact.errors import ConvergenceError, FastcontactError
 
 log = logging.getLogger("fastcontact")
@@ -34,11 +32,11 @@ class Parser(argparse.ArgumentParser):
 def parser(command: str | None = None) -> argparse.ArgumentParser:
     """Return the parser with every sub-command of this package, the arguments only of `command` if it is one of them."""
     top = Parser(prog="fastcontact", description="Elastic contact by finite elements, fast.")
-    top.add_argument("--version", action="version", version=f"fastcontact {fastcontact.__version__}")
+    top.add_argument("--version", action="version", version=f"fastcontact {__version__}")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    names = [name for _, name, _ in pkgutil.iter_modules(cli.__path__) if not name.startswith("_")]
+    names = [name for _, name, _ in pkgutil.iter_modules([os.path.dirname(__file__)]) if not name.startswith("_")]
     for name in names:
-        module = importlib.import_module(f"{cli.__name__}.{name}")
+        module = importlib.import_module(f"{__package__}.{name}")
         sub = commands.add_parser(name, help=module.HELP, description=module.HELP)
         if command not in names or command == name:  # some take long to find out what they offer
             module.arguments(sub)
@@ -94,8 +92,4 @@ def entry_point() -> None:
     """Run the command line and exit with its code."""
     # Threads of BLAS spin between the small products here; loops of our own have those of Numba.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # What imports make stays, and is not looked through for cycles time and again, least of all at the end.
-    gc.set_threshold(100_000, 50, 50)
-    code = main()
-    gc.freeze()
-    sys.exit(code)
+    sys.exit(main())

@@ -8,7 +8,7 @@ import numpy as np
 
 from fastcontact.cli._results import curve
 from fastcontact.errors import FastcontactError, FileError
-from fastcontact.results import ContactResult, StepResult
+from fastcontact.results.step import ContactResult, StepResult
 
 
 def save(axes: Any, path: str) -> None:
@@ -27,7 +27,7 @@ def save(axes: Any, path: str) -> None:
 
 def profile_picture(case: Any, step: StepResult, path: str, pair: str | None = None) -> None:
     """Plot the pressure of a contact pair with the theories of its case."""
-    from fastcontact import plot
+    from fastcontact.results import plot
 
     if not step.contact:
         raise FastcontactError("there is no contact pair whose pressure could be plotted")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 
-from fastcontact.results import StepResult
+from fastcontact.results.step import StepResult
 
 WIDTH = 30
 

@@ -50,7 +50,7 @@ def chosen_contact(step: Any, name: str | None) -> str:
 
 def case_data(results: Any) -> dict[str, Any]:
     """Return title, units, theories and approaches of the case text kept in the file; empty without one."""
-    from fastcontact.case import described
+    from fastcontact.cases.case import described
 
     try:
         data = tomllib.loads(results.case_text or "")

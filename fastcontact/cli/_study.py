@@ -123,7 +123,7 @@ def write(options: argparse.Namespace, result: Any, save: Callable[[Any, str], N
     if options.json:
         text(options.json, json.dumps(result.as_dict(), indent=2) + "\n")
     if options.csv:
-        from fastcontact.io.tables import write_csv
+        from fastcontact.results.tables import write_csv
 
         write_csv(options.csv, result.table())
     if options.png:

@@ -33,23 +33,23 @@ def run(options: argparse.Namespace) -> int:
         raise FastcontactError("--sizes and --dofs must be positive: give about how many unknowns the problem has")
     if options.problem or options.dofs:
         return _contact(options)
-    from fastcontact import benchmark
+    from fastcontact.studies.benchmark import record, subjects, timing
 
     before = _stored(options.compare) if options.compare else None
     results: dict[str, Any] = {}
     show = sys.stderr.isatty() and not options.quiet
-    for name in options.names or benchmark.names():
-        subject = benchmark.load(name)
+    for name in options.names or subjects.names():
+        subject = subjects.load(name)
         sizes = subject.SIZES[:1] if options.smallest else options.sizes or subject.SIZES
         for size in sizes:
             if show:
                 print(f"{name} {size} ...", file=sys.stderr)
-            found = benchmark.measured(subject, size, 1 if options.smallest else 3)
+            found = timing.measured(subject, size, 1 if options.smallest else 3)
             results.setdefault(name, []).append(found)
     if not options.quiet:
-        print("\n".join(benchmark.lines(results, before)))
+        print("\n".join(record.lines(results, before)))
     if options.json:
-        _write(options.json, {"environment": benchmark.environment(), "results": results})
+        _write(options.json, {"environment": record.environment(), "results": results})
     if options.png:
         _draw(options.png, results)
     return 0
@@ -58,11 +58,11 @@ def run(options: argparse.Namespace) -> int:
 def _contact(options: argparse.Namespace) -> int:
     if options.names != ["contact"] or not options.problem or not options.dofs:
         raise FastcontactError("--problem and --dofs go together, with the benchmark 'contact' alone")
-    from fastcontact import benchmark
+    from fastcontact.studies.benchmark import subjects
 
     given = {"solver": options.linear, "tolerance": options.tolerance}
     chosen = {key: value for key, value in given.items() if value is not None}
-    found = benchmark.load("contact").detailed(options.problem, options.dofs, **chosen)
+    found = subjects.load("contact").detailed(options.problem, options.dofs, **chosen)
     if not options.quiet:
         print(json.dumps(found, indent=1))
     if options.json:
@@ -85,7 +85,7 @@ def _write(path: str, content: Any) -> None:
 
 
 def _draw(path: str, results: dict[str, Any]) -> None:
-    from fastcontact.benchmark.pictures import scaling
+    from fastcontact.studies.benchmark.pictures import scaling
 
     for name, sizes in results.items():
         if len({entry["n_dofs"] for entry in sizes}) > 1:

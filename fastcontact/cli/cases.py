@@ -20,8 +20,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """List, print or copy."""
+    from fastcontact.cases.shipped import ready_case, ready_cases
     from fastcontact.errors import FastcontactError
-    from fastcontact.ready import ready_case, ready_cases
 
     if options.copy and options.name:
         raise FastcontactError("give either a name to print or --copy NAME, not both")
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _lines(path: Path) -> list[str]:
     """Return what one case is and what it checks."""
-    from fastcontact.case import read_case
+    from fastcontact.cases.case import read_case
 
     case = read_case(path)
     solid = sum(map(len, case.mesh.solids.values()))

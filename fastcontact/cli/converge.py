@@ -36,7 +36,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the study, write what was asked for, print tables and sentences."""
     from fastcontact.cli._pictures import save
-    from fastcontact.convergence import convergence_study
+    from fastcontact.studies.study import convergence_study
 
     _study.check_targets(options)
     if options.adaptive:
@@ -72,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
 def _adaptive(options: argparse.Namespace) -> int:
     """Refine until the quantity is accurate, write what was asked for, print the table; 2 if it is not."""
     from fastcontact.cli._pictures import save
-    from fastcontact.convergence import adaptive_study
+    from fastcontact.studies.adaptive import adaptive_study
 
     element, formulation = (
         _only(text, name) for text, name in ((options.elements, "element"), (options.formulations, "formulation"))
@@ -92,7 +92,7 @@ def _adaptive(options: argparse.Namespace) -> int:
         sys.stderr.write("\r" + " " * 80 + "\r")
     written = _study.write(options, study, save)
     if options.output:
-        from fastcontact.io.result_writer import ResultWriter
+        from fastcontact.results.writer import ResultWriter
 
         with ResultWriter(options.output, study.case.model, case_text=study.text, cell_fields=("error",)) as out:
             out.write(dataclasses.replace(study.last, cell_fields={"error": study.error.cells}))

@@ -19,14 +19,17 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the environment."""
-    from fastcontact import _jit, summary
-    from fastcontact.kernels import solid2d
+    from fastcontact._jit import decorators as _jit
+    from fastcontact.cases import summary
+    from fastcontact.elasticity import element_2d_kernels
 
     for name, version in summary.versions().items():
         print(f"{name:<12} {version}")
     print(f"{'threads':<12} {_jit.threads()} of {os.cpu_count()}")
     cache = getattr(
-        getattr(solid2d.add_stiffness, "_cache", None), "cache_path", "none: kernels compile in every process"
+        getattr(element_2d_kernels.add_stiffness, "_cache", None),
+        "cache_path",
+        "none: kernels compile in every process",
     )
     print(f"{'cache':<12} {cache}")
     if options.warmup:
@@ -40,11 +43,11 @@ def run(options: argparse.Namespace) -> int:
 
 def _warm_up() -> None:
     """Run small problems through the kernels that most runs need, in two and three dimensions."""
-    from fastcontact import generate
-    from fastcontact.materials import LinearElastic
-    from fastcontact.model import Model
-    from fastcontact.ramp import linear_ramp
-    from fastcontact.solving import solve
+    from fastcontact.analysis.run import solve
+    from fastcontact.elasticity.materials import LinearElastic
+    from fastcontact.mesh import generate
+    from fastcontact.model.model import Model
+    from fastcontact.model.ramp import linear_ramp
 
     for element, formulation in (("tri3", "node_to_segment"), ("tri6", "continuous"), ("tri3", "mortar")):
         model = Model(generate.half_spheres(element, size=10.0), "axisymmetric")

@@ -21,13 +21,13 @@ def run(options: argparse.Namespace) -> int:
     if not (options.med or options.xdmf):
         raise CaseError("nothing to export: give --med FILE or --xdmf FILE")
     if options.med:
-        from fastcontact.io.med import write_med_results
-        from fastcontact.io.result_reader import open_results
+        from fastcontact.results.med import write_med_results
+        from fastcontact.results.reader import open_results
 
         with open_results(options.file) as results:
             write_med_results(options.med, results.mesh, results)
     if options.xdmf:
-        from fastcontact.io.xdmf import write_xdmf
+        from fastcontact.results.xdmf import write_xdmf
 
         write_xdmf(options.file, options.xdmf)
     if not options.quiet:

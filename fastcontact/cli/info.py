@@ -17,13 +17,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print what the file holds."""
     if Path(options.file).suffix == ".vtkhdf":
-        from fastcontact.io.result_reader import open_results
+        from fastcontact.results.reader import open_results
 
         with open_results(options.file) as results:
             print("\n".join([*_mesh_lines(results.mesh), *_result_lines(results)]))
         return 0
-    from fastcontact.io.mesh_files import read_mesh_report
-    from fastcontact.mesh_quality import quality
+    from fastcontact.mesh.files.mesh_files import read_mesh_report
+    from fastcontact.mesh.quality import quality
 
     mesh, report = read_mesh_report(options.file)
     print("\n".join([str(report), *_mesh_lines(mesh), str(quality(mesh))]))

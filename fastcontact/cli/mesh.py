@@ -13,7 +13,7 @@ HELP = "make a mesh with named groups and report its quality"
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add one sub-command a generator, its options read from the generator's own signature."""
-    from fastcontact.generate import GENERATORS
+    from fastcontact.mesh.generate import GENERATORS
 
     kinds = parser.add_subparsers(dest="generator", metavar="GENERATOR", required=True)
     for name, make in GENERATORS.items():
@@ -56,9 +56,9 @@ def _option(make: Callable[..., Any], parameter: inspect.Parameter) -> dict[str,
 
 def run(options: argparse.Namespace) -> int:
     """Make the mesh, write it, print its quality."""
-    from fastcontact.generate import GENERATORS
-    from fastcontact.io.mesh_files import write_mesh
-    from fastcontact.mesh_quality import quality
+    from fastcontact.mesh.files.mesh_files import write_mesh
+    from fastcontact.mesh.generate import GENERATORS
+    from fastcontact.mesh.quality import quality
 
     make = GENERATORS[options.generator]
     names = inspect.signature(make).parameters

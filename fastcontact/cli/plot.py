@@ -30,9 +30,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the picture, or show the window."""
-    from fastcontact import plot
     from fastcontact.cli._pictures import save
-    from fastcontact.io.result_reader import open_results
+    from fastcontact.results import plot
+    from fastcontact.results.reader import open_results
 
     if not (options.png or options.view):
         raise CaseError("name the picture to write with --png FILE, or ask for a window with --view")
@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> Any:
     """Draw what belongs to one contact pair: its zones over the load, or the stresses under it."""
-    from fastcontact import plot
+    from fastcontact.results import plot
 
     name = _results.chosen_contact(step, options.contact)
     if options.zones:

@@ -22,8 +22,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write what was asked for; print the table if nothing was."""
-    from fastcontact.io.result_reader import open_results
-    from fastcontact.io.tables import contact_table, with_theory, write_csv
+    from fastcontact.results.reader import open_results
+    from fastcontact.results.tables import contact_table, with_theory, write_csv
 
     with open_results(options.file) as results:
         step = _results.chosen_step(results, options.step)
@@ -68,7 +68,7 @@ def _print(table: Any) -> None:
 
 
 def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theories: dict[str, Any]) -> None:
-    from fastcontact.io.xmgrace import Curve, write_agr
+    from fastcontact.results.xmgrace import Curve, write_agr
 
     r = np.abs(contact.coordinates[:, 0])
     curves = [Curve(r, contact.pressure, "computed", style="line+symbols")]
@@ -86,8 +86,8 @@ def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theorie
 
 
 def _write_png(path: str, case: dict[str, Any], contact: Any, step: Any, theories: dict[str, Any]) -> None:
-    from fastcontact import plot
     from fastcontact.cli._pictures import save
+    from fastcontact.results import plot
 
     named = {label.replace("Hertz ", "Hertz, "): theory for label, theory in theories.items()}
     axes = plot.pressure_profile(

@@ -39,11 +39,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Solve, write, print the summary."""
-    from fastcontact import summary
-    from fastcontact.case import read_case
-    from fastcontact.io.result_writer import ResultWriter
-    from fastcontact.restart import remaining
-    from fastcontact.solving import solve_steps
+    from fastcontact.analysis.restart import remaining
+    from fastcontact.analysis.run import solve_steps
+    from fastcontact.cases import summary
+    from fastcontact.cases.case import read_case
+    from fastcontact.results.writer import ResultWriter
 
     started = time.perf_counter()
     if options.threads is not None:
@@ -103,7 +103,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _check_same(case: Any, done: list[Any], output: Path) -> None:
     """Refuse to go on with the steps of another case."""
-    from fastcontact import restart
+    from fastcontact.analysis import restart
 
     if done:
         try:
@@ -130,13 +130,13 @@ def _written(output: Path, done: int, total: int, others: list[str]) -> str:
 
 
 def _estimated(model: Any, step: Any) -> Any:
-    from fastcontact.error_estimate import estimate_error
+    from fastcontact.studies.error_estimate import estimate_error
 
     return dataclasses.replace(step, cell_fields={ERROR: estimate_error(model, step).cells})
 
 
 def _set_threads(count: int) -> None:
-    from fastcontact import _jit
+    from fastcontact._jit import decorators as _jit
     from fastcontact.errors import CaseError
 
     limit = os.cpu_count() or 1

@@ -32,7 +32,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the sweep, write what was asked for, print the table."""
     from fastcontact.cli._pictures import save
-    from fastcontact.convergence import parameter_sweep
+    from fastcontact.studies.sweep import parameter_sweep
 
     _study.check_targets(options)
     wanted = dict(_values(text) for text in options.set)

@@ -1,1 +1,1 @@
-"""Contact: surfaces, pairing, constraints and the formulations that join them."""
+"""Contact: surfaces, the search for who faces whom, pairing, constraints and formulations."""

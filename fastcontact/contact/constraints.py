@@ -4,15 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
-from fastcontact.active_set import Compliance, State
-
 Array = NDArray[np.float64]
+
+
+class Compliance(Protocol):
+    """A symmetric positive semidefinite matrix C (m, m) over all constraints."""
+
+    def block(self, rows: NDArray[np.intp]) -> Array:
+        """Return the dense rows and columns `rows` of C."""
+        ...
+
+    def apply(self, multiplier: Array) -> Array:
+        """Return ``C multiplier`` (m,)."""
+        ...
+
+
+class Forces(Protocol):
+    """What the solution of an inequality problem says about forces; see `analysis.active_set.State`."""
+
+    @property
+    def multiplier(self) -> Array:
+        """Normal forces (m,) [force]."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +81,7 @@ class Constraints:
         """All compliance along the normals: C and `softness`."""
         return self.compliance if self.softness is None else _Softened(self.compliance, self.softness)
 
-    def force(self, state: State) -> Array:
+    def force(self, state: Forces) -> Array:
         """Return the nodal contact forces (n_dofs,) of a solution."""
         total: Array = self.B.T @ state.multiplier
         for tangent, along in zip(self.tangents, getattr(state, "tangential", np.empty((0, 0))).T, strict=True):
@@ -141,7 +160,7 @@ def _stacked_loose(parts: list[Constraints]) -> Array | None:
 
 
 class _Softened:
-    """A compliance, or none, and a diagonal one; see `active_set.Compliance`."""
+    """A compliance, or none, and a diagonal one; see `Compliance`."""
 
     def __init__(self, inner: Compliance | None, softness: Array) -> None:
         self._inner, self._softness = inner, softness
@@ -156,7 +175,7 @@ class _Softened:
 
 
 class _BlockDiagonal:
-    """The compliances of several pairs side by side; see `active_set.Compliance`."""
+    """The compliances of several pairs side by side; see `Compliance`."""
 
     def __init__(self, parts: list[Constraints]) -> None:
         self._parts = [part.compliance for part in parts]

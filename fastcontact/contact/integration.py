@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
-from fastcontact import elements, quadrature
 from fastcontact.contact.surface import Surface
+from fastcontact.mesh import elements, quadrature
 
 Array = NDArray[np.float64]
 

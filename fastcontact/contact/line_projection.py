@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.contact import line_projection_kernels
+from fastcontact.contact.search.closest import Closest
 from fastcontact.contact.surface import Surface
-from fastcontact.kernels import along2d
-from fastcontact.search import Closest
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -29,7 +29,7 @@ def along_line_normals(
     facet, xi, overhang = start.facet.astype(np.intp), start.xi[:, 0].copy(), start.overhang.copy()
     work = np.empty(3), np.empty(3)
     neighbour = _neighbours(ends, len(side.points))
-    along2d.along_normals(
+    line_projection_kernels.along_normals(
         np.ascontiguousarray(points), corners, at_nodes, counts, neighbour, facet, xi, overhang, *work
     )
     return facet, xi[:, None], overhang

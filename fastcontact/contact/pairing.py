@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact.contact.line_projection import along_line_normals
+from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.projection import along_normals, interpolated, nodal_normals, places
-from fastcontact.contact.rigid import RigidSide
+from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.contact.surface import Surface
-from fastcontact.search import Closest, closest_of_kinds
 
 Array = NDArray[np.float64]
 # In facet lengths: how far beyond both facets at a node a point may lie and still face it.

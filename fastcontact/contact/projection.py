@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fastcontact import elements
+from fastcontact.contact.search.closest import Closest
 from fastcontact.contact.surface import FacetBlock, Surface
-from fastcontact.search import Closest
+from fastcontact.mesh import elements
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact import elements
 from fastcontact.errors import ContactError, MeshError
-from fastcontact.mesh import Mesh
-from fastcontact.topology import ordered_line, outer_facets
+from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import ordered_line, outer_facets
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]

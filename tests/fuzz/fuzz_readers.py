@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 import fastcontact as fc
-from fastcontact.case import read_case
+from fastcontact.cases.case import read_case
 from fastcontact.errors import FastcontactError
-from fastcontact.io.tables import read_csv
+from fastcontact.results.tables import read_csv
 
 FIELDS = ("DEPL", "SIEF_NOEU", "PRES_CONT")
 # What HDF5 says where it could not get the memory it wanted for values. It also asks for room for its own blocks, of a

@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 
 import fastcontact as fc
-from fastcontact.io.med import write_med_mesh, write_med_results
-from fastcontact.io.tables import history_table, write_csv
+from fastcontact.mesh.files.med import write_med_mesh
+from fastcontact.results.med import write_med_results
+from fastcontact.results.tables import history_table, write_csv
 
 DATA = Path(__file__).resolve().parents[2] / "data"
 
@@ -167,7 +168,7 @@ def _for_meshio(mesh: fc.Mesh):
     """Return a function that makes meshio's mesh with physical tags, arrays or sets."""
     import meshio
 
-    from fastcontact import elements
+    from fastcontact.mesh import elements
 
     points = np.pad(mesh.points, [(0, 0), (0, 3 - mesh.dim)])
     cells = [(elements.get(name).meshio, np.array(block)) for name, block in mesh.cells.items()]

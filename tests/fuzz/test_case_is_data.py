@@ -9,7 +9,7 @@ import fuzz_toml
 import pytest
 
 import fastcontact as fc
-from fastcontact.case import read_case
+from fastcontact.cases.case import read_case
 from fastcontact.errors import FastcontactError
 
 # Texts that mean something to Python, to a shell, to templates, to YAML, to a path.

@@ -11,8 +11,8 @@ from fuzz_worker import Watch
 
 import fastcontact as fc
 from fastcontact.errors import FileError
-from fastcontact.io.med import write_med_mesh
-from fastcontact.io.result_writer import ResultWriter
+from fastcontact.mesh.files.med import write_med_mesh
+from fastcontact.results.writer import ResultWriter
 
 WAYS = ("link", "relative link", "outer storage", "virtual")
 

@@ -3,7 +3,7 @@
 import errno
 import os
 
-from fastcontact.io import _targets
+from fastcontact.mesh.files import targets
 
 
 def full_disk(patch, folder):
@@ -14,17 +14,17 @@ def full_disk(patch, folder):
 
 
 def protected_folder(patch, folder):
-    patch.setattr(_targets, "_may_write", lambda path: not path.is_dir())
+    patch.setattr(targets, "_may_write", lambda path: not path.is_dir())
 
 
 def protected_file(patch, folder):
     (folder / "old.vtkhdf").touch()
-    patch.setattr(_targets, "_may_write", lambda path: path.is_dir())
+    patch.setattr(targets, "_may_write", lambda path: path.is_dir())
 
 
 def other_writer(patch, folder):
     # Kept by the patch until the test ends.
-    patch.setattr(_targets, "held_by_a_test", _targets.PathLock(folder / "busy.vtkhdf"), raising=False)
+    patch.setattr(targets, "held_by_a_test", targets.PathLock(folder / "busy.vtkhdf"), raising=False)
 
 
 def other_results(patch, folder):

@@ -7,7 +7,7 @@ import library
 
 import fastcontact as fc
 from fastcontact import generate
-from fastcontact.generate import block, block_on_block
+from fastcontact.mesh.generate import block, block_on_block
 
 
 class Doubt(NamedTuple):

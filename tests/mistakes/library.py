@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 import fastcontact as fc
-from fastcontact import elements, generate, topology
-from fastcontact.generate import block, block_on_block
+from fastcontact import generate, topology
+from fastcontact.mesh import elements
+from fastcontact.mesh.generate import block, block_on_block
 
 
 class Mistake(NamedTuple):

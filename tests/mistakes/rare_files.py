@@ -14,12 +14,13 @@ import h5py
 import numpy as np
 
 import fastcontact as fc
-from fastcontact import case as cases
+from fastcontact.cases import case as cases
 from fastcontact.cli import _pictures, _results, bench
 from fastcontact.cli.run import _write_json
-from fastcontact.generate import block, block_on_block
-from fastcontact.io import _abaqus, _files, _hdf5, _packing
-from fastcontact.io._blocks import build_mesh
+from fastcontact.mesh.files import _abaqus, hdf5, replacing
+from fastcontact.mesh.files._blocks import build_mesh
+from fastcontact.mesh.generate import block, block_on_block
+from fastcontact.results import _packing
 
 
 def held():
@@ -57,8 +58,8 @@ def full(patch, work):
 def opened(folder, change):
     with h5py.File(folder / "spoilt.h5", "w") as file:
         change(file)
-    with _hdf5.opened(folder / "spoilt.h5") as file:
-        return _hdf5.values(file, "a")
+    with hdf5.opened(folder / "spoilt.h5") as file:
+        return hdf5.values(file, "a")
 
 
 def circle(file):
@@ -80,7 +81,7 @@ def pipe(folder):
 
 
 def vanished(folder):
-    with _files.replacing(folder / "a.txt"):
+    with replacing.replacing(folder / "a.txt"):
         pass  # nothing was written that could be put in place
 
 

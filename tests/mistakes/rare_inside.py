@@ -16,23 +16,28 @@ from scipy.sparse import bsr_array, csr_array
 
 import fastcontact as fc
 from fastcontact import generate
-from fastcontact.benchmark import subjects
-from fastcontact.case import read_case
+from fastcontact.analysis.unsupported_bodies import Floating
+from fastcontact.cases.case import read_case
 from fastcontact.cli import _study, bench, cases
 from fastcontact.cli._outputs import check_outputs
 from fastcontact.contact.formulations import _cut_faces
-from fastcontact.convergence import convergence_study, parameter_sweep, pictures, study, sweep
-from fastcontact.convergence.levels import recipe
-from fastcontact.convergence.settings import Combination, settings
-from fastcontact.floating import Floating
-from fastcontact.generate import _triangulate
-from fastcontact.generate.transform import renamed
-from fastcontact.io import _hdf5, _meshio, med, result_reader
-from fastcontact.linear import _elimination, _multigrid, amg
-from fastcontact.linear.direct import Direct
-from fastcontact.system import System
+from fastcontact.elasticity.system import System
+from fastcontact.linear.elimination import elimination
+from fastcontact.linear.multigrid import solver
+from fastcontact.linear.solvers import amg
+from fastcontact.linear.solvers.direct import Direct
+from fastcontact.mesh.files import _meshio, hdf5, med
+from fastcontact.mesh.generate import _triangulate
+from fastcontact.mesh.generate.transform import renamed
+from fastcontact.results import reader
+from fastcontact.studies import pictures, study, sweep
+from fastcontact.studies.benchmark import subjects
+from fastcontact.studies.levels import recipe
+from fastcontact.studies.settings import Combination, settings
+from fastcontact.studies.study import convergence_study
+from fastcontact.studies.sweep import parameter_sweep
 
-REPEATED = re.escape(str(_elimination.RepeatedError()))
+REPEATED = re.escape(str(elimination.RepeatedError()))
 
 
 def refusing(number):
@@ -57,7 +62,7 @@ def not_slack(patch):
 
 
 def no_checkout(patch, folder):
-    patch.setattr(subjects.fastcontact, "__file__", str(folder / "package" / "__init__.py"))
+    patch.setattr(subjects, "__file__", str(folder / "package" / "studies" / "benchmark" / "subjects.py"))
     subjects.folder()
 
 
@@ -92,7 +97,7 @@ def copied_to_a_full_disk(patch, folder):
 
 
 def distorted_facets(patch):
-    patch.setattr(_cut_faces.clip3d, "integrate", lambda *_: 0)
+    patch.setattr(_cut_faces._cut_faces_kernels, "integrate", lambda *_: 0)
     lower, upper = generate.box(divisions=(2, 2, 2)), generate.box(divisions=(2, 2, 2), origin=(0.0, 0.0, 1.0))
     mesh = generate.union(renamed(lower, lambda name: f"A_{name}"), renamed(upper, lambda name: f"B_{name}"))
     model = fc.Model(mesh, "3d")
@@ -102,7 +107,7 @@ def distorted_facets(patch):
 
 
 def stuck(patch):
-    patch.setattr(_multigrid, "MAX_ITERATIONS", 0)
+    patch.setattr(solver, "MAX_ITERATIONS", 0)
     patch.setattr(amg, "FACTORS_UP_TO", {2: 0})
     solved(blocks(), linear_solver="amg")
 
@@ -144,8 +149,8 @@ def no_point(patch):
 def packed_beyond_its_size(folder, patch):
     with h5py.File(folder / "a.h5", "w") as file:
         file.create_dataset("a", data=np.random.default_rng(1).random(2000), chunks=(10,), compression="gzip")
-    patch.setattr(_hdf5, "PLAUSIBLE_BYTES", -(10**6))
-    with _hdf5.opened(folder / "a.h5"):
+    patch.setattr(hdf5, "PLAUSIBLE_BYTES", -(10**6))
+    with hdf5.opened(folder / "a.h5"):
         pass
 
 
@@ -172,23 +177,23 @@ def parts_that_do_not_fit(folder, patch):
 
 def unreadable(folder, patch):
     (folder / "a.vtkhdf").touch()
-    patch.setattr(result_reader.os, "access", lambda *_, **__: False)
+    patch.setattr(reader.os, "access", lambda *_, **__: False)
     fc.open_results(folder / "a.vtkhdf")
 
 
 def repeated_equations(patch):
-    patch.setattr(_elimination, "DENSE_UP_TO", 0)
-    _elimination._matched(csr_array(np.array([[1.0, 0.0], [2.0, 0.0]])))
+    patch.setattr(elimination, "DENSE_UP_TO", 0)
+    elimination._matched(csr_array(np.array([[1.0, 0.0], [2.0, 0.0]])))
 
 
 CALLS = [
     ("values of points beyond the mesh", profile_beyond_the_mesh, fc.errors.FileError, r"profile 'P' names point 9 of 4: write the file anew"),
     ("parts of a file that do not fit", parts_that_do_not_fit, fc.errors.FileError, r"the parts of '.*a\.vtk' do not fit together: check the file, or convert it to \.med"),
     ("a result that may not be read", unreadable, fc.errors.FileError, r"a\.vtkhdf' may not be read: ask its owner for the permission"),
-    ("equations on the same unknown", repeated_equations, _elimination.RepeatedError, REPEATED),
-    ("equations that are equal", lambda: _elimination._block_inverse(csr_array(np.ones((2, 2)))), _elimination.RepeatedError, REPEATED),
-    ("more equations than unknowns", lambda: _elimination._matched(csr_array(np.ones((2, 1)))), _elimination.RepeatedError, REPEATED),
-    ("equations that are nearly equal", lambda: _elimination._block_inverse(csr_array([[1.0, 1.0], [1.0, 1.0 + 1e-14]])), _elimination.RepeatedError, REPEATED),
+    ("equations on the same unknown", repeated_equations, elimination.RepeatedError, REPEATED),
+    ("equations that are equal", lambda: elimination._block_inverse(csr_array(np.ones((2, 2)))), elimination.RepeatedError, REPEATED),
+    ("more equations than unknowns", lambda: elimination._matched(csr_array(np.ones((2, 1)))), elimination.RepeatedError, REPEATED),
+    ("equations that are nearly equal", lambda: elimination._block_inverse(csr_array([[1.0, 1.0], [1.0, 1.0 + 1e-14]])), elimination.RepeatedError, REPEATED),
     ("forces out of balance", out_of_balance, fc.ConvergenceError, r"step 1: the out-of-balance force 1e\+09 stays above .* \(1e-06 of the largest force\): use the direct solver or a smaller tolerance"),
     ("springs that stay stretched", not_slack, fc.ConvergenceError, r"contact does not hold .*: after \d+ positions tried, a force of .* is still missing for equilibrium under a load of 10\. Add a support, or use more load steps"),
     ("benchmarks without checkout", no_checkout, fc.errors.FastcontactError, r"the benchmarks need the source checkout, and there is no '.*': install it with pip install -e"),

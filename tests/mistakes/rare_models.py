@@ -6,12 +6,14 @@ import numpy as np
 from library import Mistake, blocks, pair_of, square, with_load
 
 import fastcontact as fc
-from fastcontact import _jit, linear, topology
+from fastcontact import topology
+from fastcontact._jit import decorators as _jit
 from fastcontact.contact.formulations import Formulation
-from fastcontact.generate import block, box, half_spheres
-from fastcontact.mesh import Mesh
-from fastcontact.plot import contact_zones
-from fastcontact.plot.axis import stresses_on_axis
+from fastcontact.linear import choice as linear
+from fastcontact.mesh.generate import block, box, half_spheres
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.results.plot import contact_zones
+from fastcontact.results.plot.axis import stresses_on_axis
 
 
 def obstacle(**options):
@@ -64,14 +66,14 @@ def without(patch, *modules):
 
 
 def picture_without_matplotlib(patch):
-    from fastcontact.plot._axes import new_axes
+    from fastcontact.results.plot._axes import new_axes
 
     without(patch, "matplotlib", "matplotlib.figure", "matplotlib.backends.backend_agg")
     new_axes(None, (4.0, 3.0))
 
 
 def view_without_pyvista(patch):
-    from fastcontact.plot.view import view
+    from fastcontact.results.plot.view import view
 
     without(patch, "pyvista")
     view(None, None)

@@ -9,17 +9,19 @@ from types import SimpleNamespace
 import numpy as np
 
 import fastcontact as fc
-from fastcontact.case import build_case, read_case
-from fastcontact.checks import Check, _check_target
+from fastcontact.cases.case import build_case, read_case
+from fastcontact.cases.checks import Check, _check_target
 from fastcontact.cli import _study
 from fastcontact.cli._main import parser
-from fastcontact.convergence import adaptive_study, convergence_study, execute, fit
-from fastcontact.convergence.levels import make_mesh
-from fastcontact.convergence.settings import combinations, settings
-from fastcontact.convergence.store import Store
-from fastcontact.convergence.substitute import _by_law
-from fastcontact.generate import block, box, half_spheres, merge_points
-from fastcontact.generate.refine import Circle, refined
+from fastcontact.mesh.generate import block, box, half_spheres, merge_points
+from fastcontact.mesh.generate.refine import Circle, refined
+from fastcontact.studies import execute, fit
+from fastcontact.studies.adaptive import adaptive_study
+from fastcontact.studies.case_parameters import _by_law
+from fastcontact.studies.levels import make_mesh
+from fastcontact.studies.settings import combinations, settings
+from fastcontact.studies.store import Store
+from fastcontact.studies.study import convergence_study
 
 CASES = [
     ("mesh is a word", '[mesh]\nfile = "forma04a.med"', 'mesh = "forma04a.med"', r"of 'mesh' must be of type dict|'mesh' must be a table"),
@@ -121,7 +123,8 @@ def interrupted(patch, command):
     def stop(*_, **__):
         raise KeyboardInterrupt
 
-    patch.setattr(f"fastcontact.convergence.{command}", stop)
+    module = {"convergence_study": "study", "parameter_sweep": "sweep"}[command]
+    patch.setattr(f"fastcontact.studies.{module}.{command}", stop)
     name = {"convergence_study": ["converge"], "parameter_sweep": ["sweep", "--set", "approach=1"]}[command]
     options = parser(name[0]).parse_args([name[0], "forma04a", *name[1:]])
     options.run(options)

@@ -6,7 +6,8 @@ import warnings
 import library
 import pytest
 
-from fastcontact import analysis, errors
+from fastcontact import errors
+from fastcontact.analysis import analysis
 
 KINDS = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, errors.FastcontactError)]
 

@@ -9,7 +9,7 @@ from accidents import ACCIDENTS
 from catalogue import CASES, COMMANDS
 from spoilt import MESHES
 
-from fastcontact import analysis
+from fastcontact.analysis import analysis
 from fastcontact.cli import main
 
 DATA = Path(__file__).parents[2] / "data"

@@ -8,7 +8,7 @@ import doubtful
 import pytest
 
 import fastcontact as fc
-from fastcontact.case import read_case
+from fastcontact.cases.case import read_case
 from fastcontact.cli import main
 
 ALSO = re.compile("contact 'pair' has only .* across its radius|the largest (rotation|equivalent strain)")

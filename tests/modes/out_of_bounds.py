@@ -3,7 +3,7 @@
 import numba
 import numpy as np
 
-from fastcontact._jit import kernel, parallel_kernel
+from fastcontact._jit.decorators import kernel, parallel_kernel
 
 
 @kernel

@@ -13,7 +13,7 @@ import sys
 import numpy as np
 
 import fastcontact as fc
-from fastcontact import parallel
+from fastcontact._jit import parallel
 
 
 def plane() -> list[fc.StepResult]:

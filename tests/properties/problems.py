@@ -11,7 +11,7 @@ from images import Image, Job, model_of
 from two_bodies import boxes
 
 import fastcontact as fc
-from fastcontact.analysis import Analysis
+from fastcontact.analysis.analysis import Analysis
 
 FORMULATIONS = (
     ("node_to_segment", ()),

@@ -8,10 +8,10 @@ from problems import FORMULATIONS, analysis_of, examples, recipes
 from scipy.sparse import bsr_array, csr_array
 
 import fastcontact as fc
-from fastcontact import linear
-from fastcontact.assembly import rigid_modes, stiffness
-from fastcontact.linear._elimination import eliminate
-from fastcontact.linear._multigrid import RAISE, RAISES
+from fastcontact.elasticity.stiffness import rigid_modes, stiffness
+from fastcontact.linear import choice as linear
+from fastcontact.linear.elimination.elimination import eliminate
+from fastcontact.linear.multigrid.solver import RAISE, RAISES
 
 # Over the largest entry.
 ROUNDING, SOLVED = 1e-14, 1e-9

@@ -8,7 +8,8 @@ from problems import analysis_of, examples, recipes
 from scipy.sparse import bsr_array, csr_array
 
 import fastcontact as fc
-from fastcontact import active_set, linear
+from fastcontact.analysis import active_set
+from fastcontact.linear import choice as linear
 
 SPACE = {"kinematics": ("3d",)}
 

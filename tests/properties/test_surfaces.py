@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from problems import examples
 from scipy.spatial.transform import Rotation
 
-from fastcontact import elements
-from fastcontact.search import closest
+from fastcontact.contact.search.closest import closest
+from fastcontact.mesh import elements
 
 SIZE = {"line2": 2, "line3": 3, "tri3": 3, "tri6": 6, "quad4": 4, "quad8": 8, "quad9": 9}
 

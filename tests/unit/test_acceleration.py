@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fastcontact.acceleration import Anderson
+from fastcontact.analysis.anderson import Anderson
 
 
 def iterations(G, x, depth, where, tolerance=1e-12, limit=200):

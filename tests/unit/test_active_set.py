@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import bsr_array, csr_array
 
-from fastcontact import active_set, linear
+from fastcontact.analysis import active_set
+from fastcontact.linear import choice as linear
 
 
 class Dense:

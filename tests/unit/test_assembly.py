@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact import elements, recovery
-from fastcontact.assembly import rigid_modes, sparsity, stiffness
+from fastcontact import recovery
+from fastcontact.elasticity.stiffness import rigid_modes, sparsity, stiffness
 from fastcontact.errors import MeshError
+from fastcontact.mesh import elements
 
 KINEMATICS = ("plane_strain", "plane_stress", "axisymmetric")
 SOLIDS = [e.name for e in elements.ELEMENTS.values() if e.dim == 2]

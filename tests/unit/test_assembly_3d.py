@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact import elements, recovery
-from fastcontact.assembly import rigid_modes, stiffness
-from fastcontact.generate.box import box
-from fastcontact.topology import corner_volumes, oriented, outer_facets
+from fastcontact import recovery
+from fastcontact.elasticity.stiffness import rigid_modes, stiffness
+from fastcontact.mesh import elements
+from fastcontact.mesh.generate.box import box
+from fastcontact.mesh.topology import corner_volumes, oriented, outer_facets
 
 SOLIDS = [e.name for e in elements.ELEMENTS.values() if e.dim == 3]
 QUADRATIC = [name for name in SOLIDS if elements.get(name).order == 2]

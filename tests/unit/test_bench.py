@@ -4,14 +4,14 @@ import json
 
 import pytest
 
-from fastcontact import benchmark
 from fastcontact.cli._main import main
+from fastcontact.studies.benchmark import subjects
 
 SUBJECTS = {"assembly", "contact", "io", "linear", "recovery", "search", "startup", "study"}
 
 
 def test_all_subjects_are_there():
-    assert set(benchmark.names()) == SUBJECTS
+    assert set(subjects.names()) == SUBJECTS
 
 
 @pytest.mark.parametrize("name", sorted(SUBJECTS))

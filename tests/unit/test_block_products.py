@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fastcontact._jit import kernel
-from fastcontact.kernels import block_products
+from fastcontact._jit.decorators import kernel
+from fastcontact.linear.multigrid import block_products
 
 SIZES = [(1, 1), (1, 3), (2, 2), (2, 3), (3, 2), (3, 3), (3, 6), (6, 3), (6, 6), (4, 5), (2, 7)]
 

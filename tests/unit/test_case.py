@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.case import read_case
+from fastcontact.cases.case import read_case
 
 GOOD = """
 title = "small"

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.case import described
-from fastcontact.checks import Check, evaluated, measured, read_check
+from fastcontact.cases.case import described
+from fastcontact.cases.checks import Check, evaluated, measured, read_check
 from fastcontact.errors import CaseError
-from fastcontact.results import ContactResult, StepResult
+from fastcontact.results.step import ContactResult, StepResult
 
 HERTZ = fc.analytic.hertz_point(E1=1000.0, nu1=0.3, R1=10.0, force=4.0)
 SLIP = fc.analytic.cattaneo_mindlin_line(

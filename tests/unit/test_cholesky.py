@@ -6,8 +6,12 @@ from scipy.linalg import ldl
 from scipy.sparse import block_diag, bsr_array, csc_array
 
 from fastcontact.errors import ModelError
-from fastcontact.kernels import cholesky, elimination_tree, triangular
-from fastcontact.linear import _cholesky
+from fastcontact.linear.cholesky import (
+    elimination_tree_kernels,
+    factorisation,
+    triangular_kernels,
+)
+from fastcontact.linear.cholesky import factorisation_kernels as kernels
 
 EXACT = np.array([4]), np.array([0.0, 0.0])
 JOINED = np.array([4, 16]), np.array([1.0, 0.6, 0.3])
@@ -45,9 +49,9 @@ def filled(A):
 def tree(A):
     n = A.shape[0]
     parent, order, count = (np.empty(n, np.intc) for _ in range(3))
-    elimination_tree.parents(A.indptr, A.indices, parent)
-    elimination_tree.postordered(parent, order)
-    elimination_tree.counts(A.indptr, A.indices, parent, order, count)
+    elimination_tree_kernels.parents(A.indptr, A.indices, parent)
+    elimination_tree_kernels.postordered(parent, order)
+    elimination_tree_kernels.counts(A.indptr, A.indices, parent, order, count)
     return parent, order, count
 
 
@@ -76,10 +80,10 @@ def test_subtrees_stand_together_in_postorder(A):
 @pytest.mark.parametrize("rule", [EXACT, JOINED], ids=["exact", "joined"])
 def test_supernodes_hold_every_entry_and_no_more_zeros_than_asked(A, rule, monkeypatch):
     n, late = A.shape[0], np.arange(A.shape[0]) > 0.7 * A.shape[0]
-    monkeypatch.setattr(_cholesky, "WIDTHS", rule[0])
-    monkeypatch.setattr(_cholesky, "SHARES", rule[1])
-    found = _cholesky._tree(A)
-    first, begin, rows = _cholesky._supernodes(A, found, late[found.order])
+    monkeypatch.setattr(factorisation, "WIDTHS", rule[0])
+    monkeypatch.setattr(factorisation, "SHARES", rule[1])
+    found = factorisation._tree(A)
+    first, begin, rows = factorisation._supernodes(A, found, late[found.order])
     L = filled(A[found.order][:, found.order])
     shown = np.zeros((n, n), bool)
     for s in range(len(first) - 1):
@@ -103,8 +107,8 @@ def test_fronts_are_eliminated_as_by_hand(size, share):
         row = expected[j, j + 1 :] / expected[j, j]
         expected[j + 1 :, j + 1 :] -= np.outer(row, expected[j, j + 1 :])
         expected[j, j + 1 :] = row
-    room = (np.empty(count * size) for count in (cholesky.PANEL, cholesky.PANEL, cholesky.ROWS))
-    assert cholesky._eliminated(F, width, *room) == -1
+    room = (np.empty(count * size) for count in (kernels.PANEL, kernels.PANEL, kernels.ROWS))
+    assert kernels._eliminated(F, width, *room) == -1
     np.testing.assert_allclose(np.triu(F), np.triu(expected), atol=1e-13 * np.abs(A).max())
 
 
@@ -113,9 +117,9 @@ def test_fronts_are_eliminated_as_by_hand(size, share):
 def test_factors_are_those_of_the_matrix(A, m):
     n = A.shape[0]
     last = np.sort(np.random.default_rng(m).permutation(n)[:m])
-    made = _cholesky.factors(bsr_array(A, blocksize=(1, 1)), last)
+    made = factorisation.factors(bsr_array(A, blocksize=(1, 1)), last)
     L, wanted = np.zeros((n, n)), np.arange(n)
-    triangular.block(*made._L, wanted, L)
+    triangular_kernels.block(*made._L, wanted, L)
     order = np.argsort(made._place)
     dense = A.toarray()[np.ix_(order, order)]
     np.testing.assert_allclose((L * made._d) @ L.T, dense, atol=1e-13 * np.abs(dense).max())
@@ -130,7 +134,7 @@ def test_factors_are_those_of_the_matrix(A, m):
 
 def test_factors_have_the_same_bits_again():
     K = bsr_array(positive(300, 0.05, 7), blocksize=(2, 2))
-    one, other = (_cholesky.factors(K, np.arange(5)) for _ in range(2))
+    one, other = (factorisation.factors(K, np.arange(5)) for _ in range(2))
     for a, b in zip((*one._L, one._d), (*other._L, other._d), strict=True):
         np.testing.assert_array_equal(a, b)
 
@@ -145,4 +149,4 @@ def test_factors_have_the_same_bits_again():
 )
 def test_what_is_not_positive_definite_is_refused(matrix, message):
     with pytest.raises(ModelError, match=message):
-        _cholesky.factors(bsr_array(np.array(matrix), blocksize=(1, 1)), np.array([1]))
+        factorisation.factors(bsr_array(np.array(matrix), blocksize=(1, 1)), np.array([1]))

@@ -5,7 +5,7 @@ import argparse
 import pytest
 
 from fastcontact.cli import _study, sweep
-from fastcontact.convergence.execute import Progress
+from fastcontact.studies.execute import Progress
 
 
 @pytest.mark.parametrize(

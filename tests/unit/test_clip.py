@@ -5,15 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fastcontact import elements, quadrature
+from fastcontact.contact.formulations import _cut_faces_kernels
+from fastcontact.contact.formulations import _cut_faces_tree_kernels as tree
 from fastcontact.contact.formulations._cut_faces import terms_of
-from fastcontact.kernels import box_tree, clip3d
+from fastcontact.mesh import elements, quadrature
 
 
 def planes(corners):
     n, count = corners.shape[:2]
     origin, axes = np.empty((n, 3)), np.empty((n, 3, 3))
-    clip3d.planes(corners, count, origin, axes)
+    _cut_faces_kernels.planes(corners, count, origin, axes)
     return origin, axes
 
 
@@ -23,9 +24,9 @@ def facing(secondary, primary, room=1000, reach=2.0):
     radius = np.linalg.norm(secondary - origin[:, None], axis=2).max(axis=1)
     low, high = primary.min(axis=1), primary.max(axis=1)
     pairs = np.empty((room, 2), np.intp)
-    count = clip3d.facing_pairs(
+    count = _cut_faces_kernels.facing_pairs(
         secondary, secondary.shape[1], origin, axes, radius, np.full(len(secondary), reach),
-        primary, primary.shape[1], np.ascontiguousarray(other_axes[:, 2]), low, high, *box_tree.build(low, high),
+        primary, primary.shape[1], np.ascontiguousarray(other_axes[:, 2]), low, high, *tree.build(low, high),
         -0.1, pairs,
     )  # fmt: skip
     return pairs[: min(count, room)], count
@@ -40,7 +41,7 @@ def integrated(secondary, primary, kinds, reference=None):
     reference = secondary if reference is None else reference
     mass = np.empty((len(secondary), one.n_nodes, one.n_nodes))
     coupling = np.empty((len(pairs), one.n_nodes, other.n_nodes))
-    wrong = clip3d.integrate(
+    wrong = _cut_faces_kernels.integrate(
         corners, one.n_corners, origin, axes, terms_of(one) @ secondary, terms_of(one) @ reference, terms_of(one),
         one.nodes[: one.n_corners].mean(axis=0), opposite, other.n_corners, terms_of(other) @ primary,
         terms_of(other), other.nodes[: other.n_corners].mean(axis=0), pairs, *quadrature.triangle(8), mass, coupling,

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fastcontact.cofactors import inverses
+from fastcontact.model.small_inverses import inverses
 
 
 @pytest.mark.parametrize("n", [2, 3])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fastcontact import cone_newton, coulomb
+from fastcontact.analysis.friction import cone_newton, coulomb
 
 
 def residual(F, free, mu, y):

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fastcontact import elements, quadrature
 from fastcontact.contact.formulations._dual_basis import MOST, biorthogonal, dual_functions, positive
+from fastcontact.mesh import elements, quadrature
 
 FACETS = ("line2", "line3", "tri3", "tri6", "quad4", "quad8", "quad9")
 

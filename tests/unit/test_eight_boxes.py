@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from fastcontact._jit import kernel
-from fastcontact.kernels import eight_boxes
-from fastcontact.kernels.eight_boxes import WIDTH, copied, emptied, lowest, squares, within, without
+from fastcontact._jit.decorators import kernel
+from fastcontact.contact.search import eight_boxes
+from fastcontact.contact.search.eight_boxes import WIDTH, copied, emptied, lowest, squares, within, without
 
 
 @kernel

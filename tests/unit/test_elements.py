@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from fastcontact import elements
 from fastcontact.errors import MeshError
+from fastcontact.mesh import elements
 
 ALL = list(elements.ELEMENTS.values())
 SOLID = [e for e in ALL if e.facet_elements]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact import elements
-from fastcontact.assembly import stiffness
+from fastcontact.elasticity.stiffness import stiffness
+from fastcontact.mesh import elements
 
 E, NU = 1000.0, 0.3
 FACES = [e.name for e in elements.ELEMENTS.values() if e.dim == 2]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fastcontact.extrapolation import Extrapolation
+from fastcontact.analysis.extrapolation import Extrapolation
 
 
 def after_two_steps(loads=(1.0, 2.0)):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.fingerprint import different, fingerprint
-from fastcontact.generate import block
+from fastcontact.mesh.generate import block
+from fastcontact.model.fingerprint import different, fingerprint
 
 
 def model(pressure=lambda points: 1.0 + points[:, 0], height=3.0, order=1, stiffness=2.0, mass=1.0):

@@ -5,12 +5,14 @@ import pytest
 from scipy.sparse import csr_array, random_array, vstack
 
 import fastcontact as fc
-from fastcontact import friction_eliminated, linear
-from fastcontact.analysis import Analysis
-from fastcontact.criteria import Criteria
+from fastcontact.analysis.analysis import Analysis
+from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.friction import eliminated
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear import _multigrid, amg
-from fastcontact.linear._gcr import KEPT, ConjugateResiduals
+from fastcontact.linear import choice as linear
+from fastcontact.linear.krylov.gcr import KEPT, ConjugateResiduals
+from fastcontact.linear.multigrid import solver
+from fastcontact.linear.solvers import amg
 
 BOTH = {"secondary": "CONT_SPHERE", "primary": "CONT_BLOCK"}
 
@@ -72,7 +74,7 @@ def test_elimination_and_compliance_agree_and_no_column_is_asked_for(formulation
 
 
 def test_what_fails_on_eliminated_constraints_is_solved_on_their_compliance(monkeypatch, caplog):
-    monkeypatch.setattr(friction_eliminated, "solve", lambda *args, **options: None)
+    monkeypatch.setattr(eliminated, "solve", lambda *args, **options: None)
     caplog.set_level("INFO", "fastcontact")
     model = small_blocks()
     one, other = (fc.solve(model, fc.linear_ramp(2), linear_solver=name)[-1] for name in ("direct", "amg"))
@@ -138,9 +140,9 @@ def test_oblique_equations_with_springs_against_a_dense_solution():
 
 
 def test_an_iteration_that_does_not_end_is_told(monkeypatch):
-    from fastcontact.linear import _oblique
+    from fastcontact.linear.elimination import nonsymmetric
 
-    monkeypatch.setattr(_oblique, "MAX_ITERATIONS", 1)
+    monkeypatch.setattr(nonsymmetric, "MAX_ITERATIONS", 1)
     analysis = Analysis(rubbing(), "amg", 1e-12, Criteria())
     n = analysis.model.n_dofs
     rows = csr_array((np.ones(2), ([0, 0], np.flatnonzero(analysis.system.free)[[0, 40]])), shape=(1, n))
@@ -151,7 +153,7 @@ def test_an_iteration_that_does_not_end_is_told(monkeypatch):
 
 
 def stuck(monkeypatch, limit=None):
-    monkeypatch.setattr(_multigrid, "MAX_ITERATIONS", 0)
+    monkeypatch.setattr(solver, "MAX_ITERATIONS", 0)
     if limit is not None:
         monkeypatch.setattr(amg, "FACTORS_UP_TO", {3: limit})
     return small_blocks(0.0)
@@ -171,7 +173,7 @@ def test_where_multigrid_stalls_factors_take_over_and_say_so(monkeypatch):
 
 
 def test_factors_that_took_over_solve_friction_on_its_compliance(monkeypatch):
-    monkeypatch.setattr(_multigrid, "MAX_ITERATIONS", 0)
+    monkeypatch.setattr(solver, "MAX_ITERATIONS", 0)
     exact = fc.solve(small_blocks(), fc.linear_ramp(3), linear_solver="direct")[-1]
     with pytest.warns(fc.FastcontactWarning, match="multigrid gave up"):
         found = fc.solve(small_blocks(), fc.linear_ramp(3), linear_solver="amg")[-1]
@@ -181,7 +183,7 @@ def test_factors_that_took_over_solve_friction_on_its_compliance(monkeypatch):
 def test_nothing_is_eliminated_once_factors_have_taken_over():
     analysis = Analysis(small_blocks(), "amg", 1e-10, Criteria())
     n = analysis.model.n_dofs
-    analysis.solver.give_up(_multigrid.StallError("stalled"))
+    analysis.solver.give_up(solver.StallError("stalled"))
     none = csr_array((0, n))
     with pytest.raises(ConvergenceError, match="factors give the compliance of friction"):
         analysis.solver.load(np.zeros(n)).oblique(none, np.empty(0), np.empty(0, np.int64), np.zeros(n), 1e-10)

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from fastcontact.kernels import cone, lemke
+from fastcontact.analysis.friction import lemke_kernels, sweep_kernels
 
 
 def swept_once(F, free, mu, y):
@@ -31,7 +31,7 @@ def test_sweeps_against_numpy(parts):
     A = rng.normal(size=(parts * m, parts * m))
     F, free, mu = A @ A.T + np.eye(parts * m), rng.normal(size=(parts, m)), rng.uniform(0.1, 1.0, m)
     y, gaps, plain = np.zeros((parts, m)), np.empty((parts, m)), np.zeros((parts, m))
-    assert cone.sweep(F, free, mu, y, gaps, 0.0, 3) == 3
+    assert sweep_kernels.sweep(F, free, mu, y, gaps, 0.0, 3) == 3
     for _ in range(3):
         plain = swept_once(F, free, mu, plain)
     np.testing.assert_allclose(y, plain, atol=1e-12 * np.abs(plain).max())
@@ -44,7 +44,7 @@ def test_pivots_against_all_bases():
         n = 5
         A = rng.normal(size=(n, n))
         M, q, z = A @ A.T + 0.1 * np.eye(n) + (A - A.T), rng.normal(size=n), np.empty(n)
-        assert lemke.pivot(M, q, z, 100) >= 0
+        assert lemke_kernels.pivot(M, q, z, 100) >= 0
         wanted = None
         for basis in itertools.product([False, True], repeat=n):
             on, x = np.flatnonzero(basis), np.zeros(n)
@@ -56,9 +56,9 @@ def test_pivots_against_all_bases():
 
 def test_pivots_tell_a_problem_without_a_solution():
     z = np.ones(1)
-    assert lemke.pivot(np.array([[-1.0]]), np.array([-1.0]), z, 10) < 0
+    assert lemke_kernels.pivot(np.array([[-1.0]]), np.array([-1.0]), z, 10) < 0
     assert z[0] == 0.0
-    assert lemke.pivot(np.array([[1.0]]), np.array([2.0]), z, 10) == 0
+    assert lemke_kernels.pivot(np.array([[1.0]]), np.array([2.0]), z, 10) == 0
     assert z[0] == 0.0
 
 
@@ -66,6 +66,6 @@ def test_pivots_are_counted():
     n = 6
     A = np.random.default_rng(1).normal(size=(n, n))
     z = np.empty(n)
-    needed = lemke.pivot(A @ A.T + np.eye(n), -np.ones(n), z, 1000)
+    needed = lemke_kernels.pivot(A @ A.T + np.eye(n), -np.ones(n), z, 1000)
     assert needed > 1
-    assert lemke.pivot(A @ A.T + np.eye(n), -np.ones(n), z, needed - 1) < 0
+    assert lemke_kernels.pivot(A @ A.T + np.eye(n), -np.ones(n), z, needed - 1) < 0

@@ -6,11 +6,11 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 import fastcontact as fc
-from fastcontact import cone_newton, coulomb, friction
+from fastcontact.analysis.friction import cone_newton, coulomb, friction
+from fastcontact.analysis.friction.slip_directions import aligning, idle, own_compliance
 from fastcontact.contact.formulations._held_nodes import compliant
 from fastcontact.contact.formulations._projection import Projection
 from fastcontact.contact.pairing import normals, tangents
-from fastcontact.slip_directions import aligning, idle, own_compliance
 
 
 def unit_vectors(rng, n, dim):

@@ -8,10 +8,10 @@ import pytest
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 import fastcontact as fc
-from fastcontact import linear
-from fastcontact.analysis import Analysis
-from fastcontact.criteria import Criteria
+from fastcontact.analysis.analysis import Analysis
+from fastcontact.analysis.criteria import Criteria
 from fastcontact.errors import ModelError
+from fastcontact.linear import choice as linear
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def problem(forma04):
 
 
 def prepared(name, analysis):
-    from fastcontact.analysis import near_nullspace
+    from fastcontact.analysis.analysis import near_nullspace
 
     solver = linear.make(name, dim=2, n_dofs=analysis.model.n_dofs, tolerance=1e-12)
     solver.prepare(analysis.system.matrix, analysis.system.unknowns_of(near_nullspace(analysis.model)))

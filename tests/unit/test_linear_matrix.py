@@ -7,11 +7,11 @@ import pytest
 from scipy.sparse import bsr_array
 
 import fastcontact as fc
-from fastcontact import linear
-from fastcontact.analysis import Analysis
-from fastcontact.criteria import Criteria
-from fastcontact.kernels import halves
-from fastcontact.linear._matrix import Given
+from fastcontact.analysis.analysis import Analysis
+from fastcontact.analysis.criteria import Criteria
+from fastcontact.linear import choice as linear
+from fastcontact.linear.multigrid import split_matrix_kernels
+from fastcontact.linear.multigrid.matrix import Given
 
 EXACT = 2.0**-47  # of halves, in units of the largest number of a row
 
@@ -33,21 +33,21 @@ def matrix(n, size, scale=1.0, seed=0):
 def test_halves_are_the_nearest_number_and_the_rest():
     numbers = np.random.default_rng(1).normal(size=1001) * 10.0 ** np.random.default_rng(2).uniform(-12, 3, 1001)
     first, second = np.empty((2, 1001), np.float32)
-    halves.split(0.25, numbers, first, second)
+    split_matrix_kernels.split(0.25, numbers, first, second)
     np.testing.assert_array_equal(first, (0.25 * numbers).astype(np.float32))
     np.testing.assert_array_equal(second, (0.25 * numbers - first).astype(np.float32))
     joined = np.empty(1001)
-    halves.join(4.0, (first, second), joined)
+    split_matrix_kernels.join(4.0, (first, second), joined)
     np.testing.assert_allclose(joined, numbers, rtol=2.0**-48)
-    halves.join(1.0, (numbers,), joined)
+    split_matrix_kernels.join(1.0, (numbers,), joined)
     np.testing.assert_array_equal(joined, numbers)
 
 
 def test_the_second_half_may_take_the_place_of_the_numbers():
     numbers = np.random.default_rng(1).normal(size=999)
     expected, first, second = np.empty(999, np.float32), np.empty(999, np.float32), numbers.view(np.float32)[:999]
-    halves.split(1.0, numbers.copy(), first, expected)
-    halves.split(1.0, numbers, first, second)
+    split_matrix_kernels.split(1.0, numbers.copy(), first, expected)
+    split_matrix_kernels.split(1.0, numbers, first, second)
     np.testing.assert_array_equal(second, expected)
 
 

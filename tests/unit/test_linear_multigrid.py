@@ -9,17 +9,18 @@ import pytest
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 import fastcontact as fc
-from fastcontact.assembly import rigid_modes, stiffness
+from fastcontact.elasticity.stiffness import rigid_modes, stiffness
+from fastcontact.elasticity.system import supports_apart
 from fastcontact.errors import ModelError
-from fastcontact.kernels import galerkin, krylov, multigrid
-from fastcontact.linear._coarse import Coarse
-from fastcontact.linear._elimination import eliminate
-from fastcontact.linear._hierarchy import Hierarchy, chebyshev, largest_eigenvalue, product
-from fastcontact.linear._matrix import Matrix
-from fastcontact.linear._pcg import ConjugateGradients
-from fastcontact.linear._ties import Ties
-from fastcontact.linear.amg import Amg
-from fastcontact.system import supports_apart
+from fastcontact.linear.elimination.constrained_matrix import Ties
+from fastcontact.linear.elimination.elimination import eliminate
+from fastcontact.linear.krylov import krylov_kernels
+from fastcontact.linear.krylov.pcg import ConjugateGradients
+from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
+from fastcontact.linear.multigrid.coarse import Coarse
+from fastcontact.linear.multigrid.hierarchy import Hierarchy, chebyshev, largest_eigenvalue, product
+from fastcontact.linear.multigrid.matrix import Matrix
+from fastcontact.linear.solvers.amg import Amg
 
 
 def problem(divisions=(7, 6, 5)):
@@ -76,17 +77,17 @@ def test_a_chebyshev_step_is_block_jacobi_with_memory(size):
     blocks = rng.normal(size=(n, size, size))
     blocks = blocks @ blocks.transpose(0, 2, 1) + np.eye(size)
     inverse = np.empty(blocks.size)
-    multigrid.invert_blocks(blocks.ravel(), size, inverse)
+    cycle_kernels.invert_blocks(blocks.ravel(), size, inverse)
     expected = np.linalg.inv(blocks)
     assert np.abs(inverse.reshape(expected.shape) - expected).max() < 1e-10 * np.abs(expected).max()
     r, d, x = (rng.normal(size=n * size) for _ in range(3))
     step = np.einsum("nij,nj->ni", expected, r.reshape(n, size)).ravel()
     d1, x1 = d.copy(), x.copy()
-    multigrid.relax(inverse, r, 0.3, 0.7, d1, x1, (0,) * size, False)
+    cycle_kernels.relax(inverse, r, 0.3, 0.7, d1, x1, (0,) * size, False)
     assert d1 == pytest.approx(0.3 * d + 0.7 * step, abs=1e-9)
     assert x1 == pytest.approx(x + d1, abs=1e-9)
     d2, x2 = np.full_like(d, np.nan), np.full_like(x, np.nan)
-    multigrid.relax(inverse, r, 0.0, 0.7, d2, x2, (0,) * size, True)
+    cycle_kernels.relax(inverse, r, 0.0, 0.7, d2, x2, (0,) * size, True)
     assert x2 == pytest.approx(0.7 * step, abs=1e-9)
     assert np.array_equal(d2, x2)
 
@@ -94,7 +95,7 @@ def test_a_chebyshev_step_is_block_jacobi_with_memory(size):
 def test_blocks_are_inverted_past_unknowns_without_stiffness():
     block = np.diag([2.0, 0.0, 4.0])
     out = np.empty(9)
-    multigrid.invert_blocks(block.ravel(), 3, out)
+    cycle_kernels.invert_blocks(block.ravel(), 3, out)
     assert out.reshape(3, 3) == pytest.approx(np.diag([0.5, 0.0, 0.25]))
 
 
@@ -125,12 +126,12 @@ def test_vector_kernels_are_those_of_numpy():
     rng = np.random.default_rng(3)
     for n in (5, 4096, 40_003):
         p, q, x, r = rng.normal(size=(4, n))
-        sums = np.empty(-(-n // krylov.CHUNK))
-        assert krylov.dot(p, q, sums) == pytest.approx(p @ q, rel=1e-10, abs=1e-10 * n)
+        sums = np.empty(-(-n // krylov_kernels.CHUNK))
+        assert krylov_kernels.dot(p, q, sums) == pytest.approx(p @ q, rel=1e-10, abs=1e-10 * n)
         x1, r1, p1, single = x.copy(), r.copy(), p.copy(), np.empty(n, np.float32)
-        assert krylov.advance(0.3, p, q, x1, r1, sums) == pytest.approx((r - 0.3 * q) @ (r - 0.3 * q))
-        krylov.turn(0.2, q, p1)
-        krylov.scaled(2.0, p, single)
+        assert krylov_kernels.advance(0.3, p, q, x1, r1, sums) == pytest.approx((r - 0.3 * q) @ (r - 0.3 * q))
+        krylov_kernels.turn(0.2, q, p1)
+        krylov_kernels.scaled(2.0, p, single)
         assert np.allclose(x1, x + 0.3 * p, rtol=0, atol=1e-14)
         assert np.allclose(p1, q + 0.2 * p, rtol=0, atol=1e-14)
         assert np.array_equal(single, (2.0 * p).astype(np.float32))
@@ -163,7 +164,7 @@ def test_a_galerkin_product_of_other_blocks():
     A.sort_indices()
     P, _ = random_blocks(2, 3, 40, 12, seed=5)
     own = matrix_of(P)
-    result = product(matrix_of(A), own, galerkin.transposed(own.indptr, own.indices, 12))
+    result = product(matrix_of(A), own, galerkin_kernels.transposed(own.indptr, own.indices, 12))
     expected = (P.T @ A @ P).toarray()
     assert np.abs(scipy_of(result).toarray() - expected).max() < 1e-12 * np.abs(expected).max()
 

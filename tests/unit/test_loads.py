@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_array
 
 import fastcontact as fc
-from fastcontact import elements, quadrature
-from fastcontact.relations import eliminate
-from fastcontact.system import ConstrainedMotion
-from fastcontact.topology import outer_facets
+from fastcontact.elasticity.relations import eliminate
+from fastcontact.elasticity.system import ConstrainedMotion
+from fastcontact.mesh import elements, quadrature
+from fastcontact.mesh.topology import outer_facets
 
 PLANE = ("tri3", "tri6", "quad4", "quad8", "quad9")
 SOLID = ("tet4", "tet10", "hex8", "hex20", "hex27", "wedge6", "wedge15", "wedge18", "pyramid5", "pyramid13")

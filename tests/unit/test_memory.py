@@ -5,8 +5,8 @@ import gc
 import pytest
 
 import fastcontact as fc
-from fastcontact.analysis import Analysis
-from fastcontact.criteria import Criteria
+from fastcontact.analysis.analysis import Analysis
+from fastcontact.analysis.criteria import Criteria
 
 
 @pytest.mark.parametrize("solver", ["direct", "amg"])

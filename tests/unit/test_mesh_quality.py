@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fastcontact import elements
 from fastcontact.errors import MeshError
-from fastcontact.generate import block, box
-from fastcontact.kernels.jacobians import extremes
-from fastcontact.mesh import Mesh
-from fastcontact.mesh_quality import check_cells, quality
+from fastcontact.mesh import elements
+from fastcontact.mesh.generate import block, box
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.quality import check_cells, quality
+from fastcontact.mesh.quality_kernels import extremes
 
 
 def one(name, points):
@@ -151,8 +151,8 @@ def test_checking_costs_less_than_assembling():
     """CPU seconds in one run: the check was 2.5 assemblies of hexahedra once."""
     from time import process_time
 
-    from fastcontact.assembly import stiffness
-    from fastcontact.materials import LinearElastic
+    from fastcontact.elasticity.materials import LinearElastic
+    from fastcontact.elasticity.stiffness import stiffness
 
     mesh = box((1.0, 1.0, 1.0), (18, 18, 18), "hex8")
     moduli = LinearElastic(E=1.0, nu=0.3).moduli("3d")[None]

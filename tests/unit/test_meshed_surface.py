@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
-from fastcontact import elements
-from fastcontact.generate import block, box, quarter_disc, sphere_octant
-from fastcontact.kernels.winding import winding_numbers
-from fastcontact.mesh import Mesh
-from fastcontact.obstacles import MeshedSurface
-from fastcontact.search import flat_triangles
-from fastcontact.topology import outer_facets
+from fastcontact.contact.obstacles import MeshedSurface
+from fastcontact.contact.search.closest import flat_triangles
+from fastcontact.mesh import elements
+from fastcontact.mesh.generate import block, box, quarter_disc, sphere_octant
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import outer_facets
+from fastcontact.model.body_overlap_3d_kernels import winding_numbers
 
 SOLIDS_3D = ("hex8", "hex20", "hex27", "tet4", "tet10", "wedge6", "wedge15", "pyramid5")
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from fastcontact._jit import kernel
-from fastcontact.kernels import packed_tree
-from fastcontact.kernels.nearest_first import (
+from fastcontact._jit.decorators import kernel
+from fastcontact.contact.search import packed_tree_kernels
+from fastcontact.contact.search.nearest_first_kernels import (
     FRONT,
     SORTED,
     farthest,
@@ -18,7 +18,7 @@ from fastcontact.kernels.nearest_first import (
     taken,
     whole_front,
 )
-from fastcontact.kernels.packed_tree import WIDTH
+from fastcontact.contact.search.packed_tree_kernels import WIDTH
 
 
 @kernel
@@ -44,9 +44,9 @@ def scattered(dim, n):
     """Boxes (n, dim) along the curve, and their tree."""
     rng = np.random.default_rng(n)
     low = rng.uniform(0, 1, (n, dim))
-    low = low[packed_tree.curve_order(low, np.zeros(dim), np.ones(dim))]
+    low = low[packed_tree_kernels.curve_order(low, np.zeros(dim), np.ones(dim))]
     high = low + rng.uniform(0, 0.5 / n ** (1 / dim), (n, dim))
-    return low, high, packed_tree.pack(low, high), packed_tree.leaves(n)
+    return low, high, packed_tree_kernels.pack(low, high), packed_tree_kernels.leaves(n)
 
 
 def distances(low, high, point):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fastcontact.kernels.norms import largest, largest_difference
+from fastcontact._jit.norms_kernels import largest, largest_difference
 
 
 @pytest.mark.parametrize("n", [0, 1, 7, 1000])

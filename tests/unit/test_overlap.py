@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
-from fastcontact.generate import block, box, sphere_octant, union
-from fastcontact.kernels.crossings import count_crossings
-from fastcontact.kernels.winding import winding_numbers
-from fastcontact.overlap import _depths_in_space, penetration
-from fastcontact.topology import outer_facets
+from fastcontact.mesh.generate import block, box, sphere_octant, union
+from fastcontact.mesh.topology import outer_facets
+from fastcontact.model.body_overlap import _depths_in_space, penetration
+from fastcontact.model.body_overlap_2d_kernels import count_crossings
+from fastcontact.model.body_overlap_3d_kernels import winding_numbers
 
 SOLIDS = ("hex8", "hex20", "hex27", "tet4", "tet10", "wedge6", "wedge15", "pyramid5", "pyramid13")
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fastcontact.kernels import packed_tree
-from fastcontact.kernels.packed_tree import WIDTH
+from fastcontact.contact.search import packed_tree_kernels
+from fastcontact.contact.search.packed_tree_kernels import WIDTH
 
 
 def lattice(dim, n):
@@ -17,7 +17,7 @@ def lattice(dim, n):
 def test_neighbours_on_the_curve_are_neighbours_in_space(dim, n):
     cells = lattice(dim, n)
     # The cube just so large that every point lies in a cell of its own: along Hilbert's curve, the next one touches it.
-    order = packed_tree.curve_order(cells, np.full(dim, -0.5), np.full(dim, n - 0.5))
+    order = packed_tree_kernels.curve_order(cells, np.full(dim, -0.5), np.full(dim, n - 0.5))
     assert np.array_equal(np.sort(order), np.arange(len(cells)))
     assert np.abs(np.diff(cells[order], axis=0)).sum(axis=1).tolist() == [1.0] * (len(cells) - 1)
 
@@ -29,10 +29,10 @@ def test_the_order_is_a_permutation_whatever_the_points(dim):
     points[::7] = points[0]
     points[5], points[6], points[11] = np.nan, np.inf, -1e300
     for low, high in ((np.full(dim, -1.0), np.full(dim, 1.0)), (np.zeros(dim), np.zeros(dim))):
-        assert np.array_equal(np.sort(packed_tree.curve_order(points, low, high)), np.arange(1000))
+        assert np.array_equal(np.sort(packed_tree_kernels.curve_order(points, low, high)), np.arange(1000))
     # What is in one cell stays in its order.
-    assert np.array_equal(packed_tree.curve_order(points[:50], np.zeros(dim), np.zeros(dim)), np.arange(50))
-    assert len(packed_tree.curve_order(points[:0], np.zeros(dim), np.ones(dim))) == 0
+    assert np.array_equal(packed_tree_kernels.curve_order(points[:50], np.zeros(dim), np.zeros(dim)), np.arange(50))
+    assert len(packed_tree_kernels.curve_order(points[:0], np.zeros(dim), np.ones(dim))) == 0
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -41,7 +41,7 @@ def test_boxes_hold_what_is_below_them(dim, n):
     rng = np.random.default_rng(n)
     low = rng.uniform(-3, 3, (n, dim))
     high = low + rng.uniform(0, 1, (n, dim))
-    boxes, first = packed_tree.pack(low, high)
+    boxes, first = packed_tree_kernels.pack(low, high)
     starts = [0]  # of the levels of nodes
     while starts[-1] < len(first) - 1:
         starts.append(starts[-1] + max(-(-(n if len(starts) == 1 else starts[-1] - starts[-2]) // WIDTH), 1))

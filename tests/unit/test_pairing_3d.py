@@ -5,14 +5,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
-from fastcontact import quadrature
 from fastcontact.contact.formulations.continuous import Continuous
 from fastcontact.contact.formulations.node_to_segment import NodeToSegment
 from fastcontact.contact.integration import facet_measure, fine_rule, gauss_rule, mass_matrix, nodal_areas
 from fastcontact.contact.pairing import Candidates, gap_rows, pair
 from fastcontact.contact.projection import interpolated, nodal_normals, places
 from fastcontact.contact.surface import surface
-from fastcontact.generate import box, merge_points, sphere_octant, union
+from fastcontact.mesh import quadrature
+from fastcontact.mesh.generate import box, merge_points, sphere_octant, union
 
 SOLIDS = ("hex8", "hex20", "hex27", "tet4", "tet10")
 

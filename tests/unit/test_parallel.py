@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact import _jit, assembly, parallel, recovery
+from fastcontact import recovery
+from fastcontact._jit import decorators as _jit
+from fastcontact._jit import parallel
+from fastcontact.elasticity import stiffness
 
 
 @pytest.fixture
@@ -28,7 +31,7 @@ def test_ranges_cover_everything_once(threads, count):
 def test_every_point_has_an_owner_that_sees_all_its_cells(threads, count):
     threads(count)
     cells = np.random.default_rng(count).integers(0, 50, (40, 4)).astype(np.int32)
-    owner, parts = assembly.owners(cells, 60)
+    owner, parts = stiffness.owners(cells, 60)
     assert len(parts) == count
     begins = [*(low for low, _ in parts), len(cells)]
     for point in range(50):
@@ -45,7 +48,7 @@ def test_parts_work_on_equally_many_cells(threads, element):
     cells = mesh.cells[element]
     for count in (2, 3):
         threads(count)
-        owner, parts = assembly.owners(cells, mesh.n_points)
+        owner, parts = stiffness.owners(cells, mesh.n_points)
         work = [np.any(owner[cells] == part, axis=1).sum() for part in range(count)]
         assert max(work) < 1.01 * min(work)
         assert all(
@@ -82,7 +85,7 @@ def test_assembly_and_recovery_give_the_same_bits_for_any_number_of_threads(thre
     found = []
     for count in (1, 2, 3, 5):
         threads(count)
-        K = assembly.stiffness(mesh, kinematics, moduli, material)
+        K = stiffness.stiffness(mesh, kinematics, moduli, material)
         stress = recovery.stress_at_points(mesh, kinematics, moduli, material, u)
         found.append((K.data.tobytes(), stress[element].tobytes()))
     assert len(set(found)) == 1
@@ -115,6 +118,6 @@ def test_a_degenerate_cell_is_named_by_its_lowest_number_whatever_the_threads(th
     for count in (1, 4):
         threads(count)
         with pytest.raises(fc.MeshError, match="not positive") as caught:
-            assembly.stiffness(bad, "plane_strain", moduli, material)
+            stiffness.stiffness(bad, "plane_strain", moduli, material)
         texts.append(str(caught.value))
     assert texts[0] == texts[1]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from fastcontact.linear._peeling import peeled
+from fastcontact.linear.elimination.pivot_order import peeled
 
 
 def layered(seed, sizes=(5, 4, 3), n_others=6):

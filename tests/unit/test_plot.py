@@ -7,8 +7,8 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.cli._pictures import _normal_stress
-from fastcontact.generate import block, box, union
-from fastcontact.results import StepResult
+from fastcontact.mesh.generate import block, box, union
+from fastcontact.results.step import StepResult
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 

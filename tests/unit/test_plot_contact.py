@@ -6,7 +6,7 @@ import pytest
 import fastcontact as fc
 from fastcontact.cli import main
 from fastcontact.errors import FastcontactError
-from fastcontact.plot.axis import stresses_on_axis
+from fastcontact.results.plot.axis import stresses_on_axis
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from math import factorial
 import numpy as np
 import pytest
 
-from fastcontact import quadrature as rules
+from fastcontact.mesh import quadrature as rules
 
 
 def on_line(i):

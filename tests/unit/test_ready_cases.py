@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
+from fastcontact.cases.shipped import case_path, ready_case, ready_cases
 from fastcontact.cli import main
-from fastcontact.ready import case_path, ready_case, ready_cases
 
 NAMES = list(ready_cases())
 # The training case on the project's own meshes: how far from Hertz, beyond what code_aster allows on its meshes.

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact import restart, step_control
-from fastcontact.analysis import Analysis
-from fastcontact.criteria import Criteria
-from fastcontact.generate import block, box, renamed, union
+from fastcontact.analysis import restart, step_halving
+from fastcontact.analysis.analysis import Analysis
+from fastcontact.analysis.criteria import Criteria
+from fastcontact.mesh.generate import block, box, renamed, union
 
 FRICTIONLESS, FRICTION = 1e-12, 1e-10
 UP_AND_DOWN = fc.Ramp((1.0, 2.0, 3.0, 4.0, 5.0), ((0.0, 0.0), (3.0, 1.0), (5.0, 0.3)))
@@ -272,11 +272,11 @@ def test_all_that_a_step_changes_is_kept_or_set_anew():
     anew = {"before", "external", "expected", "parts", "settled", "rubbing", "unsettled"}  # as a step begins
     kept = {"u", "active", "pressure", *restart.NUMBERS}
     told = {"touched"}  # by the steps so far
-    assert set(step_control._ANALYSIS) == anew | kept | told
-    assert set(step_control._PAIR) == {"before", "_closed"}
-    assert set(step_control._SIDE) == {"now", "before"}
-    assert set(step_control._EXTRAPOLATION) == {"ratio", "_loads", "_states"}
-    assert set(step_control._LOADS) == {"_loads", "_solutions"}  # the solver's memory
+    assert set(step_halving._ANALYSIS) == anew | kept | told
+    assert set(step_halving._PAIR) == {"before", "_closed"}
+    assert set(step_halving._SIDE) == {"now", "before"}
+    assert set(step_halving._EXTRAPOLATION) == {"ratio", "_loads", "_states"}
+    assert set(step_halving._LOADS) == {"_loads", "_solutions"}  # the solver's memory
 
 
 def test_a_strengthened_multigrid_cycle_is_remembered():

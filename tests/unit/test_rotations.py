@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact import elements
-from fastcontact.doubts import largest_rotation
+from fastcontact.analysis.result_warnings import largest_rotation
+from fastcontact.mesh import elements
 
 MESHES = {
     **{name: lambda name=name: fc.generate.block((2.0, 1.0), (3, 2), name) for name in ("tri3", "quad4", "quad8")},

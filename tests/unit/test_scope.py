@@ -5,10 +5,10 @@ import pytest
 from scipy.sparse import csr_array
 
 import fastcontact as fc
-from fastcontact import linear
-from fastcontact.analysis import Analysis
-from fastcontact.criteria import Criteria
-from fastcontact.scope import Everything, Surfaces
+from fastcontact.analysis.active_dofs import Everything, Surfaces
+from fastcontact.analysis.analysis import Analysis
+from fastcontact.analysis.criteria import Criteria
+from fastcontact.linear import choice as linear
 
 
 def started(related=False, friction=0.0, name="direct"):

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fastcontact import ContactError, _jit
-from fastcontact.search import closest
+from fastcontact import ContactError
+from fastcontact._jit import decorators
+from fastcontact.contact.search.closest import closest
 
 
 def search(points, corners):
@@ -124,7 +125,7 @@ def test_threads_do_not_change_a_bit(monkeypatch):
     corners, _ = random_facets(9, 500, 2)
     points, found = np.random.default_rng(10).uniform(-7, 7, (30_000, 2)), []
     for count in (1, 3):
-        monkeypatch.setattr(_jit, "threads", lambda count=count: count)
+        monkeypatch.setattr(decorators, "threads", lambda count=count: count)
         found.append(closest(points, corners))
     for field in ("facet", "xi", "normal", "overhang", "position", "distance"):
         assert np.array_equal(getattr(found[0], field), getattr(found[1], field))

@@ -7,9 +7,11 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from fastcontact import ContactError, _jit, elements
-from fastcontact.kernels import box_tree
-from fastcontact.search import _tables, _terms, closest, closest_of_kinds, flat_triangles
+from fastcontact import ContactError
+from fastcontact._jit import decorators
+from fastcontact.contact.formulations import _cut_faces_tree_kernels
+from fastcontact.contact.search.closest import _tables, _terms, closest, closest_of_kinds, flat_triangles
+from fastcontact.mesh import elements
 
 KINDS = ("tri3", "tri6", "quad4", "quad8", "quad9")
 BY_SIZE = {elements.get(name).n_nodes: elements.get(name) for name in KINDS}
@@ -259,7 +261,7 @@ def test_threads_do_not_change_a_bit(name, monkeypatch):
     points = np.concatenate([points + 1e-3 * k for k in range(30_000 // len(points) + 1)])
     found = []
     for count in (1, 2, 3):
-        monkeypatch.setattr(_jit, "threads", lambda count=count: count)
+        monkeypatch.setattr(decorators, "threads", lambda count=count: count)
         found.append(closest(points, facets))
     for field in ("facet", "xi", "normal", "overhang", "position", "distance"):
         assert np.array_equal(getattr(found[0], field), getattr(found[1], field))
@@ -271,14 +273,14 @@ def test_a_tree_holds_every_facet_once_and_its_boxes_hold_theirs(dim):
     rng = np.random.default_rng(4)
     low = np.round(rng.uniform(0, 3, (203, dim)))  # many equal centres
     high = low + rng.integers(0, 3, (203, dim))
-    box_low, box_high, child, span, order = box_tree.build(low, high)
+    box_low, box_high, child, span, order = _cut_faces_tree_kernels.build(low, high)
     assert np.array_equal(np.sort(order), np.arange(203))
     for box in range(len(child)):
         mine = order[span[box, 0] : span[box, 1]]
         assert np.array_equal(box_low[box], low[mine].min(axis=0))
         assert np.array_equal(box_high[box], high[mine].max(axis=0))
         if child[box] < 0:
-            assert len(mine) <= box_tree.LEAF
+            assert len(mine) <= _cut_faces_tree_kernels.LEAF
         else:
             halves = span[child[box] : child[box] + 2]
             assert halves.ravel().tolist() == [span[box, 0], halves[0, 1], halves[0, 1], span[box, 1]]

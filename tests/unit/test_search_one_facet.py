@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fastcontact import elements
-from fastcontact.kernels import facets3d, projection3d, straight3d
-from fastcontact.kernels.projection3d import Domain, Facets
-from fastcontact.search import _tables, flat_triangles
+from fastcontact.contact.search import facets_3d_kernels, straight_3d_kernels
+from fastcontact.contact.search import projection_3d_kernels as projection3d
+from fastcontact.contact.search.closest import _tables, flat_triangles
+from fastcontact.contact.search.projection_3d_kernels import Domain, Facets
+from fastcontact.mesh import elements
 
 OF_SIZE = {3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8", 9: "quad9"}
 
@@ -24,7 +25,7 @@ def prepared(corners):
     _, _, to_terms, to_hull, weights = _tables(m)
     facets = Facets(np.empty(corners.shape), np.zeros(3), np.empty(n), np.empty(n), np.arange(n), corners)
     low, high = np.empty((n, 3)), np.empty((n, 3))
-    facets3d.prepare(facets, 0, n, to_terms, to_hull, weights, low, high)
+    facets_3d_kernels.prepare(facets, 0, n, to_terms, to_hull, weights, low, high)
     return facets, low, high
 
 
@@ -97,7 +98,7 @@ def compare_bilinear(corners, point):
     """Check the closed form against the general search, wherever the closed form claims to be right."""
     facets, _, _ = prepared(corners)
     o, a, b, c = (tuple(term) for term in facets.terms[0])
-    s, t, square = straight3d.on_bilinear(tuple(np.subtract(point, o)), a, b, c, np.inf)
+    s, t, square = straight_3d_kernels.on_bilinear(tuple(np.subtract(point, o)), a, b, c, np.inf)
     rest = np.subtract(point, on(corners[0], 4, (s, t))[0])
     if not (square >= 0.0 and abs(rest @ c) < facets.convex[0]):
         return False
@@ -152,8 +153,8 @@ def test_a_bilinear_facet_out_of_reach_is_told_at_once():
     facets, _, _ = prepared(corners)
     o, a, b, c = (tuple(term) for term in facets.terms[0])
     far = tuple(np.subtract((5.0, 0.5, 0.0), o))
-    assert straight3d.on_bilinear(far, a, b, c, 3.9)[2] == np.inf
-    assert straight3d.on_bilinear(far, a, b, c, 4.1)[2] == pytest.approx(16.0, abs=0.01)
+    assert straight_3d_kernels.on_bilinear(far, a, b, c, 3.9)[2] == np.inf
+    assert straight_3d_kernels.on_bilinear(far, a, b, c, 4.1)[2] == pytest.approx(16.0, abs=0.01)
 
 
 @settings(max_examples=300, deadline=None)
@@ -163,7 +164,7 @@ def test_flat_triangles_in_closed_form(seed, shape, far):
     corners = rng.normal(size=(3, 3)) * [1, shape, shape]
     point = corners.mean(axis=0) + far * rng.normal(size=3)
     a, b = corners[1] - corners[0], corners[2] - corners[0]
-    s, t = straight3d.on_flat(tuple(point - corners[0]), tuple(a), tuple(b))
+    s, t = straight_3d_kernels.on_flat(tuple(point - corners[0]), tuple(a), tuple(b))
     assert min(s, t, 1 - s - t) >= -1e-12
     found = np.linalg.norm(corners[0] + s * a + t * b - point)
     # The closest point lies on a side, or its rest is perpendicular to both tangents.

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import fastcontact as fc
-from fastcontact.case import read_case
+from fastcontact.cases.case import read_case
 
 CASES = sorted((Path(__file__).resolve().parents[2] / "data" / "cases").glob("*.toml"))
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.analysis import Analysis
+from fastcontact.analysis.analysis import Analysis
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.case import build_case
+from fastcontact.cases.case import build_case
 
 E, WIDTH, HEIGHT, PRESSURE = 1000.0, 2.0, 3.0, 10.0
 

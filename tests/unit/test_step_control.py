@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact import step_control
-from fastcontact.analysis import Analysis
-from fastcontact.criteria import Criteria
-from fastcontact.generate import block
+from fastcontact.analysis import step_halving
+from fastcontact.analysis.analysis import Analysis
+from fastcontact.analysis.criteria import Criteria
+from fastcontact.mesh.generate import block
 
 FEW = 6  # geometry updates: too few for the whole load, enough for a part of it
 
@@ -114,7 +114,7 @@ def test_a_failed_step_leaves_no_trace(name, solver):
     disturbed, undisturbed = analyses
     generous, disturbed.criteria = disturbed.criteria, Criteria(max_geometry_updates=0)
     with pytest.raises(fc.ConvergenceError):
-        step_control.advance(disturbed, 4, 0.75, 1.0, 1)
+        step_halving.advance(disturbed, 4, 0.75, 1.0, 1)
     disturbed.criteria = generous
     step, expected = disturbed.step(4, 1.0), undisturbed.step(4, 1.0)
     np.testing.assert_array_equal(step.displacement, expected.displacement)
@@ -128,7 +128,7 @@ def test_parts_that_converged_before_one_failed_are_taken_back():
     model = spheres(friction=0.0)
     analysis = Analysis(model, "direct", 1e-10, Criteria(max_geometry_updates=FEW), fc.linear_ramp(1))
     with pytest.raises(fc.ConvergenceError, match=r"the part from 0\.25 to 0\.3125 fails"):
-        step_control.advance(analysis, 1, 0.0, 1.0, 4)
+        step_halving.advance(analysis, 1, 0.0, 1.0, 4)
     assert not analysis.u.any()
     analysis.criteria = Criteria()
     (expected,) = fc.solve(model, fc.linear_ramp(1), linear_solver="direct")
@@ -174,5 +174,5 @@ def test_what_fails_inside_a_pairing_is_told_with_the_pairings_before_it(monkeyp
 
     monkeypatch.setattr(Analysis, "_inequalities", failing)
     with pytest.raises(fc.ConvergenceError, match=r"stand still \(step 1 from 0 to 1\)") as caught:
-        step_control.advance(analysis, 1, 0.0, 1.0, 0)
+        step_halving.advance(analysis, 1, 0.0, 1.0, 0)
     assert [entry["settled"] for entry in caught.value.history] == [True, True]

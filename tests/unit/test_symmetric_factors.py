@@ -6,14 +6,14 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
 import fastcontact as fc
-from fastcontact import linear
-from fastcontact.analysis import Analysis
-from fastcontact.assembly import stiffness
-from fastcontact.criteria import Criteria
-from fastcontact.kernels import triangular
-from fastcontact.linear._known_loads import KnownLoads
-from fastcontact.linear._order import fill_reducing, reordered
-from fastcontact.system import supports_apart
+from fastcontact.analysis.analysis import Analysis
+from fastcontact.analysis.criteria import Criteria
+from fastcontact.elasticity.stiffness import stiffness
+from fastcontact.elasticity.system import supports_apart
+from fastcontact.linear import choice as linear
+from fastcontact.linear.cholesky import triangular_kernels
+from fastcontact.linear.cholesky.ordering import fill_reducing, reordered
+from fastcontact.linear.factors.known_loads import KnownLoads
 
 FACTORED = ["direct", "cholmod"]
 
@@ -51,18 +51,18 @@ def test_triangular_kernels_are_those_of_numpy(n, density, seed):
     L = lower(n, density, seed)
     dense, b = L.toarray(), np.random.default_rng(seed).normal(size=n)
     first, begin, rows = np.empty(n + 1, np.int64), np.empty(n + 1, np.int64), L.indices.copy()
-    count = triangular.supernodes(L.indptr, rows, first, begin)
+    count = triangular_kernels.supernodes(L.indptr, rows, first, begin)
     shape = L.indptr, L.data, first[: count + 1], begin[: count + 1], rows[: begin[count]]
     x = b.copy()
-    triangular.forward(*shape, x)
+    triangular_kernels.forward(*shape, x)
     np.testing.assert_allclose(dense @ x, b, atol=1e-13)
     x = b.copy()
-    triangular.backward(*shape, np.zeros(n, bool), x)
+    triangular_kernels.backward(*shape, np.zeros(n, bool), x)
     np.testing.assert_allclose(dense.T @ x, b, atol=1e-13)
     given = np.zeros(n, bool)
     given[n // 2 :] = True
     x = b.copy()
-    triangular.backward(*shape, given, x)
+    triangular_kernels.backward(*shape, given, x)
     np.testing.assert_array_equal(x[given], b[given])
     np.testing.assert_allclose((dense.T @ x)[~given], b[~given], atol=1e-13)
 
@@ -70,7 +70,7 @@ def test_triangular_kernels_are_those_of_numpy(n, density, seed):
 def test_columns_with_the_same_rows_share_them():
     L = lower(30, 1.0, 0)
     first, begin = np.empty(31, np.int64), np.empty(31, np.int64)
-    assert triangular.supernodes(L.indptr, L.indices.copy(), first, begin) == 1
+    assert triangular_kernels.supernodes(L.indptr, L.indices.copy(), first, begin) == 1
     assert begin[1] == 0
 
 
@@ -185,9 +185,9 @@ def test_a_symmetric_matrix_is_reordered_by_rows_and_columns():
 def test_forward_substitution_passes_over_supernodes_without_load():
     L = lower(40, 0.05, 3)
     first, begin, rows = np.empty(41, np.int64), np.empty(41, np.int64), L.indices.copy()
-    count = triangular.supernodes(L.indptr, rows, first, begin)
+    count = triangular_kernels.supernodes(L.indptr, rows, first, begin)
     for at in range(40):
         x = np.zeros(40)
         x[at] = 2.0
-        triangular.forward(L.indptr, L.data, first[: count + 1], begin[: count + 1], rows[: begin[count]], x)
+        triangular_kernels.forward(L.indptr, L.data, first[: count + 1], begin[: count + 1], rows[: begin[count]], x)
         np.testing.assert_allclose(L.toarray() @ x, 2.0 * np.eye(40)[at], atol=1e-13)

@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fastcontact import elements, topology
+from fastcontact import topology
 from fastcontact.errors import MeshError
-from fastcontact.generate import block, box
-from fastcontact.mesh_quality import check_cells
+from fastcontact.mesh import elements
+from fastcontact.mesh.generate import block, box
+from fastcontact.mesh.quality import check_cells
 
 NAMES = ["tri3", "tri6", "quad4", "quad8", "quad9", "tet4", "tet10", "hex8", "hex20", "wedge6", "pyramid5"]
 

@@ -10,7 +10,7 @@ from aster_loads import Support, constant
 from aster_mesh import Entry, MissingError, listed, nodes_of
 
 import fastcontact as fc
-from fastcontact.obstacles import HalfSpace
+from fastcontact.contact.obstacles import HalfSpace
 
 # How code_aster iterates, how it describes the same thing to itself, and what an exact method does not need.
 IGNORED_CONTACT = {

@@ -14,6 +14,7 @@ from aster_mesh import Entry, MissingError, nodes_of
 from aster_spec import Problem
 
 import fastcontact as fc
+from fastcontact.mesh import elements
 
 Field = dict[int, float]
 STRESS = {"SIXX": 0, "SIYY": 1, "SIZZ": 2, "SIXY": 3, "SIYZ": 4, "SIXZ": 5}
@@ -199,7 +200,7 @@ def _normals(mesh: fc.Mesh, group: str, coordinates: np.ndarray) -> dict[int, np
     """Return unit means of the facets' normals at the nodes of a group; the sign does not matter here."""
     total: dict[int, np.ndarray] = {}
     for name, block in fc.topology.outer_facets(mesh).items():
-        element = fc.elements.get(name)
+        element = elements.get(name)
         inside = np.isin(block, nodes_of(mesh, {"GROUP_MA": group})).all(axis=1)
         tangent = np.einsum("akj,fkd->fajd", element.gradient(element.nodes), coordinates[block[inside]])
         if mesh.dim == 2:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fastcontact.generate import block
+from fastcontact.mesh.generate import block
 
 
 def lines(size, fine, extent, growth=1.25):

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 import fastcontact as fc
-from fastcontact import elements
+from fastcontact.mesh import elements
 
 AXES = "xyz"
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.generate import merge_points, mirrored, renamed, sphere_octant, union
+from fastcontact.mesh.generate import merge_points, mirrored, renamed, sphere_octant, union
 
 E, R, FRICTION = 1000.0, 50.0, 0.3
 G = E / 2

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
-from fastcontact.generate import box, merge_points, renamed, sphere_octant, sphere_on_block, union
+from fastcontact.mesh.generate import box, merge_points, renamed, sphere_octant, sphere_on_block, union
 
 LINEAR = ("hex8", "tet4", "wedge6", "pyramid5")
 QUADRATIC = ("hex20", "hex27", "tet10", "wedge15", "wedge18", "pyramid13")

@@ -8,10 +8,10 @@ import pytest
 
 import fastcontact as fc
 from fastcontact import obstacles
-from fastcontact.case import read_case
-from fastcontact.generate import block, box, quarter_disc
-from fastcontact.model import AGAINST_OBSTACLES
-from fastcontact.summary import lines, of_step, summarise
+from fastcontact.cases.case import read_case
+from fastcontact.cases.summary import lines, of_step, summarise
+from fastcontact.mesh.generate import block, box, quarter_disc
+from fastcontact.model.model import AGAINST_OBSTACLES
 
 
 def block_under_a_ball(kinematics, element="quad4", centre=3.0, **options):

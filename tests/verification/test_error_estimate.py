@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact import elements
+from fastcontact.mesh import elements
 
 
 def pressed(kinematics, element, n):

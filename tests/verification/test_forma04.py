@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.case import read_case
+from fastcontact.cases.case import read_case
 
 # code_aster's meshes of the same letter, converged geometry (A, C: stress at C1; B: code_aster's multiplier).
 ON_CODE_ASTERS_MESH = {"a": 2773.57307445, "b": 2876.28674013, "c": 2928.76786014}

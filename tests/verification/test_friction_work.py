@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.analysis import Analysis
-from fastcontact.generate import box, renamed, union
+from fastcontact.analysis.analysis import Analysis
+from fastcontact.mesh.generate import box, renamed, union
 
 E, FRICTION, PRESSURE, SLIP = 1e5, 0.3, 1.0, 0.1
 

@@ -5,8 +5,8 @@ import pytest
 
 import fastcontact as fc
 from fastcontact import obstacles
-from fastcontact.generate import block, box, quarter_disc, sphere_octant, union
-from fastcontact.mesh import Mesh
+from fastcontact.mesh.generate import block, box, quarter_disc, sphere_octant, union
+from fastcontact.mesh.mesh import Mesh
 
 
 def lines(points, element, group="TOOL"):

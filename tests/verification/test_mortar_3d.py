@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.generate import box, renamed, union
+from fastcontact.mesh.generate import box, renamed, union
 
 KINDS = [(e, e) for e in ("hex8", "tet4", "hex20", "tet10", "hex27", "wedge6", "wedge15")]
 KINDS += [("hex8", "tet4"), ("hex20", "tet10"), ("tet10", "hex8")]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact import elements
-from fastcontact.generate import block, box, renamed, sphere_on_block, union
+from fastcontact.mesh import elements
+from fastcontact.mesh.generate import block, box, renamed, sphere_on_block, union
 
 E, NU = 1000.0, 0.3
 FLAT = [(e, e) for e in ("tri3", "tri6", "quad4", "quad8", "quad9")]

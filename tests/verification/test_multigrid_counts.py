@@ -5,8 +5,8 @@ import pytest
 from scipy.sparse import csr_array
 
 import fastcontact as fc
-from fastcontact.analysis import Analysis
-from fastcontact.criteria import Criteria
+from fastcontact.analysis.analysis import Analysis
+from fastcontact.analysis.criteria import Criteria
 
 
 def with_material(mesh):

@@ -8,7 +8,7 @@ import pytest
 from graded import graded_block, lines
 
 import fastcontact as fc
-from fastcontact.generate import renamed, union
+from fastcontact.mesh.generate import renamed, union
 
 E, NU, FORCE = 1000.0, 0.3, 0.01  # per length, of the half x >= 0
 LENGTH = 8.0  # of half the layer, which is 1 thick; it lifts off far before

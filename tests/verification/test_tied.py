@@ -5,7 +5,7 @@ import pytest
 from two_bodies import SIDES, blocks, boxes, held, rings, touching
 
 import fastcontact as fc
-from fastcontact.generate import merge_points
+from fastcontact.mesh.generate import merge_points
 
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")
 ONCE = fc.linear_ramp(1)

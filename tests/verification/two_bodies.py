@@ -3,7 +3,7 @@
 import numpy as np
 
 import fastcontact as fc
-from fastcontact.generate import block, box, renamed, union
+from fastcontact.mesh.generate import block, box, renamed, union
 
 YOUNG, POISSON = 1000.0, 0.3
 SIDES = {"plane": ("CONT_UPPER", "CONT_LOWER"), "space": ("U_ZMIN", "L_ZMAX")}

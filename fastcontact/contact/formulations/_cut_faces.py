@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact import elements, quadrature
+from fastcontact.contact.formulations import _cut_faces_kernels, _cut_faces_tree_kernels
 from fastcontact.contact.formulations._overlap import Coupling, Overlap
+from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.errors import ContactError
-from fastcontact.kernels import box_tree, clip3d
-from fastcontact.search import closest_of_kinds
+from fastcontact.mesh import elements, quadrature
 
 Array = NDArray[np.float64]
 # Facets face each other if their normals enclose more than about 95 degrees.
@@ -79,7 +79,7 @@ class _Polygons:
         """Return the facets of a block where they are."""
         nodes, count = deformed[block.facets], elements.get(block.element).n_corners
         origin, axes = np.empty((len(nodes), 3)), np.empty((len(nodes), 3, 3))
-        clip3d.planes(nodes, count, origin, axes)
+        _cut_faces_kernels.planes(nodes, count, origin, axes)
         corners = nodes[:, :count]
         radius = np.linalg.norm(corners - origin[:, None], axis=2).max(axis=1)
         return cls(block, nodes, count, origin, axes, radius, corners.min(axis=1), corners.max(axis=1))
@@ -87,11 +87,11 @@ class _Polygons:
 
 def _facing(ours: _Polygons, theirs: _Polygons, reach: Array) -> NDArray[np.intp]:
     """Return the pairs of facets (n, 2) that face each other with a part."""
-    tree = box_tree.build(theirs.low, theirs.high)
+    tree = _cut_faces_tree_kernels.build(theirs.low, theirs.high)
     room = 8 * (len(ours.nodes) + len(theirs.nodes))
     while True:
         pairs = np.empty((room, 2), np.intp)
-        count = clip3d.facing_pairs(
+        count = _cut_faces_kernels.facing_pairs(
             ours.nodes, ours.count, ours.origin, ours.axes, ours.radius, reach, theirs.nodes, theirs.count,
             np.ascontiguousarray(theirs.axes[:, 2]), theirs.low, theirs.high, *tree, FACING, pairs,
         )  # fmt: skip
@@ -109,7 +109,7 @@ def _integrated(
     n, k = ours.block.facets.shape
     mass, integrals = np.empty((n, k, k)), np.empty((len(pairs), k, other.n_nodes))
     degree = DEGREE[one.n_nodes] + max(DEGREE[one.n_nodes], DEGREE[other.n_nodes])
-    wrong = clip3d.integrate(
+    wrong = _cut_faces_kernels.integrate(
         ours.nodes, ours.count, ours.origin, ours.axes,
         to_terms @ ours.nodes, to_terms @ reference[ours.block.facets], to_terms, _middle(one),
         theirs.nodes, theirs.count, other_to_terms @ theirs.nodes, other_to_terms, _middle(other),

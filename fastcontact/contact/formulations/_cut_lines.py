@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact import elements, quadrature
 from fastcontact.contact.formulations._overlap import Coupling, Overlap
 from fastcontact.contact.pairing import Candidates, pair
+from fastcontact.contact.search.closest import closest
 from fastcontact.contact.surface import FacetBlock, Surface
-from fastcontact.search import closest
+from fastcontact.mesh import elements, quadrature
 
 Array = NDArray[np.float64]
 # Parts of a facet shorter than this, in its own length, are rounding errors of the cut.

@@ -22,7 +22,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact import elements
+from fastcontact.mesh import elements
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

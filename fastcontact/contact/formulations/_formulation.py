@@ -11,15 +11,14 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.active_set import Compliance
-from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.constraints import Compliance, Constraints
 from fastcontact.contact.formulations._held_nodes import held_nodes
+from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.pair_options import Terms
 from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair, rows_along, tangents
 from fastcontact.contact.projection import interpolated, nodal_normals, places
-from fastcontact.contact.rigid import RigidSide
 from fastcontact.contact.surface import Surface
-from fastcontact.contact.terms import Terms
-from fastcontact.contact.tie import Tie, tie
+from fastcontact.contact.tied import Tie, tie
 from fastcontact.errors import ContactError, unknown
 
 Array = NDArray[np.float64]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact import elements
 from fastcontact.contact.surface import FacetBlock
+from fastcontact.mesh import elements
 
 Array = NDArray[np.float64]
 

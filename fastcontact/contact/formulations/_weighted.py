@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fastcontact import elements
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._cut_faces import face_overlap
 from fastcontact.contact.formulations._cut_lines import line_overlap
@@ -32,6 +31,7 @@ from fastcontact.contact.pairing import Candidates, tangents_by_axes
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
+from fastcontact.mesh import elements
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

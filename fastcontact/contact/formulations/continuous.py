@@ -29,16 +29,16 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import splu
 
-from fastcontact import elements, quadrature
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._held_nodes import compliant
 from fastcontact.contact.formulations._projection import Projection
 from fastcontact.contact.integration import facet_measure, fine_rule, gauss_rule
+from fastcontact.contact.pair_options import spread
 from fastcontact.contact.pairing import Candidates, Pairing, filled_up, normals, pair
 from fastcontact.contact.surface import FacetBlock
-from fastcontact.contact.terms import spread
 from fastcontact.errors import ContactError, unknown
+from fastcontact.mesh import elements, quadrature
 
 Array = NDArray[np.float64]
 RULES = ("gauss", "simpson", "node")

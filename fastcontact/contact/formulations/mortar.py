@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
-from fastcontact import quadrature
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._cut_lines import line_points
 from fastcontact.contact.formulations._formulation import Formulation
@@ -28,10 +27,11 @@ from fastcontact.contact.formulations._held_nodes import compliant
 from fastcontact.contact.formulations._projection import Projection
 from fastcontact.contact.formulations._weighted import WeightedMortar
 from fastcontact.contact.integration import facet_measure
+from fastcontact.contact.pair_options import spread
 from fastcontact.contact.pairing import Candidates, Pairing, normals, pair
 from fastcontact.contact.surface import Surface
-from fastcontact.contact.terms import spread
 from fastcontact.errors import ContactError
+from fastcontact.mesh import quadrature
 
 Array = NDArray[np.float64]
 # A facet that faces less than this part of its length takes no part: its multipliers would have next to no equation.

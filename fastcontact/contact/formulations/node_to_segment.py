@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from fastcontact import elements
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.integration import fine_rule, mass_matrix, nodal_areas
 from fastcontact.contact.pairing import Candidates, pair
 from fastcontact.errors import ContactError
+from fastcontact.mesh import elements
 
 Array = NDArray[np.float64]
 

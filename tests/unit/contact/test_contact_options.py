@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.case import build_case, read_case
-from fastcontact.summary import lines, of_step, summarise
+from fastcontact.cases.case import build_case, read_case
+from fastcontact.cases.summary import lines, of_step, summarise
 
 CASE = """
 kinematics = "plane_strain"

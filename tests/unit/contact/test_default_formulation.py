@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.contact.default import default_formulation
+from fastcontact.contact.default_formulation import default_formulation
 from fastcontact.contact.surface import surface
-from fastcontact.generate import box, half_spheres, renamed, union
+from fastcontact.mesh.generate import box, half_spheres, renamed, union
 
 
 def chosen(mesh, secondary, primary):

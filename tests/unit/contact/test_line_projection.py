@@ -5,12 +5,12 @@ import pytest
 from scipy.optimize import brentq
 
 import fastcontact as fc
-from fastcontact import elements
 from fastcontact.contact.line_projection import along_line_normals
 from fastcontact.contact.pairing import pair
 from fastcontact.contact.projection import interpolated, nodal_normals, places
+from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import surface
-from fastcontact.search import closest_of_kinds
+from fastcontact.mesh import elements
 
 
 def wavy(element, n=8):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact import elements
 from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, rows_along
 from fastcontact.contact.projection import places
 from fastcontact.contact.surface import surface
+from fastcontact.mesh import elements
 
 
 @pytest.fixture(params=["quad4", "quad8"])

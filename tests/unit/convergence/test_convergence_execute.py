@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from fastcontact.convergence import execute
+from fastcontact.studies import execute
 
 
 def deadly(job, threads):

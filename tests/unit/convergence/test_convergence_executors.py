@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from fastcontact.cli import main
-from fastcontact.convergence import parameter_sweep
+from fastcontact.studies.sweep import parameter_sweep
 
 APPROACHES = (0.4, 1.0, 4.0)
 

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.case import read_case
-from fastcontact.convergence import fit_limit, job
-from fastcontact.convergence.levels import recipe
-from fastcontact.convergence.settings import Combination, combinations, settings
-from fastcontact.convergence.words import percent
+from fastcontact.cases.case import read_case
+from fastcontact.studies import job
+from fastcontact.studies.fit import fit_limit
+from fastcontact.studies.labels import percent
+from fastcontact.studies.levels import recipe
+from fastcontact.studies.settings import Combination, combinations, settings
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fastcontact.convergence.quantities import contact_radius, peak
-from fastcontact.generate import block
+from fastcontact.mesh.generate import block
+from fastcontact.studies.quantities import contact_radius, peak
 
 
 def test_a_maximum_on_the_axis_is_that_of_a_quartic_along_it():

@@ -4,8 +4,9 @@ import re
 
 import pytest
 
-from fastcontact.convergence import Limit, convergence_study
-from fastcontact.convergence.report import with_error_bar
+from fastcontact.studies.fit import Limit
+from fastcontact.studies.report import with_error_bar
+from fastcontact.studies.study import convergence_study
 
 
 @pytest.mark.parametrize(("value", "bar", "text"), [

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.case import read_case
+from fastcontact.cases.case import read_case
 from fastcontact.cli import main
-from fastcontact.convergence import levels
-from fastcontact.convergence import study as studies
-from fastcontact.convergence.settings import combinations, settings
 from fastcontact.errors import CaseError, ContactError
+from fastcontact.studies import levels
+from fastcontact.studies import study as studies
+from fastcontact.studies.settings import combinations, settings
 
 FORCE, PRESSURE = 600_000.0, 2900.0  # of theory
 LIMITS = {"force": 1.1 * FORCE, "pressure_max": 1.04 * PRESSURE, "C1.stress.yy": -2800.0}

@@ -2,8 +2,8 @@
 
 import pytest
 
-from fastcontact.convergence.substitute import substituted
 from fastcontact.errors import CaseError
+from fastcontact.studies.case_parameters import substituted
 
 DATA = {
     "material": [{"E": 1.0, "nu": 0.3}, {"E": 2.0, "nu": 0.2}],

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fastcontact.cli import main
-from fastcontact.convergence import parameter_sweep
 from fastcontact.errors import CaseError
+from fastcontact.studies.sweep import parameter_sweep
 
 
 @pytest.fixture(scope="module")

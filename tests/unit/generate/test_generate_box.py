@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact import elements
-from fastcontact.generate import box
-from fastcontact.generate.box import SOLIDS
-from fastcontact.topology import bodies, corner_volumes, outer_facets
+from fastcontact.mesh import elements
+from fastcontact.mesh.generate import box
+from fastcontact.mesh.generate.box import SOLIDS
+from fastcontact.mesh.topology import bodies, corner_volumes, outer_facets
 
 SIZE, ORIGIN = (2.0, 1.5, 1.2), (0.5, -0.3, 0.1)
 SIDES = {f"{axis}{end}": (k, end) for k, axis in enumerate("XYZ") for end in ("MIN", "MAX")}

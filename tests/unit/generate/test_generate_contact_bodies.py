@@ -7,7 +7,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.errors import MeshError
-from fastcontact.generate import crowned_blocks, punched_block, rings
+from fastcontact.mesh.generate import crowned_blocks, punched_block, rings
 
 QUADRANGLES = ("quad4", "quad8", "quad9")
 

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 import fastcontact as fc
 from fastcontact.errors import MeshError
-from fastcontact.generate import Forest, circles
-from fastcontact.topology import corner_areas, outer_facets
+from fastcontact.mesh.generate import Forest, circles
+from fastcontact.mesh.topology import corner_areas, outer_facets
 
 
 def area(mesh):
@@ -17,7 +17,7 @@ def area(mesh):
 
 def edge_counts(mesh):
     """How often every edge of a solid cell occurs."""
-    from fastcontact import elements
+    from fastcontact.mesh import elements
 
     edges = [b[:, elements.get(n).edges].reshape(-1, 2) for n, b in mesh.solids.items()]
     return np.unique(np.sort(np.concatenate(edges), axis=1), axis=0, return_counts=True)[1]

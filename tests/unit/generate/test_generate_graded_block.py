@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact import elements
 from fastcontact.errors import MeshError
-from fastcontact.generate import graded_block
+from fastcontact.mesh import elements
+from fastcontact.mesh.generate import graded_block
 
 FACES = [e.name for e in elements.ELEMENTS.values() if e.dim == 2]
 SOLIDS = [e.name for e in elements.ELEMENTS.values() if e.dim == 3]

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact import elements, topology
+from fastcontact import topology
 from fastcontact.errors import MeshError
-from fastcontact.generate import half_spheres, quarter_disc
+from fastcontact.mesh import elements
+from fastcontact.mesh.generate import half_spheres, quarter_disc
 
 ELEMENTS = ("tri3", "tri6", "quad4", "quad8", "quad9")
 R = 50.0

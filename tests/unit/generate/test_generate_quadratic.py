@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact import elements
 from fastcontact.errors import MeshError
-from fastcontact.generate import Circle, block, quarter_disc, to_quadratic
-from fastcontact.mesh import Mesh
+from fastcontact.mesh import elements
+from fastcontact.mesh.generate import Circle, block, quarter_disc, to_quadratic
+from fastcontact.mesh.mesh import Mesh
 
 R = 50.0
 ARCS = (Circle((0.0, -R), R, "CONT1"), Circle((0.0, -R), R, "D1B1"))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.generate import circles, refined
-from fastcontact.mesh import Mesh
+from fastcontact.mesh.generate import circles, refined
+from fastcontact.mesh.mesh import Mesh
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 MIDDLES = np.array([[0.5, 0.0], [1.0, 0.5], [0.5, 1.0], [0.0, 0.5]])

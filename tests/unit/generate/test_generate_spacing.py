@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fastcontact as fc
-from fastcontact.generate._delaunay import delaunay, edges_of, stars_of
-from fastcontact.generate._outline import filled
-from fastcontact.generate._spacing import Spacing, divided, geometric
+from fastcontact.mesh.generate._delaunay import delaunay, edges_of, stars_of
+from fastcontact.mesh.generate._outline import filled
+from fastcontact.mesh.generate._spacing import Spacing, divided, geometric
 
 size = st.floats(0.01, 1.0)
 

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact import elements, topology
-from fastcontact.generate import sphere_octant, sphere_on_block
-from fastcontact.generate.sphere import SOLIDS
+from fastcontact import topology
+from fastcontact.mesh import elements
+from fastcontact.mesh.generate import sphere_octant, sphere_on_block
+from fastcontact.mesh.generate.sphere import SOLIDS
 
 SIZES = {"R": 2.0, "size": 1.0, "contact_size": 0.2, "contact_radius": 0.5}
 

@@ -6,10 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fastcontact as fc
-from fastcontact import elements, topology
+from fastcontact import topology
 from fastcontact.errors import MeshError
-from fastcontact.generate import block, merge_points, mirrored, renamed, to_quadratic, transformed, union
-from fastcontact.mesh import Mesh
+from fastcontact.mesh import elements
+from fastcontact.mesh.generate import block, merge_points, mirrored, renamed, to_quadratic, transformed, union
+from fastcontact.mesh.mesh import Mesh
 
 ELEMENTS = ("tri3", "tri6", "quad4", "quad8", "quad9")
 SOLIDS_3D = [name for name, element in elements.ELEMENTS.items() if element.dim == 3]

@@ -6,7 +6,7 @@ import pytest
 
 from fastcontact import generate
 from fastcontact.errors import MeshError, ModelError
-from fastcontact.ramp import linear_ramp
+from fastcontact.model.ramp import linear_ramp
 
 TOO_LARGE = [
     ("half-spheres", {"element": "tri3", "size": 1e-12}, r"5e\+13 segments, more than 1000000"),

@@ -18,8 +18,8 @@ import pytest
 from test_result_files import MESH, assert_same, step_result
 
 from fastcontact import FileError, ResultWriter, open_results
-from fastcontact.io import _commits
-from fastcontact.io._uninterrupted import uninterrupted
+from fastcontact.results import _commits
+from fastcontact.results._uninterrupted import uninterrupted
 
 
 @pytest.fixture
@@ -185,7 +185,7 @@ def test_a_file_that_is_taken_up_and_then_changes_is_left_alone(how: str, path: 
 
 def test_a_pair_is_in_the_file_as_a_whole_or_not_at_all(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Stopped by hand while the first step brings its contact pairs."""
-    import fastcontact.io._appending as appending
+    import fastcontact.results._appending as appending
 
     def stop(*_: object) -> None:
         raise KeyboardInterrupt

@@ -9,11 +9,11 @@ import pytest
 from test_result_files import MESH, write
 
 import fastcontact as fc
-from fastcontact.case import read_case
+from fastcontact.cases.case import read_case
 from fastcontact.errors import FileError, MeshError
-from fastcontact.io import _heaps
-from fastcontact.io.med import write_med_mesh
-from fastcontact.io.tables import read_csv
+from fastcontact.mesh.files import _heaps
+from fastcontact.mesh.files.med import write_med_mesh
+from fastcontact.results.tables import read_csv
 
 HEAP = b"GCOL\x01\0\0\0"
 

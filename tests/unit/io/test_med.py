@@ -11,13 +11,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fastcontact import elements
 from fastcontact.errors import FastcontactWarning, FileError, MeshError
-from fastcontact.io import med
-from fastcontact.io.med import read_med_field, read_med_mesh, write_med_mesh, write_med_results
-from fastcontact.io.mesh_files import read_mesh_report
-from fastcontact.mesh import Mesh
-from fastcontact.results import ContactResult, StepResult
+from fastcontact.mesh import elements
+from fastcontact.mesh.files import med
+from fastcontact.mesh.files.med import read_med_field, read_med_mesh, write_med_mesh
+from fastcontact.mesh.files.mesh_files import read_mesh_report
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.results.med import write_med_results
+from fastcontact.results.step import ContactResult, StepResult
 
 CASES = Path(__file__).resolve().parents[4] / "shared" / "cases"
 FLAT = {name: element for name, element in elements.ELEMENTS.items() if element.dim <= 2}

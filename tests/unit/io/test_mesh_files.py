@@ -11,10 +11,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fastcontact import elements, topology
+from fastcontact import topology
 from fastcontact.errors import FastcontactWarning, FileError, MeshError
-from fastcontact.io.mesh_files import read_mesh, read_mesh_report, write_mesh
-from fastcontact.mesh import Mesh
+from fastcontact.mesh import elements
+from fastcontact.mesh.files.mesh_files import read_mesh, read_mesh_report, write_mesh
+from fastcontact.mesh.mesh import Mesh
 
 FLAT = [name for name, element in elements.ELEMENTS.items() if element.dim <= 2]
 

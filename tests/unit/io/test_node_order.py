@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact import elements
-from fastcontact.generate.box import box
-from fastcontact.io.med import write_med_mesh
-from fastcontact.io.mesh_files import read_mesh, read_mesh_report, write_mesh
-from fastcontact.mesh import Mesh
-from fastcontact.topology import corner_volumes
+from fastcontact.mesh import elements
+from fastcontact.mesh.files.med import write_med_mesh
+from fastcontact.mesh.files.mesh_files import read_mesh, read_mesh_report, write_mesh
+from fastcontact.mesh.generate.box import box
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import corner_volumes
 
 CASES = Path(__file__).resolve().parents[4] / "shared" / "cases"
 SOLIDS = {name: element for name, element in elements.ELEMENTS.items() if element.dim == 3}

@@ -14,7 +14,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact import FileError, ResultWriter, open_results
-from fastcontact.io import _result_layout as layout
+from fastcontact.results import _layout as layout
 
 RESOURCES = Path(__file__).parent / "resources"
 FILES = sorted(path.name.removesuffix(".vtkhdf.gz") for path in RESOURCES.glob("*.vtkhdf.gz"))

@@ -17,12 +17,13 @@ import h5py
 import numpy as np
 import pytest
 
-from fastcontact import elements, topology
+from fastcontact import topology
 from fastcontact.errors import FileError, ModelError
-from fastcontact.io.result_reader import open_results
-from fastcontact.io.result_writer import ResultWriter
-from fastcontact.mesh import Mesh
-from fastcontact.results import ContactResult, StepResult
+from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.results.reader import open_results
+from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.writer import ResultWriter
 
 # Corners of the cells, body by body: two blocks, 0.1 apart, of four kinds of cells.
 CORNERS = [
@@ -269,7 +270,7 @@ def test_readers_trust_the_number_of_steps_and_no_length(path: Path) -> None:
 
 
 def test_steps_can_be_followed_while_they_are_written(path: Path) -> None:
-    code = "import sys; from fastcontact.io.result_reader import open_results as read; "
+    code = "import sys; from fastcontact.results.reader import open_results as read; "
     code += "print(read(sys.argv[1])[-1].index)"
     with ResultWriter(path, MESH) as out:
         assert len(open_results(path)) == 0
@@ -516,7 +517,7 @@ def test_an_old_file_stays_until_the_new_one_is_begun(path: Path, monkeypatch: p
     def fail(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("fastcontact.io.result_writer.write_own", fail)
+    monkeypatch.setattr("fastcontact.results.writer.write_own", fail)
     with pytest.raises(FileError, match=r"cannot be begun \(No space left on device\)"):
         ResultWriter(path, MESH)
     assert path.read_bytes() == before

@@ -18,8 +18,8 @@ from test_result_files import MESH, assert_same, step_result
 
 import fastcontact as fc
 from fastcontact import ConvergenceError, FileError, ModelError, ResultWriter, open_results
-from fastcontact.io import _commits
-from fastcontact.io._packing import packed, unpacked
+from fastcontact.results import _commits
+from fastcontact.results._packing import packed, unpacked
 
 
 @pytest.fixture

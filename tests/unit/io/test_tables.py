@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from fastcontact.errors import CaseError, ContactError, FileError, MeshError
-from fastcontact.io.tables import (
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.tables import (
     contact_table,
     history_table,
     line_table,
@@ -22,8 +24,6 @@ from fastcontact.io.tables import (
     with_theory,
     write_csv,
 )
-from fastcontact.mesh import Mesh
-from fastcontact.results import ContactResult, StepResult
 
 # A quadratic triangle whose numbers run wild, with its inclined edge of length 5 as a line of two pieces.
 POINTS = [[-3.0, 0.0], [0.0, 4.0], [0.0, 0.0], [-1.5, 0.0], [-1.5, 2.0], [0.0, 2.0]]

@@ -12,11 +12,11 @@ import pytest
 from test_node_order import SOLIDS, row_of
 from test_result_files import CELL_DATA, MESH, ResultWriter, expected_point_data, step_result, write
 
-from fastcontact import elements
 from fastcontact.errors import FileError
-from fastcontact.io.xdmf import write_xdmf
-from fastcontact.mesh import Mesh
-from fastcontact.results import StepResult
+from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.results.step import StepResult
+from fastcontact.results.xdmf import write_xdmf
 
 N_STEPS = 3
 

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fastcontact.errors import CaseError, FileError
-from fastcontact.io.xmgrace import STYLES, Curve, escaped, round_axis, write_agr
+from fastcontact.results.xmgrace import STYLES, Curve, escaped, round_axis, write_agr
 
 GRACE = shutil.which("gracebat")
 needs_grace = pytest.mark.skipif(GRACE is None, reason="gracebat (Debian's grace) is not installed")

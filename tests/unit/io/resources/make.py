@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 import fastcontact as fc
-from fastcontact.generate import block, box
-from fastcontact.io import _result_layout as layout
+from fastcontact.mesh.generate import block, box
+from fastcontact.results import _layout as layout
 
 HERE = Path(__file__).parent
 CASE_TEXT = 'title = "old"\n'

@@ -1,0 +1,111 @@
+"""The one place that says njit: disk cache, safe fast-math subset, threads.
+
+Kernels compile at their first call, never at import. Where no folder is writable for the cache, they compile
+in every process instead, and one line in the log says so.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+from collections.abc import Callable
+from typing import Any
+
+import numba
+
+from fastcontact._jit import cache
+from fastcontact.errors import FastcontactError
+
+log = logging.getLogger("fastcontact")
+
+# Contraction to fused multiply-add only: NaN, infinities and the order of sums stay as written.
+FASTMATH = {"contract"}
+
+_cache_reported = False
+_forked_without_threads = False
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile `function` lazily in nopython mode, with the disk cache where one can be had."""
+    return _compile(function, parallel=False)
+
+
+def parallel_kernel(function: Callable[..., Any]) -> Any:
+    """Like `kernel`, with `prange` loops spread over threads; iterations must write disjoint memory.
+
+    With NUMBA_BOUNDSCHECK=1 the loops run in one thread: Numba checks no index inside parallel ones.
+    """
+    return _compile(function, parallel=not getattr(numba.config, "BOUNDSCHECK", None))
+
+
+def summing_kernel(function: Callable[..., Any]) -> Any:
+    """Like `kernel`, for long sums of products, which vectors take in an order of their own: the same in every run.
+
+    Only where the last bits may differ between processors, as they do in BLAS.
+    """
+    return _compile(function, parallel=False, fastmath=FASTMATH | {"reassoc"})
+
+
+def inlined_kernel(function: Callable[..., Any]) -> Any:
+    """Like `kernel`, for parts of hot loops: written out where they are called. See `kernels.borrowing` for arrays."""
+    return _compile(function, parallel=False, inline="always")
+
+
+def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = FASTMATH, inline: str = "never") -> Any:
+    options: dict[str, Any] = {"fastmath": fastmath, "parallel": parallel, "nogil": True, "error_model": "numpy"}
+    options["inline"] = inline
+    try:
+        return cache.kept(numba.njit(cache=True, **options)(function), function)
+    except RuntimeError as error:  # numba: "cannot cache function ...: no locator available for file ..."
+        if "cannot cache" not in str(error):
+            raise
+        global _cache_reported
+        if not _cache_reported:
+            _cache_reported = True
+            log.info("no writable folder for compiled kernels (set NUMBA_CACHE_DIR): compiling in every process")
+        return numba.njit(cache=False, **options)(function)
+
+
+def _notice_fork() -> None:
+    global _forked_without_threads
+    with contextlib.suppress(ValueError):  # no parallel kernel was loaded yet: the child starts threads of its own
+        _forked_without_threads = numba.threading_layer() == "omp" and compiled()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_notice_fork)
+
+
+def check_threads() -> None:
+    """Refuse parallel kernels where they would end the process: in a child forked after their threads had started.
+
+    The threads of GNU's OpenMP do not survive a fork; its library ends such a child without an exception, and a process
+    pool then waits for ever.
+
+    Raises
+    ------
+    FastcontactError
+        If this process was forked from one that had started the threads.
+    """
+    if _forked_without_threads:
+        raise FastcontactError(
+            "this process was forked after its parent had started the threads of the compiled kernels, and those do not "
+            "survive a fork: start processes by multiprocessing's 'spawn' or 'forkserver', or set "
+            "NUMBA_THREADING_LAYER=workqueue"
+        )
+
+
+def compiled() -> bool:
+    """Return whether kernels are compiled in this process: not where NUMBA_DISABLE_JIT is set."""
+    return not getattr(numba.config, "DISABLE_JIT", False)
+
+
+def set_threads(count: int) -> None:
+    """Set the number of threads that parallel kernels use in this process."""
+    numba.set_num_threads(count)
+
+
+def threads() -> int:
+    """Return the number of threads that parallel kernels use in this process."""
+    return int(numba.get_num_threads())

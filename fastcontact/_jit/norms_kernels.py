@@ -1,0 +1,28 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Norms of long vectors, without the copies that NumPy makes of them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact._jit.decorators import kernel
+
+Array = NDArray[np.float64]
+
+
+def largest(x: Array) -> float:
+    """Return the largest of ``|x|``, 0 if there is none; NaN if there is one."""
+    return float(max(x.max(initial=0.0), -x.min(initial=0.0)))
+
+
+@kernel
+def largest_difference(x: Array, y: Array) -> float:
+    """Return the largest of ``|x - y|`` (n,), 0 if there is none; NaN if there is one."""
+    found = 0.0
+    for k in range(len(x)):
+        value = x[k] - y[k]
+        found = max(found, abs(value))
+        if value != value:
+            return value
+    return found

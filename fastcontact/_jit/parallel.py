@@ -1,0 +1,72 @@
+"""Work shared by threads, with the same bits whatever their number.
+
+Compiled loops release the interpreter, so plain threads run them side by side. Each has its own rows of a matrix, or its
+own cells; nothing is added across threads.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
+from functools import lru_cache, wraps
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+
+from fastcontact._jit import decorators
+
+Result = TypeVar("Result")
+Part = TypeVar("Part")
+Given = ParamSpec("Given")
+# With fewer cells, of so many nodes, the start of threads costs more than they save.
+WORTHWHILE, NODES = 20_000, 4
+MOST = 255
+
+
+def shared(work: Callable[[Part], Result], parts: Sequence[Part]) -> list[Result]:
+    """Return the results of `work` on every part, the first in this thread, the others each in one of their own."""
+    if len(parts) == 1:
+        return [work(parts[0])]
+    with ThreadPoolExecutor(len(parts) - 1) as pool:
+        others = pool.map(work, parts[1:])
+        return [work(parts[0]), *others]
+
+
+@lru_cache(maxsize=1)
+def _libraries() -> Any:
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
+def one_blas_thread() -> AbstractContextManager[object]:
+    """Keep BLAS to one thread for a while: its others spin between the small calls of a contact iteration.
+
+    Also, the number of its threads decides the order of its sums, and so the last bits of a result.
+    """
+    limited: AbstractContextManager[object] = _libraries().limit(limits=1, user_api="blas")
+    return limited
+
+
+def on_one_blas_thread(function: Callable[Given, Result]) -> Callable[Given, Result]:
+    """Let a function run under `one_blas_thread`."""
+
+    @wraps(function)
+    def limited(*args: Given.args, **kwargs: Given.kwargs) -> Result:
+        with one_blas_thread():
+            return function(*args, **kwargs)
+
+    return limited
+
+
+def portions(count: int, nodes: int = NODES) -> list[tuple[int, int]]:
+    """Return ranges of nearly equal size that cover 0 to `count`: one a thread, or one for little work.
+
+    What is done for each of `count` cells grows with their number of `nodes`.
+    """
+    if count * nodes < WORTHWHILE * NODES:
+        return [(0, count)]
+    ends = np.linspace(0, count, min(decorators.threads(), MOST) + 1).astype(int).tolist()
+    return list(itertools.pairwise(ends))

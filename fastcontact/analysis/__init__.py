@@ -1,0 +1,1 @@
+"""The analysis of a model: load steps, contact geometry, active set, friction, restart."""

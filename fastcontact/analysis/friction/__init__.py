@@ -1,0 +1,1 @@
+"""Coulomb friction: the inequalities of contact and the friction cone, solved together."""

@@ -1,0 +1,172 @@
+"""Contact with Coulomb friction on a dense compliance: forces from gaps and slips without forces.
+
+Gaps and slips are ``(g, s) = free + F (n, t)`` with the normal forces n and the tangential ones t. Three methods stand
+behind each other:
+
+1. Newton's, see `cone_newton`; in two dimensions it is an active set of open, stick and slip forwards or backwards. It
+   nearly always suffices.
+2. The same from forces that block Gauss-Seidel sweeps have found (Jean, 1999), which suffices unless mu is large.
+3. The same from the solution for a cone with few edges, a linear complementarity problem that Lemke's pivots solve for
+   every positive definite F and every mu (Klarbring, 1986; Stewart and Trinkle, 1996; Klarbring and Pang, 1998).
+
+With large mu there may be several solutions; one of them is found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.analysis.friction import lemke_kernels, sweep_kernels
+from fastcontact.analysis.friction.cone_newton import Forces, Law, newton
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+# Residual of a solution over the largest force where round-off leaves no better one.
+ACCEPTABLE = 1e-9
+# Relative changes down to which starts are swept, and the sweeps that one may take.
+SWEPT, MOST_SWEEPS = (1e-1, 1e-2, 1e-3, 1e-4), 2000
+# Edges of the cones in three dimensions, and the largest complementarity problem.
+EDGES, LARGEST = (8, 16, 32), 2500
+# Edges repeat each other, which pivots do not bear: their problem is shifted by this fraction.
+SHIFT = 1e-6
+
+
+def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = None) -> Forces:
+    """Return forces that obey contact and Coulomb friction.
+
+    Parameters
+    ----------
+    F : ndarray ((1 + k) m, (1 + k) m)
+        Compliance, symmetric and positive semidefinite; normal parts first, then those along each of k tangents.
+    free : ndarray (1 + k, m)
+        Gaps and slips without forces.
+    mu : ndarray (m,)
+    closed : ndarray of bool (m,)
+        Constraints to start from as closed and sticking.
+    guess : ndarray (1 + k, m), optional
+        Forces to start from before that.
+    """
+    parts, m = free.shape
+    if not m:
+        return Forces(free * 0.0, free, closed, closed, True, 0.0, 0)
+    # Each constraint in units of its own compliance, so that c = 1 suits all.
+    own = np.diag(F)[:m]
+    unit = 1.0 / np.sqrt(np.maximum(own, np.finfo(float).eps * own.max()))
+    length = float(np.abs(free * unit).max()) or 1.0
+    everywhere = np.tile(unit, parts)
+    problem = _Problem(everywhere[:, None] * F * everywhere, free * unit / length, mu)
+    best, iterations = None, 0
+    if guess is not None:
+        guess = guess / (length * unit)
+    for start in _starts(problem, closed, guess):
+        found = newton(problem, start, problem.gaps(start))
+        iterations += 1 + found.iterations
+        if best is None or found.residual < best.residual:
+            best = found
+        if found.settled:
+            break
+    assert best is not None
+    settled = best.settled or best.residual <= ACCEPTABLE
+    gaps = best.gaps * length / unit
+    return Forces(best.y * length * unit, gaps, best.closed, best.sticking, settled, best.residual, iterations)
+
+
+class _Problem:
+    """See `cone_newton.Linearised`; F is scaled to compliances of one."""
+
+    def __init__(self, F: Array, free: Array, mu: Array) -> None:
+        self.F, self.free, self.mu, self.law = F, free, mu, Law(mu)
+        self.round_off = float(16 * np.finfo(float).eps * np.abs(free).max())
+
+    def gaps(self, y: Array) -> Array:
+        return self.free + (self.F @ y.ravel()).reshape(self.free.shape)
+
+    def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
+        there = _step(self, y, gaps, closed, sticking)
+        return there, self.gaps(there)
+
+
+def _starts(problem: _Problem, closed: Mask, guess: Array | None) -> Iterator[Array]:
+    """Yield forces for Newton's method to start from, the more laborious the later."""
+    if guess is not None and guess.any():
+        yield guess
+    sticking = closed | (problem.free[0] < 0) if not closed.any() else closed
+    yield _step(problem, np.zeros_like(problem.free), problem.free, sticking, sticking)
+    y, gaps = np.zeros_like(problem.free), np.empty_like(problem.free)
+    for exactness in SWEPT:
+        if sweep_kernels.sweep(problem.F, problem.free, problem.mu, y, gaps, exactness, MOST_SWEEPS) == MOST_SWEEPS:
+            break
+        yield y.copy()
+    for edges in EDGES if len(problem.free) == 3 else (2,):
+        found = _on_edges(problem, edges)
+        if found is not None:
+            yield found
+
+
+def _step(problem: _Problem, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> Array:
+    """Return the forces of `cone_newton.Linearised.step`."""
+    k, m = len(problem.free) - 1, problem.free.shape[1]
+    new = np.zeros_like(y)
+    rows = np.flatnonzero(closed)
+    q = len(rows)
+    if not q:
+        return new
+    unknown = (np.arange(1 + k)[:, None] * m + rows).ravel()
+    A, right = problem.F[np.ix_(unknown, unknown)], -problem.free[:, rows].ravel()
+    place = np.flatnonzero(~sticking[rows])
+    if len(place):
+        sliding = rows[place]
+        d, turning = problem.law.slide(y, gaps, sliding)
+        slips = [(1 + b) * q + place for b in range(k)]
+        compliance = [A[slips[b]] for b in range(k)]
+        free = [-right[slips[b]] for b in range(k)]
+        for a in range(k):
+            A[slips[a]], right[slips[a]] = 0.0, 0.0
+            A[slips[a], slips[a]] = 1.0
+            A[slips[a], place] -= problem.mu[sliding] * d[a]
+            for b in range(k) if k == 2 else ():
+                turn = turning * ((a == b) - d[a] * d[b])
+                A[slips[a], slips[b]] -= turn
+                A[slips[a]] += turn[:, None] * compliance[b]
+                right[slips[a]] -= turn * free[b]
+    new[:, rows] = _solved(A, right).reshape(1 + k, q)
+    return new
+
+
+def _solved(A: Array, right: Array) -> Array:
+    """Solve a linear system; of constraints that repeat each other any forces do, the smallest are taken."""
+    try:
+        found = np.linalg.solve(A, right)
+        if np.abs(A @ found - right).max() <= 1e-8 * np.abs(right).max(initial=0.0):
+            return np.asarray(found)
+    except np.linalg.LinAlgError:
+        pass
+    return np.asarray(np.linalg.lstsq(A, right, rcond=None)[0])
+
+
+def _on_edges(problem: _Problem, edges: int) -> Array | None:
+    """Return the forces for a cone with a few edges, None if Lemke's method does not find any.
+
+    Unknowns are the normal forces, the part of the tangential ones along each edge, and the largest slip along one.
+    """
+    k, m = len(problem.free) - 1, problem.free.shape[1]
+    size, last = (2 + edges) * m, (1 + edges) * m
+    if size > LARGEST:
+        return None
+    angle = 2 * np.pi * np.arange(edges) / edges
+    along = np.column_stack([np.cos(angle), np.sin(angle)])[:, :k]
+    X = np.kron(np.block([[np.ones((1, 1)), np.zeros((1, edges))], [np.zeros((k, 1)), along.T]]), np.eye(m))
+    M = np.zeros((size, size))
+    M[:last, :last] = X.T @ problem.F @ X
+    M[last:, :m] = np.diag(problem.mu)
+    M[last:, m:last] = -np.tile(np.eye(m), edges)
+    M[m:last, last:] = np.tile(np.eye(m), edges).T
+    q = SHIFT * (0.5 + np.arange(size) * 0.6180339887498949 % 1.0)  # no two alike
+    q[:last] += X.T @ problem.free.ravel()
+    z = np.empty(size)
+    if lemke_kernels.pivot(M, q, z, 5 * size) < 0:
+        return None
+    return (X @ z[:last]).reshape(1 + k, m)

@@ -1,0 +1,213 @@
+"""Coulomb friction for solvers that eliminate constraints: no compliance is formed.
+
+A step of Newton's method holds closed gaps and sticking slips as equations. A sliding constraint drags with ``mu n`` along
+its direction d: its multiplier acts through the rows ``B + mu d T``, see `linear.Oblique`. In three dimensions t follows
+the slip as that turns, which is a spring across d: ``t = mu n d - stiffness (s - (d s) d)``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array, vstack
+
+from fastcontact.analysis.friction.cone_newton import EXACT, Forces, Law, newton
+from fastcontact.analysis.friction.slip_directions import aligning, idle
+from fastcontact.errors import ConvergenceError
+from fastcontact.linear.protocol import Drag, Oblique
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+# The stiffest spring across a slip, in units of what holds the constraint itself: a slip that hardly moves would ask for
+# any. The solution does not depend on it, for there nothing slips across.
+STIFFEST = 10.0
+# The residual of the friction law that is small enough, in units of that of the linear solutions.
+ENOUGH = 10.0
+
+
+def solve(
+    loaded: Oblique, rows: tuple[csr_array, ...], free: Array, mu: Array, usable: Mask, *, closed: Mask,
+    held: Mask | None, forces: Array | None, u: Array, tolerance: float, patience: int | None = None,
+) -> tuple[Array, Forces] | None:  # fmt: skip
+    """Return displacement and forces, or None where the method fails.
+
+    Parameters
+    ----------
+    loaded : Oblique
+    rows : tuple of csr_array (m, n)
+        Normal rows, then those along each of k tangents.
+    free : ndarray (1 + k, m)
+        Gaps and slips at u = 0.
+    mu : ndarray (m,)
+    usable, closed : ndarray of bool (m,)
+        Constraints that may close, and those to start from as closed and sticking.
+    held : ndarray of bool (m,), optional
+        Constraints that are equations, without friction.
+    forces : ndarray (1 + k, m), optional
+        To start from.
+    u : ndarray (n,)
+        Displacement to start from.
+    tolerance : float
+        Relative residual of linear solutions.
+    patience : int, optional
+        Newton iterations after which whatever was found will do.
+    """
+    problem = Eliminated(loaded, rows, free, mu, usable, held, u, tolerance)
+    y, gaps = problem.start(forces)
+    try:
+        if forces is None or not forces.any():
+            sticking = closed if closed.any() else gaps[0] < 0.0
+            state = sticking if held is None else sticking | held, sticking
+        else:
+            state = problem.law.state(y, gaps)
+        # At least once, for forces and displacement to start from are not in balance.
+        y, gaps = problem.step(y, gaps, *state)
+        found = newton(problem, y, gaps, max(EXACT, ENOUGH * tolerance), None if patience is None else patience - 1)
+        if not found.settled and patience is None:
+            return None
+        if found.y is not problem.reached:  # between two steps: displacements are known at their ends
+            problem.step(found.y, found.gaps, found.closed, found.sticking)
+    except ConvergenceError:
+        return None
+    return problem.u, problem.unscaled(found)
+
+
+class Eliminated:
+    """See `cone_newton.Linearised`: forces and gaps in units of each constraint's own stiffness.
+
+    Attributes
+    ----------
+    u : ndarray (n,)
+        Displacement that the last step led to.
+    reached : ndarray (1 + k, m)
+        Forces that it led to, scaled.
+    """
+
+    def __init__(
+        self, loaded: Oblique, rows: tuple[csr_array, ...], free: Array, mu: Array, usable: Mask, held: Mask | None,
+        u: Array, tolerance: float,
+    ) -> None:  # fmt: skip
+        self._loaded, self._usable, self._tolerance = loaded, usable, tolerance
+        k, m = len(rows) - 1, len(mu)
+        yielding = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
+        own = _own(rows, yielding)
+        self._turn = aligning(own) if k == 2 else None
+        if self._turn is not None:
+            turned = csr_array(self._turn @ vstack(rows, format="csr"))
+            rows = tuple(turned[a * m : (a + 1) * m] for a in range(3))
+            free = (self._turn @ free.ravel()).reshape(free.shape)
+            own = _own(rows, yielding)
+        still = idle(own)
+        slipping = [csr_array(diags_array(np.where(off, 0.0, 1.0)) @ T) for T, off in zip(rows[1:], still, strict=True)]
+        self._rows = (rows[0], *slipping)
+        self._free = np.vstack([free[0], np.where(still, 0.0, free[1:])])
+        self._slips = ~still
+        self._unit = 1.0 / np.sqrt(np.where(own[0, 0] > 0.0, own[0, 0], 1.0))
+        self.law = Law(np.where(usable, mu, 0.0), None if held is None else held & usable)
+        self.u = u
+        self.round_off = float(
+            16 * np.finfo(float).eps * np.abs(self._unit * self._gaps(u))[:, usable].max(initial=0.0)
+        )
+
+    def start(self, forces: Array | None) -> tuple[Array, Array]:
+        """Return forces and gaps of the displacement to start from, scaled."""
+        y = np.zeros_like(self._free) if forces is None else np.where(self._usable, forces, 0.0)
+        if self._turn is not None:
+            y = (self._turn @ y.ravel()).reshape(y.shape)
+        y[1:][~self._slips] = 0.0
+        self.reached = y / self._unit
+        return self.reached, self._scaled(self._gaps(self.u))
+
+    def unscaled(self, found: Forces) -> Forces:
+        """Return forces and gaps along the tangents as they were given."""
+        y, gaps = self.reached * self._unit, self._gaps(self.u)
+        if self._turn is not None:
+            y, gaps = ((self._turn.T @ part.ravel()).reshape(part.shape) for part in (y, gaps))
+        return Forces(y, gaps, found.closed, found.sticking, found.settled, found.residual, 1 + found.iterations)
+
+    def _gaps(self, u: Array) -> Array:
+        return self._free + np.stack([R @ u for R in self._rows])
+
+    def _scaled(self, gaps: Array) -> Array:
+        """Return gaps in units of the constraints; what cannot close is open, by whatever."""
+        gaps = np.where(self._usable, gaps * self._unit, 0.0)
+        gaps[0, ~self._usable] = 1.0
+        return gaps
+
+    def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
+        """See `cone_newton.Linearised.step`."""
+        closed = closed & self._usable
+        shut = np.flatnonzero(closed)
+        equations = (shut, *(np.flatnonzero(closed & sticking & slips) for slips in self._slips))
+        B = csr_array(vstack([R[at] for R, at in zip(self._rows, equations, strict=True)], format="csr"))
+        c = -np.concatenate([free[at] for free, at in zip(self._free, equations, strict=True)])
+        sliding = self._sliding(y, gaps, np.flatnonzero(closed & ~sticking & (self.law.mu > 0.0)))
+        drag = self._drag(B, shut, sliding) if len(sliding.at) else None
+        u, multiplier = self._loaded.oblique(B, c, np.concatenate(equations), self.u, self._tolerance, drag)
+        new, first = np.zeros_like(y), 0
+        for own, at in zip(new, equations, strict=True):
+            own[at] = multiplier[first : first + len(at)]
+            first += len(at)
+        new[1:, sliding.at] += sliding.force(new[0, sliding.at], u)
+        self.u, self.reached = u, new / self._unit
+        return self.reached, self._scaled(self._gaps(u))
+
+    def _sliding(self, y: Array, gaps: Array, at: NDArray[np.intp]) -> _Sliding:
+        """Return what the constraints `at` (q,) do that slide."""
+        d, turning = self.law.slide(y, gaps, at)
+        pull = self.law.mu[at] * d
+        if len(d) == 1:
+            return _Sliding(at, pull)
+        across = np.stack([-d[1], d[0]])
+        rows = sum(diags_array(part) @ T[at] for part, T in zip(across, self._rows[1:], strict=True))
+        spring = np.minimum(turning / np.maximum(1.0 - turning, 1e-300), STIFFEST) * self._unit[at] ** 2
+        return _Sliding(at, pull, _Springs(across, csr_array(rows), spring, (across * self._free[1:, at]).sum(axis=0)))
+
+    def _drag(self, B: csr_array, shut: NDArray[np.intp], sliding: _Sliding) -> Drag:
+        """Return what sliding adds to equations B whose first rows are the gaps of `shut`."""
+        pull = np.zeros((len(self._rows) - 1, len(self._usable)))
+        pull[:, sliding.at] = sliding.pull
+        through = self._rows[0][shut]
+        for T, part in zip(self._rows[1:], pull, strict=True):
+            through = through + diags_array(part[shut]) @ T[shut]
+        through = csr_array(vstack([through, B[len(shut) :]], format="csr"))
+        if sliding.springs is None:
+            return Drag(through)
+        springs = sliding.springs
+        weighted = springs.rows.T @ diags_array(springs.stiffness)
+        return Drag(through, csr_array(weighted @ springs.rows), -(weighted @ springs.free))
+
+
+@dataclass(frozen=True, eq=False)
+class _Springs:
+    """Springs across slips: along (k, q), with rows (q, n), stiffness (q,), and slips (q,) across at u = 0."""
+
+    along: Array
+    rows: csr_array
+    stiffness: Array
+    free: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Sliding:
+    """Constraints `at` (q,) that slide: tangential over normal forces (k, q), and springs in three dimensions."""
+
+    at: NDArray[np.intp]
+    pull: Array
+    springs: _Springs | None = None
+
+    def force(self, normal: Array, u: Array) -> Array:
+        """Return the tangential forces (k, q)."""
+        dragged = self.pull * normal
+        if self.springs is None:
+            return dragged
+        springs = self.springs
+        return np.asarray(dragged - springs.along * springs.stiffness * (springs.rows @ u + springs.free))
+
+
+def _own(rows: tuple[csr_array, ...], yielding: Array) -> Array:
+    """Return the compliance (1 + k, 1 + k, m) of each constraint if every unknown gave way by itself (n,)."""
+    give = diags_array(yielding)
+    return np.array([[(one @ give).multiply(other).sum(axis=1) for other in rows] for one in rows])

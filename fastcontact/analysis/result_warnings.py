@@ -1,0 +1,173 @@
+"""What makes the end of an analysis doubtful: each a sentence with its number, for a warning and the result file."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.analysis.analysis import Analysis
+from fastcontact.analysis.contact_result import deep
+from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.surface import Surface
+from fastcontact.elasticity import element_kernels, recovery
+from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import bodies
+from fastcontact.model.body_overlap import penetration
+from fastcontact.model.rigid_motions import body_name
+from fastcontact.results.step import ContactResult, StepResult
+
+Array = NDArray[np.float64]
+# Equivalent strain beyond which linear kinematics are worth a warning.
+STRAIN = 0.1
+# Rotation [radian] beyond which they are: half its square is the strain that they leave out.
+ROTATION = 0.3
+# Elements across the radius of a contact that resolve its pressure.
+ACROSS = 4
+# Change of the displacement by the last of a fixed number of geometry updates, relative to its largest component.
+UNSETTLED = 1e-2
+
+
+def at_the_end(analysis: Analysis, last: StepResult) -> list[str]:
+    """Return the doubts about an analysis that has just made its `last` step."""
+    found = _interpenetration(analysis) + _large_strain(analysis, last.stress) + _large_rotation(analysis)
+    found += _carrying_springs(analysis)
+    found += [analysis.solver.gave_up] if analysis.solver.gave_up else []
+    loaded = analysis.loaded(last.load_factor)
+    for name, pair in analysis.pairs.items():
+        contact = last.contact[name]
+        found += deep(pair, contact, analysis.u) + _lost(name, contact, name in analysis.touched, loaded)
+        found += _unresolved(name, pair, contact)
+    return found + _unsettled(analysis)
+
+
+def _unsettled(analysis: Analysis) -> list[str]:
+    """Return a doubt where the last of a fixed number of geometry updates still changed much."""
+    update, change = analysis.unsettled or (0, 0.0)
+    if change <= UNSETTLED:
+        return []
+    return [
+        f"the contact geometry had not settled after the {update} updates asked for: the last one changed the displacement "
+        f"by {change:.1%} of its largest component. Allow more geometry_updates, or leave them out"
+    ]
+
+
+def _interpenetration(analysis: Analysis) -> list[str]:
+    mesh = analysis.model.mesh
+    _, body = bodies(mesh)
+    joined = {
+        frozenset((int(body[p.secondary.points[0]]), int(body[p.primary.points[0]])))
+        for p in analysis.pairs.values()
+        if isinstance(p.primary, Surface)
+    }
+    texts: list[str] = []
+    seen: set[frozenset[int]] = set()
+    coordinates = mesh.points + analysis.displacement
+    inside = sorted(penetration(mesh, analysis.model.kinematics, coordinates), key=lambda entry: -entry[2])
+    for number, other, depth, where in inside:
+        both = frozenset((number, other))
+        if both not in joined | seen and depth > 1e-9 * np.ptp(mesh.points, axis=0).max():
+            seen.add(both)
+            texts.append(
+                f"bodies {body_name(mesh, body, number)} and {body_name(mesh, body, other)} interpenetrate by "
+                f"{depth:.6g} near {np.array2string(where, precision=4)}, and no contact is defined between them: "
+                "add_contact for the groups that meet"
+            )
+    return texts
+
+
+def _carrying_springs(analysis: Analysis) -> list[str]:
+    if analysis.floating is None or analysis.settled is None:
+        return []
+    told = analysis.floating.report(analysis.settled, analysis.largest_work)
+    if told["relative_to_load"] <= analysis.criteria.relative:
+        return []
+    return [
+        f"the springs that regularise {'; '.join(told['motions'])} still carry {told['relative_to_load']:.1e} of "
+        "the load: rigid motions are so much larger than deformations that round-off leaves no more"
+    ]
+
+
+def _large_strain(analysis: Analysis, stress: Array) -> list[str]:
+    softest = min(material.shear_modulus for material, _ in analysis.model.materials)
+    strain = float(recovery.von_mises(stress).max(initial=0.0) / (3 * softest))
+    if strain <= STRAIN:
+        return []
+    return [f"the largest equivalent strain is {strain:.3f}, beyond the {STRAIN} where linear kinematics hold well"]
+
+
+def _large_rotation(analysis: Analysis) -> list[str]:
+    angle, where = largest_rotation(analysis.model.mesh, analysis.displacement)
+    if angle <= ROTATION:
+        return []
+    return [
+        f"the largest rotation is {angle:.3f} radian, near {np.array2string(where, precision=4)}: linear kinematics take "
+        f"it for small, which leaves out strains of about {0.5 * angle**2:.3f}"
+    ]
+
+
+def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
+    """Return the largest rotation of the centre of a solid cell [radian], and where (dim,).
+
+    That of linear kinematics, half the curl of the displacement (n_points, dim).
+    """
+    square, place, displacement = 0.0, np.zeros(mesh.dim), np.ascontiguousarray(displacement)
+    for name, block in mesh.solids.items():
+        element = elements.get(name)
+        centre = element.nodes[: element.n_corners].mean(axis=0)[None]
+        most, row = element_kernels.loops(mesh.dim).largest_rotation(
+            mesh.points, block, element.shape(centre), element.gradient(centre), displacement
+        )
+        if most > square:
+            square, place = most, mesh.points[block[row]].mean(axis=0)
+    return float(square**0.5), place
+
+
+def _lost(name: str, contact: ContactResult, touched: bool, loaded: bool) -> list[str]:
+    """Return a doubt where a pair never closed, or is open although the loads are still there."""
+    if contact.active.any():
+        return []
+    facing = contact.gap[np.isfinite(contact.gap)]
+    gap = f"the smallest gap is {facing.min():.4g}" if len(facing) else "no node faces the other side"
+    if not touched:
+        return [f"contact '{name}' never closed: {gap}. Check its sides and which way the loads push"]
+    return [f"contact '{name}' is lost at the end, after it was closed: {gap}"] if loaded else []
+
+
+def _unresolved(name: str, pair: Formulation, contact: ContactResult) -> list[str]:
+    """Return a doubt where too few elements lie across the radius of a contact."""
+    if pair.terms.always_closed or not contact.active.any():
+        return []
+    count = across(pair.secondary, contact.active, pair.terms.excluded_nodes(pair.secondary))
+    if count is None or count >= ACROSS:
+        return []
+    return [
+        f"contact '{name}' has only {count} {'elements' if count > 1 else 'element'} across its radius: its pressure needs "
+        f"{ACROSS} or more; refine '{pair.secondary.group}'"
+    ]
+
+
+def across(side: Surface, closed: NDArray[np.bool_], excluded: NDArray[np.bool_]) -> int | None:
+    """Return how many facets lie between the innermost closed node and the edge of the contact; None without an edge.
+
+    That is the radius in elements, whatever the shape of the contact, and also where symmetry cuts it. The edge lies
+    within the last of these facets.
+
+    Parameters
+    ----------
+    side : Surface
+    closed, excluded : ndarray of bool (m,)
+        Which nodes of the side are in contact; which ones the user keeps out of it, so that no edge is there.
+    """
+    reached = ~closed & ~excluded
+    if not reached.any():
+        return None
+    count = 0
+    while not reached[closed].all():
+        wider = reached.copy()
+        for block in side.blocks:
+            wider[block.local[reached[block.local].any(axis=1)]] = True
+        if (wider == reached).all():  # the rest of the contact is closed from end to end
+            return None
+        reached, count = wider, count + 1
+    return count

@@ -1,0 +1,240 @@
+"""Bodies that only contact holds: springs make their stiffness regular, and the solution is moved until they are slack.
+
+Each free motion gets one spring at one node, about as stiff as the body there. The springs hang on a rigid position y
+of the bodies; for every y the contact problem is regular. The elongations w(y) that it leaves are, but for their sign
+and stiffness, the gradient of a convex function of y (the Moreau envelope of the energy: Moreau, 1965; Rockafellar,
+1976). Newton's method with a line search brings them to zero; then the springs carry nothing, and the solution is that
+without them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import qr
+from scipy.sparse import bsr_array
+
+from fastcontact.analysis.active_set import State
+from fastcontact.elasticity.system import System
+from fastcontact.model.rigid_motions import FreeMotions
+
+Array = NDArray[np.float64]
+# The springs carry less than this fraction of the loads; more where round-off or the linear solver leave more.
+SLACK = 1e-12
+# What is left when nothing improves any more counts as slack below this fraction.
+STAGNANT = 1e-8
+MAX_POSITIONS = 100
+# A motion that resists less than this fraction of its spring does not resist.
+UNRESISTED = 1e-9
+
+
+@dataclass(frozen=True)
+class Settled:
+    """A contact solution with slack springs.
+
+    Attributes
+    ----------
+    state : State
+        For the springs at `position`; its iterations are those of all positions tried.
+    position : ndarray (k,)
+        Rigid displacement at each spring [length].
+    left : ndarray (k,)
+        Force still carried by each spring [force].
+    positions : int
+        Positions tried.
+    slack : bool
+        Whether the springs are slack.
+    """
+
+    state: State
+    position: Array
+    left: Array
+    positions: int
+    slack: bool
+
+
+class Floating:
+    """Springs on the free motions of a system.
+
+    Parameters
+    ----------
+    motions : FreeMotions
+    system : System
+    avoid : ndarray of int
+        Displacements to keep the springs from if possible: those of the contact surfaces.
+
+    Attributes
+    ----------
+    names : list of str
+        Of the free motions.
+    dofs : ndarray of int (k,)
+        The displacement that each spring holds.
+    motions : FreeMotions
+        The free motions, each moving one of `dofs` by 1.
+    stiffness : float
+        Of each spring [force / length].
+    """
+
+    def __init__(self, motions: FreeMotions, system: System, avoid: NDArray[np.intp]) -> None:
+        diagonal = system.matrix.diagonal()
+        weightless = diagonal == 0
+        typical = float(np.median(diagonal[system.free & (diagonal > 0)]))
+        diagonal = np.where(diagonal > 0, diagonal, typical)  # rigid obstacles have no stiffness of their own
+        self._dim = system.matrix.blocksize[0]
+        self.names = motions.names()
+        self.dofs = _sturdy(system.unknowns_of(motions.displacement), diagonal, avoid)
+        self._places = [
+            f"{'xyz'[dof % self._dim]} of {self._owner(motions, dof, weightless)}" for dof in self.dofs.tolist()
+        ]
+        self._at_springs = motions.displacement[self.dofs]
+        self.motions = motions.combined(np.asarray(np.linalg.inv(self._at_springs), np.float64))
+        self.stiffness = typical
+
+    def with_springs(self, matrix: bsr_array) -> bsr_array:
+        """Return the matrix with the springs added."""
+        data, size = matrix.data.copy(), matrix.blocksize[0]
+        for dof in self.dofs:
+            row, component = divmod(int(dof), size)
+            first, end = matrix.indptr[row], matrix.indptr[row + 1]
+            place = first + int(np.flatnonzero(matrix.indices[first:end] == row)[0])
+            data[place, component, component] += self.stiffness
+        return bsr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
+
+    def rigid(self, position: Array) -> Array:
+        """Return the displacements (n_dofs,) of the rigid position (k,)."""
+        return np.asarray(self.motions.displacement @ position)
+
+    def report(self, settled: Settled, load: float) -> dict[str, Any]:
+        """Return what was regularised, and by how much, as plain numbers and strings.
+
+        Keys: ``motions``, names of the free motions; ``springs``, their places; ``spring_stiffness`` [force / length];
+        ``force_left``, what each spring still carries [force]; ``relative_to_load``, the largest over the load;
+        ``positions``, rigid positions tried.
+        """
+        left = np.abs(settled.left)
+        return {
+            "motions": self.names,
+            "springs": self._places,
+            "spring_stiffness": self.stiffness,
+            "force_left": left.tolist(),
+            "relative_to_load": float(left.max() / load) if load else 0.0,
+            "positions": settled.positions,
+        }
+
+    def _owner(self, motions: FreeMotions, dof: int, weightless: NDArray[np.bool_]) -> str:
+        """Return what a spring hangs on: a point of a body, or an obstacle that has no point in the mesh."""
+        if not weightless[dof]:
+            return f"point {dof // self._dim}"
+        column = int(np.argmax(np.abs(motions.displacement[dof])))
+        return motions.labels[int(np.argmax(np.abs(motions.parts[:, column])))][0]
+
+    def unheld(self, settled: Settled) -> list[str]:
+        """Return the names of the free motions that the springs still hold most."""
+        work = np.abs(self._at_springs.T @ settled.left)
+        return [name for name, w in zip(self.names, work, strict=True) if w > 0.1 * work.max()]
+
+    def settle(
+        self, solve_at: Callable[[Array], State], start: Array, load: float, noise: float, round_off: float
+    ) -> Settled:
+        """Find the position at which the springs are slack.
+
+        Parameters
+        ----------
+        solve_at : callable
+            Solves the contact problem with the springs at a position (k,).
+        start : ndarray (k,)
+        load : float
+            The forces to compare those of the springs with [force].
+        noise : float
+            Accuracy of displacements, as a fraction of the largest one.
+        round_off : float
+            Accuracy of gaps [length].
+
+        Returns
+        -------
+        Settled
+            The best found if the springs do not become slack, or a contact problem does not settle.
+        """
+        search = _Search(solve_at, self.dofs, start)
+        noise *= float(np.abs(search.state.u).max())
+        enough = max(SLACK * load / self.stiffness, noise)
+        tolerable = max(enough, STAGNANT * load / self.stiffness, round_off)
+        derivative: Array | None = None
+        while search.settled and search.left > enough and search.positions < MAX_POSITIONS:
+            before = search.left
+            if derivative is None:
+                derivative = search.differences(max(0.1 * search.left, 1e3 * noise, 1e3 * round_off))
+            search.move(_step(derivative, search.elongation))
+            if search.left > 0.1 * before:
+                derivative = None
+                if search.left >= 0.5 * before and search.left <= tolerable:
+                    break
+        slack = search.settled and search.left <= tolerable
+        state = dataclasses.replace(search.state, iterations=search.iterations)  # type: ignore[type-var]
+        return Settled(state, search.position, self.stiffness * search.elongation, search.positions, slack)
+
+
+class _Search:
+    """Where the search for the position stands."""
+
+    def __init__(self, solve_at: Callable[[Array], State], dofs: NDArray[np.intp], start: Array) -> None:
+        self._solve_at, self._dofs = solve_at, dofs
+        self.positions = self.iterations = 0
+        self.settled = True
+        self.position = start
+        self.state, self.elongation = self._at(start)
+
+    @property
+    def left(self) -> float:
+        """Largest elongation [length]."""
+        return float(np.abs(self.elongation).max())
+
+    def _at(self, position: Array) -> tuple[State, Array]:
+        state = self._solve_at(position)
+        self.positions += 1
+        self.iterations += state.iterations
+        self.settled = self.settled and state.settled
+        return state, state.u[self._dofs]
+
+    def differences(self, by: float) -> Array:
+        """Return the derivative (k, k) of the elongations by the position, from differences in their direction."""
+        columns = []
+        for k, w in enumerate(self.elongation):
+            shift = np.zeros(len(self.position))
+            shift[k] = by if w >= 0 else -by
+            columns.append((self._at(self.position + shift)[1] - self.elongation) / shift[k])
+        return np.column_stack(columns)
+
+    def move(self, step: Array) -> None:
+        """Go along `step`, less far where the elongations turn round."""
+        slope, length = float(self.elongation @ step), 1.0
+        for _ in range(10):
+            state, elongation = self._at(self.position + length * step)
+            there = float(elongation @ step)
+            if there >= -0.5 * abs(slope):
+                break
+            length *= min(max(slope / (slope - there), 0.1), 0.9)
+        self.position = self.position + length * step
+        self.state, self.elongation = state, elongation
+
+
+def _step(derivative: Array, elongation: Array) -> Array:
+    """Return the Newton step; motions that nothing resists follow their springs."""
+    left, values, right = np.linalg.svd(derivative)
+    resisted = values > UNRESISTED
+    step = -right[resisted].T @ ((left[:, resisted].T @ elongation) / values[resisted])
+    free = right[~resisted]
+    return np.asarray(step + free.T @ (free @ elongation))
+
+
+def _sturdy(motions: Array, diagonal: Array, avoid: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return k unknowns that determine the motions (n, k): the stiffest ones far apart, none of `avoid` if possible."""
+    weights = np.sqrt(np.maximum(diagonal, 0.0))
+    weights[avoid] *= 1e-3
+    _, _, order = qr((motions * weights[:, None]).T, mode="economic", pivoting=True)
+    return np.sort(order[: motions.shape[1]]).astype(np.intp)

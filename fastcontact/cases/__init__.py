@@ -1,0 +1,1 @@
+"""Case files: a whole problem as TOML, the shipped cases, checks and summaries."""

@@ -1,0 +1,229 @@
+"""Checks of a case: one number of its last step held against a theory, or against a documented number."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fastcontact.errors import CaseError, unknown
+from fastcontact.results.step import ContactResult, StepResult
+
+STRESS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "yz": 4, "xz": 5}
+_AXES = {"x": 0, "y": 1, "z": 2}
+_NUMBER = (int, float)
+KEYS = {
+    "quantity": str,
+    "theory": str,
+    "of": str,
+    "value": _NUMBER,
+    "source": str,
+    "factor": _NUMBER,
+    "tolerance": _NUMBER,
+    "name": str,
+}
+# What may stand after the name of a contact pair; after that of a probe see `_of_probe`.
+OF_PAIRS = ("force", "pressure_max", "radius", "stick_radius")
+
+
+@dataclass(frozen=True)
+class Check:
+    """A comparison of a number of the last step with a theory or a documented value.
+
+    Attributes
+    ----------
+    name, quantity : str
+        `quantity` is ``"PROBE.pressure"``, ``"PROBE.shear"``, ``"PROBE.von_mises"``, ``"PROBE.stress.yy"`` or
+        ``"PROBE.displacement.x"``; or ``"PAIR.force"``, ``"PAIR.pressure_max"``, ``"PAIR.radius"`` or
+        ``"PAIR.stick_radius"``, radii in the middle of their brackets.
+    tolerance : float
+        Of the relative deviation.
+    theory : str
+        Contact pair whose theory has the target; empty for a documented value.
+    of : str
+        Name of the target in the theory, such as ``"stick_radius"`` or ``"normal.pressure_max"``. The target of a
+        stress is minus the number, since pressures are positive in compression.
+    value : float, optional
+        The documented value.
+    source : str
+        Where that is documented.
+    factor : float
+        What the number is multiplied with first; by default 4 for the force on a quarter of the theory's contact.
+    """
+
+    name: str
+    quantity: str
+    tolerance: float
+    theory: str = ""
+    of: str = "pressure_max"
+    value: float | None = None
+    source: str = ""
+    factor: float = 1.0
+
+    @property
+    def unit(self) -> str:
+        """Kind of the number: ``"pressure"``, ``"force"`` or ``"length"``."""
+        what = self.quantity.partition(".")[2].partition(".")[0]
+        return {"force": "force", "radius": "length", "stick_radius": "length", "displacement": "length"}.get(
+            what, "pressure"
+        )
+
+    @property
+    def sign(self) -> float:
+        """Sign of the target against the number in the theory."""
+        return -1.0 if ".stress." in self.quantity and self.theory else 1.0
+
+    def target(self, theory: Any) -> float:
+        """Return the number to compare with; `theory` is that of the pair, or None for a documented value."""
+        if theory is None:
+            assert self.value is not None
+            return self.value
+        number = theory
+        for part in self.of.split("."):
+            number = getattr(number, part)
+        return self.sign * float(number)
+
+    def described(self) -> str:
+        """Return what is compared with what, in one line."""
+        against = (
+            f"the theory's {self.of}" if self.theory else f"{self.value:g}{f' ({self.source})' * bool(self.source)}"
+        )
+        return f"{self.quantity} against {against} within {self.tolerance:g}"
+
+
+def read_check(
+    where: str,
+    entry: Mapping[str, Any],
+    probes: Mapping[str, int],
+    pairs: Mapping[str, Any],
+    theories: Mapping[str, Any],
+) -> Check:
+    """Return the check that an entry of a case file describes; its keys and their types are right.
+
+    Raises
+    ------
+    CaseError
+        If the quantity, or what it is compared with, is unknown.
+    """
+    for key in ("quantity", "tolerance"):
+        if key not in entry:
+            raise CaseError(f"{where} needs '{key}'")
+    if ("theory" in entry) == ("value" in entry):
+        raise CaseError(f"{where} needs either 'theory', the contact pair whose theory it is, or 'value'")
+    owner, _, what = entry["quantity"].partition(".")
+    if owner not in {**probes, **pairs}:
+        raise CaseError(unknown(f"contact pair or probe in {where}.quantity", owner, [*probes, *pairs]))
+    of_probes = [
+        "pressure",
+        "shear",
+        "von_mises",
+        *(f"stress.{c}" for c in STRESS),
+        *(f"displacement.{a}" for a in _AXES),
+    ]
+    allowed = of_probes if owner in probes else list(OF_PAIRS)
+    if what not in allowed:
+        raise CaseError(unknown(f"quantity in {where}", what, allowed))
+    of = what if what in ("force", "radius", "stick_radius") else "pressure_max"
+    check = Check(
+        name=entry.get("name", entry["quantity"]),
+        quantity=entry["quantity"],
+        tolerance=float(entry["tolerance"]),
+        theory=entry.get("theory", ""),
+        of=entry.get("of", of),
+        value=float(entry["value"]) if "value" in entry else None,
+        source=entry.get("source", ""),
+        factor=float(entry.get("factor", _whole(what, theories.get(entry.get("theory", ""), {})))),
+    )
+    if check.theory:
+        if check.theory not in theories:
+            raise CaseError(unknown(f"theory in {where}", check.theory, theories))
+        _check_target(where, check, theories[check.theory]["theory"])
+    return check
+
+
+def _whole(what: str, theory: Mapping[str, Any]) -> float:
+    """Return the factor that makes the force of a part of a contact that of the whole, 1 for other quantities."""
+    return 1.0 / float(theory.get("share", 1.0)) if what == "force" else 1.0
+
+
+def _check_target(where: str, check: Check, theory: Any) -> None:
+    try:
+        target = check.target(theory)
+    except (AttributeError, TypeError):
+        numbers = [name for name in dir(theory) if not name.startswith("_") and _is_number(theory, name)]
+        raise CaseError(unknown(f"number of the theory in {where}.of", check.of, numbers)) from None
+    if not (math.isfinite(target) and target):
+        raise CaseError(f"{where}: the theory's {check.of} is {target:g}, so no relative deviation can be told")
+
+
+def _is_number(theory: Any, name: str) -> bool:
+    value = getattr(theory, name, None)
+    return isinstance(value, _NUMBER) and not isinstance(value, bool)
+
+
+def measured(check: Check, step: StepResult, probes: Mapping[str, int]) -> float:
+    """Return the number of a step that a check is about; NaN where there is none, such as the radius of no contact."""
+    owner, _, what = check.quantity.partition(".")
+    if owner in probes:
+        return check.factor * _of_probe(step, probes[owner], what)
+    contact = step.contact[owner]
+    if what == "force":
+        return check.factor * float(np.linalg.norm(contact.force))
+    if what == "pressure_max":
+        return check.factor * contact.pressure_max
+    inside, outside = contact.radius if what == "radius" else contact.stick_radius
+    return check.factor * (0.5 * (inside + outside) if math.isfinite(outside) else inside)
+
+
+def _of_probe(step: StepResult, point: int, what: str) -> float:
+    kind, _, component = what.partition(".")
+    if kind == "stress":
+        return float(step.stress[point][STRESS[component]])
+    if kind == "displacement":
+        return float(step.displacement[point][_AXES[component]])
+    if kind == "von_mises":
+        return float(step.von_mises[point])
+    found = at_point(step, point)
+    if found is None:
+        return float("nan")
+    contact, row = found
+    return float(contact.pressure[row]) if kind == "pressure" else float(np.linalg.norm(contact.shear[row]))
+
+
+def at_point(step: StepResult, point: int) -> tuple[ContactResult, int] | None:
+    """Return the contact whose secondary side has a point, the last one of several, and its row there."""
+    found = None
+    for contact in step.contact.values():
+        rows = np.flatnonzero(contact.points == point)
+        if len(rows):
+            found = contact, int(rows[0])
+    return found
+
+
+def evaluated(check: Check, step: StepResult, probes: Mapping[str, int], theories: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a check with what came out: value, target, deviation and whether it passed.
+
+    Where the theory has a mesh-converged solution beside it, also how far from that the value lies, and that from the
+    theory.
+    """
+    own = theories[check.theory] if check.theory else {}
+    value, target = measured(check, step, probes), check.target(own.get("theory"))
+    found = own.get("mesh_converged")
+    converged = check.target(found) if found is not None and hasattr(found, check.of) else None
+    return {
+        "name": check.name,
+        "quantity": check.quantity,
+        "value": value,
+        "target": target,
+        "unit": check.unit,
+        "of": check.of if check.theory else None,
+        "source": check.source,
+        "deviation": value / target - 1.0,
+        "tolerance": check.tolerance,
+        "passed": bool(abs(value / target - 1.0) <= check.tolerance),
+        "distance_to_mesh_converged": value / converged - 1.0 if converged is not None else None,
+        "mesh_converged_deviation": converged / target - 1.0 if converged is not None else None,
+    }

@@ -1,0 +1,53 @@
+"""Ready cases: the case files that come with fastcontact, found by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fastcontact.errors import CaseError, unknown
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+# Where an installed package carries them, and where they stand in a checkout.
+_FOLDERS = (_PACKAGE / "data" / "cases", _PACKAGE.parent / "data" / "cases")
+
+
+def ready_cases() -> dict[str, Path]:
+    """Return the case files that come with fastcontact by name, in alphabetical order."""
+    folder = next((folder for folder in _FOLDERS if folder.is_dir()), None)
+    return {} if folder is None else {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def ready_case(name: str) -> Path:
+    """Return the case file of a ready case.
+
+    Raises
+    ------
+    CaseError
+        If there is none of that name; the message offers the nearest ones.
+    """
+    found = ready_cases()
+    if name not in found:
+        raise CaseError(unknown("ready case", name, found))
+    return found[name]
+
+
+def case_path(given: str | Path) -> Path:
+    """Return the file that `given` stands for: a path, or the name of a ready case where no such file exists.
+
+    Raises
+    ------
+    CaseError
+        If neither exists; the message offers the nearest ready cases.
+    """
+    path = Path(given)
+    try:
+        if path.exists() or path.suffix or path.name != str(given):
+            return path
+    except OSError as error:
+        raise CaseError(
+            f"cannot look for the case file '{str(given)[:200]}' ({error.strerror}): check its name"
+        ) from None
+    try:
+        return ready_case(path.name)
+    except CaseError as error:
+        raise CaseError(f"cannot read the case file '{given}': it does not exist, and {error}") from None

@@ -1,0 +1,217 @@
+"""A run in numbers: the dictionary behind ``--json``, and the lines a person reads."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping, Sequence
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+
+from fastcontact._version import __version__
+from fastcontact.cases.case import Case
+from fastcontact.cases.checks import at_point, evaluated
+from fastcontact.results.step import ContactResult, StepResult
+
+# Numbers that a theory must have to be compared as a whole.
+COMPARED = ("force", "pressure_max", "radius")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of fastcontact, Python and the libraries it stands on."""
+    libraries = ("numpy", "scipy", "numba", "pyamg", "meshio", "h5py")
+    found = {"fastcontact": __version__, "python": platform.python_version()}
+    return {**found, **{name: metadata.version(name) for name in libraries}}
+
+
+def summarise(
+    case: Case,
+    last: StepResult,
+    steps: Sequence[Mapping[str, Any]],
+    timings: Mapping[str, float],
+    warnings: Sequence[str],
+) -> dict[str, Any]:
+    """Return the summary of a run, given its last step and `of_step` of all: numbers, strings, lists and dictionaries."""
+    mesh = case.mesh
+    top = int(np.argmax(last.von_mises))
+    penalties = {pair.name: pair.options.get("penalty") for pair in case.model.contact}
+    return {
+        "case": case.name,
+        "title": case.title,
+        "units": dict(case.units),
+        "mesh": {"n_points": mesh.n_points, "n_cells": mesh.n_cells},
+        "n_dofs": case.model.n_dofs,
+        "steps": list(steps),
+        "contact": {name: _contact(contact, penalties.get(name)) for name, contact in last.contact.items()},
+        "probes": {name: _probe(last, point) for name, point in case.probes.items()},
+        "von_mises_max": {"value": float(last.von_mises[top]), "at": mesh.points[top].tolist()},
+        "theory": {
+            pair: _against_theory(last.contact[pair], case.approach.get(pair), **theories)
+            for pair, theories in case.theories.items()
+            if pair in last.contact and all(hasattr(theories["theory"], name) for name in COMPARED)
+        },
+        "regularised": last.iterations.get("regularised"),
+        "checks": [evaluated(check, last, case.probes, case.theories) for check in case.checks],
+        "timings": dict(timings),
+        "versions": versions(),
+        "warnings": list(warnings),
+    }
+
+
+def of_step(step: StepResult) -> dict[str, Any]:
+    """Return what the summary tells of every step: its load factor and how it was solved."""
+    counts = ("geometry_updates", "active_set_iterations", "linear_iterations")
+    found = {"load_factor": step.load_factor, **{name: step.iterations[name] for name in counts}}
+    if "substeps" in step.iterations:
+        found["substeps"] = step.iterations["substeps"]
+    return found
+
+
+def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
+    return {
+        "formulation": contact.formulation,
+        "force": float(np.linalg.norm(contact.force)),
+        "force_vector": contact.force.tolist(),
+        "radius": [_finite(value) for value in contact.radius],
+        "pressure_max": contact.pressure_max,
+        "closed_nodes": int(contact.active.sum()),
+        "obstacle_displacement": None
+        if contact.obstacle_displacement is None
+        else contact.obstacle_displacement.tolist(),
+        "penetration": contact.penetration,
+        "penalty": penalty,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _probe(step: StepResult, point: int) -> dict[str, Any]:
+    found = at_point(step, point)
+    pressure = None if found is None else float(found[0].pressure[found[1]])
+    return {
+        "stress": step.stress[point].tolist(),
+        "displacement": step.displacement[point].tolist(),
+        "von_mises": float(step.von_mises[point]),
+        "pressure": pressure,
+    }
+
+
+def _against_theory(
+    contact: ContactResult, approach: float | None, theory: Any, mesh_converged: Any = None, share: float = 1.0
+) -> dict[str, Any]:
+    """Compare a contact, a `share` of the theory's, with it at its own load and at the computed force."""
+    force = float(np.linalg.norm(contact.force)) / share
+    computed = {"force": force, "pressure_max": contact.pressure_max, "radius": list(contact.radius)}
+    compared = {"equal_approach": {"approach": approach, **_deviations(computed, theory)}}
+    if force > 0 and hasattr(theory, "at_force"):
+        compared["equal_force"] = _deviations(computed, theory.at_force(force))
+    if mesh_converged is not None:
+        compared["mesh_converged"] = _deviations(computed, mesh_converged)
+    return compared
+
+
+def _deviations(computed: Mapping[str, Any], theory: Any) -> dict[str, Any]:
+    """Return the theory's numbers, and how far the computed ones lie from them, relative to them."""
+    inside, outside = computed["radius"]
+    middle = 0.5 * (inside + outside)
+    return {
+        "force": theory.force,
+        "pressure_max": theory.pressure_max,
+        "radius": theory.radius,
+        "deviation": {
+            "force": computed["force"] / theory.force - 1.0,
+            "pressure_max": computed["pressure_max"] / theory.pressure_max - 1.0,
+            "radius": _finite(middle / theory.radius - 1.0),
+        },
+    }
+
+
+def lines(summary: Mapping[str, Any]) -> list[str]:
+    """Return the summary as lines for a person: contact, maximum of von Mises, theory, checks."""
+    unit = summary["units"]
+    steps = summary["steps"]
+    found = [
+        f"{summary['title']}",
+        f"  {summary['mesh']['n_points']} points, {summary['n_dofs']} degrees of freedom, {len(steps)} load steps, "
+        f"{sum(s['active_set_iterations'] for s in steps)} active-set iterations, "
+        f"{sum(s['geometry_updates'] for s in steps)} geometry updates",
+    ]
+    if parts := [len(s["substeps"]) for s in steps if "substeps" in s]:
+        many = "1 load step" if len(parts) == 1 else f"{len(parts)} load steps"
+        found.append(f"  {many} did not converge as a whole and went in {sum(parts)} parts")
+    for name, contact in summary["contact"].items():
+        inside, outside = contact["radius"]
+        edge = _edge(inside, outside, unit["length"])
+        found.append(
+            f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force {contact['force']:.6g} "
+            f"{unit['force']}, largest pressure {contact['pressure_max']:.6g} {unit['pressure']}, {edge}"
+        )
+        if any(contact["obstacle_displacement"] or ()):
+            moved = ", ".join(f"{value:.6g}" for value in contact["obstacle_displacement"])
+            found.append(f"  obstacle '{name}' stands ({moved}) {unit['length']} from its place at rest")
+        if contact["penalty"] is not None:
+            found.append(
+                f"  contact '{name}' penetrates by up to {contact['penetration']:.4g} {unit['length']}, with a penalty of "
+                f"{contact['penalty']:.4g} {unit['pressure']}/{unit['length']}"
+            )
+    top = summary["von_mises_max"]
+    where = ", ".join(f"{x:.4g}" for x in top["at"])
+    found.append(f"  largest von Mises stress {top['value']:.6g} {unit['pressure']} at ({where}) {unit['length']}")
+    if summary["regularised"]:
+        found.append(_regularised_line(summary["regularised"], unit))
+    for name, theory in summary["theory"].items():
+        found.extend(_theory_lines(name, theory))
+    for check in summary["checks"]:
+        found.append(_check_line(check, unit[check["unit"]]))
+    return found
+
+
+def _edge(inside: float | None, outside: float | None, unit: str) -> str:
+    """Return where the contact ends; `outside` is None where it reaches to the end of the surface."""
+    if inside is None:
+        return "open"
+    return (
+        f"radius {inside:.4g} {unit}, to its end" if outside is None else f"radius {inside:.4g} to {outside:.4g} {unit}"
+    )
+
+
+def _regularised_line(told: Mapping[str, Any], unit: Mapping[str, str]) -> str:
+    return (
+        f"  held by contact alone: {'; '.join(told['motions'])}. Regularised by springs of "
+        f"{told['spring_stiffness']:.3g} {unit['force']}/{unit['length']}, which carry {told['relative_to_load']:.1e} "
+        "of the load in the end"
+    )
+
+
+def _theory_lines(pair: str, theory: Mapping[str, Any]) -> list[str]:
+    titles = {
+        "equal_approach": "theory at equal approach",
+        "equal_force": "theory at equal force",
+        "mesh_converged": "mesh-converged solution",
+    }
+    if theory["equal_approach"]["approach"] is None:
+        titles["equal_approach"] = "the theory given"
+    return [
+        f"  contact '{pair}' against {titles[key]}: force {values['deviation']['force']:+.3%}, "
+        f"largest pressure {values['deviation']['pressure_max']:+.3%}"
+        + (f", radius {values['deviation']['radius']:+.2%}" if values["deviation"]["radius"] is not None else "")
+        for key, values in theory.items()
+    ]
+
+
+def _check_line(check: Mapping[str, Any], unit: str) -> str:
+    verdict = "within" if check["passed"] else "NOT within"
+    owner = "the theory's" if check["of"] else "the documented"
+    text = (
+        f"  check {check['name']}: {check['value']:.6g} {unit} is {abs(check['deviation']):.3%} from {owner} "
+        f"{check['target']:.6g}, {verdict} {check['tolerance']:.3g}"
+    )
+    if check["distance_to_mesh_converged"] is not None:
+        text += (
+            f"; {check['distance_to_mesh_converged']:+.3%} from the mesh-converged value, which itself is "
+            f"{check['mesh_converged_deviation']:+.3%} from the theory"
+        )
+    return text

@@ -1,0 +1,372 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Where facets face each other in 3D: one polygon clipped by the other in the plane of the first, and integrals there.
+
+A facet is a polynomial of its reference coordinates; its ``terms`` (n_terms, 3) are the coefficients of
+1, s, t, st, s^2, t^2, s^2 t, s t^2, s^2 t^2, as many as it has nodes. Its corners make the polygon that is cut, in the
+``axes`` (3, 3) of its plane: two tangents and the unit normal.
+"""
+
+import numpy as np
+
+from fastcontact._jit.decorators import kernel
+
+# A polygon of up to 4 corners clipped by one of up to 4 has at most 8.
+MOST = 12
+# Pieces smaller than this fraction of the facet are rounding errors of the cut.
+SLIVER = 1e-12
+# Newton's method on a facet; its error is the square of the last step.
+MAX_ITERATIONS, STEP = 30, 1e-8
+
+
+@kernel
+def planes(corners, n_corners, origin, axes):
+    """Fill `origin` (n, 3) with the centres of polygons (n, most, 3) and `axes` (n, 3, 3); see above."""
+    for i in range(corners.shape[0]):
+        _plane(corners[i], n_corners, origin[i], axes[i])
+
+
+@kernel
+def _plane(corners, count, origin, axes):
+    origin[:] = 0.0
+    for k in range(count):
+        for d in range(3):
+            origin[d] += corners[k, d] / count
+    normal = axes[2]
+    normal[:] = 0.0
+    for k in range(count):  # area vector (Newell), which also serves facets that are not flat
+        m = (k + 1) % count
+        for d in range(3):
+            e, f = (d + 1) % 3, (d + 2) % 3
+            normal[d] += (corners[k, e] - origin[e]) * (corners[m, f] - origin[f])
+            normal[d] -= (corners[k, f] - origin[f]) * (corners[m, e] - origin[e])
+    length = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
+    for d in range(3):
+        normal[d] /= length
+        axes[0, d] = corners[0, d] - origin[d]
+    along = axes[0, 0] * normal[0] + axes[0, 1] * normal[1] + axes[0, 2] * normal[2]
+    for d in range(3):
+        axes[0, d] -= along * normal[d]
+    size = np.sqrt(axes[0, 0] ** 2 + axes[0, 1] ** 2 + axes[0, 2] ** 2)
+    for d in range(3):
+        axes[0, d] /= size
+    for d in range(3):
+        e, f = (d + 1) % 3, (d + 2) % 3
+        axes[1, d] = normal[e] * axes[0, f] - normal[f] * axes[0, e]
+
+
+@kernel
+def _project(corners, count, origin, axes, flat):
+    """Fill `flat` (count, 2) with the coordinates of a polygon in a plane."""
+    for k in range(count):
+        for a in range(2):
+            flat[k, a] = 0.0
+            for d in range(3):
+                flat[k, a] += (corners[k, d] - origin[d]) * axes[a, d]
+
+
+@kernel
+def _area(flat, count):
+    area = 0.0
+    for k in range(count):
+        m = (k + 1) % count
+        area += 0.5 * (flat[k, 0] * flat[m, 1] - flat[m, 0] * flat[k, 1])
+    return area
+
+
+@kernel
+def _centroid(flat, count):
+    """Return the centre of area of a polygon."""
+    x, y, twice = 0.0, 0.0, 0.0
+    for k in range(1, count - 1):
+        ux, uy = flat[k, 0] - flat[0, 0], flat[k, 1] - flat[0, 1]
+        vx, vy = flat[k + 1, 0] - flat[0, 0], flat[k + 1, 1] - flat[0, 1]
+        part = ux * vy - uy * vx
+        x += part * (ux + vx) / 3.0
+        y += part * (uy + vy) / 3.0
+        twice += part
+    return flat[0, 0] + x / twice, flat[0, 1] + y / twice
+
+
+@kernel
+def _clip(subject, count, window, n_window, spare):
+    """Clip `subject` in place by a convex, counter-clockwise `window`; return its number of corners."""
+    for w in range(n_window):
+        ax, ay = window[w, 0], window[w, 1]
+        bx, by = window[(w + 1) % n_window, 0], window[(w + 1) % n_window, 1]
+        kept = 0
+        for k in range(count):
+            m = (k + 1) % count
+            here = (bx - ax) * (subject[k, 1] - ay) - (by - ay) * (subject[k, 0] - ax)
+            there = (bx - ax) * (subject[m, 1] - ay) - (by - ay) * (subject[m, 0] - ax)
+            if here >= 0.0:
+                spare[kept, 0], spare[kept, 1] = subject[k, 0], subject[k, 1]
+                kept += 1
+            if (here > 0.0 and there < 0.0) or (here < 0.0 and there > 0.0):
+                t = here / (here - there)
+                spare[kept, 0] = subject[k, 0] + t * (subject[m, 0] - subject[k, 0])
+                spare[kept, 1] = subject[k, 1] + t * (subject[m, 1] - subject[k, 1])
+                kept += 1
+        count = kept
+        for k in range(count):
+            subject[k, 0], subject[k, 1] = spare[k, 0], spare[k, 1]
+        if count < 3:
+            return 0
+    return count
+
+
+@kernel
+def _common(corners, count, others, n_others, origin, axes, subject, window, spare):
+    """Fill `subject` with the part of a polygon that faces another one; return its number of corners, 0 for none."""
+    _project(corners, count, origin, axes, subject)
+    whole = _area(subject, count)
+    _project(others, n_others, origin, axes, spare)
+    for k in range(n_others):  # facets that face each other turn opposite ways
+        window[k, 0], window[k, 1] = spare[n_others - 1 - k, 0], spare[n_others - 1 - k, 1]
+    count = _clip(subject, count, window, n_others, spare)
+    if count < 3 or _area(subject, count) <= SLIVER * whole:
+        return 0
+    return count
+
+
+@kernel
+def _misses(low, high, origin, normal, radius, reach):
+    """Whether a box lies outside the cylinder of a `radius` and of length 2 `reach` around a normal, at the latest."""
+    far, along, size = 0.0, 0.0, 0.0
+    for d in range(3):
+        apart = 0.5 * (low[d] + high[d]) - origin[d]
+        along += apart * normal[d]
+        far += apart * apart
+        size += 0.25 * (high[d] - low[d]) ** 2
+    size = np.sqrt(size)
+    return abs(along) > reach + size or far - along * along > (radius + size) ** 2
+
+
+@kernel
+def facing_pairs(
+    secondary, n_secondary, origin, axes, radius, reach,
+    primary, n_primary, other_normal, low, high, tree_low, tree_high, child, span, order, facing, pairs,
+):  # fmt: skip
+    """Find which primary polygons lie above or below each secondary one, and face it.
+
+    Parameters
+    ----------
+    secondary, primary : (n_facets, most, 3)
+        Corners.
+    n_secondary, n_primary : int
+        Number of corners.
+    origin, axes : (n_facets, 3), (n_facets, 3, 3)
+        Planes of the secondary facets.
+    radius, reach : (n_facets,)
+        Around the centres of the secondary facets; how far off, along the normal, the other side may be.
+    other_normal : (n_facets, 3)
+        Unit normals of the primary facets.
+    low, high : (n_facets, 3)
+        Boxes of the primary facets.
+    tree_low, tree_high, child, span, order
+        Their tree, see `box_tree`.
+    facing : float
+        Largest cosine between the normals of facets that face each other, e.g. -0.1.
+    pairs : (room, 2)
+        Filled in place: secondary and primary facet; ascending in the first.
+
+    Returns
+    -------
+    int
+        Number of pairs; larger than the room where that did not suffice, and then only the first are filled.
+    """
+    subject, window, spare = np.empty((MOST, 2)), np.empty((MOST, 2)), np.empty((MOST, 2))
+    stack = np.empty(128, np.int64)
+    found = 0
+    for s in range(secondary.shape[0]):
+        normal = axes[s, 2]
+        stack[0], top = 0, 1
+        while top > 0:
+            top -= 1
+            box = stack[top]
+            if _misses(tree_low[box], tree_high[box], origin[s], normal, radius[s], reach[s]):
+                continue
+            if child[box] >= 0:
+                stack[top], stack[top + 1] = child[box], child[box] + 1
+                top += 2
+                continue
+            for k in range(span[box, 0], span[box, 1]):
+                p = order[k]
+                cosine = 0.0
+                for d in range(3):
+                    cosine += normal[d] * other_normal[p, d]
+                if cosine > facing or _misses(low[p], high[p], origin[s], normal, radius[s], reach[s]):
+                    continue
+                if _common(
+                    secondary[s], n_secondary, primary[p], n_primary, origin[s], axes[s], subject, window, spare
+                ):
+                    if found < pairs.shape[0]:
+                        pairs[found, 0], pairs[found, 1] = s, p
+                    found += 1
+    return found
+
+
+@kernel
+def _fill_terms(n_terms, s, t, terms):
+    """Fill `terms` (n_terms, 3) with the terms of a facet's polynomial and their derivatives."""
+    terms[0, 0], terms[0, 1], terms[0, 2] = 1.0, 0.0, 0.0
+    terms[1, 0], terms[1, 1], terms[1, 2] = s, 1.0, 0.0
+    terms[2, 0], terms[2, 1], terms[2, 2] = t, 0.0, 1.0
+    if n_terms > 3:
+        terms[3, 0], terms[3, 1], terms[3, 2] = s * t, t, s
+    if n_terms > 5:
+        terms[4, 0], terms[4, 1], terms[4, 2] = s * s, 2.0 * s, 0.0
+        terms[5, 0], terms[5, 1], terms[5, 2] = t * t, 0.0, 2.0 * t
+    if n_terms > 7:
+        terms[6, 0], terms[6, 1], terms[6, 2] = s * s * t, 2.0 * s * t, s * s
+        terms[7, 0], terms[7, 1], terms[7, 2] = s * t * t, t * t, 2.0 * s * t
+    if n_terms > 8:
+        terms[8, 0], terms[8, 1], terms[8, 2] = s * s * t * t, 2.0 * s * t * t, 2.0 * s * s * t
+
+
+@kernel
+def _flatten(facet, origin, axes, flat):
+    """Fill `flat` (n_terms, 2) with the terms of a facet in the coordinates of a plane."""
+    for k in range(facet.shape[0]):
+        for a in range(2):
+            flat[k, a] = 0.0
+            for d in range(3):
+                shift = origin[d] if k == 0 else 0.0
+                flat[k, a] += (facet[k, d] - shift) * axes[a, d]
+
+
+@kernel
+def _locate(flat, x, y, xi, terms):
+    """Move `xi` (2,) to where a facet passes over (x, y) and fill `terms` there; return its area per unit of xi.
+
+    Zero where there is no such place.
+    """
+    n_terms = flat.shape[0]
+    for _ in range(MAX_ITERATIONS):
+        _fill_terms(n_terms, xi[0], xi[1], terms)
+        off_x, off_y = x, y
+        a, b, c, d = 0.0, 0.0, 0.0, 0.0
+        for k in range(n_terms):
+            off_x -= flat[k, 0] * terms[k, 0]
+            off_y -= flat[k, 1] * terms[k, 0]
+            a += flat[k, 0] * terms[k, 1]
+            b += flat[k, 0] * terms[k, 2]
+            c += flat[k, 1] * terms[k, 1]
+            d += flat[k, 1] * terms[k, 2]
+        area = a * d - b * c
+        if area == 0.0:
+            return 0.0
+        step_s, step_t = (d * off_x - b * off_y) / area, (a * off_y - c * off_x) / area
+        xi[0] += step_s
+        xi[1] += step_t
+        if n_terms == 3 or (abs(step_s) < STEP and abs(step_t) < STEP):
+            _fill_terms(n_terms, xi[0], xi[1], terms)
+            return abs(area)
+    return 0.0
+
+
+@kernel
+def _stretch(facet, terms):
+    """Return the area of a facet per unit of xi."""
+    area = 0.0
+    for d in range(3):
+        e, f = (d + 1) % 3, (d + 2) % 3
+        se, sf, te, tf = 0.0, 0.0, 0.0, 0.0
+        for k in range(facet.shape[0]):
+            se += facet[k, e] * terms[k, 1]
+            sf += facet[k, f] * terms[k, 1]
+            te += facet[k, e] * terms[k, 2]
+            tf += facet[k, f] * terms[k, 2]
+        area += (se * tf - sf * te) ** 2
+    return np.sqrt(area)
+
+
+@kernel
+def _fill_shape(to_terms, terms, shape):
+    for k in range(shape.shape[0]):
+        shape[k] = 0.0
+    for j in range(shape.shape[0]):
+        for k in range(shape.shape[0]):
+            shape[k] += terms[j, 0] * to_terms[j, k]
+
+
+@kernel
+def integrate(
+    secondary, n_secondary, origin, axes, deformed, reference, to_terms, middle,
+    primary, n_primary, other_deformed, other_to_terms, other_middle,
+    pairs, points, weights, mass, coupling,
+):  # fmt: skip
+    """Integrate products of shape functions over the parts where facets face each other.
+
+    Both facets are followed along the normal of the secondary polygon; areas are those of the reference surface. Parts
+    are cut into triangles around their centres: the rule is not exact on mapped facets, and its error then depends on no
+    first corner and does not jump where a corner comes or goes as the facets move. Between flat triangles it is exact.
+
+    Parameters
+    ----------
+    secondary, primary, n_secondary, n_primary, origin, axes
+        As for `facing_pairs`.
+    deformed, reference : (n_facets, n_terms, 3)
+        Terms of the secondary facets where they are and where they were.
+    to_terms : (n_terms, n_nodes)
+        From nodal values to terms.
+    middle : (2,)
+        Reference coordinates to start from.
+    other_deformed, other_to_terms, other_middle
+        The same of the primary facets.
+    pairs : (n_pairs, 2)
+        Facets that face each other, ascending in the first.
+    points, weights : (n_q, 2), (n_q,)
+        Rule on the triangle.
+    mass : (n_facets, n_nodes, n_nodes)
+        Filled in place: of the secondary shape functions, over the part that faces the primary side.
+    coupling : (n_pairs, n_nodes, n_other_nodes)
+        Filled in place: secondary times primary shape functions.
+
+    Returns
+    -------
+    int
+        -1, or the number of a pair with a facet too distorted to be followed.
+    """
+    subject, window, spare = np.empty((MOST, 2)), np.empty((MOST, 2)), np.empty((MOST, 2))
+    n, m = to_terms.shape[0], other_to_terms.shape[0]
+    terms, other_terms, shape, other_shape = np.empty((n, 3)), np.empty((m, 3)), np.empty(n), np.empty(m)
+    flat, other_flat, xi, other_xi = np.empty((n, 2)), np.empty((m, 2)), np.empty(2), np.empty(2)
+    mass[:] = 0.0
+    coupling[:] = 0.0
+    last = -1
+    for i in range(pairs.shape[0]):
+        s, p = pairs[i, 0], pairs[i, 1]
+        if s != last:
+            _flatten(deformed[s], origin[s], axes[s], flat)
+            last = s
+        _flatten(other_deformed[p], origin[s], axes[s], other_flat)
+        count = _common(secondary[s], n_secondary, primary[p], n_primary, origin[s], axes[s], subject, window, spare)
+        xi[0], xi[1], other_xi[0], other_xi[1] = middle[0], middle[1], other_middle[0], other_middle[1]
+        exact = n == 3 and m == 3
+        ox, oy = (subject[0, 0], subject[0, 1]) if exact else _centroid(subject, count)
+        for k in range(1 if exact else 0, count - 1 if exact else count):
+            following = (k + 1) % count
+            ux, uy = subject[k, 0] - ox, subject[k, 1] - oy
+            vx, vy = subject[following, 0] - ox, subject[following, 1] - oy
+            twice = ux * vy - uy * vx
+            if twice <= 0.0:
+                continue
+            for q in range(points.shape[0]):
+                x = ox + points[q, 0] * ux + points[q, 1] * vx
+                y = oy + points[q, 0] * uy + points[q, 1] * vy
+                seen = _locate(flat, x, y, xi, terms)
+                if seen == 0.0 or _locate(other_flat, x, y, other_xi, other_terms) == 0.0:
+                    return i
+                _fill_shape(to_terms, terms, shape)
+                _fill_shape(other_to_terms, other_terms, other_shape)
+                area = weights[q] * twice * _stretch(reference[s], terms) / seen
+                for a in range(n):
+                    for b in range(a + 1):
+                        mass[s, a, b] += area * shape[a] * shape[b]
+                    for b in range(m):
+                        coupling[i, a, b] += area * shape[a] * other_shape[b]
+    for s in range(mass.shape[0]):
+        for a in range(n):
+            for b in range(a):
+                mass[s, b, a] = mass[s, a, b]
+    return -1

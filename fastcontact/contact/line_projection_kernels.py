@@ -1,0 +1,88 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Projection of points on a curve in the plane along normals interpolated between its nodes."""
+
+from fastcontact._jit.decorators import kernel
+
+MOST_STEPS = 30
+MOST_FACETS = 8
+STEP = 1e-14
+# A projection that ends farther beyond its facet than this, in reference coordinates, is not trusted.
+FAR = 3.0
+
+
+@kernel
+def _shape(count, s, values, slopes):
+    """Fill shape functions and their derivatives of a line of two or three nodes at s."""
+    if count == 2:
+        values[0], values[1], values[2] = 0.5 * (1.0 - s), 0.5 * (1.0 + s), 0.0
+        slopes[0], slopes[1], slopes[2] = -0.5, 0.5, 0.0
+    else:
+        values[0], values[1], values[2] = 0.5 * s * (s - 1.0), 0.5 * s * (s + 1.0), 1.0 - s * s
+        slopes[0], slopes[1], slopes[2] = s - 0.5, s + 0.5, -2.0 * s
+
+
+@kernel
+def _newton(x, y, corners, normals, f, count, s, values, slopes):
+    """Return s where (x, y) lies along the normal of facet f, extended beyond its ends, and whether it was found."""
+    for _ in range(MOST_STEPS):
+        _shape(count, s, values, slopes)
+        px, py, tx, ty, nx, ny, mx, my = x, y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(count):
+            px -= values[k] * corners[f, k, 0]
+            py -= values[k] * corners[f, k, 1]
+            tx += slopes[k] * corners[f, k, 0]
+            ty += slopes[k] * corners[f, k, 1]
+            nx += values[k] * normals[f, k, 0]
+            ny += values[k] * normals[f, k, 1]
+            mx += slopes[k] * normals[f, k, 0]
+            my += slopes[k] * normals[f, k, 1]
+        slope = (px * my - py * mx) - (tx * ny - ty * nx)
+        # Beyond a centre of curvature, or where facets fold too sharply, nothing tells which way to go.
+        if not abs(slope) > 1e-8 * abs(tx * ny - ty * nx):
+            return s, False
+        step = -(px * ny - py * nx) / slope
+        step = min(1.0, max(-1.0, step))
+        s += step
+        if abs(s) > 2.0 * FAR:
+            return s, False
+        if abs(step) <= STEP * (1.0 + abs(s)):
+            return s, True
+    return s, abs(step) <= 1e-10
+
+
+@kernel
+def along_normals(points, corners, normals, counts, neighbour, facet, xi, overhang, values, slopes):
+    """Move projections (facet, xi) to where the points lie along the interpolated normals.
+
+    Parameters
+    ----------
+    points : ndarray (n, 2)
+    corners, normals : ndarray (n_facets, 3, 2)
+        Nodes of the facets and unit normals there, ends first.
+    counts : ndarray of int (n_facets,)
+        Nodes of each facet, 2 or 3.
+    neighbour : ndarray of int (n_facets, 2)
+        The facet beyond each end, -1 for none; its own end that is shared is the other one.
+    facet, xi, overhang : ndarray (n,)
+        Closest points, changed in place where the projection succeeds.
+    values, slopes : ndarray (3,)
+        Working space.
+    """
+    for i in range(points.shape[0]):
+        f, s, before = facet[i], xi[i], -1
+        for _ in range(MOST_FACETS):
+            s, found = _newton(points[i, 0], points[i, 1], corners, normals, f, counts[f], s, values, slopes)
+            if not found or abs(s) > FAR:
+                break
+            if abs(s) <= 1.0:
+                facet[i], xi[i], overhang[i] = f, s, 0.0
+                break
+            end = 1 if s > 0.0 else 0
+            beyond = neighbour[f, end]
+            if beyond < 0:
+                facet[i], xi[i], overhang[i] = f, 2.0 * end - 1.0, 0.5 * (abs(s) - 1.0)
+                break
+            if beyond == before:  # at the node between the two
+                facet[i], xi[i], overhang[i] = f, 2.0 * end - 1.0, 0.0
+                break
+            before, f, s = f, beyond, 1.0 - 2.0 * end

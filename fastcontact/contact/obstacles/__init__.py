@@ -1,0 +1,57 @@
+"""Rigid obstacles: shapes that a body may touch but not enter; one file each kind.
+
+An obstacle answers one question, in its own frame: how far from it is a point, and where is outside? Distances are
+signed, positive outside. Where only a height is given (paraboloid, cone, a function of position), the distance is the
+vertical one, times the cosine of the slope: exact in sign and on the surface, and to first order next to it, which is
+all that contact asks, since the pairing is renewed until the points lie on the surface.
+
+Coordinates are (x, y) in two dimensions (x the radius in axisymmetry) and (x, y, z) in three; the axis of a shape is
+the last coordinate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.contact.obstacles.meshed import MeshedSurface
+from fastcontact.contact.obstacles.shapes import Cylinder, FlatPunch, HalfSpace, Height, Sphere, cone, paraboloid
+
+Array = NDArray[np.float64]
+
+
+class Obstacle(Protocol):
+    """A rigid shape."""
+
+    def distance(self, points: Array) -> tuple[Array, Array]:
+        """Return the signed distance (n,) of `points` (n, dim) and the unit outward normals (n, dim) there [length].
+
+        The distance is infinite where there is nothing of the obstacle for a point to touch.
+        """
+        ...
+
+
+SHAPES: dict[str, Callable[..., Obstacle]] = {
+    "half_space": HalfSpace,
+    "sphere": Sphere,
+    "cylinder": Cylinder,
+    "paraboloid": paraboloid,
+    "cone": cone,
+    "flat_punch": FlatPunch,
+}
+
+__all__ = [
+    "SHAPES",
+    "Cylinder",
+    "FlatPunch",
+    "HalfSpace",
+    "Height",
+    "MeshedSurface",
+    "Obstacle",
+    "Sphere",
+    "cone",
+    "paraboloid",
+]

@@ -1,0 +1,244 @@
+"""The facets of a rigid surface: which side is out, who is neighbour to whom, normals where facets meet.
+
+Facets are numbered through blocks of one kind each. Their ridges are what two facets share: the ends of a line in two
+dimensions, the edges of a face in three.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from fastcontact.errors import ContactError
+from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import outer_facets
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+# Ridges of a facet at most: four sides of a quadrangle.
+MOST_RIDGES = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Facets of one kind.
+
+    Attributes
+    ----------
+    element : elements.Element
+    numbers : ndarray of int (n,)
+        Cell numbers in the mesh.
+    nodes : ndarray of int (n, k)
+        Connectivity, normals pointing out.
+    corners : ndarray (n, k, dim)
+        Positions of the nodes [length].
+    """
+
+    element: elements.Element
+    numbers: Indices
+    nodes: Indices
+    corners: Array
+
+    def ridges(self) -> tuple[Indices, Indices]:
+        """Return the nodes at the beginning and at the end (n, r) of each ridge; for the ends of lines, twice the node."""
+        if self.element.dim == 1:
+            return self.nodes[:, :2], self.nodes[:, :2]
+        edges = np.array(self.element.edges)
+        return self.nodes[:, edges[:, 0]], self.nodes[:, edges[:, 1]]
+
+    def normals(self) -> tuple[Array, Array]:
+        """Return the unit normals (n, k, dim) at the nodes, and the angles (n, k) of the facets there [radian]."""
+        tangent = np.einsum("akj,fkd->fadj", self.element.gradient(self.element.nodes), self.corners)
+        angle = np.full(self.nodes.shape, np.pi)
+        if self.element.dim == 1:
+            normal = np.stack([tangent[..., 1, 0], -tangent[..., 0, 0]], axis=2)
+        else:
+            normal = np.cross(tangent[..., 0], tangent[..., 1])
+            for corner in range(self.element.n_corners):
+                arms = [
+                    self.corners[:, b if a == corner else a] - self.corners[:, corner]
+                    for a, b in self.element.edges
+                    if corner in (a, b)
+                ]
+                sine = np.linalg.norm(np.cross(arms[0], arms[1]), axis=1)
+                angle[:, corner] = np.arctan2(sine, np.einsum("fd,fd->f", arms[0], arms[1]))
+        length = np.linalg.norm(normal, axis=2, keepdims=True)
+        return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0), angle
+
+
+def oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
+    """Return the facets of a group as the mesh orients them, or the other way round with `flip`.
+
+    Facets on the outside of solid cells look out of these, whatever their own order of nodes.
+
+    Raises
+    ------
+    ContactError
+        If the group holds no facets, or a facet has no area.
+    """
+    rows = mesh.split(mesh.cell_groups[group]) if mesh.cells_of(group, dim=mesh.dim - 1) else {}
+    rows = {name: found for name, found in rows.items() if elements.get(name).dim == mesh.dim - 1}
+    if not rows:
+        raise ContactError(
+            f"group '{group}' holds no facets (cells of dimension {mesh.dim - 1}), so it is no rigid surface: "
+            "name a group of lines in 2D, of triangles or quadrangles in 3D"
+        )
+    outer = outer_facets(mesh) if mesh.solids else {}
+    blocks = []
+    for name, found in rows.items():
+        element = elements.get(name)
+        nodes = _out_of_solids(mesh.cells[name][found], outer.get(name))
+        if flip:
+            nodes = nodes[:, list(element.reversed)]
+        blocks.append(Block(element, found + mesh.offsets[name], nodes.astype(np.intp), mesh.points[nodes]))
+        lengths = np.linalg.norm(blocks[-1].normals()[0], axis=2)
+        flat = np.flatnonzero(lengths.min(axis=1) == 0.0)
+        if len(flat):
+            raise ContactError(
+                f"{described(blocks, blocks[-1], int(flat[0]))} of the rigid surface '{group}' has no area, or none at "
+                "one of its nodes: remove it or repair the mesh there"
+            )
+    return blocks
+
+
+def _out_of_solids(nodes: NDArray[np.int32], outer: NDArray[np.int32] | None) -> NDArray[np.int32]:
+    """Return facets with those that are among `outer` replaced by it."""
+    if outer is None:
+        return nodes
+    both = np.concatenate([outer, nodes])
+    _, key = np.unique(np.sort(both, axis=1), axis=0, return_inverse=True)
+    key = key.ravel()
+    row = np.full(key.max() + 1, -1)
+    row[key[: len(outer)]] = np.arange(len(outer))
+    at = row[key[len(outer) :]]
+    return np.where((at >= 0)[:, None], outer[at], nodes)
+
+
+def described(blocks: list[Block], block: Block, row: int) -> str:
+    """Return number, kind and place of a facet, in words."""
+    middle = block.corners[row, : block.element.n_corners].mean(axis=0)
+    place = ", ".join(f"{x:.6g}" for x in middle)
+    return f"facet {block.numbers[row]} ({block.element.name} near ({place}))"
+
+
+def neighbours(blocks: list[Block], group: str) -> Indices:
+    """Return the facet beyond each ridge (n_facets, 4), -1 where the surface ends.
+
+    Raises
+    ------
+    ContactError
+        If the surface branches, or neighbours look to different sides; the message names a facet.
+    """
+    facet, ridge, key, sign = _ridge_table(blocks)
+    order = np.argsort(key, kind="stable")
+    facet, ridge, key, sign = facet[order], ridge[order], key[order], sign[order]
+    first = np.flatnonzero(np.r_[True, key[1:] != key[:-1]])
+    count = np.diff(np.r_[first, len(key)])
+    if (count > 2).any():
+        at = facet[first[np.argmax(count > 2)]]
+        raise ContactError(
+            f"{_named(blocks, at)} of the rigid surface '{group}' shares an edge with more than one other facet: a "
+            "surface must not branch, so split it into several groups"
+        )
+    one = first[count == 2]
+    beyond = np.full((sum(len(block.nodes) for block in blocks), MOST_RIDGES), -1, np.intp)
+    beyond[facet[one], ridge[one]] = facet[one + 1]
+    beyond[facet[one + 1], ridge[one + 1]] = facet[one]
+    _check_orientation(blocks, group, facet[one], facet[one + 1], sign[one] != sign[one + 1])
+    return beyond
+
+
+def _ridge_table(blocks: list[Block]) -> tuple[Indices, Indices, Indices, Indices]:
+    """Return facet, ridge, a key of its nodes, and the sense in which the facet goes round it, for all ridges."""
+    facets, ridges, keys, signs, start = [], [], [], [], 0
+    size = 1 + max(int(block.nodes.max()) for block in blocks)
+    for block in blocks:
+        a, b = block.ridges()
+        facets.append(np.repeat(start + np.arange(len(a)), a.shape[1]))
+        ridges.append(np.tile(np.arange(a.shape[1]), len(a)))
+        keys.append((np.minimum(a, b) * size + np.maximum(a, b)).ravel())
+        signs.append((np.broadcast_to([1, -1], a.shape) if block.element.dim == 1 else np.sign(b - a)).ravel())
+        start += len(a)
+    return np.concatenate(facets), np.concatenate(ridges), np.concatenate(keys), np.concatenate(signs)
+
+
+def _check_orientation(
+    blocks: list[Block], group: str, one: Indices, other: Indices, consistent: NDArray[np.bool_]
+) -> None:
+    """Refuse neighbours that look to different sides, naming a facet of the smaller part."""
+    if consistent.all():
+        return
+    n = sum(len(block.nodes) for block in blocks)
+    good = coo_array((np.ones(consistent.sum()), (one[consistent], other[consistent])), shape=(n, n))
+    _, part = connected_components(good, directed=False)
+    size = np.bincount(part)
+    bad = int(np.flatnonzero(~consistent)[0])
+    pair = sorted((int(one[bad]), int(other[bad])), key=lambda facet: (size[part[facet]], facet))
+    raise ContactError(
+        f"{_named(blocks, pair[0])} of the rigid surface '{group}' looks to the other side than its neighbour facet "
+        f"{_number(blocks, pair[1])}: turn it, so that all normals point out of the obstacle"
+    )
+
+
+def _number(blocks: list[Block], facet: int) -> int:
+    return int(np.concatenate([block.numbers for block in blocks])[facet])
+
+
+def _named(blocks: list[Block], facet: int) -> str:
+    for block in blocks:
+        if facet < len(block.nodes):
+            return described(blocks, block, facet)
+        facet -= len(block.nodes)
+    raise AssertionError("unreachable: facets are numbered through the blocks")
+
+
+def smooth_normals(blocks: list[Block], crease: float) -> tuple[list[Array], Array]:
+    """Return normals of facets and of points, both weighted by the facets' angles there (Thuermer and Wuethrich, 1998).
+
+    Parameters
+    ----------
+    blocks : list of Block
+    crease : float
+        Angle up to which facets count as a smooth surface [degrees].
+
+    Returns
+    -------
+    list of ndarray (n, k, dim)
+        Unit normals at the nodes of each facet: the mean over the facets there that turn from it by `crease` at most.
+    ndarray (n_points, dim)
+        The mean over all facets at a point, not normalised; it tells in from out next to the point (Baerentzen and
+        Aanaes, 2005).
+    """
+    own = [block.normals() for block in blocks]
+    dim = own[0][0].shape[2]
+    node = np.concatenate([block.nodes.ravel() for block in blocks])
+    normal = np.concatenate([found.reshape(-1, dim) for found, _ in own])
+    weight = np.concatenate([angle.ravel() for _, angle in own])
+    at_points = np.zeros((node.max() + 1, dim))
+    np.add.at(at_points, node, weight[:, None] * normal)
+    i, j = _pairs_at_nodes(node)
+    alike = np.einsum("nd,nd->n", normal[i], normal[j]) >= np.cos(np.radians(crease)) - 1e-9
+    alike |= i == j
+    mean = np.zeros_like(normal)
+    np.add.at(mean, i[alike], weight[j[alike], None] * normal[j[alike]])
+    mean /= np.linalg.norm(mean, axis=1, keepdims=True)
+    ends = np.cumsum([block.nodes.size for block in blocks])[:-1]
+    parts = np.split(mean, ends)
+    return [part.reshape(*block.nodes.shape, dim) for part, block in zip(parts, blocks, strict=True)], at_points
+
+
+def _pairs_at_nodes(node: Indices) -> tuple[Indices, Indices]:
+    """Return all pairs (i, j), i = j among them, of entries with the same node."""
+    order = np.argsort(node, kind="stable")
+    first = np.flatnonzero(np.r_[True, np.diff(node[order]) != 0])
+    count = np.diff(np.r_[first, len(node)])
+    reach, start = np.repeat(count, count), np.repeat(first, count)
+    i = np.repeat(np.arange(len(node)), reach)
+    begin = np.concatenate([[0], np.cumsum(reach)[:-1]])
+    j = np.arange(len(i)) - np.repeat(begin, reach) + np.repeat(start, reach)
+    return order[i], order[j]

@@ -1,0 +1,203 @@
+"""A rigid surface made of facets: lines in two dimensions, triangles and quadrangles in three, straight or curved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.contact.obstacles._facets import Block, neighbours, oriented_blocks, smooth_normals
+from fastcontact.contact.search.closest import Closest, closest_of_kinds
+from fastcontact.errors import ContactError
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+# Reference coordinates of a projection nearer than this to a side of its facet lie on it.
+ON_SIDE = 1e-12
+# A point counts as beyond the border of an open surface if it stands out farther than this part of a facet, and leans
+# by more than this over its height: borders on a plane of symmetry, where facets never stand quite upright, still hold.
+BEYOND, LEAN = 0.05, 0.27
+# Within this part of a facet the direction to the closest point is rounding; the facet's normal takes its place.
+TOUCHING = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class MeshedSurface:
+    """A rigid surface given by a group of facets of a mesh.
+
+    Normals point out of the obstacle, towards the body: to the right of a line's direction in two dimensions, to where
+    a face's nodes run counter-clockwise in three; facets on the outside of solid cells of their mesh look out of these.
+    Distances are exact, from the closest point of the facets as they are curved. Beyond the border of an open surface
+    there is nothing to touch.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh of the surface, or that of the model; there, the points of the group must belong to no solid cell.
+    group : str
+        A group of facets.
+    flip : bool
+        Whether to turn all normals round.
+    crease : float
+        Facets that meet at this angle or less count as one smooth surface, whose normals turn without a jump from
+        facet to facet; at larger angles the edge is sharp [degrees]. With 0 each facet keeps its own normals.
+
+    Raises
+    ------
+    MeshError
+        If there is no such group.
+    ContactError
+        If the group holds no facets, a facet has no area, facets that share an edge look to different sides, or more
+        than two share one.
+
+    Examples
+    --------
+    >>> mesh = Mesh([[-1.0, 0.0], [1.0, 0.0]], {"line2": [[1, 0]]}, cell_groups={"FLOOR": [0]})
+    >>> distance, normal = MeshedSurface(mesh, "FLOOR").distance(np.array([[0.2, 0.5]]))
+    >>> distance.tolist(), normal.tolist()
+    ([0.5], [[0.0, 1.0]])
+    """
+
+    mesh: Mesh
+    group: str
+    flip: bool = False
+    crease: float = 30.0
+    _blocks: list[Block] = field(init=False, repr=False)
+    _neighbours: Indices = field(init=False, repr=False)
+    _smooth: list[Array] = field(init=False, repr=False)
+    _own: list[Array] = field(init=False, repr=False)
+    _at_points: Array = field(init=False, repr=False)
+    _on_border: NDArray[np.bool_] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.crease <= 180.0:
+            raise ContactError(
+                f"crease = {self.crease} of the rigid surface '{self.group}' must lie in 0 to 180 degrees"
+            )
+        blocks = oriented_blocks(self.mesh, self.group, self.flip)
+        beyond = neighbours(blocks, self.group)
+        smooth, at_points = smooth_normals(blocks, self.crease)
+        on_border, first = np.zeros(len(at_points), bool), 0
+        for block in blocks:
+            ends = block.ridges()
+            open_ = beyond[first : first + len(block.nodes), : ends[0].shape[1]] < 0
+            for end in ends:
+                on_border[end[open_]] = True
+            first += len(block.nodes)
+        values = {
+            "_blocks": blocks, "_neighbours": beyond, "_smooth": smooth, "_at_points": at_points,
+            "_own": [block.normals()[0] for block in blocks], "_on_border": on_border,
+        }  # fmt: skip
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        return f"MeshedSurface('{self.group}', {len(self._neighbours)} facets)"
+
+    def check_apart(self, mesh: Mesh) -> None:
+        """Raise ContactError if the surface is part of `mesh` and hangs on solid cells there."""
+        if mesh.points is not self.mesh.points and not np.array_equal(mesh.points, self.mesh.points):
+            return
+        solid = np.zeros(mesh.n_points, bool)
+        for cells in mesh.solids.values():
+            solid[cells] = True
+        shared = self.mesh.points_of(self.group)
+        shared = shared[solid[shared]]
+        if len(shared):
+            raise ContactError(
+                f"{len(shared)} points of the rigid surface '{self.group}' belong to solid cells of the model (first: "
+                f"point {shared[0]}): a rigid surface stands apart, so give it points of its own or a mesh of its own"
+            )
+
+    def distance(self, points: Array) -> tuple[Array, Array]:
+        """See `Obstacle.distance`; infinite beyond the border of an open surface."""
+        dim = self.mesh.dim
+        if points.shape[1] != dim:
+            raise ContactError(
+                f"the rigid surface '{self.group}' has {dim} dimensions, but the model has {points.shape[1]}"
+            )
+        found = closest_of_kinds(points, [block.corners for block in self._blocks])
+        sense, smooth, on_ridge, on_border = self._frames(found)
+        apart = points - found.position
+        size = self._sizes(found.facet)
+        touching = found.distance <= TOUCHING * size
+        outside = np.einsum("nd,nd->n", apart, sense) >= 0
+        distance = np.where(outside, found.distance, -found.distance)
+        normal = smooth if self.crease else np.where(on_ridge[:, None], smooth, found.normal)
+        sense /= np.linalg.norm(sense, axis=1, keepdims=True)
+        # Next to a sharp edge the closest point tells the direction; the normals of either facet do not.
+        sharp = np.einsum("nd,nd->n", sense, smooth) < np.cos(np.radians(0.5 * self.crease)) - 1e-9
+        turned = on_ridge & sharp & ~touching
+        normal[turned] = apart[turned] / distance[turned, None]
+        height = np.abs(np.einsum("nd,nd->n", apart, sense))
+        aside = np.sqrt(np.maximum(found.distance**2 - height**2, 0.0))
+        nothing = on_border & (aside > BEYOND * size) & (aside > LEAN * height)
+        return np.where(nothing, np.inf, distance), normal
+
+    def _sizes(self, facet: Indices) -> Array:
+        sizes = [np.linalg.norm(np.ptp(block.corners, axis=1), axis=1) for block in self._blocks]
+        return np.asarray(np.concatenate(sizes)[facet])
+
+    def _frames(self, found: Closest) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return, at projections, a vector that tells in from out (n, dim), smooth normals, what is on a ridge or border.
+
+        Inside a facet its normal tells; on an edge the mean of the facets that meet there, at a corner that of all
+        facets weighted by their angles: the only ones that never err (Baerentzen and Aanaes, 2005).
+        """
+        sense, smooth = found.normal.copy(), np.empty_like(found.normal)
+        on_ridge, on_border = np.zeros(len(sense), bool), np.zeros(len(sense), bool)
+        first = 0
+        for block, normals in zip(self._blocks, self._smooth, strict=True):
+            mine = np.flatnonzero((found.facet >= first) & (found.facet < first + len(block.nodes)))
+            rows, xi = found.facet[mine] - first, found.xi[mine]
+            mean = np.einsum("nk,nkd->nd", block.element.shape(xi), normals[rows])
+            smooth[mine] = mean / np.linalg.norm(mean, axis=1, keepdims=True)
+            corner, edge = _place(block, xi)
+            at = np.flatnonzero(corner >= 0)
+            node = block.nodes[rows[at], corner[at]]
+            sense[mine[at]], on_border[mine[at]] = self._at_points[node], self._on_border[node]
+            at = np.flatnonzero(edge >= 0)
+            sense[mine[at]] += self._across(block, first, rows[at], edge[at], xi[at])
+            on_border[mine[at]] = self._neighbours[first + rows[at], edge[at]] < 0
+            on_ridge[mine] = (corner >= 0) | (edge >= 0)
+            first += len(block.nodes)
+        return sense, smooth, on_ridge, on_border
+
+    def _across(self, block: Block, first: int, rows: Indices, edge: Indices, xi: Array) -> Array:
+        """Return the normals (n, 3) of the facets beyond edges, at the same places; zero where there is none."""
+        ends = np.array(block.element.edges)[edge]
+        a, b = block.element.nodes[ends[:, 0]], block.element.nodes[ends[:, 1]]
+        along = np.linalg.norm(xi - a, axis=1) / np.linalg.norm(b - a, axis=1)
+        beyond = self._neighbours[first + rows, edge]
+        found = np.zeros((len(rows), self.mesh.dim))
+        start = 0
+        for other, normals in zip(self._blocks, self._own, strict=True):
+            mine = np.flatnonzero((beyond >= start) & (beyond < start + len(other.nodes)))
+            facet = beyond[mine] - start
+            for weight, end in ((1.0 - along, ends[:, 0]), (along, ends[:, 1])):
+                node = block.nodes[rows[mine], end[mine]]
+                local = np.argmax(other.nodes[facet] == node[:, None], axis=1)
+                found[mine] += weight[mine, None] * normals[facet, local]
+            start += len(other.nodes)
+        return found
+
+
+def _place(block: Block, xi: Array) -> tuple[Indices, Indices]:
+    """Return on which corner and on which edge of their facets reference coordinates lie, each (n,), -1 for none."""
+    element = block.element
+    none = np.full(len(xi), -1, np.intp)
+    if element.dim == 1:
+        s = xi[:, 0]
+        return np.where(s <= -1.0 + ON_SIDE, 0, np.where(s >= 1.0 - ON_SIDE, 1, none)), none
+    edges = np.array(element.edges)
+    a, b = element.nodes[edges[:, 0]], element.nodes[edges[:, 1]]
+    across = np.column_stack([a[:, 1] - b[:, 1], b[:, 0] - a[:, 0]])
+    on = np.einsum("nej,ej->ne", xi[:, None] - a[None], across) <= ON_SIDE * np.einsum("ej,ej->e", across, across)
+    corner = none.copy()
+    for k in range(element.n_corners):
+        at = np.flatnonzero((edges == k).any(axis=1))
+        corner[on[:, at].all(axis=1)] = k
+    return corner, np.where((corner < 0) & on.any(axis=1), np.argmax(on, axis=1), -1)

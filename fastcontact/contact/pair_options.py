@@ -1,0 +1,119 @@
+"""What a user asks of a contact pair, whatever its formulation: clearance, and who takes part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array, diags_array, eye_array
+
+from fastcontact.contact.pairing import Candidates, Pairing
+from fastcontact.contact.projection import places
+from fastcontact.contact.surface import Surface
+from fastcontact.mesh import elements
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+KINDS = ("unilateral", "bilateral", "bilateral_once_closed", "tied")
+Field = Callable[[Array], Array]
+
+
+@dataclass(eq=False)
+class Terms:
+    """The terms of a contact pair that all formulations keep.
+
+    Attributes
+    ----------
+    clearance, clearance_primary : callable, optional
+        What is added to the gap: functions from reference positions (n, dim) on the secondary and on the primary side
+        to lengths (n,), positive where the gap opens, negative for an interference [length].
+    factor : float
+        What both are multiplied with now.
+    excluded, frictionless : ndarray of bool (n_points,), optional
+        Nodes without contact, and without friction.
+    kind : str
+        A key of `KINDS`.
+    penalty : float, optional
+        Pressure by penetration [pressure / length]; None: no penetration.
+    """
+
+    clearance: Field | None = None
+    clearance_primary: Field | None = None
+    factor: float = 1.0
+    excluded: Mask | None = None
+    frictionless: Mask | None = None
+    kind: str = "unilateral"
+    penalty: float | None = None
+
+    @property
+    def tied(self) -> bool:
+        """Whether the pair neither opens nor slides."""
+        return self.kind == "tied"
+
+    @property
+    def always_closed(self) -> bool:
+        """Whether everything that faces the other side is closed from the beginning."""
+        return self.kind in ("tied", "bilateral")
+
+    def out(self, candidates: Candidates) -> Mask:
+        """Return which candidates (n,) carry no contact: those nearer to an excluded node than to any other."""
+        return (
+            np.zeros(len(candidates.nodes), bool) if self.excluded is None else candidates.belonging_to(self.excluded)
+        )
+
+    def borders(self, side: Surface) -> tuple[NDArray[np.intp], Array]:
+        """Return (facet, xi) of the points of lines where what belongs to excluded nodes ends."""
+        mask = self.excluded
+        if mask is None:
+            return np.empty(0, np.intp), np.empty(0)
+        order = np.argsort(elements.get(side.element).nodes[:, 0])
+        inside = mask[side.facets[:, order]]
+        # Two neighbouring shape functions are equal at 0 on linear lines, at -2/3 and 2/3 on quadratic ones.
+        equal = np.linspace(-2 / 3, 2 / 3, 2) if len(order) == 3 else np.zeros(1)
+        facet, place = np.nonzero(inside[:, 1:] != inside[:, :-1])
+        return facet, equal[place]
+
+    def excluded_nodes(self, side: Surface) -> Mask:
+        """Return which nodes (m,) of a side carry no contact."""
+        return np.zeros(len(side.points), bool) if self.excluded is None else self.excluded[side.points]
+
+    def coefficients(self, friction: float, candidates: Candidates) -> Array:
+        """Return the coefficients of friction (n,) of candidates."""
+        without = self.frictionless
+        slippery = np.zeros(len(candidates.nodes), bool) if without is None else candidates.belonging_to(without)
+        return np.where(slippery, 0.0, friction)
+
+    def added_gap(self, candidates: Candidates, pairing: Pairing, primary: object, reference: Array) -> Array:
+        """Return what clearances add to the gaps (n,) of candidates, zero where they face nothing [length]."""
+        added = np.zeros(len(candidates.nodes))
+        rows = np.flatnonzero(pairing.paired)
+        if not len(rows):
+            return added
+        if self.clearance is not None:
+            own = np.einsum("nk,nkd->nd", candidates.shape[rows], reference[candidates.nodes[rows]])
+            added[rows] += self.clearance(own)
+        if self.clearance_primary is not None and isinstance(primary, Surface):
+            at = places(primary, pairing.facet[rows], pairing.xi[rows])
+            added[rows] += self.clearance_primary(np.einsum("nk,nkd->nd", at.shape, reference[at.nodes]))
+        return self.factor * added
+
+
+def spread(side: Surface, excluded: Mask, givers: NDArray[np.intp]) -> csr_array:
+    """Return the nodal field (m, m) of a multiplier of which excluded nodes have no value of their own.
+
+    They take the mean of their neighbours among the nodes `givers`, so that a uniform field remains one; zero where
+    there are none.
+    """
+    m = len(side.points)
+    if not excluded.any():
+        return csr_array(eye_array(m, format="csr"))
+    rows = [np.repeat(block.local, block.local.shape[1], axis=1).ravel() for block in side.blocks]
+    columns = [np.tile(block.local, block.local.shape[1]).ravel() for block in side.blocks]
+    row, column = np.concatenate(rows), np.concatenate(columns)
+    near = excluded[row] & np.isin(column, givers) & ~excluded[column]
+    beside = csr_array(coo_array((np.ones(near.sum()), (row[near], column[near])), shape=(m, m)))
+    beside.data[:] = 1.0  # a neighbour on two facets counts once
+    count = np.maximum(np.asarray(beside.sum(axis=1)).ravel(), 1.0)
+    return csr_array(diags_array((~excluded).astype(float)) + diags_array(1.0 / count) @ beside)

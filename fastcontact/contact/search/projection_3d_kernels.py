@@ -1,0 +1,312 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Closest point of one facet in 3D, flat or curved, wherever it is: descents of the distance from several places.
+
+A facet of m nodes is the polynomial of the first m terms of 1, s, t, st, s^2, t^2, s^2 t, s t^2, s^2 t^2 in its reference
+coordinates, ``terms`` (n_facets, m, 3): tri3, quad4, tri6, quad8 and quad9 have 3, 4, 6, 8 and 9. Its domain is a polygon
+of ``sides`` (n_sides, 3), rows (a, b, c) for a s + b t <= c.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact.contact.search.straight_3d_kernels import ON_SIDE, cross, dot, minus, on_flat, rest, unit
+
+# Steps in reference coordinates below which a projection has converged.
+STEP = 1e-13
+MAX_ITERATIONS = 100
+Array = NDArray[np.float64]
+
+
+class Facets(NamedTuple):
+    """Facets as the search wants them, in the order of its tree.
+
+    Polynomials (n_facets, m, 3), seen from their midst (3,): far from it, rounding would be coarser than the steps of a
+    converged projection. How far each strays at most from the flat triangles between its nodes. Up to
+    where a minimum is the only one: with four nodes the bound of `straight3d.room`, with more the square of a distance below
+    which half the squared distance is a convex function on the domain. Their numbers elsewhere, and in that order their nodes
+    (n_facets, m, 3), which few projections ask for: seen from the old origin.
+    """
+
+    terms: Array
+    midst: Array
+    bend: Array
+    convex: Array
+    numbers: NDArray[np.intp]
+    nodes: Array
+
+
+class Domain(NamedTuple):
+    """Reference nodes (m, 2), flat triangles between them (n_triangles, 3), and sides (n_sides, 3) of facets of a kind."""
+
+    nodes: Array
+    triangles: NDArray[np.intp]
+    sides: Array
+
+
+@inlined_kernel
+def vector(vectors, f, k):
+    """Return vector `k` of facet `f` (n_facets, m, 3)."""
+    return vectors[f, k, 0], vectors[f, k, 1], vectors[f, k, 2]
+
+
+@inlined_kernel
+def node(facets, f, k):
+    """Return node `k` of facet `f`, seen from the midst."""
+    return minus(vector(facets.nodes, facets.numbers[f], k), (facets.midst[0], facets.midst[1], facets.midst[2]))
+
+
+@kernel
+def component(terms, f, d, s, t):
+    """Return one coordinate of facet `f` at (s, t) with its derivatives: value, s, t, ss, st, tt."""
+    m = terms.shape[1]
+    c1, c2 = terms[f, 1, d], terms[f, 2, d]
+    x, xs, xt, xss, xst, xtt = terms[f, 0, d] + c1 * s + c2 * t, c1, c2, 0.0, 0.0, 0.0
+    if m >= 4:
+        c = terms[f, 3, d]
+        x, xs, xt, xst = x + c * s * t, xs + c * t, xt + c * s, c
+    if m >= 6:
+        c4, c5 = terms[f, 4, d], terms[f, 5, d]
+        x, xs, xt = x + c4 * s * s + c5 * t * t, xs + 2.0 * c4 * s, xt + 2.0 * c5 * t
+        xss, xtt = 2.0 * c4, 2.0 * c5
+    if m >= 8:
+        c6, c7 = terms[f, 6, d], terms[f, 7, d]
+        x, xs, xt = (
+            x + (c6 * s + c7 * t) * s * t,
+            xs + (2.0 * c6 * s + c7 * t) * t,
+            xt + (c6 * s + 2.0 * c7 * t) * s,
+        )
+        xss, xst, xtt = xss + 2.0 * c6 * t, xst + 2.0 * (c6 * s + c7 * t), xtt + 2.0 * c7 * s
+    if m >= 9:
+        c = terms[f, 8, d]
+        x, xs, xt = x + c * s * s * t * t, xs + 2.0 * c * s * t * t, xt + 2.0 * c * s * s * t
+        xss, xst, xtt = xss + 2.0 * c * t * t, xst + 4.0 * c * s * t, xtt + 2.0 * c * s * s
+    return x, xs, xt, xss, xst, xtt
+
+
+@kernel
+def half_square(terms, f, s, t, point):
+    """Return half the squared distance from `point` to the point (s, t) of facet `f`."""
+    dx = point[0] - component(terms, f, 0, s, t)[0]
+    dy = point[1] - component(terms, f, 1, s, t)[0]
+    dz = point[2] - component(terms, f, 2, s, t)[0]
+    return 0.5 * (dx * dx + dy * dy + dz * dz)
+
+
+@kernel
+def _expansion(terms, f, s, t, point):
+    """Return half the squared distance with its gradient (2) and Hessian (3: ss, st, tt)."""
+    value, gs, gt, hss, hst, htt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for d in range(3):
+        x, xs, xt, xss, xst, xtt = component(terms, f, d, s, t)
+        r = point[d] - x
+        value += 0.5 * r * r
+        gs -= r * xs
+        gt -= r * xt
+        hss += xs * xs - r * xss
+        hst += xs * xt - r * xst
+        htt += xt * xt - r * xtt
+    return value, gs, gt, hss, hst, htt
+
+
+@kernel
+def _allowed(sides, s, t, ps, pt, size):
+    """Return whether a step (ps, pt) from (s, t) leaves the domain through none of the sides that (s, t) lies on."""
+    for k in range(sides.shape[0]):
+        on = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t <= ON_SIDE
+        if on and sides[k, 0] * ps + sides[k, 1] * pt > 1e-14 * size:
+            return False
+    return True
+
+
+@kernel
+def _definite(hss, hst, htt):
+    """Return the Hessian with the absolute values of its eigenvalues, moved a little off zero if it is not definite.
+
+    For two by two, |H| = (H^2 + |det H| I) / sqrt(tr H^2 + 2 |det H|), by the theorem of Cayley and Hamilton.
+    """
+    square = hss * hss + 2.0 * hst * hst + htt * htt
+    determinant = hss * htt - hst * hst
+    if hss > 0.0 and determinant > 1e-10 * square:
+        return hss, hst, htt
+    root = np.sqrt(square + 2.0 * abs(determinant))
+    shift = abs(determinant) / root + 1e-6 * root
+    return (hss * hss + hst * hst) / root + shift, hst * (hss + htt) / root, (hst * hst + htt * htt) / root + shift
+
+
+@kernel
+def _newton_step(sides, s, t, gs, gt, hss, hst, htt):
+    """Return the step to the minimum of the quadratic model over the directions that stay in the domain."""
+    ass, ast, att = _definite(hss, hst, htt)
+    determinant = ass * att - ast * ast
+    ps, pt = -(att * gs - ast * gt) / determinant, -(ass * gt - ast * gs) / determinant
+    if _allowed(sides, s, t, ps, pt, abs(ps) + abs(pt)):
+        return ps, pt
+    ps, pt, gain = 0.0, 0.0, 0.0
+    for k in range(sides.shape[0]):
+        if sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t > ON_SIDE:
+            continue
+        us, ut = -sides[k, 1], sides[k, 0]
+        slope = gs * us + gt * ut
+        along = hss * us * us + 2.0 * hst * us * ut + htt * ut * ut
+        along = max(abs(along), 1e-6 * (ass + att))
+        if slope * slope / along > gain:
+            length = -slope / along
+            if _allowed(sides, s, t, length * us, length * ut, abs(length)):
+                ps, pt, gain = length * us, length * ut, slope * slope / along
+    return ps, pt
+
+
+@kernel
+def _downhill(terms, f, s, t, sides, point, value, hss, hst, htt):
+    """Return a step down from a stationary point (s, t) that is no minimum, else zeros.
+
+    Candidates are the direction in which the Hessian is smallest, and those along the sides.
+    """
+    middle, radius = 0.5 * (hss + htt), np.sqrt(0.25 * (hss - htt) ** 2 + hst * hst)
+    if middle - radius >= -1e-9 * (abs(middle) + radius):
+        return 0.0, 0.0
+    us, ut = (hst, middle - radius - hss) if abs(hst) > 0.0 else (0.0, 1.0)
+    if abs(hst) == 0.0 and hss < htt:
+        us, ut = 1.0, 0.0
+    for k in range(-1, sides.shape[0]):
+        if k >= 0:
+            us, ut = -sides[k, 1], sides[k, 0]
+        length = 0.1 / np.sqrt(us * us + ut * ut)
+        for sign in (length, -length):
+            ps, pt = sign * us, sign * ut
+            if _fits(sides, s + ps, t + pt) and half_square(terms, f, s + ps, t + pt, point) < value * (1.0 - 1e-12):
+                return ps, pt
+    return 0.0, 0.0
+
+
+@kernel
+def _fits(sides, s, t):
+    """Return whether (s, t) lies in the domain."""
+    for k in range(sides.shape[0]):
+        if sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t < -ON_SIDE:
+            return False
+    return True
+
+
+@kernel
+def descend(terms, f, s, t, sides, point):
+    """Return the local minimum (s, t) of the distance from `point` to facet `f`, and whether the iteration converged.
+
+    Newton's method on the squared distance over the polygon of the reference domain: at its sides it goes on along
+    them, as an active-set method does, and it never steps uphill.
+    """
+    for _ in range(MAX_ITERATIONS):
+        value, gs, gt, hss, hst, htt = _expansion(terms, f, s, t, point)
+        ps, pt = _newton_step(sides, s, t, gs, gt, hss, hst, htt)
+        size = max(abs(ps), abs(pt))
+        if not size > STEP:
+            ps, pt = _downhill(terms, f, s, t, sides, point, value, hss, hst, htt)
+            if size <= STEP and (ps != 0.0 or pt != 0.0):
+                s, t = s + ps, t + pt
+                continue
+            return s, t, size <= STEP
+        length = 1.0
+        for k in range(sides.shape[0]):
+            rate = sides[k, 0] * ps + sides[k, 1] * pt
+            if rate > 1e-14 * size:
+                room = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t
+                length = min(length, max(room, 0.0) / rate)
+        if length * size > 1e-6:  # below, the decrease is lost in rounding
+            for _ in range(40):
+                if half_square(terms, f, s + length * ps, t + length * pt, point) <= value * (1.0 + 1e-14):
+                    break
+                length *= 0.5
+        s, t = s + length * ps, t + length * pt
+    return s, t, False
+
+
+@kernel
+def project(facets, f, domain, point, reach):
+    """Return (s, t) of the point of facet `f` closest to `point`, half the squared distance, and whether it converged.
+
+    The facet strays from the flat triangles between its nodes by at most `bend`: the descent starts from the closest one.
+    With more than four nodes, what it finds within `convex` is the only minimum. Else it starts again wherever a closer
+    point might hide. The distance is infinite where even a squared distance of `reach` is out of reach.
+    """
+    terms, bend = facets.terms, facets.bend[f]
+    nodes, triangles, sides = domain
+    s, t, flat = 0.0, 0.0, np.inf
+    for k in range(triangles.shape[0]):
+        a, b, square = _on_triangle(facets, f, nodes, triangles, k, point)
+        if square < flat:
+            s, t, flat = a, b, square
+    if max(np.sqrt(flat) - bend, 0.0) ** 2 > reach:
+        return s, t, np.inf, True
+    tried_s, tried_t = s, t
+    s, t, converged = descend(terms, f, s, t, sides, point)
+    best = half_square(terms, f, s, t, point)
+    if converged and terms.shape[1] > 4 and 2.0 * best < facets.convex[f]:
+        return s, t, best, True
+    for k in range(triangles.shape[0] if bend > 0.0 else 0):
+        a, b, square = _on_triangle(facets, f, nodes, triangles, k, point)
+        if square > (np.sqrt(2.0 * best) + bend) ** 2 or abs(a - tried_s) + abs(b - tried_t) < 1e-3:
+            continue
+        a, b, good = descend(terms, f, a, b, sides, point)
+        value = half_square(terms, f, a, b, point)
+        if value < best:
+            s, t, best, converged = a, b, value, good
+    side = minus(node(facets, f, 1), node(facets, f, 0))
+    # Near the centres of curvature the distance has several minima on one triangle: start from every node too.
+    for k in range(nodes.shape[0] if np.sqrt(2.0 * best) * 16.0 * bend > dot(side, side) else 0):
+        a, b, good = descend(terms, f, nodes[k, 0], nodes[k, 1], sides, point)
+        value = half_square(terms, f, a, b, point)
+        if value < best:
+            s, t, best, converged = a, b, value, good
+    return s, t, best, converged
+
+
+@kernel
+def _on_triangle(facets, f, nodes, triangles, k, point):
+    """Return (s, t) on facet `f` of the point of its flat triangle `k` closest to `point`, and its squared distance."""
+    a, b, c = triangles[k, 0], triangles[k, 1], triangles[k, 2]
+    origin = node(facets, f, a)
+    p, q, r = minus(node(facets, f, b), origin), minus(node(facets, f, c), origin), minus(point, origin)
+    v, w = on_flat(r, p, q)
+    u, away = 1.0 - v - w, rest(r, p, q, (0.0, 0.0, 0.0), v, w)
+    s = u * nodes[a, 0] + v * nodes[b, 0] + w * nodes[c, 0]
+    t = u * nodes[a, 1] + v * nodes[b, 1] + w * nodes[c, 1]
+    return s, t, dot(away, away)
+
+
+@kernel
+def onto_sides(sides, s, t):
+    """Return (s, t) moved exactly onto the sides that it lies on but for rounding."""
+    for k in range(sides.shape[0]):
+        room = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t
+        if room <= ON_SIDE:
+            # Of a + b <= c the first coordinate is solved for: it comes out as exact as the other.
+            if sides[k, 0] != 0.0:
+                s = (sides[k, 2] - sides[k, 1] * t) / sides[k, 0]
+            else:
+                t = sides[k, 2] / sides[k, 1]
+    return s, t
+
+
+@kernel
+def frame(terms, f, s, t, point, sides, nodes):
+    """Return the unit normal of facet `f` at (s, t) and the overhang of `point` beyond the domain's sides.
+
+    The point's reference coordinates on the plane tangent to the facet tell how far it lies outside, in spans of the
+    domain.
+    """
+    x, xs, xt, _, _, _ = component(terms, f, 0, s, t)
+    y, ys, yt, _, _, _ = component(terms, f, 1, s, t)
+    z, zs, zt, _, _, _ = component(terms, f, 2, s, t)
+    p, q, r = (xs, ys, zs), (xt, yt, zt), minus(point, (x, y, z))
+    pp, pq, qq, pr, qr = dot(p, p), dot(p, q), dot(q, q), dot(p, r), dot(q, r)
+    determinant = pp * qq - pq * pq
+    ds, dt = (qq * pr - pq * qr) / determinant, (pp * qr - pq * pr) / determinant
+    overhang, span = 0.0, nodes[1, 0] - nodes[0, 0]
+    for k in range(sides.shape[0]):
+        a, b = sides[k, 0], sides[k, 1]
+        if sides[k, 2] - a * s - b * t <= ON_SIDE:
+            overhang = max(overhang, (a * ds + b * dt) / span)
+    return unit(cross(p, q)), overhang

@@ -1,0 +1,80 @@
+"""Whether the two sides of a contact pair can touch at all: checks before any numerics."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.surface import Surface
+from fastcontact.errors import ContactError
+from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+# Facets of each kind that are looked at.
+SAMPLE = 200
+
+
+def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface) -> None:
+    """Raise ContactError for sides of contact `name` that share nodes or cannot face each other."""
+    if secondary.group == primary.group:
+        raise ContactError(
+            f"contact '{name}' has '{primary.group}' on both sides: name the group of the other body as one of them"
+        )
+    shared = np.intersect1d(secondary.points, primary.points)
+    if len(shared):
+        raise ContactError(
+            f"the two sides of contact '{name}' share {len(shared)} nodes (first: point {shared[0]}): "
+            "duplicate the nodes of the interface, one set for each side"
+        )
+    ours, theirs = _facet_frames(mesh, secondary), _facet_frames(mesh, primary)
+    apart = theirs[0][None] - ours[0][:, None]
+    facing = np.einsum("id,jd->ij", ours[1], theirs[1]) < 0
+    ahead = (np.einsum("ijd,id->ij", apart, ours[1]) > -0.1 * np.linalg.norm(apart, axis=2)) | (
+        np.linalg.norm(apart, axis=2) < np.minimum.outer(ours[2], theirs[2])
+    )
+    if not (facing & ahead).any():
+        behind = -np.einsum("ijd,id->ij", apart, ours[1])[facing]
+        inside = f", or do the bodies lie inside each other, by {behind.min():.4g} or more" if len(behind) else ""
+        raise ContactError(
+            f"no facet of '{secondary.group}' faces '{primary.group}': the outer sides of the two groups look away from "
+            f"each other; is one of them the wrong face of its body{inside}?"
+        )
+
+
+def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSide) -> None:
+    """Raise ContactError for an obstacle of contact `name` that no facet of the secondary side faces."""
+    centres, outward, _ = _facet_frames(mesh, secondary)
+    _, normal, paired, _ = obstacle.facing(centres)
+    along = np.einsum("id,id->i", outward, normal)[paired]
+    if len(along) and (along >= 0).all():
+        raise ContactError(
+            f"the rigid obstacle of contact '{name}' looks the same way as '{secondary.group}', so that they cannot "
+            "touch: turn its normal or its facets round, or name another face of the body"
+        )
+
+
+def _facet_frames(mesh: Mesh, side: Surface) -> tuple[Array, Array, Array]:
+    """Return centres, unit normals and sizes of about SAMPLE facets of each kind of a surface, as if flat."""
+    centres, normals, sizes = [], [], []
+    for block in side.blocks:
+        some = block.facets[:: max(1, len(block.facets) // SAMPLE), : elements.get(block.element).n_corners]
+        corners = mesh.points[some]
+        normal = _right_of(corners) if mesh.dim == 2 else _vector_area(corners)
+        centres.append(corners.mean(axis=1))
+        normals.append(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+        sizes.append(np.linalg.norm(normal, axis=1) ** (1 / (mesh.dim - 1)))
+    return np.concatenate(centres), np.concatenate(normals), np.concatenate(sizes)
+
+
+def _right_of(ends: Array) -> Array:
+    """Return the vectors (n, 2) to the right of lines (n, 2, 2), as long as they."""
+    along = ends[:, 1] - ends[:, 0]
+    return np.column_stack([along[:, 1], -along[:, 0]])
+
+
+def _vector_area(corners: Array) -> Array:
+    """Return the vector areas (n, 3) of polygons (n, n_corners, 3)."""
+    spokes = corners[:, 1:] - corners[:, :1]
+    return 0.5 * np.cross(spokes[:, :-1], spokes[:, 1:]).sum(axis=1)

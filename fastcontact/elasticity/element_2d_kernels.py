@@ -1,0 +1,198 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Element loops of 2D and axisymmetric solids: stiffness, stress at quadrature points, nodal averages.
+
+Shared arguments: ``points`` (n_points, 2); ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes),
+``dN`` (n_q, n_nodes, 2), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 4, 4) for strains
+(xx, yy, zz, 2xy); ``material`` (n_cells,). Axisymmetric integrals run over the full circle: weight 2 pi r det J w.
+"""
+
+import numpy as np
+
+from fastcontact._jit.decorators import kernel
+
+TWO_PI = 2.0 * np.pi
+
+
+@kernel
+def _map(points, cell, N, dN, q, gradient):
+    """Fill `gradient` (n_nodes, 2) with shape derivatives in x, y; return det J and the radius."""
+    n_nodes = cell.shape[0]
+    j00 = j01 = j10 = j11 = radius = 0.0
+    for a in range(n_nodes):
+        x, y = points[cell[a], 0], points[cell[a], 1]
+        j00 += dN[q, a, 0] * x
+        j01 += dN[q, a, 0] * y
+        j10 += dN[q, a, 1] * x
+        j11 += dN[q, a, 1] * y
+        radius += N[q, a] * x
+    det = j00 * j11 - j01 * j10
+    for a in range(n_nodes):
+        gradient[a, 0] = (j11 * dN[q, a, 0] - j01 * dN[q, a, 1]) / det
+        gradient[a, 1] = (j00 * dN[q, a, 1] - j10 * dN[q, a, 0]) / det
+    return det, radius
+
+
+@kernel
+def _owned(cells, c, owner, part, mine):
+    """Fill `mine` (n_nodes,) with which nodes of a cell have the owner `part`; return whether any has."""
+    found = False
+    for a in range(cells.shape[1]):
+        mine[a] = owner[cells[c, a]] == part
+        found = found or mine[a]
+    return found
+
+
+@kernel
+def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric, slots, owner, part, data):
+    """Add element stiffness blocks to `data` (n_blocks, 2, 2), in the rows of nodes with ``owner[node] == part``.
+
+    `data` is written in place at `slots`. Threads share the nodes; each adds to its rows in the order of the cells.
+    Returns the number of the first cell with a Jacobian that is not positive, or -1. Only the terms of the moduli
+    that couple normal strains with each other and shear with itself are used (isotropy, or orthotropy along x, y).
+    """
+    n_cells, n_nodes = cells.shape
+    gradient = np.empty((n_nodes, 2))
+    local = np.empty((n_nodes, n_nodes, 2, 2))
+    mine = np.empty(n_nodes, np.bool_)
+    for c in range(n_cells):
+        if not _owned(cells, c, owner, part, mine):
+            continue
+        D = moduli[material[c]]
+        shear = D[3, 3]
+        local[:] = 0.0
+        for q in range(weights.shape[0]):
+            det, radius = _map(points, cells[c], N, dN, q, gradient)
+            if not det > 0.0:
+                return c
+            weight = weights[q] * det
+            if axisymmetric:
+                weight *= TWO_PI * radius
+            for b in range(n_nodes):
+                bx, by = weight * gradient[b, 0], weight * gradient[b, 1]
+                bh = weight * N[q, b] / radius if axisymmetric else 0.0
+                # Stress of unit displacements of node b: along x, then along y.
+                xx_x = D[0, 0] * bx + D[0, 2] * bh
+                yy_x = D[1, 0] * bx + D[1, 2] * bh
+                zz_x = D[2, 0] * bx + D[2, 2] * bh
+                xx_y, yy_y, zz_y = D[0, 1] * by, D[1, 1] * by, D[2, 1] * by
+                for a in range(b + 1):
+                    ax, ay = gradient[a, 0], gradient[a, 1]
+                    ah = N[q, a] / radius if axisymmetric else 0.0
+                    local[a, b, 0, 0] += ax * xx_x + ah * zz_x + shear * ay * by
+                    local[a, b, 0, 1] += ax * xx_y + ah * zz_y + shear * ay * bx
+                    local[a, b, 1, 0] += ay * yy_x + shear * ax * by
+                    local[a, b, 1, 1] += ay * yy_y + shear * ax * bx
+        for b in range(n_nodes):
+            local[b, b, 1, 0] = local[b, b, 0, 1]  # equal but for round-off; K is symmetric to the last bit
+            for a in range(b + 1):
+                upper, lower = slots[c, a, b], slots[c, b, a]
+                if mine[a]:
+                    for i in range(2):
+                        for j in range(2):
+                            data[upper, i, j] += local[a, b, i, j]
+                if a != b and mine[b]:
+                    for i in range(2):
+                        for j in range(2):
+                            data[lower, j, i] += local[a, b, i, j]
+    return -1
+
+
+@kernel
+def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, out):
+    """Fill `out` (n_cells, n_q, 4) with the stress xx, yy, zz, xy at the points of the tables N, dN.
+
+    Positions and displacements are differentiated along the cell, and their derivatives divided: no shape function's
+    gradient is formed.
+    """
+    n_cells, n_nodes = cells.shape
+    local = np.empty((n_nodes, 4))
+    for c in range(n_cells):
+        D = moduli[material[c]]
+        for a in range(n_nodes):
+            p = cells[c, a]
+            local[a, 0], local[a, 1] = points[p, 0], points[p, 1]
+            local[a, 2], local[a, 3] = displacement[p, 0], displacement[p, 1]
+        for q in range(N.shape[0]):
+            x_r = y_r = x_s = y_s = ux_r = uy_r = ux_s = uy_s = 0.0
+            for a in range(n_nodes):
+                along_r, along_s = dN[q, a, 0], dN[q, a, 1]
+                x_r += along_r * local[a, 0]
+                y_r += along_r * local[a, 1]
+                ux_r += along_r * local[a, 2]
+                uy_r += along_r * local[a, 3]
+                x_s += along_s * local[a, 0]
+                y_s += along_s * local[a, 1]
+                ux_s += along_s * local[a, 2]
+                uy_s += along_s * local[a, 3]
+            inverse = 1.0 / (x_r * y_s - y_r * x_s)
+            exx = (ux_r * y_s - ux_s * y_r) * inverse
+            eyy = (uy_s * x_r - uy_r * x_s) * inverse
+            gxy = (ux_s * x_r - ux_r * x_s + uy_r * y_s - uy_s * y_r) * inverse
+            ezz = 0.0
+            if axisymmetric:
+                radius = ux = 0.0
+                for a in range(n_nodes):
+                    radius += N[q, a] * local[a, 0]
+                    ux += N[q, a] * local[a, 2]
+                ezz = ux / radius
+            for i in range(4):
+                out[c, q, i] = D[i, 0] * exx + D[i, 1] * eyy + D[i, 2] * ezz + D[i, 3] * gxy
+
+
+@kernel
+def largest_rotation(points, cells, N, dN, displacement):
+    """Return the square of the largest rotation [radian^2] of a cell at the first point of the tables N, dN, and its number.
+
+    Half the curl of the displacement (n_points, 2); the number is -1 where no cell rotates.
+    """
+    n_cells, n_nodes = cells.shape
+    gradient = np.empty((n_nodes, 2))
+    largest, number = 0.0, -1
+    for c in range(n_cells):
+        _map(points, cells[c], N, dN, 0, gradient)
+        curl = 0.0
+        for a in range(n_nodes):
+            p = cells[c, a]
+            curl += gradient[a, 0] * displacement[p, 1] - gradient[a, 1] * displacement[p, 0]
+        square = 0.25 * curl * curl
+        if square > largest:
+            largest, number = square, c
+    return largest, number
+
+
+@kernel
+def add_nodal(cells, extrapolation, at_points, total, count):
+    """Extrapolate quadrature values to the nodes of each cell and add them up per node, in place.
+
+    `extrapolation` (n_nodes, n_q), `at_points` (n_cells, n_q, n_components); `total` (n_points, n_components) and
+    `count` (n_points,) are added to.
+    """
+    n_cells, n_nodes = cells.shape
+    for c in range(n_cells):
+        for a in range(n_nodes):
+            p = cells[c, a]
+            count[p] += 1
+            for i in range(at_points.shape[2]):
+                value = 0.0
+                for q in range(at_points.shape[1]):
+                    value += extrapolation[a, q] * at_points[c, q, i]
+                total[p, i] += value
+
+
+@kernel
+def add_internal_force(points, cells, N, dN, weights, axisymmetric, stresses, force):
+    """Add the nodal forces of `stresses` (n_cells, n_q, 4) to `force` (n_points, 2), in place."""
+    n_cells, n_nodes = cells.shape
+    gradient = np.empty((n_nodes, 2))
+    for c in range(n_cells):
+        for q in range(weights.shape[0]):
+            det, radius = _map(points, cells[c], N, dN, q, gradient)
+            weight = weights[q] * det
+            if axisymmetric:
+                weight *= TWO_PI * radius
+            xx, yy, zz, xy = stresses[c, q, 0], stresses[c, q, 1], stresses[c, q, 2], stresses[c, q, 3]
+            for a in range(n_nodes):
+                p = cells[c, a]
+                hoop = zz * N[q, a] / radius if axisymmetric else 0.0
+                force[p, 0] += weight * (xx * gradient[a, 0] + xy * gradient[a, 1] + hoop)
+                force[p, 1] += weight * (yy * gradient[a, 1] + xy * gradient[a, 0])

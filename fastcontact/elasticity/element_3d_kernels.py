@@ -1,0 +1,382 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Element loops of 3D solids: stiffness, stress at quadrature points, internal forces.
+
+Shared arguments, as in `solid2d`: ``points`` (n_points, 3); ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes),
+``dN`` (n_q, n_nodes, 3), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 6, 6), symmetric, for
+strains (xx, yy, zz, 2xy, 2yz, 2xz); ``material`` (n_cells,). `N` and `axisymmetric` mean nothing here; they are taken
+so that the loops of both dimensions are called alike.
+"""
+
+import numpy as np
+
+from fastcontact._jit.decorators import inlined_kernel, kernel
+
+
+@kernel
+def _transposed(dN):
+    """Return the derivatives as (n_q, 3, n_nodes), so that loops over nodes run along memory."""
+    n_q, n_nodes, _ = dN.shape
+    out = np.empty((n_q, 3, n_nodes))
+    for q in range(n_q):
+        for a in range(n_nodes):
+            for i in range(3):
+                out[q, i, a] = dN[q, a, i]
+    return out
+
+
+@kernel
+def _gather(values, cells, c, x):
+    """Fill `x` (3, n_nodes) with the vectors of `values` (n_points, 3) at the nodes of cell `c`."""
+    for a in range(cells.shape[1]):
+        p = cells[c, a]
+        for i in range(3):
+            x[i, a] = values[p, i]
+
+
+@kernel
+def _map(x, slopes, q, gradient):
+    """Fill `gradient` (3, n_nodes) with shape derivatives in x, y, z; return det J."""
+    n_nodes = x.shape[1]
+    j00 = j01 = j02 = j10 = j11 = j12 = j20 = j21 = j22 = 0.0
+    for a in range(n_nodes):
+        r, s, t = slopes[q, 0, a], slopes[q, 1, a], slopes[q, 2, a]
+        j00 += r * x[0, a]
+        j01 += r * x[1, a]
+        j02 += r * x[2, a]
+        j10 += s * x[0, a]
+        j11 += s * x[1, a]
+        j12 += s * x[2, a]
+        j20 += t * x[0, a]
+        j21 += t * x[1, a]
+        j22 += t * x[2, a]
+    c00, c01, c02 = j11 * j22 - j12 * j21, j12 * j20 - j10 * j22, j10 * j21 - j11 * j20
+    c10, c11, c12 = j02 * j21 - j01 * j22, j00 * j22 - j02 * j20, j01 * j20 - j00 * j21
+    c20, c21, c22 = j01 * j12 - j02 * j11, j02 * j10 - j00 * j12, j00 * j11 - j01 * j10
+    det = j00 * c00 + j01 * c01 + j02 * c02
+    inverse = 1.0 / det
+    for a in range(n_nodes):
+        r, s, t = slopes[q, 0, a] * inverse, slopes[q, 1, a] * inverse, slopes[q, 2, a] * inverse
+        gradient[0, a] = c00 * r + c10 * s + c20 * t
+        gradient[1, a] = c01 * r + c11 * s + c21 * t
+        gradient[2, a] = c02 * r + c12 * s + c22 * t
+    return det
+
+
+@kernel
+def _is_isotropic(D):
+    """Return whether the moduli are those of an isotropic material, but for round-off."""
+    for i in range(6):
+        for j in range(6):
+            expected = 0.0
+            if i < 3 and j < 3:
+                expected = D[0, 1]
+            if i == j:
+                expected += 2.0 * D[3, 3] if i < 3 else D[3, 3]
+            if not abs(D[i, j] - expected) <= 1e-14 * abs(D[0, 0]):
+                return False
+    return True
+
+
+@kernel
+def _component(i, j):
+    """Return the number of a stress component in the order xx, yy, zz, xy, yz, xz."""
+    if i == j:
+        return i
+    if i + j == 1:
+        return 3
+    return 4 if i + j == 3 else 5
+
+
+@kernel
+def _tensors(moduli):
+    """Return the moduli as (n_materials, 9, 9): row 3 i + j, column 3 k + l holds D_ikjl, for K_ij = D_ikjl g_kl."""
+    tensors = np.empty((moduli.shape[0], 9, 9))
+    for m in range(moduli.shape[0]):
+        for row in range(9):
+            for column in range(9):
+                i, j, k, n = row // 3, row % 3, column // 3, column % 3
+                tensors[m, row, column] = moduli[m, _component(i, k), _component(j, n)]
+    return tensors
+
+
+@kernel
+def _integrate_products(x, slopes, weights, gradient, g):
+    """Fill `g` (6, n_nodes, n_nodes) with the integrals of dN_a/dx_i dN_b/dx_j for ij = 00, 01, 02, 11, 12, 22.
+
+    Returns whether the Jacobian is positive everywhere. One short loop for each ij: the compiler makes vectors of it.
+    """
+    n_nodes = x.shape[1]
+    g[:] = 0.0
+    for q in range(weights.shape[0]):
+        det = _map(x, slopes, q, gradient)
+        if not det > 0.0:
+            return False
+        weight = weights[q] * det
+        ij = 0
+        for i in range(3):
+            for j in range(i, 3):
+                for a in range(n_nodes):
+                    factor = weight * gradient[i, a]
+                    for b in range(n_nodes):
+                        g[ij, a, b] += factor * gradient[j, b]
+                ij += 1
+    return True
+
+
+@kernel
+def _owned(cells, c, owner, part, mine):
+    """Fill `mine` (n_nodes,) with which nodes of a cell have the owner `part`; return whether any has."""
+    found = False
+    for a in range(cells.shape[1]):
+        mine[a] = owner[cells[c, a]] == part
+        found = found or mine[a]
+    return found
+
+
+@kernel
+def _add_block(flat, at_upper, at_lower, upper, lower, k00, k01, k02, k10, k11, k12, k20, k21, k22):
+    """Add a block of a node pair, and its transpose on the other side of the diagonal, where asked for."""
+    u, v = 9 * upper, 9 * lower
+    if at_upper:
+        flat[u] += k00
+        flat[u + 1] += k01
+        flat[u + 2] += k02
+        flat[u + 3] += k10
+        flat[u + 4] += k11
+        flat[u + 5] += k12
+        flat[u + 6] += k20
+        flat[u + 7] += k21
+        flat[u + 8] += k22
+    if u != v and at_lower:
+        flat[v] += k00
+        flat[v + 1] += k10
+        flat[v + 2] += k20
+        flat[v + 3] += k01
+        flat[v + 4] += k11
+        flat[v + 5] += k21
+        flat[v + 6] += k02
+        flat[v + 7] += k12
+        flat[v + 8] += k22
+
+
+@inlined_kernel
+def _add_isotropic_block(flat, pair, at_upper, at_lower, upper, lower, coupling, shear, g):
+    """Add the block of two nodes for Lame's constants: K_ij = lambda g_ij + mu g_ji + mu g_kk delta_ij.
+
+    `pair` says whether the nodes differ; g comes as xx, yy, zz, xy, xz, yz, yx, zx, zy.
+    """
+    xx, yy, zz, xy, xz, yz, yx, zx, zy = g
+    trace, both = shear * (xx + yy + zz), coupling + shear
+    k01, k02, k12 = coupling * xy + shear * yx, coupling * xz + shear * zx, coupling * yz + shear * zy
+    k10, k20, k21 = coupling * yx + shear * xy, coupling * zx + shear * xz, coupling * zy + shear * yz
+    if not pair:  # equal but for round-off; K is symmetric to the last bit
+        k10, k20, k21 = k01, k02, k12
+    _add_block(
+        flat, at_upper, at_lower, upper, lower,
+        both * xx + trace, k01, k02, k10, both * yy + trace, k12, k20, k21, both * zz + trace,
+    )  # fmt: skip
+
+
+@kernel
+def _add_isotropic(g, coupling, shear, slots, c, mine, flat):
+    """Add the blocks of a cell for Lame's constants, given the integrals of `_integrate_products`."""
+    for b in range(g.shape[1]):
+        for a in range(b + 1):
+            products = (
+                g[0, a, b], g[3, a, b], g[5, a, b], g[1, a, b], g[2, a, b], g[4, a, b], g[1, b, a], g[2, b, a], g[4, b, a],
+            )  # fmt: skip
+            _add_isotropic_block(
+                flat, a != b, mine[a], mine[b], slots[c, a, b], slots[c, b, a], coupling, shear, products
+            )
+
+
+@kernel
+def _add_general(g, tensors, m, products, block, slots, c, mine, flat):
+    """Add the blocks of a cell for any moduli: K_ij = D_ikjl g_kl; `products` and `block` (9,) are overwritten."""
+    for b in range(g.shape[1]):
+        for a in range(b + 1):
+            products[0], products[4], products[8] = g[0, a, b], g[3, a, b], g[5, a, b]
+            products[1], products[2], products[5] = g[1, a, b], g[2, a, b], g[4, a, b]
+            products[3], products[6], products[7] = g[1, b, a], g[2, b, a], g[4, b, a]
+            for row in range(9):
+                total = 0.0
+                for column in range(9):
+                    total += tensors[m, row, column] * products[column]
+                block[row] = total
+            if a == b:  # as above
+                block[3], block[6], block[7] = block[1], block[2], block[5]
+            _add_block(
+                flat, mine[a], mine[b], slots[c, a, b], slots[c, b, a],
+                block[0], block[1], block[2], block[3], block[4], block[5], block[6], block[7], block[8],
+            )  # fmt: skip
+
+
+@kernel
+def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, gradient, flat):
+    """Add the blocks of a linear tetrahedron for Lame's constants: its gradients (4, 3) are constant.
+
+    `volume` is that of the reference cell. Returns whether the Jacobian is positive. Loops over four nodes, known to the
+    compiler, take half the time of `_integrate_products` and `_add_isotropic`.
+    """
+    first = cells[c, 0]
+    x0, y0, z0 = points[first, 0], points[first, 1], points[first, 2]
+    r, s, t = cells[c, 1], cells[c, 2], cells[c, 3]
+    xr, yr, zr = points[r, 0] - x0, points[r, 1] - y0, points[r, 2] - z0
+    xs, ys, zs = points[s, 0] - x0, points[s, 1] - y0, points[s, 2] - z0
+    xt, yt, zt = points[t, 0] - x0, points[t, 1] - y0, points[t, 2] - z0
+    gradient[1, 0], gradient[1, 1], gradient[1, 2] = ys * zt - zs * yt, zs * xt - xs * zt, xs * yt - ys * xt
+    gradient[2, 0], gradient[2, 1], gradient[2, 2] = zr * yt - yr * zt, xr * zt - zr * xt, yr * xt - xr * yt
+    gradient[3, 0], gradient[3, 1], gradient[3, 2] = yr * zs - zr * ys, zr * xs - xr * zs, xr * ys - yr * xs
+    det = xr * gradient[1, 0] + yr * gradient[1, 1] + zr * gradient[1, 2]
+    if not det > 0.0:
+        return False
+    for i in range(3):
+        gradient[0, i] = -(gradient[1, i] + gradient[2, i] + gradient[3, i])
+    weight = volume / det  # gradients are cofactors over det, the volume is that of the reference cell times det
+    for b in range(4):
+        gx, gy, gz = weight * gradient[b, 0], weight * gradient[b, 1], weight * gradient[b, 2]
+        for a in range(b + 1):
+            x, y, z = gradient[a, 0], gradient[a, 1], gradient[a, 2]
+            products = x * gx, y * gy, z * gz, x * gy, x * gz, y * gz, y * gx, z * gx, z * gy
+            _add_isotropic_block(
+                flat, a != b, mine[a], mine[b], slots[c, a, b], slots[c, b, a], coupling, shear, products
+            )
+    return True
+
+
+@kernel
+def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric, slots, owner, part, data):
+    """Add element stiffness blocks to `data` (n_blocks, 3, 3), in the rows of nodes with ``owner[node] == part``.
+
+    `data` is written in place at `slots`. Threads share the nodes; each adds to its rows in the order of the cells.
+    Returns the number of the first cell with a Jacobian that is not positive, or -1. The products of gradients are
+    integrated first; the moduli, constant in a cell, come in once at the end.
+    """
+    n_cells, n_nodes = cells.shape
+    slopes, tensors = _transposed(dN), _tensors(moduli)
+    isotropic = np.empty(moduli.shape[0], np.bool_)
+    for m in range(moduli.shape[0]):
+        isotropic[m] = _is_isotropic(moduli[m])
+    x, gradient = np.empty((3, n_nodes)), np.empty((3, n_nodes))
+    g, products, block = np.empty((6, n_nodes, n_nodes)), np.empty(9), np.empty(9)
+    mine, corners, volume = np.empty(n_nodes, np.bool_), np.empty((4, 3)), 0.0
+    for weight in weights:
+        volume += weight
+    flat = data.reshape(-1)
+    for c in range(n_cells):
+        if not _owned(cells, c, owner, part, mine):
+            continue
+        m = material[c]
+        if n_nodes == 4 and isotropic[m]:
+            if not _add_tetrahedron(
+                points, cells, c, volume, moduli[m, 0, 1], moduli[m, 3, 3], slots, mine, corners, flat
+            ):
+                return c
+            continue
+        _gather(points, cells, c, x)
+        if not _integrate_products(x, slopes, weights, gradient, g):
+            return c
+        if isotropic[m]:
+            _add_isotropic(g, moduli[m, 0, 1], moduli[m, 3, 3], slots, c, mine, flat)
+        else:
+            _add_general(g, tensors, m, products, block, slots, c, mine, flat)
+    return -1
+
+
+@kernel
+def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, out):
+    """Fill `out` (n_cells, n_q, 6) with the stress xx, yy, zz, xy, yz, xz at the points of the table dN.
+
+    Position and displacement are differentiated along the cell together, and no gradients of shape functions are formed.
+    """
+    n_cells, n_nodes = cells.shape
+    slopes, local = _transposed(dN), np.empty((n_nodes, 6))
+    for c in range(n_cells):
+        for a in range(n_nodes):
+            p = cells[c, a]
+            for i in range(3):
+                local[a, i], local[a, 3 + i] = points[p, i], displacement[p, i]
+        D = moduli[material[c]]
+        for q in range(dN.shape[0]):
+            xr = yr = zr = ur = vr = wr = 0.0
+            xs = ys = zs = us = vs = ws = 0.0
+            xt = yt = zt = ut = vt = wt = 0.0
+            for a in range(n_nodes):
+                r, s, t = slopes[q, 0, a], slopes[q, 1, a], slopes[q, 2, a]
+                xr += r * local[a, 0]
+                yr += r * local[a, 1]
+                zr += r * local[a, 2]
+                ur += r * local[a, 3]
+                vr += r * local[a, 4]
+                wr += r * local[a, 5]
+                xs += s * local[a, 0]
+                ys += s * local[a, 1]
+                zs += s * local[a, 2]
+                us += s * local[a, 3]
+                vs += s * local[a, 4]
+                ws += s * local[a, 5]
+                xt += t * local[a, 0]
+                yt += t * local[a, 1]
+                zt += t * local[a, 2]
+                ut += t * local[a, 3]
+                vt += t * local[a, 4]
+                wt += t * local[a, 5]
+            # Cofactors of the Jacobian: the derivatives of r, s and t in x, y and z, times its determinant.
+            rx, ry, rz = ys * zt - zs * yt, zs * xt - xs * zt, xs * yt - ys * xt
+            sx, sy, sz = zr * yt - yr * zt, xr * zt - zr * xt, yr * xt - xr * yt
+            tx, ty, tz = yr * zs - zr * ys, zr * xs - xr * zs, xr * ys - yr * xs
+            inverse = 1.0 / (xr * rx + yr * ry + zr * rz)
+            exx = (rx * ur + sx * us + tx * ut) * inverse
+            eyy = (ry * vr + sy * vs + ty * vt) * inverse
+            ezz = (rz * wr + sz * ws + tz * wt) * inverse
+            gxy = (ry * ur + sy * us + ty * ut + rx * vr + sx * vs + tx * vt) * inverse
+            gyz = (rz * vr + sz * vs + tz * vt + ry * wr + sy * ws + ty * wt) * inverse
+            gxz = (rx * wr + sx * ws + tx * wt + rz * ur + sz * us + tz * ut) * inverse
+            for i in range(6):
+                normal = D[i, 0] * exx + D[i, 1] * eyy + D[i, 2] * ezz
+                out[c, q, i] = normal + D[i, 3] * gxy + D[i, 4] * gyz + D[i, 5] * gxz
+
+
+@kernel
+def largest_rotation(points, cells, N, dN, displacement):
+    """Return the square of the largest rotation [radian^2] of a cell at the first point of the table dN, and its number.
+
+    Half the curl of the displacement (n_points, 3); the number is -1 where no cell rotates.
+    """
+    n_cells, n_nodes = cells.shape
+    slopes, x, gradient = _transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
+    largest, number = 0.0, -1
+    for c in range(n_cells):
+        _gather(points, cells, c, x)
+        _map(x, slopes, 0, gradient)
+        around_x = around_y = around_z = 0.0
+        for a in range(n_nodes):
+            p = cells[c, a]
+            u, v, w = displacement[p, 0], displacement[p, 1], displacement[p, 2]
+            around_x += gradient[1, a] * w - gradient[2, a] * v
+            around_y += gradient[2, a] * u - gradient[0, a] * w
+            around_z += gradient[0, a] * v - gradient[1, a] * u
+        square = 0.25 * (around_x * around_x + around_y * around_y + around_z * around_z)
+        if square > largest:
+            largest, number = square, c
+    return largest, number
+
+
+@kernel
+def add_internal_force(points, cells, N, dN, weights, axisymmetric, stresses, force):
+    """Add the nodal forces of `stresses` (n_cells, n_q, 6) to `force` (n_points, 3), in place."""
+    n_cells, n_nodes = cells.shape
+    slopes = _transposed(dN)
+    x, gradient = np.empty((3, n_nodes)), np.empty((3, n_nodes))
+    for c in range(n_cells):
+        _gather(points, cells, c, x)
+        for q in range(weights.shape[0]):
+            weight = weights[q] * _map(x, slopes, q, gradient)
+            xx, yy, zz = weight * stresses[c, q, 0], weight * stresses[c, q, 1], weight * stresses[c, q, 2]
+            xy, yz, xz = weight * stresses[c, q, 3], weight * stresses[c, q, 4], weight * stresses[c, q, 5]
+            for a in range(n_nodes):
+                p = cells[c, a]
+                gx, gy, gz = gradient[0, a], gradient[1, a], gradient[2, a]
+                force[p, 0] += xx * gx + xy * gy + xz * gz
+                force[p, 1] += xy * gx + yy * gy + yz * gz
+                force[p, 2] += xz * gx + yz * gy + zz * gz

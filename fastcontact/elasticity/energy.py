@@ -1,0 +1,43 @@
+"""Elastic energy of stresses, and rules to integrate it over cells more exactly than the stiffness needs."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.mesh import quadrature
+from fastcontact.mesh.elements import Element
+
+Array = NDArray[np.float64]
+
+
+def elastic_energy(stress: Array, E: Array, nu: Array) -> Array:
+    """Return stress : strain of an isotropic material (Timoshenko and Goodier, 1970, eq. 86, twice)."""
+    trace = stress[..., :3].sum(axis=-1)
+    square = (stress[..., :3] ** 2).sum(axis=-1) + 2.0 * (stress[..., 3:] ** 2).sum(axis=-1)
+    return np.asarray(((1.0 + nu) * square - nu * trace**2) / E)
+
+
+def cell_volumes(corners: Array, N: Array, dN: Array, axisymmetric: bool) -> Array:
+    """Return the volume per unit of the reference cell, (n_cells, n_q), of cells with nodes (n_cells, n_nodes, dim).
+
+    In axisymmetry over the full circle.
+    """
+    volume = np.linalg.det(np.einsum("qaj,cad->cqdj", dN, corners))
+    if axisymmetric:
+        volume *= 2.0 * np.pi * np.einsum("qa,ca->cq", N, corners[:, :, 0])
+    return np.asarray(volume)
+
+
+def integration_rule(element: Element, n_points: int | None = None) -> quadrature.Rule:
+    """Return a product rule on the reference cell, by default with three points more along each direction than its order."""
+    n = element.order + 3 if n_points is None else n_points
+    line, face = quadrature.gauss_line(n), quadrature.collapsed_triangle(n)
+    return {
+        (2, 3): lambda: face,
+        (2, 4): lambda: quadrature.gauss_square(n),
+        (3, 4): lambda: quadrature.collapsed_tetrahedron(n),
+        (3, 5): lambda: quadrature.conical_pyramid(n),
+        (3, 6): lambda: quadrature.prism(face, line),
+        (3, 8): lambda: quadrature.gauss_cube(n),
+    }[element.dim, element.n_corners]()

@@ -1,0 +1,362 @@
+"""Loads: what they act on and the nodal forces they amount to, in the reference configuration.
+
+Each kind is a class with ``check`` and ``vector``; a new class here, with an ``add_...`` of the model, is a new load.
+Nodal forces are the work-equivalent ones, the integrals of the load times the shape functions. In axisymmetry every
+force is that over the full circle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import ModelError, unknown
+from fastcontact.mesh import elements, quadrature
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import outer_facets
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int32]
+Table = tuple[tuple[float, float], ...]
+# A number, or a function from positions (n, dim) in the reference configuration to numbers (n,).
+Value = float | Callable[[Array], Array]
+# Components by the number of their axis.
+Components = Mapping[int, Value]
+
+# By the linear element on the same corners. Of degree 7 at least (products: in each direction): enough for a constant
+# load on curved quadratic cells of a ring, and for one that varies quadratically over straight facets.
+_RULES: dict[str, Callable[[], quadrature.Rule]] = {
+    "line2": lambda: quadrature.gauss_line(5),
+    "tri3": lambda: quadrature.collapsed_triangle(5),
+    "quad4": lambda: quadrature.gauss_square(4),
+    "tet4": lambda: quadrature.collapsed_tetrahedron(5),
+    "hex8": lambda: quadrature.gauss_cube(4),
+    "wedge6": lambda: quadrature.prism(quadrature.collapsed_triangle(5), quadrature.gauss_line(4)),
+    "pyramid5": lambda: quadrature.conical_pyramid(5),
+}
+
+
+class Load(Protocol):
+    """A load of a model: ``ramp`` is its own history, None that of the analysis."""
+
+    @property
+    def name(self) -> str:
+        """What the load is and where it acts, for messages."""
+        ...
+
+    @property
+    def ramp(self) -> Table | None:
+        """Points (instant, multiplier), or None."""
+        ...
+
+    def check(self, mesh: Mesh, kinematics: str) -> None:
+        """Raise MeshError or ModelError if the load cannot act on this mesh."""
+        ...
+
+    def vector(self, mesh: Mesh, kinematics: str) -> Array:
+        """Return the nodal forces (n_points, dim) at multiplier 1 [force]; errors as for `check`."""
+        ...
+
+
+@dataclass(frozen=True)
+class Pressure:
+    """A pressure [pressure] on a group of outer facets, > 0 in compression, along their outward normals."""
+
+    group: str
+    value: Value
+    ramp: Table | None = None
+
+    @property
+    def name(self) -> str:
+        """See `Load`."""
+        return f"the pressure on '{self.group}'"
+
+    def check(self, mesh: Mesh, kinematics: str) -> None:
+        """See `Load`."""
+        check_value(self.name, self.value)
+        for element, block in facets_of(mesh, self.group).items():
+            outward(mesh, self.group, element, block)
+
+    def vector(self, mesh: Mesh, kinematics: str) -> Array:
+        """See `Load`."""
+        forces = np.zeros((mesh.n_points, mesh.dim))
+        for element, block in facets_of(mesh, self.group).items():
+            facets = outward(mesh, self.group, element, block)
+            x, N, normal = _facet_points(mesh, element, facets, kinematics)
+            _add(forces, facets, N, -evaluated(self.value, x, self.name)[:, :, None] * normal)
+        return forces
+
+
+@dataclass(frozen=True)
+class Traction:
+    """Components of a force per area [pressure] on a group of facets."""
+
+    group: str
+    components: Components
+    ramp: Table | None = None
+
+    @property
+    def name(self) -> str:
+        """See `Load`."""
+        return f"the traction on '{self.group}'"
+
+    def check(self, mesh: Mesh, kinematics: str) -> None:
+        """See `Load`."""
+        facets_of(mesh, self.group)
+        for value in self.components.values():
+            check_value(self.name, value)
+
+    def vector(self, mesh: Mesh, kinematics: str) -> Array:
+        """See `Load`."""
+        forces = np.zeros((mesh.n_points, mesh.dim))
+        for element, facets in facets_of(mesh, self.group).items():
+            x, N, normal = _facet_points(mesh, element, facets, kinematics)
+            _add(forces, facets, N, _density(self, x, np.linalg.norm(normal, axis=2)))
+        return forces
+
+
+@dataclass(frozen=True)
+class BodyForce:
+    """Components of a force per volume [force / length^3] on groups of solid cells, or on all."""
+
+    groups: tuple[str, ...] | None
+    components: Components
+    ramp: Table | None = None
+
+    @property
+    def name(self) -> str:
+        """See `Load`."""
+        where = ", ".join(f"'{group}'" for group in self.groups) if self.groups is not None else "all solid cells"
+        return f"the body force on {where}"
+
+    def check(self, mesh: Mesh, kinematics: str) -> None:
+        """See `Load`."""
+        for group in self.groups or ():
+            if not mesh.cells_of(group, dim=mesh.dim):
+                raise ModelError(f"group '{group}' holds no solid cells: no body force can act on it")
+        for value in self.components.values():
+            check_value(self.name, value)
+
+    def vector(self, mesh: Mesh, kinematics: str) -> Array:
+        """See `Load`."""
+        forces = np.zeros((mesh.n_points, mesh.dim))
+        for element, cells in self.cells(mesh):
+            x, N, J, weights = _mapped(mesh, element, cells)
+            volume = np.linalg.det(J) * weights
+            _add(forces, cells, N, _density(self, x, _turned(volume, x, kinematics)))
+        return forces
+
+    def cells(self, mesh: Mesh) -> Iterator[tuple[str, Indices]]:
+        """Give the solid cells that the load acts on, by element."""
+        if self.groups is None:
+            yield from mesh.solids.items()
+            return
+        numbers = np.unique(np.concatenate([mesh.cell_groups[group] for group in self.groups]))
+        for element, rows in mesh.split(numbers).items():
+            if element in mesh.solids:
+                yield element, mesh.cells[element][rows]
+
+
+@dataclass(frozen=True)
+class NodalForce:
+    """Components of a force [force] on every node of a group."""
+
+    group: str
+    components: Mapping[int, float]
+    ramp: Table | None = None
+
+    @property
+    def name(self) -> str:
+        """See `Load`."""
+        return f"the nodal force on '{self.group}'"
+
+    def check(self, mesh: Mesh, kinematics: str) -> None:
+        """See `Load`."""
+        if not len(mesh.points_of(self.group)):
+            raise ModelError(f"group '{self.group}' is empty: no force can act on it")
+        for value in self.components.values():
+            check_number(self.name, value)
+
+    def vector(self, mesh: Mesh, kinematics: str) -> Array:
+        """See `Load`."""
+        forces = np.zeros((mesh.n_points, mesh.dim))
+        for axis, value in self.components.items():
+            forces[mesh.points_of(self.group), axis] = value
+        return forces
+
+
+@dataclass(frozen=True)
+class TotalForce:
+    """Components of a total force [force], spread as a uniform traction over a group of facets."""
+
+    group: str
+    components: Mapping[int, float]
+    ramp: Table | None = None
+
+    @property
+    def name(self) -> str:
+        """See `Load`."""
+        return f"the total force on '{self.group}'"
+
+    def check(self, mesh: Mesh, kinematics: str) -> None:
+        """See `Load`."""
+        facets_of(mesh, self.group)
+        if kinematics == "axisymmetric" and 0 in self.components:
+            raise ModelError(
+                f"{self.name} has a radial component x, but radial forces cancel over the full circle: "
+                "use add_pressure or add_traction for a radial load"
+            )
+        for value in self.components.values():
+            check_number(self.name, value)
+
+    def vector(self, mesh: Mesh, kinematics: str) -> Array:
+        """See `Load`."""
+        shares, area = np.zeros((mesh.n_points, 1)), 0.0
+        for element, facets in facets_of(mesh, self.group).items():
+            _, N, normal = _facet_points(mesh, element, facets, kinematics)
+            measure = np.linalg.norm(normal, axis=2)
+            _add(shares, facets, N, measure[:, :, None])
+            area += float(measure.sum())
+        forces = np.zeros((mesh.n_points, mesh.dim))
+        for axis, value in self.components.items():
+            forces[:, axis] = shares[:, 0] * (value / area)
+        return forces
+
+
+def facets_of(mesh: Mesh, group: str) -> dict[str, Indices]:
+    """Return the facets of a group by element.
+
+    Raises
+    ------
+    MeshError
+        If there is no such group of cells.
+    ModelError
+        If it holds no facets.
+    """
+    if group in mesh.point_groups and group not in mesh.cell_groups:
+        raise ModelError(f"group '{group}' holds points only: this load needs a group of facets")
+    blocks = mesh.cells_of(group, dim=mesh.dim - 1)
+    if not blocks:
+        raise ModelError(f"group '{group}' holds no facets (cells of dimension {mesh.dim - 1}) that a load can act on")
+    return blocks
+
+
+def outward(mesh: Mesh, group: str, element: str, block: Indices) -> Indices:
+    """Return the facets `block` (n, n_nodes) turned so that their normals point out of the solid.
+
+    Raises
+    ------
+    ModelError
+        If a facet does not lie on the outside of a solid.
+    """
+    outer = outer_facets(mesh).get(element, np.empty((0, block.shape[1]), np.int32))
+    keys = np.sort(np.vstack([outer, block]), axis=1)
+    _, first, place = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    match = first[place.ravel()[len(outer) :]]
+    missing = np.flatnonzero(match >= len(outer))
+    if len(missing):
+        where = mesh.points[block[missing[0]]].mean(axis=0)
+        raise ModelError(
+            f"{len(missing)} of {len(block)} facets of '{group}' do not lie on the outside of a solid (first near "
+            f"{where}), so a pressure has no side to act from: use add_traction there"
+        )
+    return np.ascontiguousarray(outer[match])
+
+
+def evaluated(value: Value, points: Array, name: str) -> Array:
+    """Return `value` at `points` (..., dim), shape (...).
+
+    Raises
+    ------
+    ModelError
+        If it is a function that fails or returns another shape, or a result is not finite.
+    """
+    if not callable(value):
+        return np.full(points.shape[:-1], float(value))
+    flat = np.ascontiguousarray(points.reshape(-1, points.shape[-1]))
+    found = np.asarray(value(flat))
+    if found.shape != (len(flat),) or found.dtype.kind not in "fiu":
+        raise ModelError(
+            f"{name} is a function that returned {found.dtype} numbers of shape {found.shape} for {len(flat)} points: "
+            f"it must return one real number a point, shape ({len(flat)},)"
+        )
+    bad = np.flatnonzero(~np.isfinite(found))
+    if len(bad):
+        raise ModelError(f"{name} is {found[bad[0]]} at {flat[bad[0]]}: it must be finite everywhere")
+    return found.astype(np.float64).reshape(points.shape[:-1])
+
+
+def check_number(name: str, value: Any) -> None:
+    """Raise ModelError if `value` is not a finite number; `name` names it."""
+    if not isinstance(value, Real) or isinstance(value, bool) or not math.isfinite(value):
+        raise ModelError(f"{name} is {value!r}, which is not a finite number")
+
+
+def check_value(name: str, value: Any) -> None:
+    """Raise ModelError if `value` is neither a finite number nor a function; `name` names it."""
+    if not callable(value):
+        check_number(name, value)
+
+
+def axes_of(what: str, components: Mapping[str, Any], dim: int) -> dict[int, Any]:
+    """Return components given by the names of their axes, those that are not None, by number.
+
+    Raises
+    ------
+    ModelError
+        If there is none, or an axis is not one of the space.
+    """
+    given = {name: value for name, value in components.items() if value is not None}
+    if not given:
+        raise ModelError(f"{what} has no component: give for example y=-1.0")
+    for name in given:
+        if name not in "xyz"[:dim]:
+            raise ModelError(f"{what}: {unknown('component', name, 'xyz'[:dim])}")
+    return {"xyz".index(name): value for name, value in given.items()}
+
+
+def _mapped(mesh: Mesh, element: str, cells: Indices) -> tuple[Array, Array, Array, Array]:
+    """Return positions (c, q, dim), shape values (q, n), Jacobians (c, q, dim, cell dim) and weights (q,)."""
+    reference = elements.get(element)
+    xi, weights = _RULES[reference.linear]()
+    N, dN = reference.shape(xi), reference.gradient(xi)
+    corners = mesh.points[cells]
+    x = np.einsum("qn,cnd->cqd", N, corners)
+    return x, N, np.einsum("qnk,cnd->cqdk", dN, corners), weights
+
+
+def _facet_points(mesh: Mesh, element: str, facets: Indices, kinematics: str) -> tuple[Array, Array, Array]:
+    """Return positions (f, q, dim), shape values (q, n) and area vectors (f, q, dim) of the quadrature of facets."""
+    x, N, J, weights = _mapped(mesh, element, facets)
+    if mesh.dim == 2:
+        normal = np.stack([J[:, :, 1, 0], -J[:, :, 0, 0]], axis=2)
+    else:
+        normal = np.cross(J[:, :, :, 0], J[:, :, :, 1])
+    return x, N, _turned(normal * weights[:, None], x, kinematics)
+
+
+def _turned(measure: Array, x: Array, kinematics: str) -> Array:
+    """Return a measure (c, q) or (c, q, dim) taken over the full circle in axisymmetry."""
+    if kinematics != "axisymmetric":
+        return measure
+    circle = 2.0 * np.pi * x[:, :, 0]
+    return measure * (circle if measure.ndim == 2 else circle[:, :, None])
+
+
+def _density(load: Traction | BodyForce, x: Array, measure: Array) -> Array:
+    """Return the components of a load times the measure (c, q) of each point, (c, q, dim)."""
+    density = np.zeros(x.shape)
+    for axis, value in load.components.items():
+        density[:, :, axis] = evaluated(value, x, load.name) * measure
+    return density
+
+
+def _add(forces: Array, cells: Indices, N: Array, density: Array) -> None:
+    """Add the integrals of a density (c, q, dim) times the shape functions to nodal forces."""
+    np.add.at(forces, cells, np.einsum("qn,cqd->cnd", N, density))

@@ -1,0 +1,174 @@
+"""Stiffness matrix: its sparsity once, its values as often as needed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import bsr_array
+
+from fastcontact._jit import parallel
+from fastcontact.elasticity import element_kernels
+from fastcontact.elasticity import stiffness_kernels as pattern_kernels
+from fastcontact.errors import MeshError
+from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+class Owners(NamedTuple):
+    """Parts that points (n_points,) belong to, and for each part the range of the cells that it works on."""
+
+    owner: NDArray[np.uint8]
+    cells: list[tuple[int, int]]
+
+
+@dataclass(frozen=True, eq=False)
+class Sparsity:
+    """Which node pairs share a cell.
+
+    Attributes
+    ----------
+    indptr, indices : ndarray of int32
+        Node-block rows and columns, sorted.
+    slots : dict of str to ndarray (n_cells, n_nodes, n_nodes)
+        By solid element: position in `indices` of every node pair of every cell.
+    """
+
+    indptr: NDArray[np.int32]
+    indices: NDArray[np.int32]
+    slots: dict[str, NDArray[np.int32]]
+    _owners: dict[tuple[str, int], Owners] = field(default_factory=dict, init=False, repr=False)
+
+    def owners(self, mesh: Mesh, name: str) -> Owners:
+        """Return how threads share the assembly of an element, found once for every number of them."""
+        key = name, len(parallel.portions(*mesh.cells[name].shape))
+        if key not in self._owners:
+            self._owners[key] = owners(mesh.cells[name], mesh.n_points)
+        return self._owners[key]
+
+
+def sparsity(mesh: Mesh) -> Sparsity:
+    """Return the sparsity of the stiffness matrix of `mesh`."""
+    blocks = mesh.solids
+    sizes = np.concatenate([[0], *(np.full(len(b), b.shape[1]) for b in blocks.values())])
+    start = np.cumsum(sizes, dtype=np.int64)
+    nodes = np.concatenate([np.empty(0, np.int32), *(b.ravel() for b in blocks.values())])
+    first, cells = pattern_kernels.cells_at_nodes(start, nodes, mesh.n_points)
+    indptr, indices = pattern_kernels.neighbours(start, nodes, first, cells)
+    slots = {name: pattern_kernels.slots_of(block, indptr, indices) for name, block in blocks.items()}
+    return Sparsity(indptr, indices, slots)
+
+
+def stiffness(
+    mesh: Mesh,
+    kinematics: str,
+    moduli: Array,
+    material: dict[str, NDArray[np.int32]],
+    pattern: Sparsity | None = None,
+) -> bsr_array:
+    """Assemble the stiffness matrix of the solid cells.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    kinematics : str
+        ``"axisymmetric"`` (forces over the full circle), ``"plane_strain"`` or ``"plane_stress"`` (unit thickness),
+        or ``"3d"``.
+    moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
+        Symmetric [pressure].
+    material : dict of str to ndarray of int (n_cells,)
+        By solid element: material number of each cell.
+    pattern : Sparsity, optional
+        From `sparsity`, to reuse it.
+
+    Returns
+    -------
+    bsr_array (n_points * dim, n_points * dim)
+        Symmetric, blocks of dim x dim [force / length].
+
+    Raises
+    ------
+    MeshError
+        If a cell is degenerate or turned inside out.
+    """
+    pattern = pattern or sparsity(mesh)
+    data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))
+    loops = element_kernels.loops(mesh.dim)
+    for name, block in mesh.solids.items():
+        tables = elements.get(name).tables
+        owner, parts = pattern.owners(mesh, name)
+
+        def add(
+            part: int, name: str = name, block: NDArray[np.int32] = block, tables: Any = tables, owner: Any = owner,
+            parts: Any = parts,
+        ) -> int:  # fmt: skip
+            rows = slice(*parts[part])
+            bad = loops.add_stiffness(
+                mesh.points, block[rows], *tables, moduli, material[name][rows], kinematics == "axisymmetric",
+                pattern.slots[name][rows], owner, part, data,
+            )  # fmt: skip
+            return int(bad) if bad < 0 else int(bad) + rows.start
+
+        found = parallel.shared(add, range(len(parts)))
+        bad = min((number for number in found if number >= 0), default=-1)
+        if bad >= 0:
+            where = mesh.points[block[bad]].mean(axis=0)
+            raise MeshError(
+                f"cell {bad} of {name} near {where} is degenerate or inside out: its Jacobian is not positive"
+            )
+    size = mesh.n_points * mesh.dim
+    return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
+
+
+def owners(cells: NDArray[np.int32], n_points: int) -> Owners:
+    """Return which part each point belongs to, and the cells that each part works on.
+
+    A point belongs to the first portion of the cells that has it, so that a part's rows are those of its own cells but for
+    a seam. Portions are chosen so that parts work on the same number of cells, those at their seams included.
+    """
+    portions = parallel.portions(*cells.shape)
+    if len(portions) == 1:
+        return Owners(np.zeros(n_points, np.uint8), portions)
+    ends = np.array([0, *(end for _, end in portions)])
+    work = _owners(cells, n_points, ends)[1]
+    beside = work - np.diff(ends)
+    ends[1:-1] = np.cumsum(np.maximum(work.mean() - beside, 0.0))[:-1]
+    return _owners(cells, n_points, np.minimum(ends, len(cells)))[0]
+
+
+def _owners(cells: NDArray[np.int32], n_points: int, ends: Indices) -> tuple[Owners, Indices]:
+    """Return what belongs to the portions of the cells that begin and end at `ends`, and how many cells each works on."""
+    owner = np.full(n_points, parallel.MOST, np.uint8)
+    last, work = np.zeros((2, len(ends) - 1), np.int64)
+    pattern_kernels.first_parts(cells, ends, parallel.MOST, owner, last, work)
+    return Owners(owner, list(zip(ends[:-1].tolist(), np.maximum(last, ends[:-1]).tolist(), strict=True))), work
+
+
+def rigid_modes(points: Array, kinematics: str) -> Array:
+    """Return the rigid-body modes (n_points * dim, n_modes) as displacements of all points.
+
+    Columns: axisymmetric, the translation along the axis; plane, two translations and the rotation; 3D, three
+    translations and three rotations. Rotations turn about the mean point.
+    """
+    n, dim = points.shape
+    if kinematics == "axisymmetric":
+        modes = np.zeros((n, 2, 1))
+        modes[:, 1, 0] = 1.0
+        return modes.reshape(-1, 1)
+    x = points - points.mean(axis=0)
+    if dim == 2:
+        modes = np.zeros((n, 2, 3))
+        modes[:, 0, 0] = modes[:, 1, 1] = 1.0
+        modes[:, 0, 2], modes[:, 1, 2] = -x[:, 1], x[:, 0]
+        return modes.reshape(2 * n, 3)
+    modes = np.zeros((n, 3, 6))
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        modes[:, k, k] = 1.0
+        modes[:, i, 3 + k], modes[:, j, 3 + k] = -x[:, j], x[:, i]
+    return modes.reshape(3 * n, 6)

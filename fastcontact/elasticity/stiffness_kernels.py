@@ -1,0 +1,95 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Sparsity of a stiffness matrix by node blocks: neighbours of each node, slot of each node pair of each cell.
+
+Cells of all elements come as one ragged list: cell ``c`` owns ``nodes[start[c]:start[c + 1]]``.
+"""
+
+import numpy as np
+
+from fastcontact._jit.decorators import kernel
+
+
+@kernel
+def cells_at_nodes(start, nodes, n_points):
+    """Return (first, cells): the cells at node p are ``cells[first[p]:first[p + 1]]``, ascending."""
+    first = np.zeros(n_points + 1, np.int64)
+    for k in range(nodes.shape[0]):
+        first[nodes[k] + 1] += 1
+    for p in range(n_points):
+        first[p + 1] += first[p]
+    position = first[:-1].copy()
+    cells = np.empty(nodes.shape[0], np.int32)
+    for c in range(start.shape[0] - 1):
+        for k in range(start[c], start[c + 1]):
+            p = nodes[k]
+            cells[position[p]] = c
+            position[p] += 1
+    return first, cells
+
+
+@kernel
+def neighbours(start, nodes, first, cells):
+    """Return (indptr, indices): sorted numbers of the nodes that share a cell with each node, itself included."""
+    n_points = first.shape[0] - 1
+    seen = np.full(n_points, -1, np.int32)
+    indptr = np.zeros(n_points + 1, np.int32)
+    for p in range(n_points):
+        count = 0
+        for k in range(first[p], first[p + 1]):
+            for m in range(start[cells[k]], start[cells[k] + 1]):
+                if seen[nodes[m]] != p:
+                    seen[nodes[m]] = p
+                    count += 1
+        indptr[p + 1] = indptr[p] + max(count, 1)  # a node without cells keeps its diagonal
+    indices = np.empty(indptr[-1], np.int32)
+    seen[:] = -1
+    for p in range(n_points):
+        at = indptr[p]
+        for k in range(first[p], first[p + 1]):
+            for m in range(start[cells[k]], start[cells[k] + 1]):
+                if seen[nodes[m]] != p:
+                    seen[nodes[m]] = p
+                    indices[at] = nodes[m]
+                    at += 1
+        if at == indptr[p]:
+            indices[at] = p
+        indices[indptr[p] : indptr[p + 1]].sort()
+    return indptr, indices
+
+
+@kernel
+def slots_of(cells, indptr, indices):
+    """Return (n_cells, n_nodes, n_nodes) positions in `indices` of every node pair of every cell."""
+    n_cells, n_nodes = cells.shape
+    slots = np.empty((n_cells, n_nodes, n_nodes), np.int32)
+    for c in range(n_cells):
+        for a in range(n_nodes):
+            row = cells[c, a]
+            for b in range(n_nodes):
+                low, high = indptr[row], indptr[row + 1]
+                while high - low > 1:
+                    middle = (low + high) // 2
+                    if indices[middle] <= cells[c, b]:
+                        low = middle
+                    else:
+                        high = middle
+                slots[c, a, b] = low
+    return slots
+
+
+@kernel
+def first_parts(cells, ends, nobody, owner, last, work):
+    """Fill `owner` (n_points,), given as `nobody`, with the first of the parts of the cells that has each point.
+
+    Part p consists of the cells ``ends[p]`` to ``ends[p + 1] - 1``; ``work[p]`` cells have a point that it owns, none of
+    them from ``last[p]`` on. Both (n_parts,) are given as zeros.
+    """
+    for part in range(len(ends) - 1):
+        for c in range(ends[part], ends[part + 1]):
+            for a in range(cells.shape[1]):
+                if owner[cells[c, a]] == nobody:
+                    owner[cells[c, a]] = part
+                first = owner[cells[c, a]]
+                if last[first] <= c:
+                    last[first] = c + 1
+                    work[first] += 1

@@ -1,0 +1,263 @@
+"""The linear system of a model: from all displacements u to the unknowns v of the linear solver and back.
+
+``u = T v + t``: T is the identity but for the displacements that relations express by others, t holds the prescribed
+ones. The matrix for the solver is ``T.T K T`` with the rows and columns of everything that is no unknown cleared but
+for their diagonal, so that it keeps the size and blocks of K.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import bsr_array, csr_array, diags_array
+
+from fastcontact._jit.norms_kernels import largest
+from fastcontact.elasticity import system_kernels
+from fastcontact.elasticity.relations import Elimination, Relation, eliminate, stacked_rows
+from fastcontact.errors import ModelError
+from fastcontact.linear.multigrid.cycle_kernels import row_sums
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+# Supports and right-hand sides that miss a condition by less than this fraction meet it.
+CONFLICT = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Stiffness:
+    """A stiffness matrix as the sum of `parts` (n, n): that of the linear solver, and what supports took out of it.
+
+    Two matrices that differ in the rows and columns of supports alone need not be kept both.
+    """
+
+    parts: tuple[Any, ...]
+
+    def __matmul__(self, u: Array) -> Array:
+        total = np.asarray(self.parts[0] @ u)
+        for part in self.parts[1:]:
+            total += part @ u
+        return total
+
+    def largest_row_sum(self, u: Array) -> float:
+        """Return the largest entry of ``|K| |u|``, added up over the parts: what cancels in ``K u``."""
+        return sum(_largest_row_sum(part, u) for part in self.parts)
+
+
+def _largest_row_sum(K: Any, u: Array) -> float:
+    if isinstance(K, csr_array):
+        return float((abs(K) @ np.abs(u)).max(initial=0.0))
+    if not isinstance(K, bsr_array):
+        return float(K.largest_row_sum(u))
+    out = np.empty(K.shape[0])
+    row_sums(K.indptr, K.indices, (K.data.reshape(-1),), u, (0,) * K.blocksize[0], out)
+    return float(out.max(initial=0.0))
+
+
+class System:
+    """Stiffness, supports and relations of a model.
+
+    Parameters
+    ----------
+    K : bsr_array (n, n)
+        Stiffness [force / length]; what supports take out of it is taken out of this array.
+    supported : ndarray of bool (n,)
+        Displacement components that are prescribed.
+    relations : sequence of Relation
+    loose : ndarray of bool (n,), optional
+        Components without stiffness that are free all the same, since something else holds them: none by default.
+
+    Attributes
+    ----------
+    K : Stiffness
+        All of it.
+    matrix : bsr_array (n, n)
+        For the linear solver.
+    fixed : ndarray of bool (n,)
+        Supported components, and those of points without stiffness or relation, which stay at zero.
+    free : ndarray of bool (n,)
+        The unknowns.
+    held : ndarray of bool (n,)
+        Components that a support or a relation may exert a force on.
+    """
+
+    def __init__(
+        self, K: bsr_array, supported: Mask, relations: Sequence[Relation] = (), loose: Mask | None = None
+    ) -> None:
+        R = stacked_rows(relations, K.shape[0])
+        related = np.zeros(K.shape[0], bool)
+        related[R.indices] = True
+        loose = np.zeros(K.shape[0], bool) if loose is None else loose
+        self.fixed: Mask = supported | (np.asarray(K.diagonal() == 0.0) & ~related & ~loose)
+        self.held: Mask = self.fixed | related
+        self._constraints = ConstrainedMotion(self.fixed, relations)
+        self.T = self._constraints.T if relations else None
+        self.free: Mask = self._constraints.free
+        if self.T is None:
+            self.K = Stiffness(supports_apart(K, self.fixed))
+            self.matrix = self.K.parts[0]
+        else:
+            self.K = Stiffness((K,))
+            condensed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
+            condensed.sort_indices()
+            self.free &= (condensed.diagonal() > 0) | loose  # not points that relations tie to nothing but each other
+            self.matrix = supports_apart(condensed, ~self.free)[0]
+        self._no_unknowns = np.flatnonzero(~self.free)
+
+    def keep(self, matrix: Any) -> None:
+        """Take what the linear solver made of `matrix`, whose room it may have taken, in its place: ``matrix @ v``."""
+        if self.K.parts[0] is self.matrix:
+            self.K = Stiffness((matrix, *self.K.parts[1:]))
+        self.matrix = matrix
+
+    def lift(self, prescribed: Array, values: Array) -> Array:
+        """Return t for the prescribed displacements (n,) and the right-hand sides (m,) of the relations.
+
+        Raises
+        ------
+        ModelError
+            If relations and supports contradict each other.
+        """
+        return self._constraints.lift(prescribed, values)
+
+    def values(self, multiplier: Sequence[float]) -> Array:
+        """Return the right-hand sides (m,) of the relations, given the multiplier of each."""
+        return self._constraints.values(multiplier)
+
+    def right(self, f: Array, t: Array) -> Array:
+        """Return the right-hand side (n,) of the solver for the forces `f` (n,) on all displacements."""
+        # Without relations t moves supports alone, and those act on unknowns through what was taken out of the matrix.
+        return self.reduced(f - (self.K.parts[1] if self.T is None else self.K) @ t)
+
+    def reduced(self, force: Array) -> Array:
+        """Return the forces (n,) on the unknowns that `force` (n,) on all displacements amounts to."""
+        return self._of_unknowns(force.copy() if self.T is None else self.T.T @ force)
+
+    def _of_unknowns(self, values: Array) -> Array:
+        """Clear, in place, the values (n,) of everything that is no unknown."""
+        values[self._no_unknowns] = 0.0
+        return values
+
+    def rows(self, rows: csr_array, offset: Array, t: Array) -> tuple[csr_array, Array]:
+        """Return ``rows @ u + offset`` as rows and offset for the unknowns v."""
+        offset = offset + rows @ t
+        rows = rows.copy() if self.T is None else csr_array(rows @ self.T)
+        rows.data[~self.free[rows.indices]] = 0.0
+        rows.eliminate_zeros()
+        return rows, offset
+
+    def displacement(self, v: Array, t: Array) -> Array:
+        """Return all displacements (n,)."""
+        return (v if self.T is None else self.T @ v) + t
+
+    def unknowns(self, u: Array, t: Array | float = 0.0) -> Array:
+        """Return v (n,) of displacements u (n,) that obey the relations."""
+        return self._of_unknowns(u - t)
+
+    def unknowns_of(self, motions: Array) -> Array:
+        """Return the unknowns (n, k) of motions (n, k) that obey supports and relations."""
+        return np.where(self.free[:, None], motions, 0.0)
+
+    def involved(self, dofs: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Return the unknowns that the displacements `dofs` depend on, ascending."""
+        if self.T is not None:
+            dofs = np.unique(self.T[dofs].indices)
+        return dofs[self.free[dofs]].astype(np.intp)
+
+    def balance(self, out: Array) -> tuple[Array, float]:
+        """Return the forces (n,) of supports and relations, and the largest force that nothing holds.
+
+        `out` (n,) is the internal minus all other forces.
+        """
+        return np.where(self.held, out, 0.0), largest(self.reduced(out))
+
+
+class ConstrainedMotion:
+    """What supports and relations leave of the displacements, ``u = T v + t``; without stiffness.
+
+    Parameters
+    ----------
+    fixed : ndarray of bool (n,)
+    relations : sequence of Relation
+    """
+
+    def __init__(self, fixed: Mask, relations: Sequence[Relation]) -> None:
+        self.fixed, self.relations = fixed, list(relations)
+        self.free: Mask = ~fixed
+        if not relations:
+            return
+        self._tie: Elimination = eliminate(stacked_rows(relations, len(fixed)), fixed)
+        self.free[self._tie.pivots] = False
+        self.T = csr_array(self._tie.T @ diags_array(self.free.astype(float)))
+        self.T.eliminate_zeros()
+
+    def values(self, multiplier: Sequence[float]) -> Array:
+        """Return the right-hand sides (m,) for the multiplier of each relation."""
+        blocks = [
+            np.full(relation.rows.shape[0], relation.value * factor)
+            for relation, factor in zip(self.relations, multiplier, strict=True)
+        ]
+        return np.concatenate(blocks) if blocks else np.empty(0)
+
+    def lift(self, prescribed: Array, values: Array) -> Array:
+        """See `System.lift`."""
+        known: Array = np.where(self.fixed, prescribed, 0.0)
+        if not self.relations:
+            return known
+        given = np.concatenate([known, values])
+        off = np.abs(self._tie.conditions @ given)
+        scale = np.abs(self._tie.conditions) @ np.abs(given)
+        wrong = np.flatnonzero(off > CONFLICT * scale)
+        if len(wrong):
+            raise ModelError(
+                f"{self._name(int(self._tie.origin[wrong[0]]))} contradicts the supports or relations before it by "
+                f"{off[wrong[0]]:.3g}: remove one of them"
+            )
+        lift: Array = self._tie.T @ known + self._tie.S @ values
+        return lift
+
+    def _name(self, row: int) -> str:
+        ends = np.cumsum([relation.rows.shape[0] for relation in self.relations])
+        return self.relations[int(np.searchsorted(ends, row, side="right"))].name
+
+
+def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
+    """Take the rows and columns of supported degrees of freedom out of K (n, n), which is changed in place.
+
+    Returns
+    -------
+    matrix : bsr_array (n, n)
+        K without them, their diagonal kept.
+    taken : csr_array (n, n)
+        What K was, minus `matrix`: few numbers.
+    """
+    K = _with_diagonal(K)
+    diagonal = K.diagonal()
+    kept = np.where(diagonal > 0, diagonal, diagonal.max(initial=1.0))
+    supported = fixed.reshape(-1, K.blocksize[0])
+    given = K.indptr, K.indices, K.data, supported, supported.any(axis=1), kept
+    start = np.empty(K.shape[0] + 1, np.int32)
+    system_kernels.take_out(*given, start, np.empty(0, np.int32), np.empty(0))
+    columns, taken = np.empty(start[-1], np.int32), np.empty(start[-1])
+    if len(taken):
+        system_kernels.take_out(*given, start, columns, taken)
+    return K, csr_array((taken, columns, start), shape=K.shape)
+
+
+def _with_diagonal(K: bsr_array) -> bsr_array:
+    """Return K with a block on the diagonal of every block row, zero where there was none."""
+    present = np.zeros(len(K.indptr) - 1, bool)
+    block_row = np.repeat(np.arange(len(present)), np.diff(K.indptr))
+    present[block_row[block_row == K.indices]] = True
+    missing = np.flatnonzero(~present)
+    if not len(missing):
+        return K
+    size = K.blocksize[0]
+    rows, columns = np.r_[block_row, missing], np.r_[K.indices, missing]
+    order = np.lexsort((columns, rows))
+    data = np.concatenate([K.data, np.zeros((len(missing), size, size))])[order]
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(present)))])
+    return bsr_array((data, columns[order], indptr), shape=K.shape)

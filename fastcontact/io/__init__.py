@@ -1,1 +1,0 @@
-"""Mesh and result files, in and out: one file a format."""

@@ -1,0 +1,74 @@
+"""Linear solvers by name, and the one that suits a problem; a new file in `solvers` is a new solver."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import logging
+import pkgutil
+
+from fastcontact.errors import ModelError, unknown
+from fastcontact.linear import solvers
+from fastcontact.linear.protocol import Counters, Drag, LinearSolver, Loaded, Oblique
+
+log = logging.getLogger("fastcontact")
+# Solvers that need a package which is not among the dependencies, and the extra that brings it.
+OPTIONAL = {"cholmod": ("kvxopt", "cholmod"), "pardiso": ("pypardiso", "mkl")}
+KNOWN = tuple(name for _, name, _ in pkgutil.iter_modules(solvers.__path__))
+SOLVERS = tuple(name for name in KNOWN if name not in OPTIONAL or importlib.util.find_spec(OPTIONAL[name][0]))
+# Above these sizes a multigrid solution is cheaper than a factorisation (measured, see bench/README.md). The second where
+# constraints need columns of K^-1, which factors give at once and multigrid one solution each.
+DIRECT_UP_TO = {2: 3_000_000, 3: 15_000}
+DIRECT_WITH_COLUMNS_UP_TO = {2: 3_000_000, 3: 150_000}
+
+
+def make(
+    name: str, *, dim: int, n_dofs: int, tolerance: float = 1e-10, precision: str | None = None, columns: bool = False
+) -> LinearSolver:  # fmt: skip
+    """Return a linear solver by name.
+
+    Parameters
+    ----------
+    name : str
+        ``"direct"`` (always there), ``"cholmod"`` or ``"pardiso"`` (direct too, where their packages are
+        installed), ``"amg"`` or ``"auto"``: direct for 2D and small 3D problems, multigrid beyond. Multigrid needs
+        more iterations where parts are thin or materials nearly incompressible.
+    dim, n_dofs : int
+        Dimension and number of unknowns, for ``"auto"``.
+    tolerance : float
+        Relative residual of iterative solvers.
+    precision : {"single", "double"}, optional
+        Of the multigrid cycle, single by default; direct solvers work in double precision always.
+    columns : bool
+        Whether constraints cannot be eliminated, but need columns of ``K^-1``: those with a compliance of their own. For
+        ``"auto"``.
+
+    Raises
+    ------
+    ModelError
+        If there is no such solver, a package that it needs is missing, or the tolerance is no relative one.
+    """
+    if not 0.0 < tolerance < 1.0:
+        raise ModelError(f"the tolerance {tolerance} of the linear solver must lie between 0 and 1, such as 1e-10")
+    if name == "auto":
+        name, reason = chosen(dim, n_dofs, columns)
+        log.info("linear solver: %s, %s", name, reason)
+    if name in OPTIONAL and name not in SOLVERS:
+        package, extra = OPTIONAL[name]
+        raise ModelError(f"linear solver '{name}' needs the package {package}: pip install 'fastcontact[{extra}]'")
+    if name not in SOLVERS:
+        raise ModelError(unknown("linear solver", name, [*SOLVERS, "auto"]))
+    options = {} if precision is None or name != "amg" else {"precision": precision}
+    solver: LinearSolver = importlib.import_module(f"{solvers.__name__}.{name}").SOLVER(tolerance, **options)
+    return solver
+
+
+def chosen(dim: int, n_dofs: int, columns: bool = False) -> tuple[str, str]:
+    """Return the solver that ``"auto"`` stands for, and why."""
+    limit = (DIRECT_WITH_COLUMNS_UP_TO if columns else DIRECT_UP_TO)[dim]
+    if n_dofs <= limit:
+        return "direct", f"for {n_dofs} unknowns in {dim}D a factorisation is cheapest (up to {limit})"
+    return "amg", f"for {n_dofs} unknowns in {dim}D a factorisation is dearer than multigrid (beyond {limit})"
+
+
+__all__ = ["SOLVERS", "Counters", "Drag", "LinearSolver", "Loaded", "Oblique", "make"]

@@ -1,0 +1,1 @@
+"""A sparse Cholesky factorisation that keeps the unknowns of the contact surfaces last."""

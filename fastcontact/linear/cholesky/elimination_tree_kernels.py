@@ -1,0 +1,191 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""What the Cholesky factor of a sparse symmetric matrix looks like, found without computing it.
+
+The matrix A (n, n) is given by columns, both triangles: ``start`` (n + 1,) and ``rows`` (nnz,). In its elimination tree the
+parent of a column is the first row below the diagonal of that column of the factor, -1 for roots (Liu, 1990).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact._jit.decorators import inlined_kernel, kernel
+
+Indices = NDArray[np.int32]
+Offsets = NDArray[np.int64]
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@kernel
+def parents(start: Indices, rows: Indices, parent: Indices) -> None:
+    """Fill `parent` (n,) with the elimination tree."""
+    n = len(parent)
+    ancestor = np.full(n, -1, np.int32)  # like the parent, but on a shorter way to the root
+    for j in range(n):
+        parent[j] = -1
+        for k in range(start[j], start[j + 1]):
+            i = rows[k]
+            while i != -1 and i < j:
+                above = ancestor[i]
+                ancestor[i] = j
+                if above == -1:
+                    parent[i] = j
+                i = above
+
+
+@kernel
+def postordered(parent: Indices, order: Indices) -> None:
+    """Fill `order` (n,) with the columns so that every subtree stands together, children before their parent."""
+    n, count = len(parent), 0
+    first, beside, stack = np.full(n, -1, np.int32), np.full(n, -1, np.int32), np.empty(n, np.int32)
+    for j in range(n - 1, -1, -1):
+        if parent[j] != -1:
+            beside[j] = first[parent[j]]
+            first[parent[j]] = j
+    for root in range(n):
+        if parent[root] != -1:
+            continue
+        stack[0], top = root, 0
+        while top >= 0:
+            child = first[stack[top]]
+            if child == -1:
+                order[count] = stack[top]
+                count += 1
+                top -= 1
+            else:
+                first[stack[top]] = beside[child]
+                top += 1
+                stack[top] = child
+
+
+@kernel
+def counts(start: Indices, rows: Indices, parent: Indices, order: Indices, count: Indices) -> None:
+    """Fill `count` (n,) with the entries of each column of the factor, the diagonal included.
+
+    `order` (n,) is that of `postordered`. By the leaves of row subtrees (Gilbert, Ng and Peyton, 1994).
+    """
+    n = len(parent)
+    first, farthest, last = np.full(n, -1, np.int32), np.full(n, -1, np.int32), np.full(n, -1, np.int32)
+    ancestor = np.arange(n).astype(np.int32)
+    for k in range(n):
+        j = order[k]
+        count[j] = 1 if first[j] == -1 else 0
+        while j != -1 and first[j] == -1:
+            first[j] = k
+            j = parent[j]
+    for k in range(n):
+        j = order[k]
+        if parent[j] != -1:
+            count[parent[j]] -= 1
+        for at in range(start[j], start[j + 1]):
+            i = rows[at]
+            if i <= j or first[j] <= farthest[i]:
+                continue
+            # Column j is a leaf of the subtree of row i; what it has in common with the leaf before counts once.
+            farthest[i] = first[j]
+            before, last[i] = last[i], j
+            count[j] += 1
+            if before != -1:
+                count[_common(before, ancestor)] -= 1
+        if parent[j] != -1:
+            ancestor[j] = parent[j]
+    for j in range(n):
+        if parent[j] != -1:
+            count[parent[j]] += count[j]
+
+
+@inlined_kernel
+def _common(j: int, ancestor: Indices) -> int:
+    """Return the root of the set that j belongs to; the way there is shortened."""
+    root = j
+    while root != ancestor[root]:
+        root = ancestor[root]
+    while j != root:
+        above = ancestor[j]
+        ancestor[j] = root
+        j = above
+    return root
+
+
+@kernel
+def supernodes(
+    parent: Indices, count: Indices, given: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets
+) -> int:
+    """Find runs of columns with the same rows below them, or nearly so; return how many.
+
+    Parameters
+    ----------
+    parent, count : ndarray of int (n,)
+        Tree and entries of columns that are numbered as in `postordered`.
+    given : ndarray of bool (n,)
+        No run has columns of both kinds.
+    widths : ndarray (k,), shares : ndarray (k + 1,)
+        Runs that follow each other in the tree become one where zeros are at most a share of its entries: which one, the
+        first of the widths ascending that is no smaller than that of the run says. The last share is that of all wider ones.
+    first, below : ndarray of int (n + 1,)
+        Filled: the first column of each run, n at the end, and the number of rows below.
+    """
+    n, top = len(parent), -1
+    entries = np.empty(n, np.int64)
+    for j in range(n):
+        same = j > 0 and parent[j - 1] == j and count[j - 1] == count[j] + 1 and given[j - 1] == given[j]
+        if not same:
+            if top >= 0:
+                top = _joined(parent, given, widths, shares, first, below, entries, top, j)
+            top += 1
+            first[top], entries[top] = j, 0
+        entries[top] += count[j]
+        below[top] = count[j] - 1
+    if n:
+        top = _joined(parent, given, widths, shares, first, below, entries, top, n)
+    first[top + 1] = n
+    return top + 1
+
+
+@inlined_kernel
+def _joined(
+    parent: Indices, given: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets, entries: Offsets,
+    top: int, end: int,
+) -> int:  # fmt: skip
+    """Join the run `top`, which ends before column `end`, with those just before it while that adds few zeros."""
+    while top > 0 and first[top] <= parent[first[top] - 1] < end and given[first[top] - 1] == given[first[top]]:
+        width = end - first[top - 1]
+        all_entries = width * (width + 1) // 2 + width * below[top]
+        k = 0
+        while k < len(widths) and width > widths[k]:
+            k += 1
+        if all_entries - entries[top - 1] - entries[top] > shares[k] * all_entries:
+            break
+        entries[top - 1] += entries[top]
+        below[top - 1] = below[top]
+        top -= 1
+    return top
+
+
+@kernel
+def rows_below(
+    start: Indices, rows: Indices, order: Indices, place: Indices, parent: Indices, first: Offsets, begin: Offsets,
+    found: Indices,
+) -> None:  # fmt: skip
+    """Fill `found` with the rows of each run of columns below it, ascending; those of run s begin at ``begin[s]``.
+
+    The matrix is numbered as it was, everything else as in `postordered`: ``order[k]`` is column k, ``place`` the inverse.
+    """
+    n, count = len(order), len(first) - 1
+    own, seen, at = np.empty(n, np.int32), np.full(count, -1, np.int32), begin[:count].copy()
+    for s in range(count):
+        own[first[s] : first[s + 1]] = s
+    for i in range(n):
+        # The row runs up the tree from each of its entries until it meets a way taken before, or its own column.
+        for k in range(start[order[i]], start[order[i] + 1]):
+            j = place[rows[k]]
+            if j >= i:
+                continue
+            s = own[j]
+            while s != own[i] and seen[s] != i:
+                seen[s] = i
+                found[at[s]] = i
+                at[s] += 1
+                s = own[parent[first[s + 1] - 1]]

@@ -1,0 +1,193 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Factors ``L D L.T`` of a sparse symmetric positive definite matrix, supernode by supernode (Duff and Reid, 1983).
+
+Every supernode gathers a small dense matrix, its front: its own columns of the matrix and what the supernodes below it in
+the elimination tree leave. Its columns are eliminated there, and the rest of the front is left to the supernode above.
+Fronts are symmetric, and only their upper triangles count: row j of a front is column j of L.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact._jit.decorators import inlined_kernel, kernel
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int32]
+Offsets = NDArray[np.int64]
+
+# Columns that are eliminated together, and rows of what they change that are computed together.
+PANEL, ROWS = 48, 96
+# Products of fewer multiplications are no work for BLAS.
+SMALL = 20_000
+
+
+@kernel
+def room(parent: Indices, first: Offsets, begin: Offsets) -> tuple[int, int]:
+    """Return the entries of the largest front, and those that fronts leave at most at a time."""
+    count = len(first) - 1
+    front = most = used = top = 0
+    left = np.empty(count, np.int64)  # supernodes whose rest waits
+    for s in range(count):
+        below = begin[s + 1] - begin[s]
+        front = max(front, (first[s + 1] - first[s] + below) ** 2)
+        while top > 0 and first[s] <= parent[first[left[top - 1] + 1] - 1] < first[s + 1]:
+            top -= 1
+            used -= (begin[left[top] + 1] - begin[left[top]]) ** 2
+        if below:
+            left[top] = s
+            top += 1
+            used += below**2
+            most = max(most, used)
+    return front, most
+
+
+@kernel
+def factorise(
+    start: Indices, rows: Indices, values: Array, order: Indices, place: Indices, parent: Indices, first: Offsets,
+    begin: Offsets, below: Indices, sizes: tuple[int, int], begins: Offsets, L: Array, d: Array,
+) -> int:  # fmt: skip
+    """Fill L and `d` (n,); return the first column whose pivot, then in `d`, is not positive, or -1.
+
+    Parameters
+    ----------
+    start, rows, values
+        The matrix by columns, both triangles, numbered as it was; everything else is numbered as in
+        `elimination_tree.postordered`.
+    order, place : ndarray of int (n,)
+        The column that is eliminated at a time, and when each is.
+    parent : ndarray of int (n,)
+        Elimination tree.
+    first, begin, below
+        Supernodes and the rows below them, as in `triangular`.
+    sizes : (int, int)
+        See `room`.
+    begins : ndarray of int (n + 1,)
+        Where the columns of L begin.
+    L : ndarray
+        Filled column by column, the unit diagonal first.
+    d : ndarray (n,)
+        Filled with the diagonal of D.
+    """
+    count = len(first) - 1
+    front, waiting = np.empty(sizes[0]), np.empty(sizes[1])
+    local, left = np.empty(len(order), np.int64), np.empty(count, np.int64)
+    # Room for a panel, its transpose and product.
+    widest = 0
+    for s in range(count):
+        widest = max(widest, first[s + 1] - first[s] + begin[s + 1] - begin[s])
+    one, other, product = np.empty(PANEL * widest), np.empty(PANEL * widest), np.empty(ROWS * widest)
+    top = used = 0
+    for s in range(count):
+        low, high = first[s], first[s + 1]
+        width, size = high - low, high - low + begin[s + 1] - begin[s]
+        F = front[: size * size].reshape(size, size)
+        for i in range(size):
+            F[i, i:] = 0.0
+        for k in range(width):
+            local[low + k] = k
+        for k in range(begin[s], begin[s + 1]):
+            local[below[k]] = width + k - begin[s]
+        for j in range(low, high):
+            for k in range(start[order[j]], start[order[j] + 1]):
+                i = place[rows[k]]
+                if i >= j:
+                    F[j - low, local[i]] = values[k]
+        while top > 0 and low <= parent[first[left[top - 1] + 1] - 1] < high:
+            top -= 1
+            child = left[top]
+            m = begin[child + 1] - begin[child]
+            used -= m * m
+            _add(waiting[used : used + m * m].reshape(m, m), below[begin[child] : begin[child + 1]], local, F)
+        bad = _eliminated(F, width, one, other, product)
+        if bad >= 0:
+            d[low + bad] = F[bad, bad]
+            return low + bad
+        for j in range(width):
+            d[low + j] = F[j, j]
+            at = begins[low + j]
+            L[at] = 1.0
+            for k in range(j + 1, size):
+                L[at + k - j] = F[j, k]
+        m = size - width
+        if m:
+            rest = waiting[used : used + m * m].reshape(m, m)
+            for i in range(m):
+                rest[i, i:] = F[width + i, width + i :]
+            left[top] = s
+            top += 1
+            used += m * m
+    return -1
+
+
+@kernel
+def _add(rest: Array, rows: Indices, local: Offsets, F: Array) -> None:
+    """Add what a front left for its `rows` (m,) to the front above."""
+    m = len(rows)
+    for i in range(m):
+        target, own = F[local[rows[i]]], rest[i]
+        for k in range(i, m):
+            target[local[rows[k]]] += own[k]
+
+
+@kernel
+def _eliminated(F: Array, width: int, one: Array, other: Array, product: Array) -> int:
+    """Eliminate the first `width` columns of a front; return the first without a positive pivot, or -1.
+
+    The pivots stay on the diagonal, to the right of it the columns of L.
+    """
+    size = len(F)
+    for begin in range(0, width, PANEL):
+        end = min(begin + PANEL, width)
+        for j in range(begin, end):
+            pivot = F[j, j]
+            if not pivot > 0.0:
+                return j
+            row = F[j]
+            for i in range(j + 1, end):
+                factor, target = row[i] / pivot, F[i]
+                for k in range(i, size):
+                    target[k] -= factor * row[k]
+            for k in range(j + 1, size):
+                row[k] /= pivot
+        m = size - end
+        if m:
+            if (end - begin) * m * m < SMALL:
+                _reduced_by_rows(F, begin, end)
+            else:
+                _reduced_by_blocks(F, begin, end, one, other, product)
+    return -1
+
+
+@inlined_kernel
+def _reduced_by_rows(F: Array, begin: int, end: int) -> None:
+    """Subtract from the rest of a front what the columns `begin` to `end` of L make there."""
+    size = len(F)
+    for j in range(begin, end):
+        row, pivot = F[j], F[j, j]
+        for i in range(end, size):
+            factor, target = row[i] * pivot, F[i]
+            for k in range(i, size):
+                target[k] -= factor * row[k]
+
+
+@kernel
+def _reduced_by_blocks(F: Array, begin: int, end: int, one: Array, other: Array, product: Array) -> None:
+    """The same by products of matrices."""
+    size, width = len(F), end - begin
+    m = size - end
+    plain, scaled = one[: m * width].reshape(m, width), other[: m * width].reshape(m, width)
+    for j in range(width):
+        row, pivot = F[begin + j], F[begin + j, begin + j]
+        for i in range(m):
+            plain[i, j] = row[end + i]
+            scaled[i, j] = pivot * row[end + i]
+    for low in range(0, m, ROWS):
+        high = min(low + ROWS, m)
+        change = product[: (high - low) * (m - low)].reshape(high - low, m - low)
+        np.dot(scaled[low:high], plain[low:].T, change)
+        for i in range(low, high):
+            target, own = F[end + i], change[i - low]
+            for k in range(i, m):
+                target[end + k] -= own[k - low]

@@ -1,0 +1,84 @@
+"""Factors ``P K P.T = L D L.T`` of a symmetric positive definite matrix, and what contact takes from them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dpotri
+
+from fastcontact._jit.parallel import on_one_blas_thread
+from fastcontact.linear.cholesky import triangular_kernels
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+class Shape(NamedTuple):
+    """L (n, n) by columns, row numbers once for all columns of a supernode; see `kernels.triangular`."""
+
+    start: NDArray[np.int64]
+    values: Array
+    first: NDArray[np.int64]
+    begin: NDArray[np.int64]
+    rows: NDArray[np.int32]
+
+
+class SymmetricFactors:
+    """L and D.
+
+    Parameters
+    ----------
+    L : Shape
+        Lower triangular (n, n) with a unit diagonal.
+    d : ndarray (n,)
+        Diagonal of D.
+    place : ndarray of int (n,)
+        Where each unknown stands in the factors.
+    last : ndarray of int (m,)
+        Unknowns that are eliminated after all others: no column of theirs in L has a row of another one.
+    """
+
+    def __init__(self, L: Shape, d: Array, place: Indices, last: Indices) -> None:
+        self.n = len(d)
+        self.nnz = len(L.values)
+        self._L, self._d, self._place, self._last = L, d, place, last
+        self._given = np.zeros(self.n, bool)
+        self._given[place[last]] = True
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the factors [bytes]."""
+        return sum(array.nbytes for array in (*self._L, self._d, self._place, self._given))
+
+    def solve(self, F: Array) -> Array:
+        """Return ``K^-1 F`` for right-hand sides (n,) or (n, k)."""
+        nothing = np.zeros(self.n, bool)
+        X = np.empty((self.n, *F.shape[1:]))
+        X[self._place] = F
+        columns = np.ascontiguousarray(X.reshape(self.n, -1).T)
+        for x in columns:
+            triangular_kernels.forward(*self._L, x)
+            x /= self._d
+            triangular_kernels.backward(*self._L, nothing, x)
+        return np.ascontiguousarray(columns.T).reshape(X.shape)[self._place]
+
+    @on_one_blas_thread
+    def last_inverse(self) -> Array:
+        """Return the rows and columns `last` of ``K^-1``, in the order of `last`."""
+        at = np.sort(self._place[self._last])
+        wanted, trailing = np.full(self.n, -1), np.zeros((len(at), len(at)))
+        wanted[at] = np.arange(len(at))
+        triangular_kernels.block(*self._L, wanted, trailing)
+        inverse, _ = dpotri(trailing * np.sqrt(self._d[at]), lower=True)
+        inverse = np.tril(inverse) + np.tril(inverse, -1).T
+        order = np.searchsorted(at, self._place[self._last])
+        return np.ascontiguousarray(inverse[np.ix_(order, order)])
+
+    def extended(self, u: Array) -> Array:
+        """Return the displacement (n,) under forces on the unknowns `last` alone, which move by u (m,)."""
+        x = np.zeros(self.n)
+        x[self._place[self._last]] = u
+        triangular_kernels.backward(*self._L, self._given, x)
+        return x[self._place]

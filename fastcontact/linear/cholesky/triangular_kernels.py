@@ -1,0 +1,148 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Triangular solutions with the factors of a symmetric matrix, column blocks of equal structure (supernodes) at a time.
+
+L (n, n) is lower triangular with a unit diagonal, column by column: `start` (n + 1,) and `values`, the diagonal first.
+The columns ``first[s]`` to ``first[s + 1] - 1`` of supernode s share the rows ``rows[begin[s] : begin[s + 1]]`` below
+them; between themselves they are full.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact._jit.decorators import kernel, summing_kernel
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int32]
+Offsets = NDArray[np.int64]
+
+
+@kernel
+def supernodes(start: Offsets, rows: Offsets, first: Offsets, begin: Offsets) -> int:
+    """Find the supernodes of L with row numbers `rows` (nnz,), sorted; return how many.
+
+    `first` and `begin` (n + 1,) are filled; the rows that they share are moved to the front of `rows`.
+    """
+    n = len(start) - 1
+    count, kept = 0, 0
+    begin[0] = 0
+    for j in range(n):
+        if j == 0 or not _continues(start, rows, j):
+            first[count] = j
+            count += 1
+        if j == n - 1 or not _continues(start, rows, j + 1):
+            # No column after this one is part of its supernode; what moves is moved to places that were read before.
+            for k in range(start[j] + 1, start[j + 1]):
+                rows[kept] = rows[k]
+                kept += 1
+            begin[count] = kept
+    first[count] = n
+    return count
+
+
+@kernel
+def _continues(start: Offsets, rows: Offsets, j: int) -> bool:
+    """Return whether column j has the rows of column j - 1 without the first."""
+    before, now = start[j - 1] + 1, start[j]
+    length = start[j + 1] - now
+    if start[j] - before != length:
+        return False
+    for k in range(length):
+        if rows[before + k] != rows[now + k]:
+            return False
+    return True
+
+
+@kernel
+def unit_diagonal(start: Offsets, values: Array, d: Array) -> None:
+    """Turn the factor L of ``L L.T``, the diagonal first in every column, into that of ``L D L.T``; fill d (n,)."""
+    for j in range(len(d)):
+        pivot = values[start[j]]
+        d[j] = pivot * pivot
+        for k in range(start[j], start[j + 1]):
+            values[k] /= pivot
+
+
+@kernel
+def block(
+    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Indices, wanted: Offsets, out: Array
+) -> None:
+    """Fill `out` (m, m), zero before, with the rows and columns of L that `wanted` (n,) numbers; -1 stands for the others."""
+    for s in range(len(first) - 1):
+        high = first[s + 1]
+        for j in range(first[s], high):
+            if wanted[j] < 0:
+                continue
+            for i in range(j, high):
+                if wanted[i] >= 0:
+                    out[wanted[i], wanted[j]] = values[start[j] + i - j]
+            for k in range(begin[s], begin[s + 1]):
+                if wanted[rows[k]] >= 0:
+                    out[wanted[rows[k]], wanted[j]] = values[start[j] + high - j + k - begin[s]]
+
+
+@kernel
+def forward(start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Indices, x: Array) -> None:
+    """Replace x (n,) by ``L^-1 x``."""
+    moved = np.empty(len(x))
+    for s in range(len(first) - 1):
+        low, high = first[s], first[s + 1]
+        below = begin[s + 1] - begin[s]
+        j = low
+        while j < high and x[j] == 0.0:  # loads are often few
+            j += 1
+        if j == high:
+            continue
+        moved[:below] = 0.0
+        for j in range(low, high):
+            xj = x[j]
+            at = start[j] + 1
+            for k in range(j + 1, high):
+                x[k] -= values[at] * xj
+                at += 1
+            for k in range(below):
+                moved[k] += values[at + k] * xj
+        for k in range(below):
+            x[rows[begin[s] + k]] -= moved[k]
+
+
+@summing_kernel
+def backward(
+    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Indices, given: NDArray[np.bool_], x: Array
+) -> None:
+    """Replace x (n,) by the solution of ``L.T y = x`` in which the entries `given` (n,) keep their values.
+
+    Nothing that is given may stand before something that it depends on: with j given, so are all rows of column j.
+    """
+    gathered = np.empty(len(x))
+    for s in range(len(first) - 2, -1, -1):
+        low, high = first[s], first[s + 1]
+        j = high - 1
+        while j >= low and given[j]:
+            j -= 1
+        if j < low:
+            continue
+        below = begin[s + 1] - begin[s]
+        for k in range(below):
+            gathered[k] = x[rows[begin[s] + k]]
+        # Two columns at a time read only once what both are multiplied with; the last one may be alone.
+        while j >= low:
+            alone = j == low
+            one = start[j] + 1
+            other = one if alone else start[j - 1] + 2
+            first_sum, second_sum = 0.0, 0.0
+            # Slices, since the compiler sees of those that their entries lie side by side.
+            n = high - 1 - j
+            a, b, beside = values[one : one + n], values[other : other + n], x[j + 1 : high]
+            for k in range(n):
+                first_sum += a[k] * beside[k]
+                second_sum += b[k] * beside[k]
+            a, b = values[one + n : one + n + below], values[other + n : other + n + below]
+            for k in range(below):
+                first_sum += a[k] * gathered[k]
+                second_sum += b[k] * gathered[k]
+            x[j] -= first_sum
+            if not alone:
+                x[j - 1] -= second_sum + values[other - 1] * x[j]
+            j -= 2

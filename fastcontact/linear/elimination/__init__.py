@@ -1,0 +1,1 @@
+"""Linear equations eliminated from the unknowns of multigrid, one unknown for each equation."""

@@ -1,0 +1,58 @@
+"""Constraints on a few unknowns whose part of ``K^-1`` is known: nothing as long as a displacement is touched."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from fastcontact.linear.compliance import balanced
+from fastcontact.linear.protocol import Monitor
+
+Array = NDArray[np.float64]
+
+
+class LoadedInverse:
+    """See `linear.protocol.Loaded`; all its vectors are those of the few unknowns.
+
+    Parameters
+    ----------
+    inverse : ndarray (k, k)
+        Rows and columns of ``K^-1``, symmetric.
+    free : ndarray (k,)
+        Displacement without constraints.
+    """
+
+    def __init__(self, inverse: Array, free: Array) -> None:
+        self._inverse, self._free = inverse, free
+
+    def solve(
+        self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """See `Loaded`."""
+        if B.shape[0] == 0:
+            return self._free, np.empty(0)
+        moved = B @ self._inverse
+        multiplier = balanced(_symmetric(B @ moved.T), c - B @ self._free, C)
+        return self._free + multiplier @ moved, multiplier
+
+    def reduce(self, R: csr_array) -> tuple[Array, Array]:
+        """See `Loaded`."""
+        return R @ self._free, _symmetric(R @ (R @ self._inverse).T)
+
+    def near(self, force: Array, elsewhere: Array | None) -> Array:
+        """See `Loaded`."""
+        return np.asarray(self._free + self._inverse @ force)
+
+    def everywhere(self, force: Array, u: Array | None = None) -> Array:
+        """See `Loaded`."""
+        return self.near(force, None)
+
+    def condensed(self) -> LoadedInverse:
+        """See `Loaded`."""
+        return self
+
+
+def _symmetric(flexibility: Array) -> Array:
+    return 0.5 * (flexibility + flexibility.T)

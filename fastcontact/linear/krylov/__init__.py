@@ -1,0 +1,1 @@
+"""Krylov methods preconditioned by a multigrid cycle."""

@@ -1,0 +1,111 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Vector work of conjugate gradients: sums in fixed chunks, the same for any number of threads."""
+
+from numba import prange
+
+from fastcontact._jit.decorators import kernel, parallel_kernel
+
+CHUNK = 4096
+# Chunks up to which waking another thread costs more than it saves.
+ALONE = 4
+
+
+@kernel
+def _dot(a, b, low, high):
+    """Return the dot product of a stretch, in four sums that the processor can add side by side."""
+    s0 = s1 = s2 = s3 = 0.0
+    whole = low + (high - low) // 4 * 4
+    for i in range(low, whole, 4):
+        s0 += a[i] * b[i]
+        s1 += a[i + 1] * b[i + 1]
+        s2 += a[i + 2] * b[i + 2]
+        s3 += a[i + 3] * b[i + 3]
+    for i in range(whole, high):
+        s0 += a[i] * b[i]
+    return (s0 + s1) + (s2 + s3)
+
+
+@kernel
+def _total(sums):
+    total = 0.0
+    for k in range(sums.shape[0]):
+        total += sums[k]
+    return total
+
+
+@parallel_kernel
+def _dots(a, b, sums):
+    n = a.shape[0]
+    if sums.shape[0] <= ALONE:
+        for c in range(sums.shape[0]):
+            sums[c] = _dot(a, b, c * CHUNK, min(n, (c + 1) * CHUNK))
+        return
+    for c in prange(sums.shape[0]):
+        sums[c] = _dot(a, b, c * CHUNK, min(n, (c + 1) * CHUNK))
+
+
+@kernel
+def dot(a, b, sums):
+    """Return the dot product of `a` and `b` (n,); `sums` (ceil(n / CHUNK),) is work space."""
+    _dots(a, b, sums)
+    return _total(sums)
+
+
+@kernel
+def _advance_part(alpha, p, q, x, r, low, high):
+    for i in range(low, high):
+        x[i] += alpha * p[i]
+        r[i] -= alpha * q[i]
+    return _dot(r, r, low, high)
+
+
+@parallel_kernel
+def _advance(alpha, p, q, x, r, sums):
+    n = x.shape[0]
+    if sums.shape[0] <= ALONE:
+        for c in range(sums.shape[0]):
+            sums[c] = _advance_part(alpha, p, q, x, r, c * CHUNK, min(n, (c + 1) * CHUNK))
+        return
+    for c in prange(sums.shape[0]):
+        sums[c] = _advance_part(alpha, p, q, x, r, c * CHUNK, min(n, (c + 1) * CHUNK))
+
+
+@kernel
+def advance(alpha, p, q, x, r, sums):
+    """Step ``x += alpha p``, ``r -= alpha q`` and return the square of the norm of r."""
+    _advance(alpha, p, q, x, r, sums)
+    return _total(sums)
+
+
+@kernel
+def _turn_part(beta, z, p, low, high):
+    for i in range(low, high):
+        p[i] = z[i] + beta * p[i]
+
+
+@parallel_kernel
+def turn(beta, z, p):
+    """Turn the search direction: ``p = z + beta p``."""
+    n = p.shape[0]
+    if n <= ALONE * CHUNK:
+        _turn_part(beta, z, p, 0, n)
+        return
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        _turn_part(beta, z, p, c * CHUNK, min(n, (c + 1) * CHUNK))
+
+
+@kernel
+def _scaled_part(factor, a, b, low, high):
+    for i in range(low, high):
+        b[i] = factor * a[i]
+
+
+@parallel_kernel
+def scaled(factor, a, b):
+    """Fill `b` with ``factor a``, in the precision of b."""
+    n = a.shape[0]
+    if n <= ALONE * CHUNK:
+        _scaled_part(factor, a, b, 0, n)
+        return
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        _scaled_part(factor, a, b, c * CHUNK, min(n, (c + 1) * CHUNK))

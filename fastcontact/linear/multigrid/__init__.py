@@ -1,0 +1,1 @@
+"""Algebraic multigrid: a hierarchy built once, and a compiled cycle over it."""

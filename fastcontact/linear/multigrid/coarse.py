@@ -1,0 +1,68 @@
+"""The coarsest level of a multigrid hierarchy: a dense Cholesky factor, or SuperLU where aggregation stops early."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_array, diags_array
+from scipy.sparse.linalg import splu
+
+from fastcontact.linear.multigrid import cycle_kernels
+
+Values = NDArray[Any]
+# A dense factor of more unknowns costs more than a sparse one.
+DENSE_UP_TO = 1500
+
+
+class Coarse:
+    """Solves with a symmetric positive semidefinite matrix; unknowns without stiffness of their own stay at zero.
+
+    Parameters
+    ----------
+    A : csc_array (n, n)
+
+    Attributes
+    ----------
+    matrix : csc_array (n, n)
+        `A`; what is solved with also holds the last change.
+    """
+
+    def __init__(self, A: csc_array) -> None:
+        self.n, self.matrix = A.shape[0], A
+        self._lu: Any = None
+        self._factor: Values = np.empty((0, 0))
+        self._reciprocal, self._work = np.empty(self.n), np.empty(self.n)
+        self._changed = True
+        self.set(None)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory [bytes]."""
+        return self._factor.nbytes if self._lu is None else 12 * int(self._lu.nnz)
+
+    def set(self, change: csc_array | None) -> None:
+        """Factorise the matrix plus the symmetric `change`."""
+        if change is None and not self._changed:
+            return
+        self._changed = change is not None
+        A = self.matrix if change is None else csc_array(self.matrix + change)
+        if self.n <= DENSE_UP_TO:
+            self._factor = A.toarray(order="C")
+            cycle_kernels.factorise_dense(self._factor, self._reciprocal)
+            return
+        diagonal = A.diagonal()
+        self._idle = np.flatnonzero(diagonal <= 1e-12 * diagonal.max())
+        kept = np.ones(self.n)
+        kept[self._idle] = 0.0
+        K = diags_array(kept) @ A @ diags_array(kept) + diags_array(1.0 - kept)
+        self._lu = splu(csc_array(K), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+
+    def solve(self, b: Values, x: Values) -> None:
+        """Fill `x` with the solution for the right-hand side `b`, both (n,)."""
+        if self._lu is None:
+            cycle_kernels.solve_dense(self._factor, self._reciprocal, b, self._work, x)
+            return
+        x[:] = self._lu.solve(b.astype(float))
+        x[self._idle] = 0.0

@@ -1,0 +1,254 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Products with block matrices, smoothing steps and the tied rows of the multigrid cycle.
+
+A block matrix comes as ``indptr`` (n_rows + 1,), ``indices`` (n_blocks,) and ``data`` (n_blocks * m * n,), its blocks
+one after the other, row by row. The block size comes as two tuples of zeros, ``rows`` of length m and ``cols`` of
+length n: lengths of tuples are known to the compiler. Views of blocks inside the loops would cost four times as much.
+
+Every row is summed by one thread in a fixed order, so results are the same for any number of threads.
+"""
+
+import numpy as np
+from numba import prange
+
+from fastcontact._jit.decorators import kernel, parallel_kernel
+from fastcontact.linear.multigrid.block_products import row_sizes, row_times
+
+# Block rows that one thread takes at a time, and up to how many rows waking another thread costs more than it saves.
+CHUNK = 256
+ALONE = 1024
+
+
+@kernel
+def _dot(a, at, x, j, length):
+    """Return the sum of ``a[at + c] x[j + c]``."""
+    s = a[at] * x[j]
+    for c in range(1, len(length)):
+        s += a[at + c] * x[j + c]
+    return s
+
+
+@kernel
+def _part(share, z, i):
+    """Return ``share z[i]``; z need not be set where the share is zero."""
+    return share * z[i] if share != 0.0 else share
+
+
+@kernel
+def _multiply(low, high, indptr, indices, numbers, x, factor, share, z, y, rows, cols):
+    m = len(rows)
+    for i in range(low, high):
+        sums = row_times(indices, numbers, x, indptr[i], indptr[i + 1], rows, cols)
+        for r in range(m):
+            y[m * i + r] = _part(share, z, m * i + r) + factor * sums[r]
+
+
+@parallel_kernel
+def multiply(indptr, indices, numbers, x, factor, share, z, y, rows, cols):
+    """Fill `y` (n_rows * m,) with ``share z + factor A x``; z and y may be the same array.
+
+    The `numbers` of A come as a tuple, whole or in halves: see `halves`.
+    """
+    n = indptr.shape[0] - 1
+    if n <= ALONE:
+        _multiply(0, n, indptr, indices, numbers, x, factor, share, z, y, rows, cols)
+        return
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        _multiply(c * CHUNK, min(n, (c + 1) * CHUNK), indptr, indices, numbers, x, factor, share, z, y, rows, cols)
+
+
+@kernel
+def _row_sums(low, high, indptr, indices, numbers, x, rows, out):
+    for i in range(low, high):
+        sums = row_sizes(indices, numbers, x, indptr[i], indptr[i + 1], rows, rows)
+        for r in range(len(rows)):
+            out[len(rows) * i + r] = sums[r]
+
+
+@parallel_kernel
+def row_sums(indptr, indices, numbers, x, rows, out):
+    """Fill `out` (n,) with ``|A| |x|``: the size of the numbers that cancel each other in ``A x``."""
+    n = indptr.shape[0] - 1
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        _row_sums(c * CHUNK, min(n, (c + 1) * CHUNK), indptr, indices, numbers, x, rows, out)
+
+
+@kernel
+def _relax(low, high, inverse, r, first, second, d, x, rows):
+    m = len(rows)
+    for i in range(low, high):
+        for a in range(m):
+            step = second * _dot(inverse, (m * i + a) * m, r, m * i, rows)
+            if first != 0.0:
+                step += first * d[m * i + a]
+                x[m * i + a] += step
+            else:
+                x[m * i + a] = step
+            d[m * i + a] = step
+
+
+@kernel
+def _relax_on(low, high, inverse, r, second, d, x, rows):
+    m = len(rows)
+    for i in range(low, high):
+        for a in range(m):
+            step = second * _dot(inverse, (m * i + a) * m, r, m * i, rows)
+            d[m * i + a] = step
+            x[m * i + a] += step
+
+
+@kernel
+def _relax_rows(low, high, inverse, r, first, second, d, x, rows, begin):
+    if first == 0.0 and not begin:
+        _relax_on(low, high, inverse, r, second, d, x, rows)
+    else:
+        _relax(low, high, inverse, r, first, second, d, x, rows)
+
+
+@parallel_kernel
+def relax(inverse, r, first, second, d, x, rows, begin):
+    """One step of a Chebyshev iteration: ``d = first d + second D^-1 r`` and ``x = x + d``.
+
+    `inverse` (n_rows * m * m,) holds the inverted diagonal blocks. With ``first = 0``, d need not be set before, and
+    with `begin` x neither: it then starts from zero.
+    """
+    n = r.shape[0] // len(rows)
+    if n <= ALONE:
+        _relax_rows(0, n, inverse, r, first, second, d, x, rows, begin)
+        return
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        _relax_rows(c * CHUNK, min(n, (c + 1) * CHUNK), inverse, r, first, second, d, x, rows, begin)
+
+
+@kernel
+def _dot_rows(a, b, length):
+    """Return the dot product of the beginnings of two vectors, in four sums side by side."""
+    s0 = s1 = s2 = s3 = 0.0
+    whole = length // 4 * 4
+    for k in range(0, whole, 4):
+        s0 += a[k] * b[k]
+        s1 += a[k + 1] * b[k + 1]
+        s2 += a[k + 2] * b[k + 2]
+        s3 += a[k + 3] * b[k + 3]
+    for k in range(whole, length):
+        s0 += a[k] * b[k]
+    return (s0 + s1) + (s2 + s3)
+
+
+@kernel
+def factorise_dense(A, reciprocal):
+    """Replace the lower triangle of a symmetric positive semidefinite `A` (n, n) by its Cholesky factor.
+
+    `reciprocal` (n,) takes the inverses of its diagonal; unknowns without stiffness of their own, or that follow from
+    those before them, get zero and are left out of solutions.
+    """
+    n = A.shape[0]
+    largest = 0.0
+    for i in range(n):
+        largest = max(largest, A[i, i])
+    for i in range(n):
+        for j in range(i):
+            A[i, j] = (A[i, j] - _dot_rows(A[i], A[j], j)) * reciprocal[j]
+        pivot = A[i, i] - _dot_rows(A[i], A[i], i)
+        if pivot > 1e-12 * A[i, i] and A[i, i] > 1e-12 * largest:
+            reciprocal[i] = 1.0 / np.sqrt(pivot)
+        else:
+            reciprocal[i] = 0.0
+
+
+@kernel
+def solve_dense(L, reciprocal, b, work, x):
+    """Fill `x` (n,) with the solution for the right-hand side `b`, from `factorise_dense`; `work` (n,) is scratch."""
+    n = L.shape[0]
+    for i in range(n):
+        work[i] = (b[i] - _dot_rows(L[i], work, i)) * reciprocal[i]
+    for i in range(n - 1, -1, -1):
+        value = work[i] * reciprocal[i]
+        x[i] = value
+        for j in range(i):
+            work[j] -= L[i, j] * value
+
+
+@kernel
+def subtract_rows(numbers, indptr, indices, data, x, y, size):
+    """Subtract from `y` the product with `x` of a block matrix whose rows are rows `numbers` of y.
+
+    Blocks are `size` x `size`; `indices` number the blocks of x.
+    """
+    for i in range(numbers.shape[0]):
+        for a in range(size):
+            s = x[0] * 0
+            for k in range(indptr[i], indptr[i + 1]):
+                at, j = (k * size + a) * size, indices[k] * size
+                for b in range(size):
+                    s += data[at + b] * x[j + b]
+            y[numbers[i] * size + a] -= s
+
+
+@kernel
+def complete(pivots, indptr, indices, data, x):
+    """Set ``x[pivots] = tie x`` for sparse rows `tie` that do not involve pivots."""
+    for p in range(pivots.shape[0]):
+        s = x[0] * 0
+        for k in range(indptr[p], indptr[p + 1]):
+            s += data[k] * x[indices[k]]
+        x[pivots[p]] = s
+
+
+@kernel
+def condense(pivots, indptr, indices, data, r):
+    """Move the forces at the pivots to what they are tied to: ``r += tie.T r[pivots]``, ``r[pivots] = 0``."""
+    for p in range(pivots.shape[0]):
+        force = r[pivots[p]]
+        r[pivots[p]] = 0
+        for k in range(indptr[p], indptr[p + 1]):
+            r[indices[k]] += data[k] * force
+
+
+@kernel
+def release(pivots, indptr, indices, data, forces, r):
+    """Undo `condense`, given the `forces` (m,) that were at the pivots."""
+    for p in range(pivots.shape[0]):
+        r[pivots[p]] = forces[p]
+        for k in range(indptr[p], indptr[p + 1]):
+            r[indices[k]] -= data[k] * forces[p]
+
+
+@kernel
+def invert_blocks(blocks, size, out):
+    """Fill `out` (n * size * size,) with the inverses of symmetric positive semidefinite `blocks` (n * size * size,).
+
+    Unknowns without stiffness of their own get rows and columns of zeros: Gauss-Jordan elimination passes them by.
+    """
+    a = np.empty((size, 2 * size))
+    for i in range(blocks.shape[0] // (size * size)):
+        base = i * size * size
+        largest = 0.0
+        for r in range(size):
+            largest = max(largest, blocks[base + r * size + r])
+            for c in range(size):
+                a[r, c] = blocks[base + r * size + c]
+                a[r, size + c] = 1.0 if r == c else 0.0
+        for p in range(size):
+            own = blocks[base + p * size + p]
+            idle = not (a[p, p] > 1e-10 * own and own > 1e-12 * largest)
+            if idle:
+                for k in range(size):
+                    a[k, p] = a[p, k] = 0.0
+                for k in range(2 * size):
+                    a[p, k] = 0.0
+                for k in range(size):
+                    a[k, size + p] = 0.0
+                continue
+            pivot = 1.0 / a[p, p]
+            for k in range(2 * size):
+                a[p, k] *= pivot
+            for r in range(size):
+                if r != p:
+                    factor = a[r, p]
+                    if factor != 0.0:
+                        for k in range(2 * size):
+                            a[r, k] -= factor * a[p, k]
+        for r in range(size):
+            for c in range(size):
+                out[base + r * size + c] = a[r, size + c]

@@ -1,0 +1,305 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Set-up of a multigrid hierarchy: the graph of a matrix, smoothed prolongators and Galerkin products.
+
+Block matrices as in `multigrid`, block sizes as tuples of zeros too; numbers that are needed exactly as in `halves`. Rows
+are computed one by one in a fixed order.
+"""
+
+import numpy as np
+from numba import prange
+
+from fastcontact._jit.decorators import kernel, parallel_kernel
+from fastcontact.linear.multigrid.block_products import add_product, add_transposed
+
+# Block rows that one thread takes at a time; in Galerkin products the number of parts, each with its own work space.
+CHUNK = 512
+PARTS = 8
+
+
+@kernel
+def graph(indptr, indices, data, size):
+    """Return (start, neighbours) of the blocks that are not zero; the diagonal is left out.
+
+    A row without neighbours is a node that no other moves with: all its unknowns are supported.
+    """
+    n = indptr.shape[0] - 1
+    start = np.zeros(n + 1, np.int32)
+    neighbours = np.empty(indices.shape[0], np.int32)
+    at = 0
+    square = size * size
+    for i in range(n):
+        for k in range(indptr[i], indptr[i + 1]):
+            if indices[k] == i:
+                continue
+            for e in range(k * square, (k + 1) * square):
+                if data[e] != 0.0:
+                    neighbours[at] = indices[k]
+                    at += 1
+                    break
+        start[i + 1] = at
+    return start, neighbours[:at].copy()
+
+
+@kernel
+def diagonal_blocks(indptr, indices, data, size):
+    """Return the diagonal blocks (n * size * size,)."""
+    n = indptr.shape[0] - 1
+    square = size * size
+    out = np.zeros(n * square, data.dtype)
+    for i in range(n):
+        for k in range(indptr[i], indptr[i + 1]):
+            if indices[k] == i:
+                for e in range(square):
+                    out[i * square + e] += data[k * square + e]
+    return out
+
+
+@kernel
+def transposed(indptr, indices, n_columns):
+    """Return (start, origin, slot): the blocks of each column, their rows and their numbers, rows ascending."""
+    start = np.zeros(n_columns + 1, np.int32)
+    for k in range(indices.shape[0]):
+        start[indices[k] + 1] += 1
+    for c in range(n_columns):
+        start[c + 1] += start[c]
+    place = start[:-1].copy()
+    origin, slot = np.empty(indices.shape[0], np.int32), np.empty(indices.shape[0], np.int32)
+    for i in range(indptr.shape[0] - 1):
+        for k in range(indptr[i], indptr[i + 1]):
+            at = place[indices[k]]
+            origin[at], slot[at] = i, k
+            place[indices[k]] += 1
+    return start, origin, slot
+
+
+@parallel_kernel
+def transpose_blocks(slot, data, out, rows, cols):
+    """Fill `out` with the transposed blocks ``data[slot]``, in the precision of `out`; blocks are rows x cols."""
+    m, n = len(rows), len(cols)
+    for c in prange((slot.shape[0] + CHUNK - 1) // CHUNK):
+        for k in range(c * CHUNK, min(slot.shape[0], (c + 1) * CHUNK)):
+            for a in range(m):
+                for b in range(n):
+                    out[(k * n + b) * m + a] = data[(slot[k] * m + a) * n + b]
+
+
+@kernel
+def _aggregates_of(i, indptr, indices, aggregate, found):
+    """Fill `found` with the aggregates of node i and its neighbours, ascending; return their number."""
+    count = 0
+    for k in range(indptr[i], indptr[i + 1]):
+        own = aggregate[indices[k]]
+        if own < 0:
+            continue
+        at = count
+        while at > 0 and found[at - 1] > own:
+            at -= 1
+        if at > 0 and found[at - 1] == own:
+            continue
+        for e in range(count, at, -1):
+            found[e] = found[e - 1]
+        found[at] = own
+        count += 1
+    return count
+
+
+@parallel_kernel
+def count_prolongator(indptr, indices, aggregate):
+    """Return the row pointers of the smoothed prolongator: each node and its neighbours, by aggregate."""
+    n = indptr.shape[0] - 1
+    widest = 0
+    for i in range(n):
+        widest = max(widest, indptr[i + 1] - indptr[i])
+    start = np.zeros(n + 1, np.int32)
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        found = np.empty(widest, np.int32)
+        for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
+            start[i + 1] = _aggregates_of(i, indptr, indices, aggregate, found)
+    for i in range(n):
+        start[i + 1] += start[i]
+    return start
+
+
+@kernel
+def _smooth_row(
+    i, indptr, indices, data, inverse, aggregate, tentative, omega, start, columns, out, found, sums, rows, cols
+):
+    m, n = len(rows), len(cols)
+    count = _aggregates_of(i, indptr, indices, aggregate, found)
+    for e in range(count * m * n):
+        sums[e] = 0.0
+    for k in range(indptr[i], indptr[i + 1]):
+        j = indices[k]
+        if aggregate[j] < 0:
+            continue
+        at = 0
+        while found[at] != aggregate[j]:
+            at += 1
+        add_product(sums, at * m * n, data, k * m * m, tentative, j * m * n, rows, rows, cols)
+    for at in range(count):
+        base = (start[i] + at) * m * n
+        columns[start[i] + at] = found[at]
+        for r in range(m):
+            for c in range(n):
+                s = 0.0
+                for t in range(m):
+                    s += inverse[(i * m + r) * m + t] * sums[(at * m + t) * n + c]
+                own = tentative[(i * m + r) * n + c] if found[at] == aggregate[i] else 0.0
+                out[base + r * n + c] = own - omega * s
+
+
+@parallel_kernel
+def smooth_prolongator(indptr, indices, data, inverse, aggregate, tentative, omega, start, out, rows, cols):
+    """Return the columns of ``(I - omega D^-1 A) T`` with the row pointers `start`, and fill its blocks into `out`.
+
+    `tentative` (n_nodes * m * n,) is the block of T in each node's own aggregate; `aggregate` is -1 for nodes in none.
+    """
+    n = indptr.shape[0] - 1
+    m = len(rows)
+    widest = 0
+    for i in range(n):
+        widest = max(widest, start[i + 1] - start[i])
+    columns = np.empty(start[n], np.int32)
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        found = np.empty(widest + 1, np.int32)
+        sums = np.empty((widest + 1) * m * len(cols))
+        for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
+            _smooth_row(
+                i,
+                indptr,
+                indices,
+                data,
+                inverse,
+                aggregate,
+                tentative,
+                omega,
+                start,
+                columns,
+                out,
+                found,
+                sums,
+                rows,
+                cols,
+            )
+    return columns
+
+
+@kernel
+def _reach(row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, found):
+    """Find the fine nodes next to those of a coarse node, and the coarse nodes that these reach; return both counts."""
+    n_near = n_found = 0
+    for e in range(tstart[row], tstart[row + 1]):
+        i = torigin[e]
+        for k in range(indptr[i], indptr[i + 1]):
+            j = indices[k]
+            if seen[j] != row:
+                seen[j] = row
+                near[n_near] = j
+                n_near += 1
+    for e in range(n_near):
+        j = near[e]
+        for k in range(start[j], start[j + 1]):
+            J = columns[k]
+            if seen_coarse[J] != row:
+                seen_coarse[J] = row
+                found[n_found] = J
+                n_found += 1
+    return n_near, n_found
+
+
+@parallel_kernel
+def count_galerkin(indptr, indices, start, columns, tstart, torigin, count, near_count):
+    """Fill, for each coarse row of ``P.T A P``, the number of its blocks and of fine nodes it is summed over."""
+    n, n_coarse = indptr.shape[0] - 1, tstart.shape[0] - 1
+    for part in prange(PARTS):
+        seen, near = np.full(n, -1, np.int32), np.empty(n, np.int32)
+        seen_coarse, found = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
+        for row in range(part * n_coarse // PARTS, (part + 1) * n_coarse // PARTS):
+            near_count[row], count[row] = _reach(
+                row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, found
+            )
+
+
+@kernel
+def _galerkin_row(
+    row,
+    near,
+    n_near,
+    place,
+    products,
+    indptr,
+    indices,
+    data,
+    start,
+    columns,
+    P,
+    tstart,
+    torigin,
+    tslot,
+    low,
+    places,
+    out,
+    rows,
+    cols,
+):
+    """Sum one row: first ``Z = A P_I`` for the fine nodes near it, then ``P.T Z``, transposed: A is symmetric."""
+    m, n = len(rows), len(cols)
+    for e in range(n_near):
+        place[near[e]] = e
+    for e in range(n_near * m * n):
+        products[e] = 0.0
+    for e in range(tstart[row], tstart[row + 1]):
+        i, own = torigin[e], tslot[e] * m * n
+        for k in range(indptr[i], indptr[i + 1]):  # A_ji = A_ij.T
+            add_transposed(products, place[indices[k]] * m * n, data, k * m * m, P, own, rows, rows, cols)
+    for e in range(n_near):
+        j, base = near[e], e * m * n
+        for k in range(start[j], start[j + 1]):
+            block = (low + places[columns[k]]) * n * n
+            add_transposed(out, block, (products,), base, P, k * m * n, cols, rows, cols)
+
+
+@parallel_kernel
+def galerkin(
+    indptr, indices, data, start, columns, P, tstart, torigin, tslot, low, largest, out_columns, out, rows, cols
+):
+    """Fill the columns and blocks of ``P.T A P``, A symmetric; `low` are its row pointers, `out` holds zeros.
+
+    `largest` is the largest number of fine nodes that a coarse row is summed over.
+    """
+    n, n_coarse = indptr.shape[0] - 1, tstart.shape[0] - 1
+    m, size = len(rows), len(cols)
+    for part in prange(PARTS):
+        seen, near = np.full(n, -1, np.int32), np.empty(n, np.int32)
+        seen_coarse, found = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
+        place, places = np.empty(n, np.int32), np.empty(n_coarse, np.int32)
+        products = np.empty(largest * m * size)
+        for row in range(part * n_coarse // PARTS, (part + 1) * n_coarse // PARTS):
+            n_near, n_found = _reach(
+                row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, found
+            )
+            found[:n_found].sort()
+            for e in range(n_found):
+                places[found[e]] = e
+                out_columns[low[row] + e] = found[e]
+            _galerkin_row(
+                row,
+                near,
+                n_near,
+                place,
+                products,
+                indptr,
+                indices,
+                data,
+                start,
+                columns,
+                P,
+                tstart,
+                torigin,
+                tslot,
+                low[row],
+                places,
+                out,
+                rows,
+                cols,
+            )

@@ -1,0 +1,307 @@
+"""A multigrid hierarchy of smoothed aggregation and its V-cycle, on compiled block kernels.
+
+Unknowns of neighbouring nodes are gathered into aggregates (pyamg's), which move like rigid bodies at first; one step of
+block Jacobi smooths these motions (Vanek, Mandel and Brezina, 1996), and the coarse matrix is the Galerkin product.
+The smoother is the Chebyshev iteration for the upper part of the spectrum of ``D^-1 A``, D the diagonal blocks
+(Adams, Brezina, Hu and Tuminaro, 2003): other than Gauss-Seidel it is the same for any number of threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+from scipy.sparse import bsr_array, csr_matrix
+
+from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
+from fastcontact.linear.multigrid.coarse import Coarse
+from fastcontact.linear.multigrid.matrix import Matrix
+
+Array = NDArray[np.float64]
+Values = NDArray[Any]
+Indices = NDArray[np.int32]
+
+# The coarsest level has at most so many unknowns, or a level fewer than this part of the unknowns of the one above.
+COARSEST = 200
+STAGNANT = 0.7
+# Lanczos steps for the largest eigenvalue, what is added to their estimate, and the part of the spectrum smoothed.
+LANCZOS_STEPS = 8
+SAFETY = 1.08
+SMOOTHED = 1 / 24
+DEGREE = 3
+
+
+@dataclass(eq=False)
+class Level:
+    """A matrix of the hierarchy with its smoother, the way to the next coarser one, and work space.
+
+    Attributes
+    ----------
+    A : Matrix
+    diagonal, inverse : ndarray (n_nodes * size * size,)
+        Diagonal blocks, and their inverses as the smoother takes them.
+    bound : float
+        Upper bound of the eigenvalues of ``D^-1 A``.
+    P, R : Matrix or None
+        Prolongator and its transpose; None on the coarsest level.
+    tie : TiedRows or None
+        Unknowns that follow others, on the finest level.
+    change : Change or None
+        What ties add to the matrix, on coarser levels.
+    b, x, r, d : ndarray (n,)
+        Right-hand side, iterate, residual and step of the cycle.
+    """
+
+    A: Matrix
+    diagonal: Values
+    inverse: Values
+    bound: float
+    P: Matrix | None = None
+    R: Matrix | None = None
+    tie: Any = None
+    change: Any = None
+    b: Values = field(init=False)
+    x: Values = field(init=False)
+    r: Values = field(init=False)
+    d: Values = field(init=False)
+
+    def __post_init__(self) -> None:
+        n = (len(self.A.indptr) - 1) * len(self.A.rows)
+        self.b, self.x, self.r, self.d = (np.zeros(n, self.A.data.dtype) for _ in range(4))
+
+    @property
+    def n(self) -> int:
+        """Number of unknowns."""
+        return len(self.b)
+
+    def relax(self, r: Values, first: float, second: float, begin: bool = False) -> None:
+        """Make a Chebyshev step: see `kernels.multigrid.relax`."""
+        kind = r.dtype.type
+        cycle_kernels.relax(self.inverse, r, kind(first), kind(second), self.d, self.x, self.A.rows, begin)
+        if self.tie is not None:
+            self.tie.complete(self.x)
+
+    def residual(self) -> None:
+        """Fill `r` with ``b - A x``."""
+        self.subtract_product(self.x, self.b, self.r)
+
+    def subtract_product(self, x: Values, b: Values, r: Values) -> None:
+        """Fill `r` with ``b - A x``, ties included."""
+        self.A.combine(-1.0, x, 1.0, b, r)
+        if self.tie is not None:
+            self.tie.condense(r)
+        elif self.change is not None:
+            self.change.subtract(x, r)
+
+    def correct(self, coarse: Values) -> None:
+        """Add the correction of the next coarser level."""
+        assert self.P is not None
+        self.P.combine(1.0, coarse, 1.0, self.x, self.x)
+        if self.tie is not None:
+            self.tie.complete(self.x)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory [bytes]."""
+        own = self.A.nbytes + self.diagonal.nbytes + self.inverse.nbytes + 4 * self.b.nbytes
+        return own + sum(A.nbytes for A in (self.P, self.R) if A is not None)
+
+
+def chebyshev(bound: float, degree: int) -> list[tuple[float, float]]:
+    """Return the factors (of the last step, of the residual) of a Chebyshev iteration for [SMOOTHED bound, bound]."""
+    centre, half = 0.5 * (1 + SMOOTHED) * bound, 0.5 * (1 - SMOOTHED) * bound
+    factors = [(0.0, 1.0 / centre)]
+    rho = half / centre
+    for _ in range(1, degree):
+        new = 1.0 / (2.0 * centre / half - rho)
+        factors.append((new * rho, 2.0 * new / half))
+        rho = new
+    return factors
+
+
+class Hierarchy:
+    """Multigrid for a symmetric positive definite matrix; see the module.
+
+    Parameters
+    ----------
+    A : Matrix
+        Square blocks. Its `data` are in the precision of the cycle; the set-up is done in double precision.
+    modes : ndarray (n, n_modes)
+        Displacements that cost little energy: zero at supported unknowns.
+    """
+
+    def __init__(self, A: Matrix, modes: Array) -> None:
+        self.dtype: DTypeLike = A.data.dtype
+        self.n = (len(A.indptr) - 1) * len(A.rows)
+        self.levels: list[Level] = []
+        while True:
+            level = self._level(A)
+            self.levels.append(level)
+            coarser = self._coarsened(A, level, modes) if level.n > COARSEST else None
+            if coarser is None:
+                break
+            level.P, level.R, A, modes = coarser
+        self.coarse = Coarse(_scipy(A))
+        self._free_bounds = [level.bound for level in self.levels]
+        self.set_bounds()
+
+    def _level(self, A: Matrix) -> Level:
+        size = len(A.rows)
+        own = Matrix(A.indptr, A.indices, A.data.astype(self.dtype, copy=False), A.rows, A.cols)
+        diagonal = galerkin_kernels.diagonal_blocks(A.indptr, A.indices, own.data, size)
+        inverse = np.empty_like(diagonal)
+        cycle_kernels.invert_blocks(diagonal, size, inverse)
+        level = Level(own, diagonal, inverse, 1.0)
+        level.bound = SAFETY * largest_eigenvalue(level)
+        return level
+
+    def _coarsened(self, A: Matrix, level: Level, modes: Array) -> tuple[Matrix, Matrix, Matrix, Array] | None:
+        """Return the prolongator, its transpose, the coarse matrix and its modes; None where aggregates do not help."""
+        from pyamg.aggregation.aggregate import standard_aggregation
+        from pyamg.aggregation.tentative import fit_candidates
+
+        size, n = len(A.rows), len(A.indptr) - 1
+        start, near = galerkin_kernels.graph(A.indptr, A.indices, A.data, size)
+        ones = np.ones(len(near), np.int8)
+        aggregates, _ = standard_aggregation(csr_matrix((ones, near, start), shape=(n, n)))
+        n_coarse, n_modes = aggregates.shape[1], modes.shape[1]
+        if n_coarse == 0 or n_coarse * n_modes > STAGNANT * level.n:
+            return None
+        T, coarse_modes = fit_candidates(aggregates, modes)
+        aggregate = np.full(n, -1, np.int32)
+        member = np.flatnonzero(np.diff(aggregates.indptr))
+        aggregate[member] = aggregates.indices
+        tentative = np.zeros((n, size * n_modes))
+        tentative[member] = T.data.reshape(len(member), -1)
+        omega = 4.0 / 3.0 / (level.bound / SAFETY)
+        cols = (0,) * n_modes
+        indptr = galerkin_kernels.count_prolongator(A.indptr, A.indices, aggregate)
+        # In the precision of the cycle from the start: the coarse matrix is then the exact product of what is used.
+        blocks = np.empty(int(indptr[-1]) * size * n_modes, self.dtype)
+        columns = galerkin_kernels.smooth_prolongator(
+            A.indptr, A.indices, A.exact, level.inverse, aggregate, tentative.ravel(), omega, indptr, blocks, A.rows, cols
+        )  # fmt: skip
+        del tentative, T
+        index = galerkin_kernels.transposed(indptr, columns, n_coarse)
+        P = Matrix(indptr, columns, blocks, A.rows, cols)
+        coarse = product(A, P, index)
+        R = Matrix(index[0], index[1], np.empty_like(P.data), cols, A.rows)
+        galerkin_kernels.transpose_blocks(index[2], P.data, R.data, A.rows, cols)
+        return P, R, coarse, coarse_modes
+
+    def __repr__(self) -> str:
+        sizes = " -> ".join(str(level.n) for level in self.levels)
+        return f"{len(self.levels)} levels, unknowns {sizes}, operator complexity {self.complexity:.2f}"
+
+    @property
+    def complexity(self) -> float:
+        """Entries of the matrices of all levels over those of the finest."""
+        return sum(len(level.A.data) for level in self.levels) / len(self.levels[0].A.data)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory [bytes]."""
+        return sum(level.nbytes for level in self.levels) + self.coarse.nbytes
+
+    @property
+    def bounds(self) -> list[float]:
+        """Bounds of the smoothers by level."""
+        return [level.bound for level in self.levels]
+
+    @bounds.setter
+    def bounds(self, values: Sequence[float]) -> None:
+        for level, bound in zip(self.levels, values, strict=True):
+            level.bound = bound
+        self._factors = [chebyshev(bound, DEGREE) for bound in values]
+
+    def raise_bounds(self, factor: float) -> None:
+        """Raise the bounds of the smoothers, until the next `set_bounds`."""
+        self.bounds = [factor * bound for bound in self.bounds]
+
+    def set_bounds(self, anew: Sequence[int] = ()) -> None:
+        """Set the bounds of the smoothers to those of K, but for levels `anew`, where they are estimated again."""
+        for number, level in enumerate(self.levels):
+            level.bound = self._free_bounds[number]
+            if number in anew:
+                level.bound = max(level.bound, SAFETY * largest_eigenvalue(level))
+        self._factors = [chebyshev(level.bound, DEGREE) for level in self.levels]
+
+    def cycle(self, number: int = 0) -> None:
+        """Improve by one V-cycle: from ``levels[number].b`` to ``levels[number].x``, starting at zero."""
+        level = self.levels[number]
+        if level.P is None or level.R is None:
+            self.coarse.solve(level.b, level.x)
+            return
+        factors = self._factors[number]
+        level.relax(level.b, *factors[0], True)
+        for factor in factors[1:]:
+            level.residual()
+            level.relax(level.r, *factor)
+        level.residual()
+        below = self.levels[number + 1]
+        level.R.multiply(level.r, below.b)
+        self.cycle(number + 1)
+        level.correct(below.x)
+        for factor in factors:
+            level.residual()
+            level.relax(level.r, *factor)
+
+
+def product(A: Matrix, P: Matrix, index: tuple[Indices, Indices, Indices]) -> Matrix:
+    """Return ``P.T A P`` for a symmetric A; `index` from `galerkin.transposed`."""
+    n_coarse = len(index[0]) - 1
+    count, near = np.zeros(n_coarse, np.int32), np.zeros(n_coarse, np.int32)
+    galerkin_kernels.count_galerkin(A.indptr, A.indices, P.indptr, P.indices, index[0], index[1], count, near)
+    indptr = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
+    columns = np.empty(indptr[-1], np.int32)
+    out = np.zeros(int(indptr[-1]) * len(P.cols) ** 2)
+    galerkin_kernels.galerkin(
+        A.indptr, A.indices, A.exact, P.indptr, P.indices, P.data, *index, indptr, int(near.max(initial=0)),
+        columns, out, P.rows, P.cols,
+    )  # fmt: skip
+    return Matrix(indptr, columns, out, P.cols, P.cols)
+
+
+def largest_eigenvalue(level: Level) -> float:
+    """Return an estimate, from below, of the largest eigenvalue of ``D^-1 A`` from the Lanczos process.
+
+    The process is that behind conjugate gradients with preconditioner D (Golub and Van Loan, section 11.3).
+    """
+    r = np.random.default_rng(0).normal(size=level.n).astype(level.b.dtype)
+    z, q, p = np.empty_like(r), np.empty_like(r), np.zeros_like(r)
+    scratch, zero = np.empty_like(r), np.zeros_like(r)
+    if level.tie is not None:
+        level.tie.condense(r)
+    diagonal, beside = [], []
+    old_alpha, beta, rz = 1.0, 0.0, 0.0
+    kind = r.dtype.type
+    for step in range(min(LANCZOS_STEPS, level.n)):
+        cycle_kernels.relax(level.inverse, r, kind(0), kind(1), scratch, z, level.A.rows, True)
+        if level.tie is not None:
+            level.tie.complete(z)
+        new = float(r @ z)
+        if not new > 1e-12 * abs(rz):
+            break
+        beta = new / rz if step else 0.0
+        rz = new
+        p = z + kind(beta) * p
+        level.subtract_product(p, zero, q)
+        q *= -1
+        alpha = rz / float(p @ q)
+        diagonal.append(1 / alpha + beta / old_alpha)
+        beside.append(np.sqrt(beta) / old_alpha)
+        r -= kind(alpha) * q
+        old_alpha = alpha
+    T = np.diag(diagonal) + np.diag(beside[1:], 1) + np.diag(beside[1:], -1)
+    return float(np.linalg.eigvalsh(T).max()) if diagonal else 1.0
+
+
+def _scipy(A: Matrix) -> Any:
+    """Return a matrix as SciPy's compressed columns."""
+    size = len(A.rows)
+    n = (len(A.indptr) - 1) * size
+    data = np.sum([part.astype(float) for part in A.exact], axis=0)
+    return bsr_array((data.reshape(-1, size, size), A.indices, A.indptr), shape=(n, n)).tocsc()

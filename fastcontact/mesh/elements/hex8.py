@@ -1,0 +1,30 @@
+"""Eight-node hexahedron on [-1, 1]^3: the face z = -1 counter-clockwise, then z = 1; 2 x 2 x 2 integration points."""
+
+import numpy as np
+
+from fastcontact.mesh.elements import _product, quad4
+from fastcontact.mesh.elements._element import Array, Element
+from fastcontact.mesh.quadrature import gauss_cube
+
+NODES = np.column_stack([np.tile(quad4.NODES, (2, 1)), np.repeat([-1.0, 1.0], 4)])
+EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+
+
+def shape(xi: Array) -> Array:
+    """Shape functions, (m, 3) to (m, 8)."""
+    return _product.values((1 + xi[:, None] * NODES) / 2)
+
+
+def gradient(xi: Array) -> Array:
+    """Derivatives, (m, 3) to (m, 8, 3)."""
+    factors = (1 + xi[:, None] * NODES) / 2
+    return _product.gradients(factors, np.broadcast_to(NODES / 2, factors.shape))
+
+
+ELEMENT = Element(
+    name="hex8", dim=3, order=1, nodes=NODES, edges=EDGES,
+    facets=((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7)),
+    facet_elements=("quad4",) * 6,
+    shape=shape, gradient=gradient, quadrature=gauss_cube(2), meshio="hexahedron", med="HE8", vtk=12,
+    linear="hex8", quadratic="hex20", corner_shape=shape,
+)  # fmt: skip

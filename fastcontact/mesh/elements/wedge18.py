@@ -1,0 +1,36 @@
+"""Eighteen-node wedge: the fifteen of wedge15, then centres of the faces 0143, 1254, 2035; 21 integration points."""
+
+import numpy as np
+
+from fastcontact.mesh.elements import line3, tri6, wedge6, wedge15
+from fastcontact.mesh.elements._element import Array, Element
+from fastcontact.mesh.quadrature import gauss_line, prism, triangle_7
+
+NODES = np.vstack([wedge15.NODES, np.column_stack([tri6.ELEMENT.nodes[3:], np.zeros(3)])])
+# Node i is the product of the tri6 function I[i] in x, y and the line3 function J[i] in z.
+I = np.array([0, 1, 2, 0, 1, 2, 3, 4, 5, 3, 4, 5, 0, 1, 2, 3, 4, 5])  # noqa: E741
+J = np.array([0, 0, 0, 1, 1, 1, 0, 0, 0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
+
+
+def shape(xi: Array) -> Array:
+    """Shape functions, (m, 3) to (m, 18)."""
+    return tri6.shape(xi[:, :2])[:, I] * line3.shape(xi[:, 2:])[:, J]
+
+
+def gradient(xi: Array) -> Array:
+    """Derivatives, (m, 3) to (m, 18, 3)."""
+    across = tri6.gradient(xi[:, :2])[:, I] * line3.shape(xi[:, 2:])[:, J, None]
+    along = tri6.shape(xi[:, :2])[:, I, None] * line3.gradient(xi[:, 2:])[:, J]
+    return np.concatenate([across, along], axis=2)
+
+
+ELEMENT = Element(
+    name="wedge18", dim=3, order=2, nodes=NODES, edges=wedge6.EDGES,
+    facets=(
+        (0, 2, 1, 8, 7, 6), (3, 4, 5, 9, 10, 11),
+        (0, 1, 4, 3, 6, 13, 9, 12, 15), (1, 2, 5, 4, 7, 14, 10, 13, 16), (2, 0, 3, 5, 8, 12, 11, 14, 17),
+    ),
+    facet_elements=("tri6", "tri6", "quad9", "quad9", "quad9"),
+    shape=shape, gradient=gradient, quadrature=prism(triangle_7(), gauss_line(3)),
+    meshio="wedge18", med="P18", vtk=32, linear="wedge6", quadratic="wedge18", corner_shape=wedge6.shape,
+)  # fmt: skip

@@ -1,0 +1,73 @@
+"""Abaqus input files: what meshio reads wrongly is refused, and what it writes wrongly is written here."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+from fastcontact.errors import FileError
+from fastcontact.mesh.mesh import Mesh
+
+NUMBERS_A_LINE = 8
+
+
+def check_readable(path: Path) -> None:
+    """Refuse files of which meshio would silently lose points or members of sets.
+
+    Raises
+    ------
+    FileError
+        If a set is defined in several places, sets of elements are given to some *ELEMENT sections only, or
+        there are several sections of nodes.
+    """
+    sections = [_keyword(line) for line in _lines(path) if line.startswith("*") and not line.startswith("**")]
+    n_node_sections = sum(keyword == "NODE" for keyword, _ in sections)
+    if n_node_sections > 1:
+        raise FileError(f"'{path}' has {n_node_sections} *NODE sections, of which meshio keeps one: join them")
+    for option in ("ELSET", "NSET"):
+        named = [options[option].casefold() for keyword, options in sections if options.get(option)
+                 and keyword in (option, "ELEMENT")]  # fmt: skip
+        twice = [name for name, count in Counter(named).items() if count > 1]
+        if twice:
+            raise FileError(
+                f"'{path}' defines the {option} '{twice[0]}' in several places, of which meshio keeps one: "
+                "define it once, or convert the mesh to .med"
+            )
+    with_set = [bool(options.get("ELSET")) for keyword, options in sections if keyword == "ELEMENT"]
+    if sorted(with_set, reverse=True) != with_set:
+        raise FileError(
+            f"'{path}' names an ELSET in a later *ELEMENT section only, which meshio gives to wrong cells: "
+            "name one in each, or define them by *ELSET"
+        )
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        return path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError as error:
+        raise FileError(f"cannot read '{path}': {error}") from error
+
+
+def _keyword(line: str) -> tuple[str, dict[str, str]]:
+    first, *rest = line.lstrip("*").split(",")
+    pairs = (word.partition("=") for word in rest)
+    return first.strip().upper(), {name.strip().upper(): value.strip() for name, _, value in pairs}
+
+
+def append_cell_sets(path: Path, mesh: Mesh) -> None:
+    """Append the groups of cells, each once; meshio writes one *ELSET for each element of a group.
+
+    Raises
+    ------
+    FileError
+        If a group has a name that Abaqus cannot take.
+    """
+    for name in mesh.group_names:
+        if any(character in name for character in ",=*\n") or name != name.strip():
+            raise FileError(f"group name '{name}' holds a blank or a sign that Abaqus files cannot take: rename it")
+    with open(path, "a", encoding="utf-8") as file:
+        for name, members in mesh.cell_groups.items():
+            file.write(f"*ELSET, ELSET={name}\n")
+            numbers = [str(number + 1) for number in members.tolist()]
+            for start in range(0, len(numbers), NUMBERS_A_LINE):
+                file.write(",".join(numbers[start : start + NUMBERS_A_LINE]) + "\n")

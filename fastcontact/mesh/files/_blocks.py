@@ -1,0 +1,153 @@
+"""From what mesh files hold (blocks of cells, each with its own groups) to one Mesh."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import FastcontactWarning, MeshError
+from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import Mesh
+
+VERTEX = "vertex"
+# How many unknown kinds of cells a message names, and how much of each name.
+SHOWN = 12
+
+Rows = NDArray[np.intp]
+Groups = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Cells of one kind: connectivity (n_cells, n_nodes), and the rows of it in each group.
+
+    `kind` is the name of an element, or ``"vertex"`` for cells of one node, which a Mesh has not.
+    """
+
+    kind: str
+    nodes: NDArray[Any]
+    groups: Mapping[str, Rows] = field(default_factory=dict)
+
+
+def build_mesh(
+    points: NDArray[Any],
+    blocks: Iterable[Block],
+    point_groups: Mapping[str, NDArray[Any]],
+    names: Iterable[str] = (),
+) -> Mesh:
+    """Return one Mesh of all blocks.
+
+    Blocks of the same kind are joined, groups of vertex cells become groups of points, `names` without any
+    cell become empty groups, and a flat mesh in 3D coordinates becomes a 2D one.
+
+    Raises
+    ------
+    MeshError
+        If there is no cell, the points are no numbers, or the Mesh is not valid.
+    """
+    try:
+        places = np.asarray(points, np.float64)
+    except (TypeError, ValueError):
+        raise MeshError("its coordinates are no numbers: check that the file is complete") from None
+    joined = merged(blocks)
+    solid = [block for block in joined if block.kind != VERTEX and len(block.nodes)]
+    vertices = [block for block in joined if block.kind == VERTEX]
+    if not solid:
+        raise MeshError("the mesh has no cells: nothing can be computed on points alone")
+    cell_groups = {name: np.empty(0, np.intp) for name in names} | _numbered(solid)
+    all_point_groups = {name: np.asarray(members, np.intp) for name, members in point_groups.items()}
+    for block in vertices:
+        for name in _add_vertices(all_point_groups, block, solid):
+            cell_groups.pop(name, None)
+    dim = max(elements.get(block.kind).dim for block in solid)
+    cells = {block.kind: block.nodes for block in solid}
+    return Mesh(_without_flat_z(places, dim), cells, cell_groups, all_point_groups)
+
+
+def check_known(foreign: Mapping[str, int], known: Iterable[str]) -> None:
+    """Raise MeshError if there is any kind of cells in `foreign`, given with their numbers."""
+    if foreign:
+        listed = [f"{count} cells of kind {kind[:SHOWN]}" for kind, count in list(foreign.items())[:SHOWN]]
+        more = [f"{len(foreign) - SHOWN} kinds more"] if len(foreign) > SHOWN else []
+        raise MeshError(
+            f"it has {', '.join([*listed, *more])}, which fastcontact does not know: use only {', '.join(sorted(known))}"
+        )
+
+
+def merged(blocks: Iterable[Block]) -> list[Block]:
+    """Return one block of each kind, in the order in which the kinds first appear."""
+    by_kind: dict[str, list[Block]] = {}
+    for block in blocks:
+        by_kind.setdefault(block.kind, []).append(block)
+    return [_joined(parts) for parts in by_kind.values()]
+
+
+def _joined(parts: list[Block]) -> Block:
+    if len(parts) == 1:
+        return parts[0]
+    groups: dict[str, list[Rows]] = {}
+    start = 0
+    for part in parts:
+        for name, rows in part.groups.items():
+            groups.setdefault(name, []).append(np.asarray(rows, np.intp) + start)
+        start += len(part.nodes)
+    joined = {name: np.concatenate(pieces) for name, pieces in groups.items()}
+    return Block(parts[0].kind, np.concatenate([part.nodes for part in parts]), joined)
+
+
+def without_duplicates(block: Block) -> tuple[Block, int]:
+    """Return the block with cells on the same nodes united (their groups too), and how many were too many."""
+    if not len(block.nodes):
+        return block, 0
+    _, first, inverse = np.unique(np.sort(block.nodes, axis=1), axis=0, return_index=True, return_inverse=True)
+    if len(first) == len(block.nodes):
+        return block, 0
+    kept = np.sort(first)
+    position = np.searchsorted(kept, first)[inverse.reshape(-1)]
+    groups = {name: np.unique(position[rows]) for name, rows in block.groups.items()}
+    return Block(block.kind, block.nodes[kept], groups), len(block.nodes) - len(kept)
+
+
+def _numbered(blocks: list[Block]) -> Groups:
+    """Return the groups as cell numbers through all blocks."""
+    groups: dict[str, list[Rows]] = {}
+    start = 0
+    for block in blocks:
+        for name, rows in block.groups.items():
+            groups.setdefault(name, []).append(np.asarray(rows, np.intp) + start)
+        start += len(block.nodes)
+    return {name: np.concatenate(parts) for name, parts in groups.items()}
+
+
+def _add_vertices(point_groups: Groups, block: Block, solid: list[Block]) -> list[str]:
+    """Turn groups of vertex cells into groups of points; return the names of those that hold nothing else."""
+    turned = []
+    for name, rows in block.groups.items():
+        points = block.nodes[rows, 0]
+        carried = [other.nodes[other.groups[name]].ravel() for other in solid if name in other.groups]
+        if not carried:
+            point_groups[name] = np.union1d(point_groups.get(name, points[:0]), points)
+            turned.append(name)
+            continue
+        lost = np.setdiff1d(points, np.concatenate(carried))
+        if len(lost):
+            warnings.warn(
+                f"group '{name}' mixes cells with single points: {len(lost)} points that its cells do "
+                "not have are left out; give them a group of their own",
+                FastcontactWarning,
+                stacklevel=2,
+            )
+    return turned
+
+
+def _without_flat_z(points: NDArray[Any], dim: int) -> NDArray[Any]:
+    """Drop the third coordinate where it only says that the mesh is flat."""
+    if points.ndim != 2 or points.shape[1] != 3 or dim == 3 or not len(points):
+        return points
+    size = np.ptp(points[:, :2], axis=0).max()
+    return points[:, :2] if np.ptp(points[:, 2]) <= 1e-12 * size else points

@@ -1,0 +1,346 @@
+"""Everything that touches meshio: its formats in and out, its groups, its habits of printing and exiting."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import io
+import logging
+import threading
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import FastcontactError, FastcontactWarning, FileError, MeshError
+from fastcontact.mesh import elements
+from fastcontact.mesh.files import _abaqus
+from fastcontact.mesh.files._blocks import VERTEX, Block, build_mesh, check_known, merged, without_duplicates
+from fastcontact.mesh.files._meshio_guard import bounded
+from fastcontact.mesh.mesh import Mesh
+
+logger = logging.getLogger("fastcontact")
+
+# meshio prints through the standard streams; only one thread at a time may divert them.
+_STREAMS = threading.Lock()
+
+# Integer cell data that mean groups, in the formats of Gmsh, Medit and others; 0 means no group.
+TAGS = ("gmsh:physical", "medit:ref", "tetgen:ref", "netgen:index", "avsucd:material", "cell_tags")
+# What Gmsh calls things of dimension 0 to 3: a tag without a name becomes a group like "curve_7".
+SHAPES = ("point", "curve", "surface", "volume")
+# Formats with named arrays: a group becomes an array of 0 and 1 under its prefix and its quoted name.
+ARRAY_FORMATS = ("vtk", "vtu", "xdmf")
+CELL_PREFIX, POINT_PREFIX = "cell_group:", "point_group:"
+# Formats whose writers are known to keep all our cells; of the others, the result is read back.
+COMPLETE_FORMATS = ("vtk", "vtu", "gmsh22", "abaqus")
+# Formats that know points of two coordinates; the others get a zero, and reading drops it again.
+FLAT_FORMATS = ("gmsh22", "abaqus", "medit", "su2", "dolfin-xml")
+
+# Cells that meshio gets in another order than ours: our node k is its node NODE_ORDER[format][element][k]. It mirrors
+# the linear wedge of VTK, as old documents of VTK want and VTK 9.7 does not, and leaves Gmsh's wedge of 18 nodes alone.
+Orders = Mapping[str, tuple[int, ...]]
+_WEDGE_OF_VTK: Orders = {"wedge6": elements.get("wedge6").reversed}
+_WEDGE_OF_GMSH: Orders = {"wedge18": (0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16)}
+NODE_ORDER: dict[str, Orders] = {
+    "vtk": _WEDGE_OF_VTK,
+    "vtu": _WEDGE_OF_VTK,
+    "gmsh": _WEDGE_OF_GMSH,
+    "gmsh22": _WEDGE_OF_GMSH,
+}
+
+# How much of what meshio says goes into a message.
+LONGEST = 300
+KEEPS_ALL = "write a .med file to keep them"
+USUAL = (".med", ".msh", ".vtu", ".vtk", ".inp", ".xdmf", ".mesh")
+OTHER_FORMATS = "write .med, .vtu or .msh instead"
+
+
+@dataclass(frozen=True, eq=False)
+class MeshioContent:
+    """A mesh read by meshio: the mesh, its format, and cells left out as vertices and as duplicates."""
+
+    mesh: Mesh
+    format: str
+    n_vertices: int
+    n_duplicates: int
+
+
+def _library() -> Any:
+    """Return the package meshio, its table of dimensions completed: without some cells it can do nothing with them."""
+    import meshio
+    from meshio._mesh import topological_dimension
+
+    for element in elements.ELEMENTS.values():
+        topological_dimension.setdefault(element.meshio, element.dim)
+    return meshio
+
+
+@contextlib.contextmanager
+def _contained(action: str, path: Path) -> Iterator[None]:
+    """Keep meshio from printing and from ending the process; what it says goes to the log or the error."""
+    said = io.StringIO()
+    try:
+        with _STREAMS, contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            yield
+    except FastcontactError:
+        raise
+    except (Exception, SystemExit) as error:
+        words = said.getvalue() if isinstance(error, SystemExit) else str(error)
+        reason = " ".join(words.split()) or type(error).__name__
+        reason = reason if len(reason) <= LONGEST else f"{reason[:LONGEST]}..."
+        remedy = "check the file, or convert it to .med" if action == "read" else OTHER_FORMATS
+        raise FileError(f"meshio cannot {action} '{path}' ({reason}): {remedy}") from error
+    if said.getvalue():
+        logger.info("meshio, to %s %s: %s", action, path, " ".join(said.getvalue().split()))
+
+
+def _format(path: Path, writing: bool) -> str:
+    """Return meshio's name of the format of a file, by its suffix."""
+    meshio = _library()
+    suffixes = ["".join(path.suffixes[i:]).lower() for i in range(len(path.suffixes))]
+    formats = meshio.extension_to_filetypes
+    names = next((formats[suffix] for suffix in suffixes if suffix in formats), None)
+    if names is None:
+        near = difflib.get_close_matches(path.suffix, formats, n=1, cutoff=0.7)
+        remedy = f"did you mean '{near[0]}'?" if near else f"use {', '.join(USUAL)} or another format of meshio"
+        raise FileError(f"'{path}': unknown mesh file suffix '{path.suffix}': {remedy}")
+    if "gmsh" not in names:
+        return str(names[0])
+    if writing:
+        return "gmsh22"
+    # Ansys has the same suffix, and meshio's reader of its files never ends on a damaged one.
+    with open(path, "rb") as file:
+        if file.read(1) != b"$":
+            raise FileError(f"'{path}' is no Gmsh file, which starts with $MeshFormat: convert it to .med")
+    return "gmsh"
+
+
+def read(path: Path) -> MeshioContent:
+    """Read a mesh and its groups.
+
+    Raises
+    ------
+    FileError
+        If meshio cannot read the file, or would read its groups wrongly.
+    MeshError
+        If the mesh has no cells or a kind of cells that fastcontact does not know.
+    """
+    meshio = _library()
+    file_format = _format(path, writing=False)
+    if file_format == "abaqus":
+        _abaqus.check_readable(path)
+    with _contained("read", path), bounded(path, file_format):
+        found = meshio.read(path, file_format=file_format)
+    try:
+        blocks = merged(_blocks(found, NODE_ORDER.get(file_format, {})))
+        n_duplicates = 0
+        if file_format == "gmsh":
+            # Version 2 of that format repeats a cell for each of its groups.
+            united = [without_duplicates(block) for block in blocks if block.kind != VERTEX]
+            blocks = [block for block, _ in united] + [block for block in blocks if block.kind == VERTEX]
+            n_duplicates = sum(count for _, count in united)
+        mesh = build_mesh(found.points, blocks, _point_groups(found), _cell_group_names(found, file_format))
+    except MeshError as error:
+        raise MeshError(f"'{path}': {error}") from None
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        # meshio has taken what stands in the file as it is: arrays of any shape and kind.
+        raise FileError(f"the parts of '{path}' do not fit together: check the file, or convert it to .med") from error
+    n_vertices = sum(len(block.nodes) for block in blocks if block.kind == VERTEX)
+    return MeshioContent(mesh, file_format, n_vertices, n_duplicates)
+
+
+def _cell_group_names(found: Any, file_format: str) -> list[str]:
+    """Return the names of all groups of cells, also of those without any."""
+    names = [name for name in found.cell_sets if not name.startswith("gmsh:")]
+    names += [unquote(key[len(CELL_PREFIX) :]) for key in found.cell_data if key.startswith(CELL_PREFIX)]
+    if file_format == "gmsh":
+        names += [name for name, (_, dim) in found.field_data.items() if dim > 0]
+    return names
+
+
+def _blocks(found: Any, order: Orders) -> list[Block]:
+    foreign: dict[str, int] = {}
+    for block in found.cells:
+        if block.type not in elements.BY_MESHIO and block.type != VERTEX:
+            foreign[block.type] = foreign.get(block.type, 0) + len(block.data)
+    check_known(foreign, elements.BY_MESHIO)
+    return [_block(found, index, cells, order) for index, cells in enumerate(found.cells)]
+
+
+def _block(found: Any, index: int, cells: Any, order: Orders) -> Block:
+    kind = VERTEX if cells.type == VERTEX else elements.BY_MESHIO[cells.type].name
+    dim = 0 if kind == VERTEX else elements.get(kind).dim
+    groups: dict[str, NDArray[Any]] = {}
+    for key, data in found.cell_data.items():
+        if key in TAGS:
+            _add(groups, _tagged(np.asarray(data[index]), dim, found.field_data))
+        elif key.startswith(CELL_PREFIX):
+            _add(groups, {unquote(key[len(CELL_PREFIX) :]): np.flatnonzero(data[index])})
+    for name, sets in found.cell_sets.items():
+        if not name.startswith("gmsh:") and index < len(sets):
+            _add(groups, {name: np.asarray(sets[index], np.intp).reshape(-1)})
+    nodes = np.asarray(cells.data)
+    nodes = nodes[:, order[kind]] if kind in order else nodes
+    return Block(kind, nodes, {name: rows for name, rows in groups.items() if len(rows)})
+
+
+def _add(groups: dict[str, NDArray[Any]], more: Mapping[str, NDArray[Any]]) -> None:
+    for name, rows in more.items():
+        groups[name] = np.union1d(groups[name], rows) if name in groups else rows
+
+
+def _tagged(tags: NDArray[Any], dim: int, field_data: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    """Return the members of each tag, by its name for this dimension or else by a name made of the tag."""
+    if tags.ndim != 1 or tags.dtype.kind not in "iu":
+        return {}
+    names = {(int(entry[0]), int(entry[1])): name for name, entry in field_data.items() if np.size(entry) == 2}
+    return {
+        names.get((tag, dim), f"{SHAPES[dim]}_{tag}"): np.flatnonzero(tags == tag)
+        for tag in np.unique(tags).tolist()
+        if tag
+    }
+
+
+def _point_groups(found: Any) -> dict[str, NDArray[Any]]:
+    groups: dict[str, NDArray[Any]] = {}
+    for key, data in found.point_data.items():
+        if key in TAGS:
+            _add(groups, _tagged(np.asarray(data), 0, {}))
+        elif key.startswith(POINT_PREFIX):
+            _add(groups, {unquote(key[len(POINT_PREFIX) :]): np.flatnonzero(data)})
+    for name, members in found.point_sets.items():
+        _add(groups, {name: np.asarray(members, np.intp).reshape(-1)})
+    return groups
+
+
+def write(path: Path, temporary: Path, mesh: Mesh) -> None:
+    """Write a mesh to `temporary` in the format of `path`'s suffix.
+
+    Raises
+    ------
+    FileError
+        If meshio cannot write the mesh in this format, or would leave out cells.
+    """
+    meshio = _library()
+    file_format = _format(path, writing=True)
+    if file_format in ("tetgen", "svg"):
+        raise FileError(f"'{path}': {file_format} is no mesh format of one file; {OTHER_FORMATS}")
+    parts = _parts(mesh, file_format)
+    # By default XDMF puts the numbers into a second file, which cannot be replaced together with the first.
+    options = {"data_format": "XML"} if file_format == "xdmf" else {}
+    with _contained("write", path):
+        meshio.write(temporary, meshio.Mesh(**parts), file_format=file_format, **options)
+    if file_format == "abaqus":
+        _abaqus.append_cell_sets(temporary, mesh)
+    if file_format not in COMPLETE_FORMATS:
+        _check_complete(path, temporary, file_format, mesh)
+
+
+def _parts(mesh: Mesh, file_format: str) -> dict[str, Any]:
+    """Return the arguments of meshio's Mesh, groups as the format can take them."""
+    width = mesh.dim if file_format in FLAT_FORMATS else 3
+    points = np.pad(mesh.points, [(0, 0), (0, width - mesh.dim)])
+    parts: dict[str, Any] = {"points": points, "cells": _meshio_cells(mesh, NODE_ORDER.get(file_format, {}))}
+    if file_format in ARRAY_FORMATS:
+        return _with_arrays(parts, mesh)
+    if file_format == "gmsh22":
+        return _with_tags(parts, mesh)
+    if file_format == "abaqus":
+        return {**parts, "point_sets": dict(mesh.point_groups)}
+    lost = len(mesh.cell_groups) + len(mesh.point_groups)
+    if lost:
+        _warn(f"{file_format} files have no named groups: {lost} groups are left out; {KEEPS_ALL}")
+    return parts
+
+
+def _meshio_cells(mesh: Mesh, order: Orders) -> list[tuple[str, NDArray[Any]]]:
+    return [
+        (elements.get(name).meshio, block[:, np.argsort(order[name])] if name in order else np.array(block))
+        for name, block in mesh.cells.items()
+    ]
+
+
+def _warn(message: str) -> None:
+    warnings.warn(message, FastcontactWarning, stacklevel=2)
+
+
+def _with_arrays(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
+    """Return the parts with an array of 0 and 1 for each group."""
+    cell_data = {}
+    for name, members in mesh.cell_groups.items():
+        flags = _flags(members, mesh.n_cells)
+        cell_data[CELL_PREFIX + quote(name)] = np.split(flags, list(mesh.offsets.values())[1:])
+    point_data = {POINT_PREFIX + quote(name): _flags(m, mesh.n_points) for name, m in mesh.point_groups.items()}
+    return {**parts, "cell_data": cell_data, "point_data": point_data}
+
+
+def _flags(members: NDArray[Any], count: int) -> NDArray[np.int32]:
+    flags = np.zeros(count, np.int32)
+    flags[members] = 1
+    return flags
+
+
+def _with_tags(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
+    """Return the parts with a physical tag for each cell, and a vertex cell for each point in a group."""
+    dims = np.concatenate([np.full(len(block), elements.get(name).dim) for name, block in mesh.cells.items()])
+    tags = np.zeros(mesh.n_cells, np.int32)
+    field_data: dict[str, NDArray[Any]] = {}
+    # Small groups overwrite large ones, so that a group of everything does not hide all others.
+    for name, members in sorted(mesh.cell_groups.items(), key=lambda item: -len(item[1])):
+        if len(members):
+            dim, tag = int(dims[members].max()), len(field_data) + 1
+            tags[members[dims[members] == dim]] = tag
+            field_data[name] = np.array([tag, dim])
+    cut = {
+        name: len(members) - int((tags[members] == field_data[name][0]).sum())
+        for name, members in mesh.cell_groups.items()
+        if name in field_data
+    }
+    _warn_of_cuts({name: count for name, count in cut.items() if count})
+    blocks = np.split(tags, list(mesh.offsets.values())[1:])
+    cells, blocks = _with_vertices(parts["cells"], blocks, mesh.point_groups, field_data)
+    data = {"gmsh:physical": blocks, "gmsh:geometrical": [np.maximum(block, 1) for block in blocks]}
+    return {**parts, "cells": cells, "cell_data": data, "field_data": field_data}
+
+
+def _with_vertices(
+    cells: list[Any], blocks: list[Any], point_groups: Mapping[str, Any], field_data: dict[str, Any]
+) -> tuple[list[Any], list[Any]]:
+    named = {name: members for name, members in point_groups.items() if len(members) and name not in field_data}
+    twice = [name for name in point_groups if name in field_data]
+    if twice:
+        _warn(
+            f"{len(twice)} groups of points have the name of a group of cells ({', '.join(twice)}), which "
+            f"Gmsh files cannot tell apart: they are left out; {KEEPS_ALL}"
+        )
+    if not named:
+        return cells, blocks
+    tags = {name: len(field_data) + 1 + i for i, name in enumerate(named)}
+    field_data.update({name: np.array([tag, 0]) for name, tag in tags.items()})
+    vertices = np.concatenate(list(named.values()))[:, None]
+    vertex_tags = np.concatenate([np.full(len(members), tags[name], np.int32) for name, members in named.items()])
+    return [*cells, (VERTEX, vertices)], [*blocks, vertex_tags]
+
+
+def _warn_of_cuts(cut: Mapping[str, int]) -> None:
+    if cut:
+        _warn(
+            f"Gmsh files of version 2.2 hold one group a cell: {sum(cut.values())} memberships of the groups "
+            f"{', '.join(cut)} are left out; {KEEPS_ALL}"
+        )
+
+
+def _check_complete(path: Path, temporary: Path, file_format: str, mesh: Mesh) -> None:
+    """Read back what was written: several of meshio's writers leave out or change cells without an error."""
+    meshio = _library()
+    with _contained("read back", path):
+        found = meshio.read(temporary, file_format=file_format)
+    wrong = [kind for kind, block in _meshio_cells(mesh, {}) if not np.array_equal(found.get_cells_type(kind), block)]
+    if wrong or len(found.points) != mesh.n_points:
+        listed = f"the {', '.join(wrong)} cells" if wrong else "the points"
+        raise FileError(f"'{path}': meshio's {file_format} format does not keep {listed}; {OTHER_FORMATS}")

@@ -1,0 +1,135 @@
+"""HDF5 files from elsewhere, opened with care: nothing outside the file is read, and damage is named."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import FastcontactError, FileError
+from fastcontact.mesh.files import _heaps
+from fastcontact.mesh.files.replacing import existing_file
+from fastcontact.mesh.files.targets import PathLike
+
+# What a data set may take in memory: this much [bytes], or this many times the size of its file if that is more.
+# Zeros compress a thousandfold, but no whole file does that holds a mesh or results.
+PLAUSIBLE_BYTES = 1 << 28
+PLAUSIBLE_EXPANSION = 20
+FEW_OBJECTS = 1000
+# Groups in groups; HDF5 itself follows them by recursion, and deep ones overrun its stack.
+DEEPEST = 64
+# Kinds of numbers, and strings of fixed length: no references, no variable lengths, no records.
+PLAIN_KINDS = "iufS"
+
+
+@contextmanager
+def opened(path: PathLike) -> Iterator[Any]:
+    """Open an HDF5 file for reading, for the length of a block.
+
+    Raises
+    ------
+    FileError
+        If the file is missing, is not HDF5, is refused by `check_contents`, or turns out damaged inside the block.
+    """
+    import h5py
+
+    found = existing_file(path)
+    try:
+        if not h5py.is_hdf5(found):
+            raise FileError(f"'{path}' is not an HDF5 file: check that it is complete and has the right suffix")
+        with h5py.File(found, "r") as file:
+            _heaps.check_all(found, file.id.get_create_plist().get_sizes()[1])
+            check_contents(file, path)
+            yield file
+    except (FastcontactError, Warning):
+        raise
+    except Exception as error:  # what HDF5, and numbers that make no sense, can raise has no end
+        raise FileError(f"cannot read '{path}', it is damaged or incomplete: write it anew") from error
+
+
+def check_contents(file: Any, path: PathLike, below: _heaps.Bytes | None = None) -> None:
+    """Look through an open HDF5 file before anything in it is read; with the file `below` it, also where it keeps its texts.
+
+    Raises
+    ------
+    FileError
+        If a link or the values of a data set lead to another file, a data set wants a filter that HDF5 does not bring
+        along or more memory than a file of this size can mean, or groups stand deeper or in more places than in a tree.
+    """
+    from h5py import h5d, h5g, h5o
+    from h5py.h5l import TYPE_HARD, TYPE_SOFT
+
+    limit = max(PLAUSIBLE_BYTES, PLAUSIBLE_EXPANSION * file.id.get_filesize())
+    seen: set[Any] = {h5o.get_info(file["/"].id).addr}
+    waiting: list[tuple[Any, str, int]] = [(file["/"].id, "", 0)]
+    while waiting:
+        group, where, depth = waiting.pop()
+        links: list[tuple[bytes, int]] = []
+        group.links.iterate(lambda name, info, links=links: links.append((name, info.type)), info=True)
+        for raw, kind in links:
+            name = f"{where}/{raw.decode('utf-8', 'replace')}"
+            if kind == TYPE_SOFT:
+                continue  # it stays in this file
+            if kind != TYPE_HARD:
+                raise FileError(f"'{path}' refers to another file at '{name}': copy the data into one file")
+            item = h5o.open(group, raw)
+            if isinstance(item, h5d.DatasetID):
+                _check_dataset(item, f"'{name}' of '{path}'", limit, file.id.get_filesize())
+                if below is not None and item.dtype.hasobject and item.get_offset() is not None:
+                    _heaps.check_texts(below, item.get_offset(), item.get_space().get_simple_extent_npoints(), path)
+            elif isinstance(item, h5g.GroupID):
+                address = h5o.get_info(item).addr
+                if address in seen or depth >= DEEPEST:
+                    raise FileError(f"'{path}' has groups in a circle or too deep, at '{name[:80]}': write it anew")
+                seen.add(address)
+                waiting.append((item, name, depth + 1))
+
+
+def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> None:
+    """Refuse a data set whose values stand elsewhere, or whose size cannot be meant."""
+    from h5py import h5d, h5z
+
+    settings = dataset.get_create_plist()
+    layout = settings.get_layout()
+    if layout == h5d.VIRTUAL or settings.get_external_count():
+        raise FileError(f"{where} stores its values in another file: copy the data into one file")
+    item, count = dataset.get_type().get_size(), dataset.get_space().get_simple_extent_npoints()
+    size = count * item
+    # Texts and references become objects one by one, and take their room in the file.
+    if count > max(FEW_OBJECTS, file_size // 8) and dataset.dtype.hasobject:
+        raise FileError(f"{where} declares {count} texts or references, which its file cannot hold: write it anew")
+    if layout == h5d.CHUNKED:
+        chunk = int(np.prod([int(n) for n in settings.get_chunk()], dtype=object)) * item
+        own = (h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32, h5z.FILTER_SZIP,
+               h5z.FILTER_NBIT, h5z.FILTER_SCALEOFFSET)  # fmt: skip
+        filters = [settings.get_filter(number)[0] for number in range(settings.get_nfilters())]
+        # An unknown filter would be looked for among the shared libraries of the system.
+        if not set(filters) <= set(own):
+            raise FileError(f"{where} is packed by the filter {filters[0]}, which not every HDF5 knows: use gzip")
+        if dataset.get_storage_size() > 2 * (size + chunk) + PLAUSIBLE_BYTES:
+            raise FileError(f"{where} takes more room packed than it can hold: the file is damaged, write it anew")
+        size = max(size, chunk)
+    if size > limit:
+        raise FileError(f"{where} declares {size:.3g} bytes, which a file of its size cannot hold: write it anew")
+
+
+def values(group: Any, name: str) -> NDArray[Any]:
+    """Return a data set of `group` as an array of numbers or of strings of fixed length.
+
+    Raises
+    ------
+    FileError
+        If it is missing, or holds neither.
+    """
+    import h5py
+
+    where = f"'{group.name}/{name}' of '{group.file.filename}'"
+    if name not in group:
+        raise FileError(f"{where} is missing: the file is incomplete, write it anew")
+    dataset = group[name]
+    if not isinstance(dataset, h5py.Dataset) or dataset.dtype.base.kind not in PLAIN_KINDS:
+        raise FileError(f"{where} holds no plain numbers: the file is damaged, write it anew")
+    return np.asarray(dataset[()])

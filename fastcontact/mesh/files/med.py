@@ -1,0 +1,420 @@
+"""MED files, as Salome and code_aster read and write them: meshes with groups, nodal results at all instants.
+
+With h5py alone. Arrays are stored component by component ("no interlace"), node numbers count from 1. Meshes
+of MED 2.3 to 4.x are read; what is written carries the stamp 3.0.0, which every later library reads, or 4.0.0 where
+there are wedges of 18 nodes, which came with that version.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import FileError, MeshError, unknown
+from fastcontact.mesh import elements
+from fastcontact.mesh.files._blocks import VERTEX, Block, build_mesh, check_known
+from fastcontact.mesh.files._med_families import (
+    Families,
+    checked_name,
+    decoded,
+    families_of,
+    members,
+    read_families,
+    write_families,
+)
+from fastcontact.mesh.files.hdf5 import opened, values
+from fastcontact.mesh.files.replacing import replacing
+from fastcontact.mesh.files.targets import PathLike
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+# Elements whose nodes MED numbers otherwise than we do: our node k is node NODE_ORDER[code][k] of MED. MED sees the
+# base of a solid from outside, where we see it from inside: its cells are ours in the mirror.
+NODE_ORDER = {element.med: element.reversed for element in elements.ELEMENTS.values() if element.dim == 3}
+# The centres of faces follow in MED as bottom, sides round about, top; ours as -x, +x, -y, +y, bottom, top.
+_FACES_OF_H27 = dict(zip(range(20, 26), (24, 22, 21, 23, 20, 25)))
+NODE_ORDER["H27"] = tuple(_FACES_OF_H27.get(node, node) for node in NODE_ORDER["H27"])
+
+NAME_SIZE = 64
+COMPONENT_SIZE = 16
+NO_PROFILE = "MED_NO_PROFILE_INTERNAL"
+NO_STEP = -1
+FLOAT64 = 6
+
+AXES = ("X", "Y", "Z")
+
+
+@dataclass(frozen=True, eq=False)
+class MedContent:
+    """A mesh of a MED file, with what a reader wants to tell about it.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    name : str
+        Name of the mesh in the file.
+    version : str
+        Version of the format, e.g. ``"3.0.7"``; empty if the file does not say.
+    n_vertices : int
+        Cells of one node; their groups have become groups of points.
+    """
+
+    mesh: Mesh
+    name: str
+    version: str
+    n_vertices: int
+
+
+def read_med_mesh(path: PathLike, mesh_name: str | None = None) -> Mesh:
+    """Read a mesh with its groups, cells oriented as they are in the file.
+
+    Of a mesh with several time steps the first one is read.
+
+    Parameters
+    ----------
+    path : path-like
+    mesh_name : str, optional
+        Which mesh to read, where the file holds several.
+
+    Raises
+    ------
+    FileError
+        If the file is missing, not HDF5, damaged, linked to others, or does not hold exactly the mesh meant.
+    MeshError
+        If the mesh has no cells, is a structured grid, or has a kind of cells that fastcontact does not know.
+    """
+    return read_med(path, mesh_name).mesh
+
+
+def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
+    """Read a mesh and what there is to tell about it; parameters and errors as in `read_med_mesh`."""
+    with opened(path) as file:
+        name = _chosen_mesh(file, path, mesh_name)
+        group = file["ENS_MAA"][name]
+        try:
+            mesh, n_vertices = _read_mesh(file, group)
+        except MeshError as error:
+            raise MeshError(f"mesh '{name}' of '{path}': {error}") from None
+        return MedContent(mesh, name, _version(file), n_vertices)
+
+
+def _version(file: Any) -> str:
+    info = file["INFOS_GENERALES"].attrs if "INFOS_GENERALES" in file else {}
+    return ".".join(str(int(info[key])) for key in ("MAJ", "MIN", "REL") if key in info)
+
+
+def _chosen_mesh(file: Any, path: PathLike, mesh_name: str | None) -> str:
+    names = list(file["ENS_MAA"]) if "ENS_MAA" in file else []
+    if not names:
+        raise FileError(f"'{path}' holds no MED mesh (no entry in ENS_MAA): name a MED file that has one")
+    if mesh_name is not None:
+        if mesh_name not in names:
+            raise FileError(f"'{path}': {unknown('mesh', mesh_name, names)}")
+        return mesh_name
+    if len(names) > 1:
+        listed = ", ".join(f"'{name[:NAME_SIZE]}'" for name in names[:12]) + (", ..." if len(names) > 12 else "")
+        raise FileError(f"'{path}' holds {len(names)} meshes ({listed}): say which one with mesh_name")
+    return str(names[0])
+
+
+def _read_mesh(file: Any, group: Any) -> tuple[Mesh, int]:
+    if int(group.attrs.get("TYP", 0)) != 0:
+        raise MeshError("it is a structured grid: convert it to an unstructured mesh")
+    step = _first_step(group)
+    points = _read_points(step, group.attrs)
+    name = group.name.rsplit("/", 1)[-1]
+    folders = [folder for folder in (group.get("FAS"), file.get(f"FAS/{name}")) if folder is not None]
+    families: Families = {}
+    for folder in folders:
+        families.update(read_families(folder))
+    blocks = list(_read_blocks(step, families))
+    point_groups: dict[str, Any] = dict.fromkeys(_group_names(families, +1), ())
+    point_groups.update(_members(step["NOE"], len(points), families))
+    n_vertices = sum(len(block.nodes) for block in blocks if block.kind == VERTEX)
+    for block in blocks:
+        if len(block.nodes) and (block.nodes.min() < 0 or block.nodes.max() >= len(points)):
+            raise MeshError(f"a cell names node {block.nodes.max() + 1}, but nodes go from 1 to {len(points)}")
+    return build_mesh(points, blocks, point_groups, _group_names(families, -1)), n_vertices
+
+
+def _group_names(families: Families, sign: int) -> list[str]:
+    """Return the groups of all families of points (+1) or cells (-1), also of families without members."""
+    return [name for number in sorted(families, key=abs) if number * sign > 0 for name in families[number]]
+
+
+def _first_step(group: Any) -> Any:
+    """Return the HDF5 group with points and cells: the mesh itself in MED 2, its first time step later."""
+    if "NOE" in group:
+        return group
+    steps = [entry for entry in group.values() if "NOE" in entry]
+    if not steps:
+        raise MeshError("it has no nodes: check that the file is complete")
+    return min(steps, key=lambda step: (int(step.attrs["NDT"]), int(step.attrs["NOR"])))
+
+
+def _read_points(step: Any, mesh_attributes: Mapping[str, Any]) -> Array:
+    flat = values(step["NOE"], "COO")
+    attributes = step["NOE"]["COO"].attrs
+    system = int(mesh_attributes.get("REP", attributes.get("REP", 0)))
+    if system != 0:
+        kind = {1: "cylindrical", 2: "spherical"}.get(system, f"of kind {system}")
+        raise MeshError(f"its coordinates are {kind}: convert them to Cartesian ones")
+    count = int(attributes["NBR"])
+    dim = len(flat) // max(count, 1)
+    if count == 0 or dim * count != len(flat):
+        raise MeshError(f"it has {len(flat)} coordinates for {count} nodes: check that the file is complete")
+    if dim == 1:
+        raise MeshError("it is in a space of one dimension: two or three are needed")
+    return np.asarray(flat, np.float64).reshape(dim, count).T
+
+
+def _read_blocks(step: Any, families: Families) -> Iterator[Block]:
+    # MED 2 keeps faces and edges in folders of their own (FAC, ARE); later versions put all cells under MAI.
+    folders = [step[name] for name in ("MAI", "FAC", "ARE") if name in step]
+    entries = [entry for folder in folders for entry in folder.items()]
+    foreign = {code: _cell_count(entry) for code, entry in entries if code not in elements.BY_MED and code != "PO1"}
+    check_known(foreign, elements.BY_MED)
+    for code, entry in entries:
+        if "NOD" not in entry:
+            raise MeshError(f"its {code} cells have no nodal connectivity: write the mesh with nodal connectivity")
+        nodes = _read_nodes(entry, code)
+        yield Block(_kind(code), nodes, _members(entry, len(nodes), families))
+
+
+def _members(entry: Any, count: int, families: Families) -> dict[str, NDArray[np.intp]]:
+    if "FAM" not in entry:
+        return {}
+    numbers = values(entry, "FAM")
+    if numbers.shape != (count,):
+        raise MeshError(f"it has {numbers.size} family numbers for {count} cells or nodes: write it anew")
+    return members(numbers, families)
+
+
+def _kind(code: str) -> str:
+    return VERTEX if code == "PO1" else elements.BY_MED[code].name
+
+
+def _cell_count(entry: Any) -> int:
+    index = entry.get("INN")
+    if index is not None:
+        return max(len(index) - 1, 0)
+    return int(entry["NOD"].attrs.get("NBR", 0)) if "NOD" in entry else 0
+
+
+def _read_nodes(entry: Any, code: str) -> NDArray[Any]:
+    flat = values(entry, "NOD")
+    size = 1 if code == "PO1" else elements.BY_MED[code].n_nodes
+    if len(flat) % size:
+        raise MeshError(f"its {code} cells have {len(flat)} node numbers, which is no multiple of {size}")
+    nodes = flat.reshape(size, -1).T - 1
+    return nodes[:, NODE_ORDER[code]] if code in NODE_ORDER else nodes
+
+
+def write_med_mesh(path: PathLike, mesh: Mesh, *, mesh_name: str = "mesh") -> None:
+    """Write a mesh with all its groups; the file appears only when it is complete.
+
+    When the file is read again, the elements stand in alphabetical order of their MED codes.
+
+    Parameters
+    ----------
+    path : path-like
+    mesh : Mesh
+    mesh_name : str
+        Name of the mesh in the file, at most 64 bytes.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written or a name is too long for MED (80 bytes for groups).
+    """
+    with new_file(path, mesh) as file:
+        add_mesh(file, mesh, mesh_name)
+
+
+@contextmanager
+def new_file(path: PathLike, mesh: Mesh) -> Iterator[Any]:
+    """Open a new MED file that takes its place when all is written; `mesh` tells which version it needs."""
+    import h5py
+
+    version = 4 if "wedge18" in mesh.cells else 3
+    with replacing(path) as temporary, _in_order(version >= 4), h5py.File(temporary, "w") as file:
+        _set(file.create_group("INFOS_GENERALES"), MAJ=version, MIN=0, REL=0)
+        yield file
+
+
+@contextmanager
+def _in_order(wanted: bool) -> Iterator[None]:
+    """Let new HDF5 groups remember the order of their members, without which libraries refuse a file of version 4."""
+    import h5py
+
+    settings = h5py.get_config()
+    before, settings.track_order = settings.track_order, wanted
+    try:
+        yield
+    finally:
+        settings.track_order = before
+
+
+def _set(group: Any, **attributes: Any) -> None:
+    """Set attributes with the types of the MED library: 32-bit integers, doubles, strings of fixed length."""
+    for name, value in attributes.items():
+        if isinstance(value, int):
+            value = np.int32(value)
+        group.attrs[name] = np.bytes_(value) if isinstance(value, (str, bytes)) else value
+
+
+def _padded(names: Iterable[str]) -> str:
+    return "".join(f"{name:<{COMPONENT_SIZE}}" for name in names)
+
+
+def add_mesh(file: Any, mesh: Mesh, mesh_name: str) -> None:
+    """Write a mesh with its groups into an open file."""
+    checked_name("mesh", mesh_name, NAME_SIZE)
+    if "/" in mesh_name:
+        raise FileError(f"mesh name '{mesh_name}' holds a slash, which separates folders in a MED file: rename it")
+    group = file.create_group(f"ENS_MAA/{mesh_name}")
+    _set(
+        group,
+        DIM=max(elements.get(name).dim for name in mesh.cells) if mesh.cells else mesh.dim,
+        ESP=mesh.dim,
+    )
+    _set(group, REP=0, SRT=0, TYP=0, NXT=NO_STEP, NXI=NO_STEP, UNT="", DES="fastcontact")
+    _set(group, NOM=_padded(AXES[: mesh.dim]), UNI=_padded([""] * mesh.dim))
+    step = group.create_group(_step_key(NO_STEP, NO_STEP))
+    _set(step, CGT=1, NDT=NO_STEP, NOR=NO_STEP, PDT=-1.0, NXT=NO_STEP, NXI=NO_STEP, PVT=NO_STEP, PVI=NO_STEP)
+    folder = file.create_group(f"FAS/{mesh_name}")
+    _set(folder.create_group("FAMILLE_ZERO"), NUM=0)
+    _write_points(step, mesh, folder)
+    _write_cells(step, mesh, folder)
+
+
+def _write_points(step: Any, mesh: Mesh, folder: Any) -> None:
+    numbers, families = families_of(mesh.point_groups, mesh.n_points, +1)
+    points = step.create_group("NOE")
+    _set(points, CGT=1, CGS=1, PFL=NO_PROFILE)
+    _write_array(points, "COO", mesh.points.T, mesh.n_points)
+    _write_array(points, "FAM", numbers, mesh.n_points)
+    if families:
+        write_families(folder.create_group("NOEUD"), families)
+
+
+def _write_cells(step: Any, mesh: Mesh, folder: Any) -> None:
+    numbers, families = families_of(mesh.cell_groups, mesh.n_cells, -1)
+    cells = step.create_group("MAI")
+    _set(cells, CGT=1)
+    for name, start in mesh.offsets.items():
+        element, block = elements.get(name), mesh.cells[name]
+        entry = cells.create_group(element.med)
+        _set(entry, CGT=1, CGS=1, GEO=100 * element.dim + element.n_nodes, PFL=NO_PROFILE)
+        if element.med in NODE_ORDER:
+            block = block[:, np.argsort(NODE_ORDER[element.med])]
+        _write_array(entry, "NOD", block.T + np.int32(1), len(block))
+        _write_array(entry, "FAM", numbers[start : start + len(block)], len(block))
+    if families:
+        write_families(folder.create_group("ELEME"), families)
+
+
+def _write_array(group: Any, name: str, array: NDArray[Any], count: int) -> None:
+    dataset = group.create_dataset(name, data=np.ascontiguousarray(array).ravel())
+    _set(dataset, CGT=1, NBR=count)
+
+
+def _step_key(number: int, iteration: int) -> str:
+    return f"{number:020d}{iteration:020d}"
+
+
+def add_field(
+    file: Any, name: str, components: tuple[str, ...], field: Array, instant: tuple[int, float], mesh_name: str
+) -> None:
+    """Add a nodal field to a file at one instant.
+
+    Parameters
+    ----------
+    file : h5py.File
+    name : str
+        Of the field.
+    components : tuple of str
+    field : ndarray (n_points, n_components)
+    instant : (int, float)
+        Number and time.
+    mesh_name : str
+        The mesh in the file that the field belongs to.
+    """
+    number, time = instant
+    where = f"CHA/{name}"
+    if where not in file:
+        _set(file.create_group(where), MAI=mesh_name, TYP=FLOAT64, NCO=len(components), UNT="")
+        _set(file[where], NOM=_padded(components), UNI=_padded([""] * len(components)))
+    group = file[where].create_group(_step_key(number, NO_STEP))
+    _set(group, NDT=number, NOR=NO_STEP, PDT=float(time), RDT=NO_STEP, ROR=NO_STEP)
+    support = group.create_group("NOE")
+    _set(support, GAU="", PFL=NO_PROFILE)
+    profile = support.create_group(NO_PROFILE)
+    _set(profile, GAU="", NBR=len(field), NGA=1)
+    profile.create_dataset("CO", data=np.asarray(field, np.float64).T.ravel())
+
+
+def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
+    """Read a nodal field at all its instants, from a file of MED 3 or later.
+
+    Parameters
+    ----------
+    path : path-like
+    field : str
+        Name of the field, e.g. ``"DEPL"``.
+
+    Returns
+    -------
+    times : ndarray (n_instants,)
+        In the order of the file's step numbers.
+    values : ndarray (n_instants, n_points, n_components)
+        NaN at points where the file gives no value.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read, has no such field, or the field is not given at nodes.
+    """
+    with opened(path) as file:
+        names = list(file["CHA"]) if "CHA" in file else []
+        if field not in names:
+            raise FileError(f"'{path}': {unknown('field', field, names)}")
+        group = file["CHA"][field]
+        instants = [entry for entry in group.values() if "NOE" in entry and "PDT" in entry.attrs]
+        if not instants:
+            raise FileError(f"field '{field}' of '{path}' has no values at nodes in the layout of MED 3 or 4")
+        instants.sort(key=lambda entry: (int(entry.attrs["NDT"]), int(entry.attrs["NOR"])))
+        times = np.array([entry.attrs["PDT"] for entry in instants], np.float64)
+        n_points = _field_size(file, group, instants)
+        n_components = int(group.attrs["NCO"])
+        return times, np.stack([_read_instant(file, entry["NOE"], n_points, n_components) for entry in instants])
+
+
+def _field_size(file: Any, group: Any, instants: list[Any]) -> int:
+    """Return the number of points of the field's mesh, or of the field where the mesh is in another file."""
+    name = decoded(bytes(group.attrs["MAI"]))
+    if f"ENS_MAA/{name}" in file:
+        mesh = file[f"ENS_MAA/{name}"]
+        return len(_read_points(_first_step(mesh), mesh.attrs))
+    n_components = int(group.attrs["NCO"])
+    return max(values(profile, "CO").size // n_components for entry in instants for profile in entry["NOE"].values())
+
+
+def _read_instant(file: Any, support: Any, n_points: int, n_components: int) -> Array:
+    field = np.full((n_points, n_components), np.nan)
+    for name, profile in support.items():
+        part = values(profile, "CO").reshape(n_components, -1).T
+        if name == NO_PROFILE:
+            field[:] = part
+            continue
+        rows = values(file["PROFILS"][name], "PFL").astype(np.int64) - 1
+        if rows.min(initial=0) < 0 or rows.max(initial=0) >= n_points:
+            raise FileError(f"profile '{name}' names point {rows.max() + 1} of {n_points}: write the file anew")
+        field[rows] = part
+    return field

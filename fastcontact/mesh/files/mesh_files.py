@@ -1,0 +1,142 @@
+"""Mesh files of any format, in and out: MED through our own reader and writer, the rest through meshio."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+
+from fastcontact.errors import FileError
+from fastcontact.mesh import topology
+from fastcontact.mesh.files import _meshio, med
+from fastcontact.mesh.files.replacing import existing_file, replacing
+from fastcontact.mesh.files.targets import PathLike, checked_target
+from fastcontact.mesh.mesh import Mesh
+
+logger = logging.getLogger("fastcontact")
+
+# code_aster's names for the meshes and results it reads and writes are MED files too.
+MED_SUFFIXES = (".med", ".mmed", ".rmed")
+
+
+@dataclass(frozen=True)
+class MeshReport:
+    """What happened while a mesh was read.
+
+    Attributes
+    ----------
+    path : str
+    format : str
+        Format and, where the file tells it, its version, e.g. ``"MED 3.0.7"``.
+    mesh_name : str
+        Name of the mesh in the file; empty where the format has none.
+    n_turned : int
+        Solid cells whose nodes were reordered because they were inside out (clockwise in 2D).
+    dropped : mapping of str to int
+        Kinds of cells that are not in the mesh, with their number: ``"vertex"`` (cells of one node; their
+        groups are now groups of points), ``"duplicate"`` (cells that Gmsh repeats for each of their groups).
+    """
+
+    path: str
+    format: str
+    mesh_name: str = ""
+    n_turned: int = 0
+    dropped: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __str__(self) -> str:
+        name = f", mesh '{self.mesh_name}'" if self.mesh_name else ""
+        left_out = "".join(f", {count} {kind} cells left out" for kind, count in self.dropped.items())
+        return f"{self.path} ({self.format}{name}): {self.n_turned} cells turned{left_out}"
+
+
+def read_mesh(path: PathLike, *, mesh_name: str | None = None, orient: bool = True) -> Mesh:
+    """Read a mesh with its named groups.
+
+    The format follows from the suffix: MED (``.med``, ``.mmed``, ``.rmed``), Gmsh (``.msh``), Abaqus
+    (``.inp``), VTK (``.vtk``, ``.vtu``), XDMF, Medit (``.mesh``) and all others of meshio. MED groups, Gmsh
+    physical groups, Medit references and Abaqus sets all become groups of cells and points. A flat mesh in 3D
+    coordinates becomes a 2D one; points without cells are kept. How many cells were turned goes to the logger
+    ``fastcontact`` at level INFO, and to `read_mesh_report`.
+
+    Parameters
+    ----------
+    path : path-like
+    mesh_name : str, optional
+        Which mesh to read, of a MED file with several.
+    orient : bool
+        Turn solid cells that are inside out (clockwise in 2D); see `fastcontact.topology.oriented`.
+
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    FileError
+        If the file is missing, of an unknown format, damaged, or holds no mesh or several.
+    MeshError
+        If the mesh has no cells or a kind of cells that fastcontact does not know.
+
+    Examples
+    --------
+    >>> mesh = read_mesh("blocks.med")                        # doctest: +SKIP
+    """
+    return read_mesh_report(path, mesh_name=mesh_name, orient=orient)[0]
+
+
+def read_mesh_report(path: PathLike, *, mesh_name: str | None = None, orient: bool = True) -> tuple[Mesh, MeshReport]:
+    """Read a mesh, and tell what happened; parameters and errors as in `read_mesh`."""
+    found = existing_file(path)
+    if found.suffix.lower() in MED_SUFFIXES:
+        content = med.read_med(found, mesh_name)
+        mesh, file_format, name = content.mesh, f"MED {content.version}".strip(), content.name
+        dropped = {"vertex": content.n_vertices}
+    elif mesh_name is not None:
+        raise FileError(f"'{path}' is no MED file, so its mesh has no name: leave out mesh_name='{mesh_name}'")
+    else:
+        other = _meshio.read(found)
+        mesh, file_format, name = other.mesh, other.format, ""
+        dropped = {"vertex": other.n_vertices, "duplicate": other.n_duplicates}
+    mesh, n_turned = topology.oriented(mesh) if orient else (mesh, 0)
+    left_out = MappingProxyType({kind: count for kind, count in dropped.items() if count})
+    report = MeshReport(str(path), file_format, name, n_turned, left_out)
+    logger.info("read %s", report)
+    return mesh, report
+
+
+def write_mesh(path: PathLike, mesh: Mesh) -> None:
+    """Write a mesh; the format follows from the suffix, and the file appears only when it is complete.
+
+    What each format keeps of the groups:
+
+    - ``.med``: everything.
+    - ``.vtk``, ``.vtu``, ``.xdmf``: everything, as arrays of 0 and 1 named ``cell_group:...`` and
+      ``point_group:...``.
+    - ``.inp`` (Abaqus): all groups as sets; element types are the first that meshio finds for a shape.
+    - ``.msh`` (Gmsh 2.2): one group a cell, the smallest; groups of mixed dimension keep the highest; empty
+      groups and groups of points with the name of a group of cells are left out. A warning says how much.
+    - all others: no groups; a warning says how many.
+
+    Parameters
+    ----------
+    path : path-like
+    mesh : Mesh
+
+    Raises
+    ------
+    FileError
+        If the folder is missing, the format is unknown, or it cannot hold all cells or names.
+
+    Warns
+    -----
+    FastcontactWarning
+        If the format cannot hold all groups.
+    """
+    target = Path(checked_target(path))
+    if target.suffix.lower() in MED_SUFFIXES:
+        med.write_med_mesh(target, mesh)
+        return
+    with replacing(target) as temporary:
+        _meshio.write(target, temporary, mesh)

@@ -1,0 +1,64 @@
+"""Mesh makers with named groups, and operations on meshes.
+
+A maker is a function of plain numbers, strings and tuples that returns a `Mesh`; one listed in ``GENERATORS`` can be
+named in case files and on the command line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from fastcontact.mesh.generate.blocks import block, block_on_block, cylinder_on_block
+from fastcontact.mesh.generate.box import box
+from fastcontact.mesh.generate.crowned_blocks import crowned_blocks
+from fastcontact.mesh.generate.forest import Forest
+from fastcontact.mesh.generate.graded_block import graded_block
+from fastcontact.mesh.generate.half_spheres import half_spheres, quarter_disc
+from fastcontact.mesh.generate.punched_block import punched_block
+from fastcontact.mesh.generate.quadratic import Circle, to_quadratic
+from fastcontact.mesh.generate.refine import circles, linearised, refined
+from fastcontact.mesh.generate.rings import rings
+from fastcontact.mesh.generate.sphere import sphere_octant, sphere_on_block
+from fastcontact.mesh.generate.transform import merge_points, mirrored, renamed, transformed, union
+from fastcontact.mesh.mesh import Mesh
+
+GENERATORS: dict[str, Callable[..., Mesh]] = {
+    "half-spheres": half_spheres,
+    "quarter-disc": quarter_disc,
+    "block-on-block": block_on_block,
+    "cylinder-on-block": cylinder_on_block,
+    "box": box,
+    "graded-block": graded_block,
+    "sphere-on-block": sphere_on_block,
+    "sphere-octant": sphere_octant,
+    "punched-block": punched_block,
+    "crowned-blocks": crowned_blocks,
+    "rings": rings,
+}
+
+__all__ = [
+    "GENERATORS",
+    "Circle",
+    "Forest",
+    "block",
+    "block_on_block",
+    "box",
+    "circles",
+    "crowned_blocks",
+    "cylinder_on_block",
+    "graded_block",
+    "half_spheres",
+    "linearised",
+    "merge_points",
+    "mirrored",
+    "punched_block",
+    "quarter_disc",
+    "refined",
+    "renamed",
+    "rings",
+    "sphere_octant",
+    "sphere_on_block",
+    "to_quadratic",
+    "transformed",
+    "union",
+]

@@ -1,0 +1,86 @@
+"""Structured blocks between four curved sides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.mesh.generate._check import affordable
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+SIDES = ("BOTTOM", "RIGHT", "TOP", "LEFT")
+
+
+def rectangular(x: Array, y: Array) -> Array:
+    """Grid (n + 1, m + 1, 2) of the coordinates x (n + 1,) and y (m + 1,) [length]."""
+    affordable(len(x) * len(y))
+    return np.stack(np.meshgrid(x, y, indexing="ij"), axis=2)
+
+
+def transfinite(bottom: Array, right: Array, top: Array, left: Array, u: Array, v: Array) -> Array:
+    """Grid between four sides by bilinear blending.
+
+    Bilinearly blended Coons patch (W. J. Gordon and C. A. Hall, Int. J. Numer. Meth. Engng 7, 1973, eq. 6).
+
+    Parameters
+    ----------
+    bottom, top : ndarray (n + 1, 2)
+        Nodes in the direction of u [length].
+    right, left : ndarray (m + 1, 2)
+        Nodes in the direction of v [length].
+    u, v : ndarray (n + 1,), (m + 1,)
+        Relative abscissae of the nodes of opposite sides, 0 to 1.
+
+    Returns
+    -------
+    ndarray (n + 1, m + 1, 2)
+        The sides are met exactly.
+    """
+    affordable(len(u) * len(v))
+    U, V = u[:, None, None], v[None, :, None]
+    between_rows = (1 - V) * bottom[:, None] + V * top[:, None]
+    between_columns = (1 - U) * left[None] + U * right[None]
+    corners = (1 - U) * ((1 - V) * bottom[0] + V * top[0]) + U * ((1 - V) * bottom[-1] + V * top[-1])
+    grid = between_rows + between_columns - corners
+    grid[:, 0], grid[:, -1], grid[0], grid[-1] = bottom, top, left, right
+    return grid
+
+
+def structured(grid: Array, solid: str, sides: Mapping[str, str], triangles: bool = False) -> Mesh:
+    """Return the linear mesh of a grid.
+
+    Parameters
+    ----------
+    grid : ndarray (n + 1, m + 1, 2)
+        Nodes, counter-clockwise: the first index to the right, the second up [length].
+    solid : str
+        Name of the group of all cells.
+    sides : mapping of str to str
+        Name of the group of lines on each of BOTTOM, RIGHT, TOP, LEFT that gets one.
+    triangles : bool
+        Whether each quadrangle is cut in two, along diagonals that alternate.
+    """
+    n, m = grid.shape[0] - 1, grid.shape[1] - 1
+    numbers = np.arange((n + 1) * (m + 1)).reshape(n + 1, m + 1)
+    quads = np.stack([numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]], axis=2)
+    name, block = ("tri3", _cut(quads)) if triangles else ("quad4", quads.reshape(-1, 4))
+    nodes = {"BOTTOM": numbers[:, 0], "RIGHT": numbers[-1], "TOP": numbers[::-1, -1], "LEFT": numbers[0, ::-1]}
+    groups, lines, first = {solid: np.arange(len(block))}, [np.empty((0, 2), int)], len(block)
+    for side, group in sides.items():
+        line = np.column_stack([nodes[side][:-1], nodes[side][1:]])
+        groups[group] = np.concatenate([groups.get(group, np.empty(0, int)), first + np.arange(len(line))])
+        lines.append(line)
+        first += len(line)
+    return Mesh(grid.reshape(-1, 2), {name: block, "line2": np.concatenate(lines)}, groups)
+
+
+def _cut(quads: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Triangles (2 n m, 3) of quadrangles (n, m, 4), their diagonals alternating like a chessboard's."""
+    i, j = np.indices(quads.shape[:2])
+    rising = quads[..., [[0, 1, 2], [0, 2, 3]]]
+    falling = quads[..., [[0, 1, 3], [1, 2, 3]]]
+    return np.where(((i + j) % 2 == 0)[..., None, None], rising, falling).reshape(-1, 3)

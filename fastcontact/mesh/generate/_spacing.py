@@ -1,0 +1,91 @@
+"""Where the nodes of a line stand: equal, geometric, or after a size function."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.mesh.generate._check import segments
+
+Array = NDArray[np.float64]
+Curve = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class Spacing:
+    """Wanted edge length as a function of the distance from a pole.
+
+    The length is `near` within `plateau` of the pole, then grows linearly to `far` at `reach`, and stays there.
+
+    Attributes
+    ----------
+    near, far : float
+        Edge length at the pole and far from it [length].
+    pole : (float, float)
+        Coordinates of the pole [length].
+    plateau, reach : float
+        Distances from the pole [length].
+    """
+
+    near: float
+    far: float
+    pole: tuple[float, float] = (0.0, 0.0)
+    plateau: float = 0.0
+    reach: float = 1.0
+
+    @property
+    def uniform(self) -> bool:
+        """Whether the length is the same everywhere."""
+        return self.near == self.far
+
+    def at_distance(self, distance: Array | float) -> Array:
+        """Edge length at the given distance from the pole [length]."""
+        ramp = np.clip((np.asarray(distance) - self.plateau) / (self.reach - self.plateau), 0.0, 1.0)
+        return self.near + (self.far - self.near) * ramp
+
+    def __call__(self, points: Array) -> Array:
+        """Edge length (n,) wanted at `points` (n, 2) [length]."""
+        return self.at_distance(np.hypot(points[:, 0] - self.pole[0], points[:, 1] - self.pole[1]))
+
+
+def segments_for(length: float, size: float) -> int:
+    """Smallest number of equal segments not longer than `size`."""
+    return segments(length / size)
+
+
+def geometric(length: float, first: float, last: float) -> Array:
+    """Relative abscissae (n + 1,) from 0 to 1 of segments in geometric progression.
+
+    The ratio of the last segment to the first is exactly ``last / first``; n is the smallest number for which no
+    segment is longer than wanted, so all are shorter than asked by one common factor. From the sum of a geometric
+    series, S = (last q - first) / (q - 1), the ratio of neighbours is q = (S - first) / (S - last).
+    """
+    if first == last:
+        return np.linspace(0.0, 1.0, segments_for(length, first) + 1)
+    if length <= min(first, last):
+        return np.array([0.0, 1.0])
+    n = 2
+    if length * (1 - 1e-12) > max(first, last):  # otherwise a segment and a rest of rounding: two do
+        # log(last / first) / log(q), without cancellation where the sizes are nearly the same.
+        ratios = math.log1p((last - first) / first) / math.log1p((last - first) / (length - last))
+        n = 1 + segments(ratios)
+    abscissa = np.concatenate([[0.0], np.cumsum(np.geomspace(first, last, n))])
+    return abscissa / abscissa[-1]
+
+
+def divided(curve: Curve, length: float, spacing: Spacing) -> Array:
+    """Points (n + 1, 2) on `curve` (parameter 0 to 1, constant speed), no segment longer than its `spacing`."""
+    if spacing.uniform:
+        return curve(np.linspace(0.0, 1.0, segments_for(length, spacing.far) + 1))
+    # The integral of ds / h counts the segments; 16 samples per smallest segment resolve it.
+    fine = np.linspace(0.0, 1.0, 16 * segments_for(length, min(spacing.near, spacing.far)) + 1)
+    density = length / spacing(curve(0.5 * (fine[:-1] + fine[1:])))
+    number = np.concatenate([[0.0], np.cumsum(density * np.diff(fine))])
+    n = segments(number[-1])
+    parameter = np.interp(np.linspace(0.0, number[-1], n + 1), number, fine)
+    parameter[0], parameter[-1] = 0.0, 1.0
+    return curve(parameter)

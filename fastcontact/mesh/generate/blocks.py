@@ -1,0 +1,229 @@
+"""Rectangular blocks, one block on another, and a cylinder on a block."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import MeshError
+from fastcontact.mesh.generate._blocks import SIDES, rectangular, structured
+from fastcontact.mesh.generate._check import FACES, TRIANGLES, count, number, one_of, pair, positive, within
+from fastcontact.mesh.generate._outline import filled, straight
+from fastcontact.mesh.generate._places import with_points_at
+from fastcontact.mesh.generate._spacing import Spacing, divided, geometric, segments_for
+from fastcontact.mesh.generate.half_spheres import quarter_disc
+from fastcontact.mesh.generate.quadratic import in_element
+from fastcontact.mesh.generate.transform import renamed, union
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+
+def block(
+    size: tuple[float, float] = (1.0, 1.0),
+    divisions: tuple[int, int] = (4, 4),
+    element: str = "quad4",
+    origin: tuple[float, float] = (0.0, 0.0),
+    *,
+    name: str = "BLOCK",
+    distortion: float = 0.0,
+) -> Mesh:
+    """Rectangle in equal cells.
+
+    Groups of cells: `name` (all of it), BOTTOM, RIGHT, TOP, LEFT. Groups of points: BOTTOM_LEFT, BOTTOM_RIGHT,
+    TOP_RIGHT, TOP_LEFT.
+
+    Parameters
+    ----------
+    size : (float, float)
+        Width and height [length].
+    divisions : (int, int)
+        Cells along the width and the height; triangles are halves of them.
+    element : {"tri3", "tri6", "quad4", "quad8", "quad9"}
+        Element of the solid.
+    origin : (float, float)
+        Lower left corner [length].
+    name : str
+        Name of the solid group.
+    distortion : float
+        How far inner nodes are moved, 0 to 0.24 of a cell, in a fixed pattern.
+
+    Raises
+    ------
+    MeshError
+        If an argument is out of range.
+    """
+    one_of("element", element, FACES)
+    width, height = (positive(f"size[{i}]", value) for i, value in enumerate(pair("size", size)))
+    n, m = (count(f"divisions[{i}]", value) for i, value in enumerate(pair("divisions", divisions)))
+    left, bottom = (number(f"origin[{i}]", value) for i, value in enumerate(pair("origin", origin)))
+    amount = within("distortion", distortion, 0.0, 0.24)
+    grid = rectangular(left + width * np.linspace(0, 1, n + 1), bottom + height * np.linspace(0, 1, m + 1))
+    grid += _pattern(n, m) * amount * np.array([width / n, height / m])
+    return _finished(grid, element, name)
+
+
+def _finished(grid: Array, element: str, name: str) -> Mesh:
+    """Mesh of a grid in the wanted element, its sides and corners named."""
+    sides = {side: side for side in SIDES}
+    mesh = in_element(structured(grid, name, sides, triangles=element in TRIANGLES), element)
+    places = {"BOTTOM_LEFT": grid[0, 0], "BOTTOM_RIGHT": grid[-1, 0]}
+    return with_points_at(mesh, {**places, "TOP_RIGHT": grid[-1, -1], "TOP_LEFT": grid[0, -1]})
+
+
+def _pattern(n: int, m: int) -> Array:
+    """Shifts (n + 1, m + 1, 2) between -1 and 1, without order but the same every time, zero on the sides."""
+    i, j = np.indices((n + 1, m + 1))
+    shift = np.stack([np.sin(5.1 * i + 2.3 * j + 0.7), np.cos(3.7 * i - 4.3 * j)], axis=2)
+    shift[0] = shift[-1] = shift[:, 0] = shift[:, -1] = 0.0
+    return shift
+
+
+def block_on_block(
+    element: str = "quad4",
+    *,
+    size_lower: tuple[float, float] = (10.0, 5.0),
+    size_upper: tuple[float, float] = (10.0, 5.0),
+    divisions_lower: tuple[int, int] = (8, 4),
+    divisions_upper: tuple[int, int] = (6, 3),
+    shift: float = 0.0,
+    distortion: float = 0.0,
+) -> Mesh:
+    """Two rectangles, the upper one resting on the lower one along y = 0; their nodes need not match.
+
+    Groups of cells: LOWER, UPPER, CONT_LOWER (top of the lower block), CONT_UPPER (bottom of the upper one) and the
+    outer sides LOWER_BOTTOM, LOWER_LEFT, LOWER_RIGHT, UPPER_TOP, UPPER_LEFT, UPPER_RIGHT. Groups of points: the
+    corners LOWER_BOTTOM_LEFT ... UPPER_TOP_RIGHT.
+
+    Parameters
+    ----------
+    element : {"tri3", "tri6", "quad4", "quad8", "quad9"}
+        Element of both solids.
+    size_lower, size_upper : (float, float)
+        Widths and heights [length].
+    divisions_lower, divisions_upper : (int, int)
+        Cells along the widths and the heights.
+    shift : float
+        x of the upper block's left side; the lower one's stands at 0 [length].
+    distortion : float
+        How far inner nodes are moved, 0 to 0.24 of a cell, in a fixed pattern.
+
+    Raises
+    ------
+    MeshError
+        If an argument is out of range, or the blocks do not face each other.
+    """
+    width_lower, height = (
+        positive(f"size_lower[{i}]", value) for i, value in enumerate(pair("size_lower", size_lower))
+    )
+    width_upper = positive("size_upper[0]", pair("size_upper", size_upper)[0])
+    if not -width_upper < number("shift", shift) < width_lower:
+        raise MeshError(
+            f"shift = {shift:g} is out of range: the blocks face each other between {-width_upper:g} and "
+            f"{width_lower:g}"
+        )
+    lower = block(size_lower, divisions_lower, element, (0.0, -height), name="LOWER", distortion=distortion)
+    upper = block(size_upper, divisions_upper, element, (shift, 0.0), name="UPPER", distortion=distortion)
+    return union(
+        renamed(lower, lambda name: _side_name(name, "LOWER", "TOP")),
+        renamed(upper, lambda name: _side_name(name, "UPPER", "BOTTOM")),
+    )
+
+
+def _side_name(name: str, body: str, contact: str) -> str:
+    """Name of a block's group once the block is one of two."""
+    if name == contact:
+        return f"CONT_{body}"
+    return name if name == body else f"{body}_{name}"
+
+
+def cylinder_on_block(
+    element: str = "quad4",
+    *,
+    R: float = 50.0,
+    block_size: tuple[float, float] | None = None,
+    size: float | None = None,
+    contact_size: float | None = None,
+) -> Mesh:
+    """Lower half of a cylinder on a block, the half x >= 0 of both, for plane strain.
+
+    The cylinder's quarter disc touches the block at the origin; both meshes are finest there. Groups of cells:
+    CYLINDER, BLOCK, AXIS (x = 0 of both), CYLINDER_TOP, CYLINDER_SIDE (outer half of the arc), CONT_CYLINDER (the
+    45 degrees of arc next to the pole), CONT_BLOCK (top of the block), BLOCK_SIDE, BLOCK_BOTTOM. Groups of points:
+    POLE_CYLINDER, POLE_BLOCK (two points at the origin), CENTRE (of the cylinder).
+
+    Parameters
+    ----------
+    element : {"tri3", "tri6", "quad4", "quad8", "quad9"}
+        Element of both solids.
+    R : float
+        Radius of the cylinder [length].
+    block_size : (float, float), optional
+        Width (from the axis x = 0) and height of the block, 2 R each by default [length].
+    size : float, optional
+        Longest edges far from the contact, R/10 by default [length].
+    contact_size : float, optional
+        Edges along the surfaces at the contact, R/100 by default [length].
+
+    Raises
+    ------
+    MeshError
+        If an argument is out of range.
+    """
+    one_of("element", element, FACES)
+    R = positive("R", R)
+    far = R / 10 if size is None else positive("size", size, R / 2, "R/2")
+    near = min(R / 100, far) if contact_size is None else positive("contact_size", contact_size, far, "size")
+    extent = (2 * R, 2 * R) if block_size is None else pair("block_size", block_size)
+    width, height = (positive(f"block_size[{i}]", value) for i, value in enumerate(extent))
+    if element in TRIANGLES:
+        foundation = _free_block(element, width, height, Spacing(near, far, reach=R))
+    else:
+        foundation = _graded_block(element, width, height, near, far)
+    return union(_cylinder(element, R, near, far), foundation)
+
+
+def _cylinder(element: str, R: float, near: float, far: float) -> Mesh:
+    """Quarter disc above the block, under the cylinder's names."""
+    if element in TRIANGLES:
+        disc = quarter_disc(element, body="upper", R=R, size=far, contact_size=near)
+    else:
+        n = segments_for(R / 2, far)
+        disc = quarter_disc(element, body="upper", R=R, arc_sizes=(near, far), radial_sizes=(near, far), segments=n)
+    names = {"SPHHAU": "CYLINDER", "A1A2": "AXIS", "A2B2": "CYLINDER_TOP", "CONT2": "CONT_CYLINDER"}
+    names |= {"D2B2": "CYLINDER_SIDE", "C2": "POLE_CYLINDER", "A2": "CENTRE"}
+    return renamed(disc, names.get)
+
+
+_BLOCK_NAMES = {
+    "BLOCK": "BLOCK",
+    "BOTTOM": "BLOCK_BOTTOM",
+    "RIGHT": "BLOCK_SIDE",
+    "TOP": "CONT_BLOCK",
+    "LEFT": "AXIS",
+    "TOP_LEFT": "POLE_BLOCK",
+}
+
+
+def _graded_block(element: str, width: float, height: float, near: float, far: float) -> Mesh:
+    """Quadrangles whose sides grow geometrically from the pole."""
+    x = width * geometric(width, near, far)
+    y = -height * geometric(height, near, far)[::-1]
+    return renamed(_finished(rectangular(x, y + 0.0), element, "BLOCK"), _BLOCK_NAMES.get)
+
+
+def _free_block(element: str, width: float, height: float, spacing: Spacing) -> Mesh:
+    """Triangles whose sides grow with the distance from the pole, as in the cylinder."""
+    corners = [(0.0, 0.0), (0.0, -height), (width, -height), (width, 0.0)]
+    names = ["LEFT", "BOTTOM", "RIGHT", "TOP"]
+    sides = []
+    for name, start, end in zip(names, corners, corners[1:] + corners[:1], strict=True):
+
+        def side(s: Array, start: tuple[float, float] = start, end: tuple[float, float] = end) -> Array:
+            return straight(start, end, s)
+
+        sides.append((name, divided(side, math.dist(start, end), spacing)))
+    mesh = in_element(filled("BLOCK", sides, spacing), element)
+    return renamed(with_points_at(mesh, {"TOP_LEFT": (0.0, 0.0)}), _BLOCK_NAMES.get)

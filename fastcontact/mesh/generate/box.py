@@ -1,0 +1,122 @@
+"""Rectangular boxes in three dimensions: hexahedra, or hexahedra cut into tetrahedra, wedges or pyramids."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import MeshError
+from fastcontact.mesh import elements
+from fastcontact.mesh.elements import Element
+from fastcontact.mesh.generate._check import affordable, count, number, one_of, positive
+from fastcontact.mesh.mesh import Mesh
+
+Indices = NDArray[np.int64]
+
+AXES = "xyz"
+# All nodes of all elements stand on a lattice of four steps a hexahedron: mid nodes of the inner edges of pyramids too.
+STEPS = 4
+_HEX = elements.get("hex8")
+_CORNERS = ((_HEX.nodes + 1) / 2 * STEPS).astype(np.int64)
+# Corners of the cells that make up a hexahedron, 8 being its centre. Neighbours match: the cuts of opposite faces are
+# the same, shifted.
+_CUTS = {
+    "hex8": [list(range(8))],
+    "tet4": [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]],
+    "wedge6": [[0, 1, 2, 4, 5, 6], [0, 2, 3, 4, 6, 7]],
+    "pyramid5": [[*reversed(facet), 8] for facet in _HEX.facets],
+}
+SOLIDS = tuple(name for name, element in elements.ELEMENTS.items() if element.linear in _CUTS)
+
+
+def box(
+    size: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    divisions: tuple[int, int, int] = (4, 4, 4),
+    element: str = "hex8",
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    *,
+    name: str = "BOX",
+) -> Mesh:
+    """Box of equal hexahedra, whole or cut into 6 tetrahedra, 2 wedges (standing along z) or 6 pyramids each.
+
+    Groups of cells: `name` (all of it) and the outer facets XMIN, XMAX, YMIN, YMAX, ZMIN, ZMAX.
+
+    Parameters
+    ----------
+    size : (float, float, float)
+        Lengths along x, y, z [length].
+    divisions : (int, int, int)
+        Hexahedra along x, y, z.
+    element : {"hex8", "hex20", "hex27", "tet4", "tet10", "wedge6", "wedge15", "wedge18", "pyramid5", "pyramid13"}
+        Element of the solid.
+    origin : (float, float, float)
+        Corner with the smallest coordinates [length].
+    name : str
+        Name of the solid group.
+
+    Raises
+    ------
+    MeshError
+        If an argument is out of range.
+
+    Examples
+    --------
+    >>> mesh = box((2.0, 1.0, 1.0), (2, 1, 1), "wedge6")
+    >>> mesh.n_points, len(mesh.cells["wedge6"]), sorted(mesh.cells)
+    (12, 4, ['quad4', 'tri3', 'wedge6'])
+    """
+    solid = elements.get(one_of("element", element, SOLIDS))
+    lengths = np.array([positive(f"size[{i}]", value) for i, value in enumerate(_triple("size", size))])
+    shape = np.array([count(f"divisions[{i}]", value) for i, value in enumerate(_triple("divisions", divisions))])
+    corner = np.array([number(f"origin[{i}]", value) for i, value in enumerate(_triple("origin", origin))])
+    block, lattice = _solids(solid, shape)
+    facets, sides = _sides(solid, block, lattice, STEPS * shape)
+    cells, groups, first = {element: block}, {name: np.arange(len(block))}, len(block)
+    for kind, found in facets.items():
+        cells[kind] = found
+        for side, rows in sides[kind].items():
+            groups[side] = np.concatenate([groups.get(side, rows[:0]), first + rows])
+        first += len(found)
+    return Mesh(corner + lattice / (STEPS * shape) * lengths, cells, groups)
+
+
+def _triple(name: str, value: Any) -> tuple[Any, Any, Any]:
+    if isinstance(value, str) or not hasattr(value, "__len__") or len(value) != 3:
+        raise MeshError(f"{name} must be three numbers, not {value!r}")
+    return value[0], value[1], value[2]
+
+
+def _solids(solid: Element, shape: Indices) -> tuple[Indices, Indices]:
+    """Return the connectivity of the cells, and the points (n_points, 3) in steps of the lattice."""
+    affordable(float(np.prod(shape, dtype=float)) * len(_CUTS[solid.linear]))
+    corners = np.vstack([_CORNERS, _CORNERS.mean(axis=0, keepdims=True).astype(np.int64)])
+    local = solid.corner_shape(solid.nodes) @ corners[_CUTS[solid.linear]]
+    # One number for each place of the lattice; they add up.
+    n_y, n_z = STEPS * shape[1:] + 1
+    weights = np.array([n_y * n_z, n_z, 1])
+    first = STEPS * np.indices(tuple(shape.tolist())).reshape(3, -1).T @ weights
+    places = first[:, None, None] + np.rint(local).astype(np.int64) @ weights
+    found, block = np.unique(places, return_inverse=True)
+    lattice = np.column_stack([found // (n_y * n_z), found // n_z % n_y, found % n_z])
+    return block.reshape(-1, solid.n_nodes), lattice
+
+
+def _sides(
+    solid: Element, block: Indices, lattice: Indices, last: Indices
+) -> tuple[dict[str, Indices], dict[str, dict[str, Indices]]]:
+    """Return the outer facets by facet element, and their rows in each group such as XMIN."""
+    facets: dict[str, list[Indices]] = {}
+    sides: dict[str, dict[str, Indices]] = {}
+    for axis, end in ((axis, end) for axis in range(3) for end in ("MIN", "MAX")):
+        on = lattice[:, axis] == (last[axis] if end == "MAX" else 0)
+        for local, kind in zip(solid.facets, solid.facet_elements, strict=True):
+            nodes = block[:, local]
+            found = nodes[on[nodes].all(axis=1)]
+            if len(found):
+                start = sum(map(len, facets.setdefault(kind, [])))
+                facets[kind].append(found)
+                rows, side = sides.setdefault(kind, {}), f"{AXES[axis].upper()}{end}"
+                rows[side] = np.concatenate([rows.get(side, found[:0, 0]), start + np.arange(len(found))])
+    return {kind: np.concatenate(parts) for kind, parts in facets.items()}, sides

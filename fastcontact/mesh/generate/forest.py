@@ -1,0 +1,230 @@
+"""Local refinement of 2D meshes: triangles and quadrangles quartered where wanted, neighbours made to fit.
+
+A forest holds every cell of a first mesh and its descendants. Marked leaves are quartered ("red"); neighbours of smaller
+leaves are divided for the mesh only ("green": Bank, Sherman and Weiser, 1983), never for good, so angles do not
+deteriorate however often one refines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import MeshError
+from fastcontact.mesh import elements
+from fastcontact.mesh.generate.quadratic import Curve, edges_on
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.quality import check_cells
+
+Array = NDArray[np.float64]
+Indices = NDArray[Any]
+Mask = NDArray[np.bool_]
+
+CORNERS = {"line2": 2, "tri3": 3, "quad4": 4}
+# Children of a cell by its corners 0.., then the middles of its edges, then (quadrangles) its centre.
+RED = {
+    "line2": [[0, 2], [2, 1]],
+    "tri3": [[0, 3, 5], [3, 1, 4], [5, 4, 2], [4, 5, 3]],
+    "quad4": [[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]],
+}
+# Cells for the mesh where edge 0 (or edges 0 and 2) of a cell, turned so, are divided.
+GREEN: dict[tuple[str, int], dict[str, list[list[int]]]] = {
+    ("tri3", 1): {"tri3": [[0, 3, 2], [3, 1, 2]]},
+    ("quad4", 1): {"tri3": [[0, 4, 3], [4, 1, 2], [4, 2, 3]]},
+    ("quad4", 2): {"quad4": [[0, 4, 6, 3], [4, 1, 2, 6]]},
+}
+
+
+@dataclass(eq=False)
+class _Leaves:
+    """Leaves of one kind: corners (n, k), and the cell of the first mesh that each descends from."""
+
+    corners: Indices
+    root: Indices
+
+
+class Forest:
+    """A mesh that can be refined again and again, here and there.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Two-dimensional: line2, tri3, quad4.
+    curves : iterable of Curve
+        True shapes of the boundary: new points on facets that lie on a curve are put on it.
+
+    Raises
+    ------
+    MeshError
+        If a cell is of another kind, or a curve's group has no facet on the curve.
+    """
+
+    def __init__(self, mesh: Mesh, curves: Iterable[Curve] = ()) -> None:
+        for name, block in mesh.cells.items():
+            if name not in CORNERS:
+                raise MeshError(
+                    f"{len(block)} cells of {name} cannot be refined locally: use `linearised` on a mesh of triangles and "
+                    "quadrangles, and `to_quadratic` after refinement"
+                )
+        self.first, self.curves = mesh, list(curves)
+        self.points = mesh.points
+        self._leaves = {
+            name: _Leaves(block.astype(np.int64), mesh.offsets[name] + np.arange(len(block)))
+            for name, block in mesh.cells.items()
+        }
+        # Ends of divided edges as one number each, sorted, and the points in their middle.
+        self._divided, self._middle = np.empty(0, np.int64), np.empty(0, np.int64)
+        self._groups = {group: np.asarray(members) for group, members in mesh.point_groups.items()}
+        self._on_curve = [edges_on(mesh, curve) for curve in self.curves]
+
+    @property
+    def solids(self) -> list[str]:
+        """Kinds of solid leaves, in the order in which `refine` takes their marks."""
+        return [name for name in self._leaves if name != "line2"]
+
+    @property
+    def n_leaves(self) -> int:
+        """Number of solid leaves."""
+        return sum(len(self._leaves[name].corners) for name in self.solids)
+
+    def refine(self, marked: Mask) -> None:
+        """Quarter the marked solid leaves, and others so that no edge is divided more than once on one side.
+
+        Parameters
+        ----------
+        marked : ndarray of bool (n_leaves,)
+            By kind as in `solids`, leaves of one kind in the order of `mesh()`'s origins.
+        """
+        starts = np.cumsum([0, *(len(self._leaves[name].corners) for name in self.solids)])
+        marks = {name: marked[a:b] for name, a, b in zip(self.solids, starts[:-1], starts[1:], strict=True)}
+        while any(mask.any() for mask in marks.values()):
+            for name, mask in marks.items():
+                self._quarter(name, mask)
+            marks = {name: self._too_coarse(name) for name in self.solids}
+        self._halve_lines()
+
+    def _key(self, ends: Indices) -> Indices:
+        """One number for each edge (..., 2), the same from either end; good for up to 2**31 points."""
+        return (ends.min(axis=-1) << 32) | ends.max(axis=-1)
+
+    def _edges(self, name: str, corners: Indices) -> Indices:
+        return self._key(corners[:, elements.get(name).edges]) if name != "line2" else self._key(corners)[:, None]
+
+    def _middles(self, keys: Indices) -> Indices:
+        """Points in the middle of edges, -1 where an edge is not divided."""
+        if not len(self._divided):
+            return np.full(keys.shape, -1)
+        place = np.minimum(np.searchsorted(self._divided, keys), len(self._divided) - 1)
+        return np.where(self._divided[place] == keys, self._middle[place], -1)
+
+    def _divide(self, keys: Indices) -> None:
+        """Put a point in the middle of edges that have none yet."""
+        new = np.setdiff1d(keys, self._divided)
+        if not len(new):
+            return
+        ends = np.column_stack([new >> 32, new & 0xFFFFFFFF])
+        numbers = len(self.points) + np.arange(len(new))
+        places = self.points[ends].mean(axis=1)
+        for k, curve in enumerate(self.curves):
+            on = np.isin(new, self._on_curve[k])
+            places[on] = curve.project(places[on])
+            halves = self._key(np.stack([ends[on], np.column_stack([numbers[on], numbers[on]])], axis=2).reshape(-1, 2))
+            self._on_curve[k] = np.concatenate([self._on_curve[k], halves])
+        self.points = np.concatenate([self.points, places])
+        for group, members in self._groups.items():
+            if len(members) > 1:
+                self._groups[group] = np.concatenate([members, numbers[np.isin(ends, members).all(axis=1)]])
+        order = np.argsort(np.concatenate([self._divided, new]))
+        self._divided = np.concatenate([self._divided, new])[order]
+        self._middle = np.concatenate([self._middle, numbers])[order]
+
+    def _quarter(self, name: str, mask: Mask) -> None:
+        leaves = self._leaves[name]
+        parents = leaves.corners[mask]
+        keys = self._edges(name, parents)
+        self._divide(np.unique(keys))
+        lattice = [parents, self._middles(keys)]
+        if name == "quad4":
+            lattice.append(len(self.points) + np.arange(len(parents))[:, None])
+            self.points = np.concatenate([self.points, self._centres(parents, lattice[1])])
+        points = np.concatenate(lattice, axis=1)
+        children = points[:, RED[name]].reshape(-1, CORNERS[name])
+        self._leaves[name] = _Leaves(
+            np.concatenate([leaves.corners[~mask], children]),
+            np.concatenate([leaves.root[~mask], np.repeat(leaves.root[mask], len(RED[name]))]),
+        )
+
+    def _centres(self, corners: Indices, middles: Indices) -> Array:
+        """Centres of quadrangles, where the shape functions of the curved cell put them."""
+        return 0.5 * self.points[middles].sum(axis=1) - 0.25 * self.points[corners].sum(axis=1)
+
+    def _too_coarse(self, name: str) -> Mask:
+        """Leaves that green division cannot make fit: an edge divided twice, or too many edges divided."""
+        corners = self._leaves[name].corners
+        keys = self._edges(name, corners)
+        middles = self._middles(keys)
+        divided = middles >= 0
+        ends = corners[:, elements.get(name).edges]
+        twice = np.zeros(divided.shape, bool)
+        for end in (0, 1):
+            half = self._key(np.stack([ends[:, :, end], np.where(divided, middles, 0)], axis=2))
+            twice |= divided & (self._middles(half) >= 0)
+        count = divided.sum(axis=1)
+        opposite = (count == 2) & (divided[:, 0] == divided[:, 2]) if name == "quad4" else np.zeros(len(corners), bool)
+        return np.asarray(twice.any(axis=1) | ((count > 1) & ~opposite))
+
+    def _halve_lines(self) -> None:
+        if "line2" not in self._leaves:
+            return
+        while True:
+            corners = self._leaves["line2"].corners
+            mask = (self._middles(self._edges("line2", corners)) >= 0).ravel()
+            if not mask.any():
+                return
+            self._quarter("line2", mask)
+
+    def mesh(self) -> tuple[Mesh, Indices]:
+        """Return the mesh of all leaves, and for its solid cells (as in `Mesh.solids`) the leaf each belongs to.
+
+        Groups of cells hold the descendants of their cells; a new point joins the groups that hold both ends of its edge.
+        """
+        blocks: dict[str, list[Indices]] = {}
+        roots: dict[str, list[Indices]] = {}
+        owners: dict[str, list[Indices]] = {}
+        first = 0
+        for name, leaves in self._leaves.items():
+            for kind, cells, source in self._fitted(name, leaves.corners):
+                blocks.setdefault(kind, []).append(cells)
+                roots.setdefault(kind, []).append(leaves.root[source])
+                owners.setdefault(kind, []).append(first + source)
+            first += len(leaves.corners) if name != "line2" else 0
+        cells_by = {kind: np.concatenate(parts) for kind, parts in blocks.items()}
+        root = np.concatenate([np.concatenate(roots[kind]) for kind in cells_by])
+        groups = {group: np.flatnonzero(np.isin(root, members)) for group, members in self.first.cell_groups.items()}
+        mesh = Mesh(self.points, cells_by, groups, self._groups)
+        check_cells(mesh)
+        return mesh, np.concatenate([np.concatenate(owners[kind]) for kind in mesh.solids])
+
+    def _fitted(self, name: str, corners: Indices) -> list[tuple[str, Indices, Indices]]:
+        """Return kinds, cells and their leaves: leaves as they are, or green where edges are divided."""
+        if name == "line2":
+            return [(name, corners, np.arange(len(corners)))]
+        middles = self._middles(self._edges(name, corners))
+        count = (middles >= 0).sum(axis=1)
+        found = [(name, corners[count == 0], np.flatnonzero(count == 0))]
+        sides = CORNERS[name]
+        for turn in range(sides):
+            turned = (np.arange(sides) + turn) % sides
+            for number in (1, 2):
+                here = (count == number) & (middles[:, turn] >= 0)
+                if (name, number) not in GREEN or (number == 2 and turn > 1):
+                    continue
+                lattice = np.concatenate([corners[:, turned], middles[:, turned]], axis=1)[here]
+                for kind, pattern in GREEN[name, number].items():
+                    cells = lattice[:, pattern].reshape(-1, CORNERS[kind])
+                    found.append((kind, cells, np.repeat(np.flatnonzero(here), len(pattern))))
+        return found

@@ -1,0 +1,214 @@
+"""Two half-spheres as quarter discs in the (r, y) plane: the meshes of the Hertz contact study."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.mesh.generate._blocks import structured, transfinite
+from fastcontact.mesh.generate._check import FACES, TRIANGLES, count, one_of, pair, positive, unused, within
+from fastcontact.mesh.generate._outline import arc, filled, straight
+from fastcontact.mesh.generate._places import with_points_at
+from fastcontact.mesh.generate._spacing import Spacing, divided, geometric
+from fastcontact.mesh.generate.quadratic import Circle, in_element
+from fastcontact.mesh.generate.transform import merge_points, mirrored, union
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+# Names of the upper body's groups by those of the lower one; A1A2 is the axis of both.
+_UPPER = {"SPHBAS": "SPHHAU", "A1B1": "A2B2", "CONT1": "CONT2", "D1B1": "D2B2"}
+_UPPER |= {f"{letter}1": f"{letter}2" for letter in "ABCD"} | {f"{letter}1": letter for letter in "MNP"}
+
+
+def half_spheres(
+    element: str = "tri3",
+    *,
+    R: float = 50.0,
+    size: float | None = None,
+    contact_size: float | None = None,
+    contact_radius: float | None = None,
+    arc_sizes: tuple[float, float] | None = None,
+    segments: int | None = None,
+    radial_sizes: tuple[float, float] | None = None,
+) -> Mesh:
+    """Two half-spheres that touch at the origin, each a quarter disc in the (r, y) plane.
+
+    The lower body has its centre at A1 = (0, -R), the end of its flat edge at B1 = (R, -R), its pole at C1 = (0, 0)
+    and D1 half-way along the arc; the upper body is its mirror image in y = 0. The poles C1 and C2 are two points
+    at one place. Nothing is random: equal arguments give equal meshes.
+
+    Groups of cells: SPHBAS, SPHHAU (lower, upper body), A1A2 (axis of both), A1B1, A2B2 (flat edges), CONT1, CONT2
+    (arcs C1-D1, C2-D2), D1B1, D2B2 (the rest of the arcs). Groups of points: A1 B1 C1 D1 A2 B2 C2 D2; with
+    quadrangles also the block corners M N P (upper body, at (0, R/2), (R/2, R/2), (R/2, R)) and M1 N1 P1 (lower).
+
+    Parameters
+    ----------
+    element : {"tri3", "tri6", "quad4", "quad8", "quad9"}
+        Triangles fill the discs freely; quadrangles stand in three blocks per body. The middle nodes of quadratic
+        elements lie on the circle.
+    R : float
+        Radius [length].
+    size : float, optional
+        Triangles only: longest edge, R/25 by default [length].
+    contact_size : float, optional
+        Triangles only: longest edge at the pole; it grows linearly to `size` at the distance R from the pole. By
+        default the mesh is uniform [length].
+    contact_radius : float, optional
+        Triangles only: distance from the pole up to which `contact_size` holds, 0 by default [length].
+    arc_sizes : (float, float), optional
+        Quadrangles only: segments of the arc at its pole and at D, in geometric progression between; R/250 and R/25
+        by default. The number of segments is a whole number, so both sizes come out shorter by one common factor
+        [length].
+    segments : int, optional
+        Quadrangles only: segments on the sides of the square A-M, on D-B and on the radial lines M-C, N-D and P-B;
+        15 by default.
+    radial_sizes : (float, float), optional
+        Quadrangles only: segments of the radial line M-C at the contact C and at M, in geometric progression
+        between; by default `segments` of them, graded as much as the arc [length].
+
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    MeshError
+        If an argument is out of range or means nothing to the element.
+
+    Examples
+    --------
+    >>> mesh = half_spheres("quad4", segments=4, arc_sizes=(2.0, 5.0))
+    >>> mesh.point("C1") == mesh.point("C2")
+    False
+    """
+    lower = quarter_disc(
+        element,
+        R=R,
+        size=size,
+        contact_size=contact_size,
+        contact_radius=contact_radius,
+        arc_sizes=arc_sizes,
+        segments=segments,
+        radial_sizes=radial_sizes,
+    )
+    return union(lower, mirrored(lower, "y", rename=_UPPER))
+
+
+def quarter_disc(
+    element: str = "tri3",
+    *,
+    body: str = "lower",
+    R: float = 50.0,
+    size: float | None = None,
+    contact_size: float | None = None,
+    contact_radius: float | None = None,
+    arc_sizes: tuple[float, float] | None = None,
+    segments: int | None = None,
+    radial_sizes: tuple[float, float] | None = None,
+) -> Mesh:
+    """One of the two bodies of `half_spheres`, with its groups.
+
+    Parameters
+    ----------
+    element, R, size, contact_size, contact_radius, arc_sizes, segments, radial_sizes
+        As for `half_spheres`.
+    body : {"lower", "upper"}
+        Which one.
+
+    Raises
+    ------
+    MeshError
+        If an argument is out of range or means nothing to the element.
+    """
+    one_of("element", element, FACES)
+    one_of("body", body, ("lower", "upper"))
+    R = positive("R", R)
+    if element in TRIANGLES:
+        unused(element, arc_sizes=arc_sizes, segments=segments, radial_sizes=radial_sizes)
+        linear = _of_triangles(R, _spacing(R, size, contact_size, contact_radius))
+    else:
+        unused(element, size=size, contact_size=contact_size, contact_radius=contact_radius)
+        linear = _of_quadrangles(R, arc_sizes, segments, radial_sizes)
+    disc = in_element(linear, element, [Circle((0.0, -R), R, group) for group in ("CONT1", "D1B1")])
+    return disc if body == "lower" else mirrored(disc, "y", rename=_UPPER)
+
+
+def _corners(R: float) -> dict[str, tuple[float, float]]:
+    """Corners of the lower body; D by the same formula as the nodes of the arc."""
+    x, y = arc((0.0, -R), R, np.array([0.25 * math.pi]))[0]
+    return {"A1": (0.0, -R), "B1": (R, -R), "C1": (0.0, 0.0), "D1": (float(x), float(y))}
+
+
+def _spacing(R: float, size: float | None, contact_size: float | None, contact_radius: float | None) -> Spacing:
+    far = R / 25 if size is None else positive("size", size, R, "R")
+    if contact_size is None:
+        unused("uniform", contact_radius=contact_radius)
+        return Spacing(far, far, reach=R)
+    near = positive("contact_size", contact_size, far, "size")
+    plateau = 0.0 if contact_radius is None else within("contact_radius", contact_radius, 0.0, R / 2)
+    return Spacing(near, far, plateau=plateau, reach=R)
+
+
+def _of_triangles(R: float, spacing: Spacing) -> Mesh:
+    """Lower body in tri3."""
+    corners, right, half = _corners(R), 0.5 * math.pi, 0.25 * math.pi
+    sides = [
+        ("A1B1", divided(lambda s: straight(corners["A1"], corners["B1"], s), R, spacing)),
+        ("D1B1", divided(lambda s: arc((0.0, -R), R, right - s * half), R * half, spacing)),
+        ("CONT1", divided(lambda s: arc((0.0, -R), R, half - s * half), R * half, spacing)),
+        ("A1A2", divided(lambda s: straight(corners["C1"], corners["A1"], s), R, spacing)),
+    ]
+    return with_points_at(filled("SPHBAS", sides, spacing), corners)
+
+
+def _of_quadrangles(
+    R: float,
+    arc_sizes: tuple[float, float] | None,
+    segments: int | None,
+    radial_sizes: tuple[float, float] | None,
+) -> Mesh:
+    """Lower body in quad4: the square A-P-N-M and the two blocks between it and the arc."""
+    n = 15 if segments is None else count("segments", segments)
+    length = 0.25 * math.pi * R
+    near, far = (R / 250, R / 25) if arc_sizes is None else _sizes("arc_sizes", arc_sizes, length)
+    along = geometric(length, near, far)
+    equal = np.linspace(0.0, 1.0, n + 1)
+    if radial_sizes is None:
+        lengths = (near / far) ** (np.arange(n) / max(n - 1, 1))
+        outward = np.append(0.0, np.cumsum(lengths)) / lengths.sum()
+    else:
+        at_contact, inside = _sizes("radial_sizes", radial_sizes, 0.5 * R)
+        outward = geometric(0.5 * R, inside, at_contact)
+    return _three_blocks(R, along, outward, equal)
+
+
+def _sizes(name: str, value: tuple[float, float], length: float) -> tuple[float, float]:
+    first, second = pair(name, value)
+    return positive(f"{name}[0]", first, length), positive(f"{name}[1]", second, length)
+
+
+def _three_blocks(R: float, along: Array, outward: Array, equal: Array) -> Mesh:
+    """Lower body from the relative abscissae along C-D, along M-C and along the equally divided sides."""
+    places = {**_corners(R), "M1": (0.0, -R / 2), "N1": (R / 2, -R / 2), "P1": (R / 2, -R)}
+
+    def line(start: str, end: str, relative: Array) -> Array:
+        return straight(places[start], places[end], relative)
+
+    half = 0.25 * math.pi
+    contact = arc((0.0, -R), R, half * along)
+    rest = arc((0.0, -R), R, half * (2.0 - equal))
+    bottom, across = line("A1", "P1", along), line("M1", "N1", along)
+    inner, radial = line("P1", "N1", equal), line("N1", "D1", outward)
+    radial[-1] = contact[-1] = rest[-1]
+    square = transfinite(bottom, inner, across, line("A1", "M1", equal), along, equal)
+    upper = transfinite(across, radial, contact, line("M1", "C1", outward), along, outward)
+    outer = transfinite(line("P1", "B1", outward), rest, radial, inner, outward, equal)
+    blocks = [
+        structured(square, "SPHBAS", {"BOTTOM": "A1B1", "LEFT": "A1A2"}),
+        structured(upper, "SPHBAS", {"TOP": "CONT1", "LEFT": "A1A2"}),
+        structured(outer, "SPHBAS", {"BOTTOM": "A1B1", "RIGHT": "D1B1"}),
+    ]
+    return with_points_at(merge_points(union(*blocks), 1e-9 * R), places)

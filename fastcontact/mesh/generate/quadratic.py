@@ -1,0 +1,184 @@
+"""Linear meshes made quadratic, mid nodes on the true curves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import MeshError
+from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.quality import check_cells
+from fastcontact.mesh.topology import outer_facets
+
+Array = NDArray[np.float64]
+Indices = NDArray[Any]
+
+# Ends this near to a curve, relative to their edge, lie on it.
+_ON_CURVE = 1e-6
+_WITH_CENTRE = {"quad8": "quad9"}
+
+
+class Curve(Protocol):
+    """What `to_quadratic` asks of a curve: the group it carries, and the nearest points on it."""
+
+    @property
+    def group(self) -> str | None:
+        """Group of facets on the curve, or None for all outer facets."""
+        ...
+
+    def project(self, points: Array) -> Array:
+        """Nearest points (n, dim) on the curve."""
+        ...
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A circle in the plane.
+
+    Parameters
+    ----------
+    centre : (float, float)
+        [length].
+    radius : float
+        [length].
+    group : str, optional
+        Group of facets that lie on it; by default all outer facets whose ends do.
+
+    Raises
+    ------
+    MeshError
+        If the radius is not a positive number.
+    """
+
+    centre: tuple[float, float]
+    radius: float
+    group: str | None = None
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.radius) and self.radius > 0.0):
+            raise MeshError(f"radius = {self.radius} is out of range: it must be greater than 0")
+
+    def project(self, points: Array) -> Array:
+        """Nearest points (n, 2) on the circle."""
+        arms = points - np.asarray(self.centre)
+        length = np.hypot(arms[:, 0], arms[:, 1])
+        # The centre itself has no nearest point: it stays, far from the circle.
+        return np.asarray(self.centre) + arms * (self.radius / np.where(length > 0.0, length, 1.0))[:, None]
+
+
+def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool = False) -> Mesh:
+    """Return the mesh with a mid node on every edge: tri3 to tri6, quad4 to quad8 or quad9, hex8 to hex20 ...
+
+    A mid node stands half-way between its ends, but on the curve where the edge belongs to a facet of the curve's
+    group and both its ends lie on the curve. Points keep their numbers, mid nodes follow, then centre nodes.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Cells of linear elements.
+    curves : iterable of Curve
+        True shapes of the boundary, for example `Circle`.
+    centre_nodes : bool
+        Whether quadrangles get a centre node (quad9); 2D only.
+
+    Raises
+    ------
+    MeshError
+        If a cell is quadratic already, `centre_nodes` is asked of a 3D mesh, a curve's group has no edge on the
+        curve, or a cell is folded by its curved side (its Jacobian is not positive at a quadrature point).
+    """
+    names = _quadratic_names(mesh, centre_nodes)
+    edges = _edges(mesh.cells, mesh.n_points)
+    middles = mesh.points[_ends(edges, mesh.n_points)].mean(axis=1)
+    for curve in curves:
+        rows = _rows_on(mesh, curve, edges)
+        middles[rows] = curve.project(middles[rows])
+    points = [mesh.points, middles]
+    cells, n_points = {}, mesh.n_points + len(middles)
+    for name, block in mesh.cells.items():
+        mids = mesh.n_points + np.searchsorted(edges, _edge_keys(name, block, mesh.n_points))
+        columns = [block, mids]
+        if names[name] in _WITH_CENTRE.values():
+            points.append(_centres(mesh.points[block], middles[mids - mesh.n_points]))
+            columns.append(n_points + np.arange(len(block))[:, None])
+            n_points += len(block)
+        cells[names[name]] = np.column_stack(columns)
+    result = mesh.replace(points=np.concatenate(points), cells=cells)
+    check_cells(result)
+    return result
+
+
+def in_element(mesh: Mesh, element: str, curves: Iterable[Curve] = ()) -> Mesh:
+    """Return a checked linear mesh in the wanted element: as it is, or made quadratic on the curves."""
+    if elements.get(element).order == 1:
+        check_cells(mesh)
+        return mesh
+    return to_quadratic(mesh, curves, centre_nodes=element in _WITH_CENTRE.values())
+
+
+def _quadratic_names(mesh: Mesh, centre_nodes: bool) -> dict[str, str]:
+    """Quadratic element of each element of the mesh."""
+    if centre_nodes and mesh.dim != 2:
+        raise MeshError("centre_nodes is for 2D meshes: leave it out, and cells get mid nodes on their edges only")
+    names = {}
+    for name in mesh.cells:
+        element = elements.get(name)
+        if element.order != 1:
+            raise MeshError(f"to_quadratic needs linear cells, but the mesh has {len(mesh.cells[name])} {name}")
+        names[name] = _WITH_CENTRE.get(element.quadratic, element.quadratic) if centre_nodes else element.quadratic
+    return names
+
+
+def _edge_keys(name: str, block: Indices, n_points: int) -> Indices:
+    """One number (n_cells, n_edges) per edge, the same in all cells that share it."""
+    ends = np.sort(block[:, elements.get(name).edges].astype(np.int64), axis=2)
+    return ends[:, :, 0] * n_points + ends[:, :, 1]
+
+
+def _edges(cells: Mapping[str, Indices], n_points: int) -> Indices:
+    """Sorted edge keys of all cells, each once."""
+    keys = [_edge_keys(name, block, n_points).ravel() for name, block in cells.items()]
+    return np.unique(np.concatenate(keys)) if keys else np.empty(0, np.int64)
+
+
+def _ends(keys: Indices, n_points: int) -> Indices:
+    """Point numbers (n_edges, 2) of the ends of edges."""
+    return np.column_stack([keys // n_points, keys % n_points])
+
+
+def edges_on(mesh: Mesh, curve: Curve) -> Indices:
+    """Return the edges of the curve's facets that have both ends on it, each as ``least end << 32 | greatest end``.
+
+    Raises
+    ------
+    MeshError
+        If there is none.
+    """
+    facets = outer_facets(mesh) if curve.group is None else mesh.cells_of(curve.group, dim=mesh.dim - 1)
+    ends = _ends(_edges(facets, mesh.n_points), mesh.n_points)
+    places = mesh.points[ends]
+    length = np.linalg.norm(places[:, 1] - places[:, 0], axis=1)
+    flat = places.reshape(-1, mesh.dim)
+    off = np.linalg.norm(curve.project(flat) - flat, axis=1).reshape(-1, 2).max(axis=1)
+    on = off <= _ON_CURVE * length
+    if not on.any():
+        where = "outer facets" if curve.group is None else f"group '{curve.group}'"
+        raise MeshError(f"no edge of {where} has both ends on {curve}: check its centre and radius")
+    return ends[on, 0] << 32 | ends[on, 1]
+
+
+def _rows_on(mesh: Mesh, curve: Curve, edges: Indices) -> Indices:
+    """Rows of `edges` that belong to the curve's facets and have both ends on it."""
+    found = edges_on(mesh, curve)
+    return np.searchsorted(edges, (found >> 32) * mesh.n_points + (found & 0xFFFFFFFF))
+
+
+def _centres(corners: Array, middles: Array) -> Array:
+    """Centre of curved quadrangles (n_cells, dim): where the eight-node shape functions put it."""
+    return 0.5 * middles.sum(axis=1) - 0.25 * corners.sum(axis=1)

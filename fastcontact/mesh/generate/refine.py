@@ -1,0 +1,300 @@
+"""Uniform refinement of a 2D mesh: every cell into two or four of its own kind, boundaries kept on their curves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import MeshError
+from fastcontact.mesh import elements
+from fastcontact.mesh.generate.quadratic import Circle, Curve
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.quality import check_cells
+from fastcontact.mesh.topology import outer_facets
+
+Array = NDArray[np.float64]
+Indices = NDArray[Any]
+
+# Corners of the children in the reference cell, each child turned like its parent.
+_CHILDREN = {
+    "line2": [[[-1.0], [0.0]], [[0.0], [1.0]]],
+    "tri3": [
+        [[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]],
+        [[0.5, 0.0], [1.0, 0.0], [0.5, 0.5]],
+        [[0.0, 0.5], [0.5, 0.5], [0.0, 1.0]],
+        [[0.5, 0.5], [0.0, 0.5], [0.5, 0.0]],
+    ],
+    "quad4": [
+        [[-1.0, -1.0], [0.0, -1.0], [0.0, 0.0], [-1.0, 0.0]],
+        [[0.0, -1.0], [1.0, -1.0], [1.0, 0.0], [0.0, 0.0]],
+        [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]],
+        [[-1.0, 0.0], [0.0, 0.0], [0.0, 1.0], [-1.0, 1.0]],
+    ],
+}
+# Nodes this near to a curve, relative to the longest edge of the mesh there, lie on it.
+_ON_CURVE = 1e-6
+# A polyline that turns by more than this from one node to the next is no picture of a circle.
+_TURN = np.pi / 5
+
+
+@dataclass(frozen=True, eq=False)
+class _Pattern:
+    """How cells of one element are divided.
+
+    Attributes
+    ----------
+    shape : ndarray (m, n_nodes)
+        Shape functions of the parent at all points of its children; the parent's own nodes come first.
+    children : ndarray of int (n_children, n_nodes)
+        Children by those points.
+    on_edge : ndarray of int (m,)
+        Edge on which a new point lies; -1 for the parent's nodes and for points inside.
+    along : ndarray of int (m,)
+        Position of a new point along its edge, in quarters from the edge's first corner.
+    """
+
+    shape: Array
+    children: Indices
+    on_edge: Indices
+    along: Indices
+
+
+@cache
+def _pattern(name: str) -> _Pattern:
+    element = elements.get(name)
+    if element.linear not in _CHILDREN:
+        raise MeshError(f"cells of {name} cannot be refined: only lines, triangles and quadrangles are divided here")
+    points = [tuple(node) for node in element.nodes.tolist()]
+    children = []
+    for corners in _CHILDREN[element.linear]:
+        places = element.corner_shape(element.nodes) @ np.array(corners)
+        child = []
+        for place in np.round(places * 8.0).tolist():  # eighths are exact
+            node = tuple(x / 8.0 for x in place)
+            if node not in points:
+                points.append(node)
+            child.append(points.index(node))
+        children.append(child)
+    lattice = np.array(points)
+    on_edge, along = np.full(len(points), -1), np.zeros(len(points), int)
+    for number, (a, b) in enumerate(element.edges):
+        start, way = element.nodes[a], element.nodes[b] - element.nodes[a]
+        part = (lattice - start) @ way / (way @ way)
+        there = np.abs(lattice - start - part[:, None] * way).max(axis=1) < 1e-12
+        there[: element.n_nodes] = False
+        on_edge[there], along[there] = number, np.round(4 * part[there]).astype(int)
+    return _Pattern(element.shape(lattice), np.array(children), on_edge, along)
+
+
+def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
+    """Return the mesh with every line halved and every triangle and quadrangle quartered.
+
+    New points stand where the parent's shape functions put them; on a curve if they belong to a facet of the curve's
+    group all of whose nodes lie on it. Points keep their numbers. Cell groups hold the children of their cells; a new
+    point joins every point group that holds all nodes of its edge (or, inside a cell, of the cell).
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Two-dimensional; tri3, tri6, quad4, quad8, quad9, line2, line3.
+    curves : iterable of Curve
+        True shapes of the boundary, for example `Circle`; see also `circles`.
+
+    Raises
+    ------
+    MeshError
+        If a cell is of another kind, a curve's group has no facet on the curve, or a child is folded by its curved
+        side.
+    """
+    curves = list(curves)
+    keys, where, numbers = _numbered(mesh)
+    points = np.concatenate([mesh.points, *(_places(mesh, name, rows) for name, rows in where.items())])
+    order = np.concatenate([np.arange(mesh.n_points), *(mesh.n_points + rows[:, 2] for rows in where.values())])
+    points[order] = points.copy()
+    for curve in curves:
+        rows = _on_curve(mesh, curve, keys)
+        points[rows] = curve.project(points[rows])
+    cells = {}
+    for name, block in mesh.cells.items():
+        cells[name] = numbers[name][:, _pattern(name).children].reshape(-1, block.shape[1])
+    result = Mesh(points, cells, _cell_groups(mesh), _point_groups(mesh, where))
+    check_cells(result)
+    return result
+
+
+def _numbered(mesh: Mesh) -> tuple[Indices, dict[str, Indices], dict[str, Indices]]:
+    """Number the new points: first those on edges, once for all cells that share them, then those inside cells.
+
+    Return the sorted keys of the points on edges; by element the points that its cells bring in, (n, 3) rows of cell,
+    lattice point and place among the new points; by element the points of every cell's lattice.
+    """
+    numbers, codes, sources = {}, [], []
+    for name, block in mesh.cells.items():
+        pattern = _pattern(name)
+        numbers[name] = np.empty((len(block), len(pattern.shape)), np.int64)
+        numbers[name][:, : block.shape[1]] = block
+        ends = block[:, elements.get(name).edges].astype(np.int64)
+        for point in np.flatnonzero(pattern.on_edge >= 0).tolist():
+            a, b = ends[:, pattern.on_edge[point]].T
+            codes.append(_keys(a, b, int(pattern.along[point]), mesh.n_points))
+            sources.append((name, point))
+    lengths = [len(code) for code in codes]
+    flat = np.concatenate(codes) if codes else np.empty(0, np.int64)
+    keys, first, rank = np.unique(flat, return_index=True, return_inverse=True)
+    where: dict[str, list[Indices]] = {name: [] for name in mesh.cells}
+    starts = np.concatenate([[0], np.cumsum(lengths)]).astype(int)
+    for (name, point), start, end in zip(sources, starts[:-1], starts[1:], strict=True):
+        numbers[name][:, point] = mesh.n_points + rank[start:end]
+        here = np.flatnonzero((first >= start) & (first < end))
+        where[name].append(np.column_stack([first[here] - start, np.full(len(here), point), here]))
+    count = len(keys)
+    for name, block in mesh.cells.items():
+        pattern = _pattern(name)
+        for point in range(block.shape[1], len(pattern.shape)):
+            if pattern.on_edge[point] < 0:
+                new = count + np.arange(len(block))
+                numbers[name][:, point] = mesh.n_points + new
+                where[name].append(np.column_stack([np.arange(len(block)), np.full(len(block), point), new]))
+                count += len(block)
+    return keys, {n: np.concatenate([np.empty((0, 3), np.int64), *rows]) for n, rows in where.items()}, numbers
+
+
+def _keys(a: Indices, b: Indices, quarters: int, n_points: int) -> Indices:
+    """One number for a point on the edge from a to b, the same from either end."""
+    from_least = np.where(a < b, quarters, 4 - quarters)
+    return (np.minimum(a, b) * n_points + np.maximum(a, b)) * 4 + from_least
+
+
+def _places(mesh: Mesh, name: str, rows: Indices) -> Array:
+    """Coordinates (n, 2) of new points, by the shape functions of their parents."""
+    corners = mesh.points[mesh.cells[name][rows[:, 0]]]
+    return np.einsum("in,ind->id", _pattern(name).shape[rows[:, 1]], corners)
+
+
+def _edge_nodes(name: str) -> list[list[int]]:
+    """Local nodes of each edge, corners first."""
+    element = elements.get(name)
+    middle = [[element.n_corners + k] if element.order == 2 else [] for k in range(len(element.edges))]
+    return [[*edge, *middle[k]] for k, edge in enumerate(element.edges)]
+
+
+def _facets_on(mesh: Mesh, curve: Curve) -> list[Indices]:
+    """Facets of the curve's group, block by block, all of whose nodes lie on the curve."""
+    facets = outer_facets(mesh) if curve.group is None else mesh.cells_of(curve.group, dim=1)
+    found = []
+    for block in facets.values():
+        places = mesh.points[block]
+        length = np.linalg.norm(places[:, 1] - places[:, 0], axis=1)
+        flat = places.reshape(-1, mesh.dim)
+        off = np.linalg.norm(curve.project(flat) - flat, axis=1).reshape(block.shape)
+        found.append(block[off.max(axis=1) <= _ON_CURVE * length])
+    if not sum(map(len, found)):
+        where = "outer facet" if curve.group is None else f"facet of group '{curve.group}'"
+        raise MeshError(f"no {where} has all its nodes on {curve}: check its centre and radius")
+    return found
+
+
+def _on_curve(mesh: Mesh, curve: Curve, keys: Indices) -> Indices:
+    """Numbers of the new points on the facets that lie on the curve."""
+    ends = np.concatenate([block[:, :2] for block in _facets_on(mesh, curve)]).astype(np.int64)
+    wanted = np.unique(np.concatenate([_keys(ends[:, 0], ends[:, 1], q, mesh.n_points) for q in (1, 2, 3)]))
+    return mesh.n_points + np.flatnonzero(np.isin(keys, wanted))
+
+
+def _cell_groups(mesh: Mesh) -> dict[str, Indices]:
+    """Children of each group's cells: those of one cell follow one another."""
+    pieces, start = {}, 0
+    for name, first in mesh.offsets.items():
+        pieces[name] = (first, start, len(_pattern(name).children))
+        start += pieces[name][2] * len(mesh.cells[name])
+    groups: dict[str, Indices] = {}
+    for group, members in mesh.cell_groups.items():
+        rows = mesh.split(members)
+        parts = [pieces[n][1] + (r[:, None] * pieces[n][2] + np.arange(pieces[n][2])).ravel() for n, r in rows.items()]
+        groups[group] = np.concatenate(parts) if parts else np.empty(0, np.int64)
+    return groups
+
+
+def _point_groups(mesh: Mesh, where: dict[str, Indices]) -> dict[str, Indices]:
+    groups: dict[str, Indices] = {}
+    for group, members in mesh.point_groups.items():
+        inside = np.zeros(mesh.n_points, bool)
+        inside[members] = True
+        joining = [members]
+        for name, rows in where.items() if len(members) > 1 else ():
+            block, on_edge = mesh.cells[name], _pattern(name).on_edge
+            edges = _edge_nodes(name)
+            for point in np.unique(rows[:, 1]):
+                local = edges[on_edge[point]] if on_edge[point] >= 0 else list(range(block.shape[1]))
+                these = rows[rows[:, 1] == point]
+                joining.append(mesh.n_points + these[inside[block[these[:, 0]][:, local]].all(axis=1), 2])
+        groups[group] = np.concatenate(joining)
+    return groups
+
+
+def linearised(mesh: Mesh) -> Mesh:
+    """Return the mesh on its corners alone: tri6 to tri3, quad8 and quad9 to quad4, line3 to line2.
+
+    Points that no cell uses any more are dropped; the others keep their order.
+    """
+    cells = {name: block[:, : elements.get(name).n_corners] for name, block in mesh.cells.items()}
+    used = np.ones(mesh.n_points, bool)
+    for name, block in mesh.cells.items():
+        used[block[:, elements.get(name).n_corners :]] = False
+    for block in cells.values():
+        used[block] = True
+    number = np.cumsum(used) - 1
+    merged: dict[str, Indices] = {}
+    order: list[NDArray[np.int64]] = []
+    for linear in dict.fromkeys(elements.get(name).linear for name in cells):
+        parts = [name for name in cells if elements.get(name).linear == linear]
+        merged[linear] = number[np.concatenate([cells[name] for name in parts])]
+        order += [mesh.offsets[name] + np.arange(len(cells[name])) for name in parts]
+    place = np.argsort(np.concatenate(order)) if order else np.empty(0, np.int64)
+    return Mesh(
+        mesh.points[used],
+        merged,
+        {group: place[members] for group, members in mesh.cell_groups.items()},
+        {group: number[members[used[members]]] for group, members in mesh.point_groups.items()},
+    )
+
+
+def circles(mesh: Mesh) -> list[Circle]:
+    """Return the circles on which groups of outer facets lie, one a group, so that `refined` can keep to them.
+
+    A circle through the nodes is found by least squares. It counts if all nodes lie on it to rounding, there are more
+    nodes than make a circle, and the line turns gently: four corners of a square lie on a circle, too.
+    """
+    found = []
+    for group in mesh.cell_groups:
+        blocks = mesh.cells_of(group, dim=1)
+        solids = any(elements.get(name).dim == 2 for name in mesh.split(mesh.cell_groups[group]))
+        if blocks and not solids:
+            circle = _circle(mesh, group, list(blocks.values()))
+            if circle is not None:
+                found.append(circle)
+    return found
+
+
+def _circle(mesh: Mesh, group: str, blocks: list[Indices]) -> Circle | None:
+    points = mesh.points[np.unique(np.concatenate([block.ravel() for block in blocks]))]
+    if len(points) < 4:
+        return None
+    middle, size = points.mean(axis=0), np.ptp(points, axis=0).max()
+    x = (points - middle) / size
+    # x^2 + y^2 = 2 a x + 2 b y + c is linear in the centre (a, b).
+    system = np.column_stack([2 * x, np.ones(len(x))])
+    if np.linalg.cond(system) > 1e8:
+        return None
+    (a, b, c), *_ = np.linalg.lstsq(system, (x**2).sum(axis=1), rcond=None)
+    radius = np.sqrt(max(c + a * a + b * b, 0.0))
+    longest = max(np.linalg.norm(np.diff(mesh.points[block[:, :2]], axis=1), axis=2).max() for block in blocks) / size
+    off = np.abs(np.hypot(x[:, 0] - a, x[:, 1] - b) - radius).max()
+    if off > _ON_CURVE * longest or longest > 2 * radius * np.sin(_TURN / 2):
+        return None
+    return Circle((float(middle[0] + size * a), float(middle[1] + size * b)), float(radius * size), group)

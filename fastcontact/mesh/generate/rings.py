@@ -1,0 +1,80 @@
+"""Two concentric rings, one in the other: the press fit of a bush in a hub."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import MeshError
+from fastcontact.mesh.generate._blocks import structured
+from fastcontact.mesh.generate._check import FACES, TRIANGLES, affordable, count, one_of, pair, positive
+from fastcontact.mesh.generate.quadratic import Circle, to_quadratic
+from fastcontact.mesh.generate.transform import union
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+
+def rings(
+    element: str = "quad8",
+    *,
+    inner_radius: float = 20.0,
+    interface_radius: float = 50.0,
+    outer_radius: float = 100.0,
+    divisions_inner: tuple[int, int] = (6, 16),
+    divisions_outer: tuple[int, int] = (8, 16),
+) -> Mesh:
+    """Quarter of two rings that touch at the interface radius, centred at the origin, x >= 0 and y >= 0.
+
+    The rings fit without play: give their contact a ``clearance`` below 0 for an interference. Groups of cells: INNER,
+    OUTER, CONT_INNER, CONT_OUTER (both sides of the interface), BORE, RIM, SYMMETRY_X (x = 0 of both), SYMMETRY_Y
+    (y = 0 of both).
+
+    Parameters
+    ----------
+    element : {"tri3", "tri6", "quad4", "quad8", "quad9"}
+        Element of both solids; mid nodes of curved sides stand on their circles.
+    inner_radius, interface_radius, outer_radius : float
+        Increasing [length].
+    divisions_inner, divisions_outer : (int, int)
+        Cells along the radius and around the quarter; those around may differ.
+
+    Raises
+    ------
+    MeshError
+        If an argument is out of range.
+
+    Examples
+    --------
+    >>> sorted(rings("quad4").cell_groups)[:4]
+    ['BORE', 'CONT_INNER', 'CONT_OUTER', 'INNER']
+    """
+    one_of("element", element, FACES)
+    a, b = positive("inner_radius", inner_radius), positive("interface_radius", interface_radius)
+    c = positive("outer_radius", outer_radius)
+    if not a < b < c:
+        raise MeshError(f"inner_radius, interface_radius and outer_radius must increase, not {a:g}, {b:g}, {c:g}")
+    return union(
+        _ring(element, (a, b), pair("divisions_inner", divisions_inner), "INNER", ("BORE", "CONT_INNER")),
+        _ring(element, (b, c), pair("divisions_outer", divisions_outer), "OUTER", ("CONT_OUTER", "RIM")),
+    )
+
+
+def _ring(
+    element: str, radii: tuple[float, float], divisions: tuple[int, int], name: str, sides: tuple[str, str]
+) -> Mesh:
+    """Return a quarter of one ring; its sides are those at the smaller and at the larger radius."""
+    n, m = (count(f"divisions_{name.lower()}[{i}]", value) for i, value in enumerate(divisions))
+    r, angle = np.linspace(*radii, n + 1), np.linspace(0.0, math.pi / 2, m + 1)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    cosine[-1] = 0.0
+    affordable(n * m)
+    grid = r[:, None, None] * np.column_stack([cosine, sine])[None]
+    groups = {"LEFT": sides[0], "RIGHT": sides[1], "BOTTOM": "SYMMETRY_Y", "TOP": "SYMMETRY_X"}
+    mesh = structured(grid, name, groups, triangles=element in TRIANGLES)
+    if element in ("tri3", "quad4"):
+        return mesh
+    circles = [Circle((0.0, 0.0), radius, group) for radius, group in zip(radii, sides, strict=True)]
+    return to_quadratic(mesh, circles, centre_nodes=element == "quad9")

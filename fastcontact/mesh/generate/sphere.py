@@ -1,0 +1,200 @@
+"""A sphere on a block in three dimensions, a quarter of both: boxes mapped on their shapes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.mesh.generate._check import count, one_of, pair, positive
+from fastcontact.mesh.generate._places import with_points_at
+from fastcontact.mesh.generate._spacing import Spacing, divided, segments_for
+from fastcontact.mesh.generate.box import box
+from fastcontact.mesh.generate.transform import merge_points, renamed, union
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.quality import check_cells
+
+Array = NDArray[np.float64]
+Map = Callable[[Array, Array, Array], Array]
+
+# Wedges of different blocks would not match, and the apex of a pyramid in a thin curved cell would stand outside it.
+SOLIDS = ("hex8", "hex20", "hex27", "tet4", "tet10")
+
+# Middle of the faces of the inner block over the radius, and how far its faces bulge from a cube to a ball.
+INNER, BULGE = 0.45, 0.5
+
+
+def sphere_on_block(
+    element: str = "hex8",
+    *,
+    R: float = 50.0,
+    block_size: tuple[float, float] | None = None,
+    size: float | None = None,
+    contact_size: float | None = None,
+    contact_radius: float | None = None,
+    growth: float = 0.4,
+) -> Mesh:
+    """Lower half of a sphere on a block, the quarter x >= 0, z >= 0 of both.
+
+    The sphere touches the block at the origin, its centre stands at (0, R, 0). The meshes do not match; both are
+    finest at the contact. Groups of cells: SPHERE, BLOCK, SYMMETRY_X, SYMMETRY_Z (x = 0 and z = 0 of both), SPHERE_TOP
+    (y = R), CONT_SPHERE (around the pole, up to 45 degrees along x and along z), SPHERE_SIDE (the rest of the sphere),
+    CONT_BLOCK (top of the block), BLOCK_SIDE, BLOCK_BOTTOM. Groups of points: POLE_SPHERE, POLE_BLOCK (two points at
+    the origin), CENTRE (of the sphere).
+
+    Parameters
+    ----------
+    element : {"hex8", "hex20", "hex27", "tet4", "tet10"}
+        Element of both solids. All nodes of the surface lie on the sphere.
+    R : float
+        Radius of the sphere [length].
+    block_size : (float, float), optional
+        Side of the quarter of the block along x and z, and its height along y, R each by default [length].
+    size : float, optional
+        Longest edges far from the contact, R/4 by default [length].
+    contact_size : float, optional
+        Edges at the contact, R/50 by default [length].
+    contact_radius : float, optional
+        Distance from the pole up to which `contact_size` holds, R/10 by default; half as deep below the surfaces
+        [length].
+    growth : float
+        Increase of the edges over the distance beyond, until they reach `size`. It bounds the accuracy that a smaller
+        `contact_size` brings.
+
+    Raises
+    ------
+    MeshError
+        If an argument is out of range.
+
+    Examples
+    --------
+    >>> mesh = sphere_on_block("tet4", contact_size=5.0)
+    >>> mesh.point("POLE_SPHERE") == mesh.point("POLE_BLOCK")
+    False
+    """
+    one_of("element", element, SOLIDS)
+    R = positive("R", R)
+    width, height = (R, R) if block_size is None else pair("block_size", block_size)
+    sphere = sphere_octant(
+        element, R=R, size=size, contact_size=contact_size, contact_radius=contact_radius, growth=growth
+    )
+    spacing = _spacing(R, size, contact_size, contact_radius, growth)
+    across = _graded(positive("block_size[0]", width), spacing)
+    down = _graded(positive("block_size[1]", height), _shallow(spacing))
+    names = {"BLOCK": "BLOCK", "XMIN": "SYMMETRY_X", "YMIN": "SYMMETRY_Z", "ZMIN": "CONT_BLOCK", "ZMAX": "BLOCK_BOTTOM"}
+    names |= {"XMAX": "BLOCK_SIDE", "YMAX": "BLOCK_SIDE"}
+    block = _mapped(
+        element, (across, across, down), lambda x, z, depth: np.column_stack([x, -depth, z]), "BLOCK", names
+    )
+    return union(sphere, with_points_at(block, {"POLE_BLOCK": (0.0, 0.0, 0.0)}))
+
+
+def sphere_octant(
+    element: str = "hex8",
+    *,
+    R: float = 50.0,
+    size: float | None = None,
+    contact_size: float | None = None,
+    contact_radius: float | None = None,
+    growth: float = 0.4,
+) -> Mesh:
+    """Lower half of a sphere, the quarter x >= 0, z >= 0: the upper body of `sphere_on_block`, with its groups.
+
+    An inner block stands at the centre, a rounded cube, and three between it and the surface.
+
+    Parameters
+    ----------
+    element, R, size, contact_size, contact_radius, growth
+        As for `sphere_on_block`.
+
+    Raises
+    ------
+    MeshError
+        If an argument is out of range.
+    """
+    one_of("element", element, SOLIDS)
+    R = positive("R", R)
+    spacing = _spacing(R, size, contact_size, contact_radius, growth)
+    eighth = math.pi / 4
+    around = _graded(R * eighth, spacing) / R
+    outward = 1.0 - _graded((1.0 - INNER) * R, _shallow(spacing))[::-1] / ((1.0 - INNER) * R)
+    upward = np.linspace(0.0, eighth, count("segments", segments_for(R * eighth, spacing.far)) + 1)
+
+    def ball(outside: int) -> Map:
+        """Return the map of the inner block (outside = -1), or of that beyond its face in one of the directions."""
+
+        def place(*parameters: Array) -> Array:
+            coordinates = np.column_stack(parameters)
+            depth = np.zeros(len(coordinates)) if outside < 0 else coordinates[:, outside].copy()
+            if outside >= 0:
+                coordinates[:, outside] = eighth
+            cube = np.tan(coordinates)
+            length = np.linalg.norm(cube, axis=1, keepdims=True)
+            direction = np.divide(cube, length, out=np.zeros_like(cube), where=length > 0)
+            rounded = (1.0 - BULGE) * cube + BULGE * _ball(cube)
+            x, z, down = (R * ((1.0 - depth[:, None]) * INNER * rounded + depth[:, None] * direction)).T
+            return np.column_stack([x, R - down, z])
+
+        return place
+
+    names = {"SPHERE": "SPHERE", "XMIN": "SYMMETRY_X", "YMIN": "SYMMETRY_Z", "ZMIN": "SPHERE_TOP"}
+    grids = {-1: {}, 0: {"XMAX": "SPHERE_SIDE"}, 1: {"YMAX": "SPHERE_SIDE"}, 2: {"ZMAX": "CONT_SPHERE"}}
+    parts = []
+    for outside, outer in grids.items():
+        grid = [around, around, upward]
+        kept = dict(names)
+        if outside >= 0:
+            grid[outside] = outward
+            del kept[("XMIN", "YMIN", "ZMIN")[outside]]
+        parts.append(_mapped(element, (grid[0], grid[1], grid[2]), ball(outside), "SPHERE", kept | outer))
+    whole = merge_points(union(*parts), 1e-6 * R * float(np.diff(around).min()))
+    check_cells(whole)
+    return with_points_at(whole, {"POLE_SPHERE": (0.0, 0.0, 0.0), "CENTRE": (0.0, R, 0.0)})
+
+
+def _ball(cube: Array) -> Array:
+    """Map the cube [-1, 1]^3 (n, 3) smoothly on the unit ball, faces on the sphere (Nowell, 2005)."""
+    square = cube * cube
+    next_, last = np.roll(square, -1, axis=1), np.roll(square, -2, axis=1)
+    return cube * np.sqrt(1.0 - next_ / 2 - last / 2 + next_ * last / 3)
+
+
+def _spacing(
+    R: float, size: float | None, contact_size: float | None, contact_radius: float | None, growth: float
+) -> Spacing:
+    far = R / 4 if size is None else positive("size", size, R / 2, "R/2")
+    near = min(R / 50, far) if contact_size is None else positive("contact_size", contact_size, far, "size")
+    plateau = R / 10 if contact_radius is None else positive("contact_radius", contact_radius, R / 2, "R/2")
+    return Spacing(near, far, plateau=plateau, reach=plateau + max(far - near, near) / positive("growth", growth, 1.0))
+
+
+def _shallow(spacing: Spacing) -> Spacing:
+    """Return the spacing below the surface: as at the contact, but fine only half as far."""
+    shift = 0.5 * spacing.plateau
+    return Spacing(spacing.near, spacing.far, plateau=spacing.plateau - shift, reach=spacing.reach - shift)
+
+
+def _graded(length: float, spacing: Spacing) -> Array:
+    """Return places (n + 1,) from 0 to `length` after a spacing about 0 [length]."""
+    return divided(lambda s: np.column_stack([length * s, np.zeros(len(s))]), length, spacing)[:, 0]
+
+
+def _mapped(element: str, grid: tuple[Array, Array, Array], place: Map, solid: str, names: Mapping[str, str]) -> Mesh:
+    """Return a box with the given grid lines, mapped; of its groups and outer facets those that `names` lists."""
+    divisions = tuple(len(lines) - 1 for lines in grid)
+    lattice = box((1.0, 1.0, 1.0), (divisions[0], divisions[1], divisions[2]), element, name=solid)
+    parameters = [np.interp(x * n, np.arange(n + 1), lines) for x, n, lines in zip(lattice.points.T, divisions, grid)]
+    return renamed(_without_unnamed_facets(lattice.replace(points=place(*parameters)), names), dict(names))
+
+
+def _without_unnamed_facets(mesh: Mesh, names: Mapping[str, str]) -> Mesh:
+    """Return the mesh with the groups in `names` only, and without facets that belong to none of them."""
+    groups = {name: mesh.cell_groups[name] for name in names}
+    kept = np.unique(np.concatenate(list(groups.values())))
+    rows = mesh.split(kept)
+    cells = {name: mesh.cells[name][rows[name]] for name in mesh.cells if name in rows}
+    number = np.full(mesh.n_cells, -1)
+    number[kept] = np.arange(len(kept))
+    return mesh.replace(cells=cells, cell_groups={name: number[members] for name, members in groups.items()})

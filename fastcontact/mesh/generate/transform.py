@@ -1,0 +1,197 @@
+"""Mirror, move, unite, weld and rename meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from fastcontact.errors import MeshError
+from fastcontact.mesh import elements
+from fastcontact.mesh.generate._check import number, one_of
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+Indices = NDArray[Any]
+Groups = dict[str, Indices]
+Names = Mapping[str, str | None] | Callable[[str], str | None]
+
+_AXES = ("x", "y", "z")
+
+
+def renamed(mesh: Mesh, names: Names) -> Mesh:
+    """Return the mesh with its groups renamed.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    names : mapping or callable
+        New name by old name. A name that a mapping lacks stays; None drops the group. Groups that get the same
+        name are united.
+    """
+
+    def groups(old: Mapping[str, Indices]) -> Groups:
+        new: Groups = {}
+        for name, members in old.items():
+            target = names(name) if callable(names) else names.get(name, name)
+            if target is not None:
+                new[target] = np.union1d(new[target], members) if target in new else members
+        return new
+
+    return mesh.replace(cell_groups=groups(mesh.cell_groups), point_groups=groups(mesh.point_groups))
+
+
+def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None) -> Mesh:
+    """Return the mirror image; cells and facets are turned so that they stay oriented as they were.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    axis : {"x", "y", "z"}
+        Coordinate that is reflected.
+    at : float
+        Where the mirror stands on that axis [length].
+    rename : mapping or callable, optional
+        New names of groups, as in `renamed`.
+
+    Raises
+    ------
+    MeshError
+        If the mesh has no such axis.
+    """
+    column = _AXES.index(one_of("axis", axis, _AXES[: mesh.dim]))
+    points = mesh.points.copy()
+    points[:, column] = 2.0 * number("at", at) - points[:, column]
+    cells = {name: block[:, elements.get(name).reversed] for name, block in mesh.cells.items()}
+    image = mesh.replace(points=points, cells=cells)
+    return image if rename is None else renamed(image, rename)
+
+
+def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float = 1.0, rotate: float = 0.0) -> Mesh:
+    """Return the mesh scaled about the origin, then rotated about it (2D only), then translated.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    translate : array_like (dim,), optional
+        Shift [length].
+    scale : float
+        Factor, greater than 0.
+    rotate : float
+        Angle, counter-clockwise [degrees].
+
+    Raises
+    ------
+    MeshError
+        If a number is out of range, or a 3D mesh is to be rotated.
+    """
+    if not number("scale", scale) > 0.0:
+        raise MeshError(f"scale = {scale:g} is out of range: it must be greater than 0 (reflect with mirrored)")
+    points = mesh.points * scale
+    if number("rotate", rotate) != 0.0:
+        if mesh.dim != 2:
+            raise MeshError("rotate turns 2D meshes only: rotate the points of a 3D mesh with Mesh.replace")
+        cosine, sine = np.cos(np.radians(rotate)), np.sin(np.radians(rotate))
+        points = points @ np.array([[cosine, sine], [-sine, cosine]])
+    if translate is not None:
+        shift = np.asarray(translate, dtype=float)
+        if shift.shape != (mesh.dim,):
+            raise MeshError(f"translate must be {mesh.dim} numbers, not {translate!r}")
+        points = points + shift
+    return mesh.replace(points=points)
+
+
+def union(*meshes: Mesh) -> Mesh:
+    """Return one mesh of several: points one after the other, none merged, groups of the same name united.
+
+    Raises
+    ------
+    MeshError
+        If there is no mesh or the dimensions differ.
+    """
+    if not meshes:
+        raise MeshError("union needs at least one mesh")
+    if len({mesh.dim for mesh in meshes}) > 1:
+        raise MeshError(f"union needs meshes of one dimension, not {[mesh.dim for mesh in meshes]}")
+    first_point = np.cumsum([0] + [mesh.n_points for mesh in meshes])
+    blocks: dict[str, list[Indices]] = {}
+    for mesh, shift in zip(meshes, first_point[:-1], strict=True):
+        for name, block in mesh.cells.items():
+            blocks.setdefault(name, []).append(block + shift)
+    cells = {name: np.concatenate(parts) for name, parts in blocks.items()}
+    cell_groups: dict[str, list[Indices]] = {}
+    point_groups: dict[str, list[Indices]] = {}
+    starts = _starts(cells)
+    for mesh, shift in zip(meshes, first_point[:-1], strict=True):
+        numbers = _renumbering(mesh, starts)
+        for name, members in mesh.cell_groups.items():
+            cell_groups.setdefault(name, []).append(numbers[members])
+        for name, members in mesh.point_groups.items():
+            point_groups.setdefault(name, []).append(members + shift)
+    return Mesh(
+        np.concatenate([mesh.points for mesh in meshes]),
+        cells,
+        {name: np.concatenate(parts) for name, parts in cell_groups.items()},
+        {name: np.concatenate(parts) for name, parts in point_groups.items()},
+    )
+
+
+def _starts(cells: Mapping[str, Indices]) -> dict[str, int]:
+    """Number of the first cell of each element."""
+    lengths = [len(block) for block in cells.values()]
+    return dict(zip(cells, np.cumsum([0, *lengths[:-1]]).tolist(), strict=True))
+
+
+def _renumbering(mesh: Mesh, starts: dict[str, int]) -> Indices:
+    """New number of each cell of `mesh`; moves `starts` on, past its cells."""
+    numbers = np.empty(mesh.n_cells, np.int64)
+    for name, start in mesh.offsets.items():
+        n = len(mesh.cells[name])
+        numbers[start : start + n] = starts[name] + np.arange(n)
+        starts[name] += n
+    return numbers
+
+
+def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
+    """Return the mesh with points closer than `tolerance` welded into one, the first of them.
+
+    Points are welded wherever they lie, also where two bodies only touch. Chains of close points become one.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    tolerance : float
+        Largest distance of points that are the same, at least 0 [length].
+
+    Raises
+    ------
+    MeshError
+        If two nodes of one cell fall together: the tolerance is larger than an edge.
+    """
+    from scipy.spatial import cKDTree
+
+    if not number("tolerance", tolerance) >= 0.0:
+        raise MeshError(f"tolerance = {tolerance:g} is out of range: it must be at least 0")
+    pairs = cKDTree(mesh.points).query_pairs(tolerance, output_type="ndarray")
+    if not len(pairs):
+        return mesh
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(mesh.n_points,) * 2)
+    _, cluster = connected_components(links, directed=False)
+    _, first = np.unique(cluster, return_index=True)
+    kept = np.sort(first)
+    target = np.searchsorted(kept, first)[cluster]
+    cells = {name: target[block] for name, block in mesh.cells.items()}
+    for name, block in cells.items():
+        in_order = np.sort(block, axis=1)
+        bad = np.flatnonzero((in_order[:, 1:] == in_order[:, :-1]).any(axis=1))
+        if len(bad):
+            raise MeshError(
+                f"tolerance = {tolerance:g} welds two nodes of cell {mesh.offsets[name] + bad[0]} ({name}): "
+                "it must be smaller than the shortest edge"
+            )
+    point_groups = {name: target[members] for name, members in mesh.point_groups.items()}
+    return mesh.replace(points=mesh.points[kept], cells=cells, point_groups=point_groups)

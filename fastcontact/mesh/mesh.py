@@ -1,0 +1,235 @@
+"""A mesh: points, cells by element, named groups. It never changes; operations return a new one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastcontact.errors import MeshError, unknown
+from fastcontact.mesh import elements
+
+Array = NDArray[np.float64]
+Indices = NDArray[Any]
+
+
+def _read_only(values: ArrayLike, dtype: Any) -> NDArray[Any]:
+    array = np.array(values, dtype=dtype, order="C")
+    array.setflags(write=False)
+    return array
+
+
+def _numbers(what: str, values: ArrayLike) -> NDArray[Any]:
+    """Return whole numbers as an array that loses nothing when it becomes one of 32 bits."""
+    array = np.asarray(values)
+    if array.size == 0:
+        return array.astype(np.int32)
+    if array.dtype.kind not in "iuf" or (array.dtype.kind == "f" and not np.array_equal(array, np.floor(array))):
+        raise MeshError(f"{what} must be given by whole numbers, counted from 0, not by {array.dtype} values")
+    if array.min() < -(2**31) or array.max() >= 2**31:
+        raise MeshError(f"{what} name the number {array.max()}, beyond the 2147483647 that a mesh can count to")
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Points, cells and named groups.
+
+    Cells of every dimension stand together: solids, and the facets (lines in 2D) that carry group names. Cells are
+    numbered through all elements in the order of `cells`; a cell group is a sorted array of those numbers.
+
+    Parameters
+    ----------
+    points : array_like (n_points, dim)
+        Reference coordinates [length].
+    cells : mapping of str to array_like (n_cells, n_nodes)
+        Connectivity by element name (``"tri3"``, ``"line2"``, ...).
+    cell_groups : mapping of str to array_like (n,)
+        Cell numbers of each named group of cells.
+    point_groups : mapping of str to array_like (n,)
+        Point numbers of each named group of points.
+
+    Raises
+    ------
+    MeshError
+        If an array has the wrong shape, a number is not finite, or an index is out of range.
+
+    Examples
+    --------
+    >>> mesh = Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2]]}, point_groups={"origin": [0]})
+    >>> mesh.n_points, mesh.dim
+    (3, 2)
+    """
+
+    points: Array
+    cells: Mapping[str, Indices]
+    cell_groups: Mapping[str, Indices] = field(default_factory=dict)
+    point_groups: Mapping[str, Indices] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        points = _read_only(self.points, np.float64)
+        if points.ndim != 2 or points.shape[1] not in (2, 3):
+            raise MeshError(f"points must have shape (n_points, 2) or (n_points, 3), not {points.shape}")
+        bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+        if len(bad):
+            raise MeshError(
+                f"point {bad[0]} has coordinates {points[bad[0]]}: {len(bad)} points are not finite numbers"
+            )
+        cells = {name: self._checked_cells(name, block, len(points)) for name, block in self.cells.items()}
+        cells = {name: block for name, block in cells.items() if len(block)}
+        n_cells = sum(map(len, cells.values()))
+        set_ = object.__setattr__
+        set_(self, "points", points)
+        set_(self, "cells", MappingProxyType(cells))
+        set_(self, "cell_groups", self._checked_groups("cell", self.cell_groups, n_cells))
+        set_(self, "point_groups", self._checked_groups("point", self.point_groups, len(points)))
+
+    @staticmethod
+    def _checked_cells(name: str, block: ArrayLike, n_points: int) -> Indices:
+        element = elements.get(name)
+        conn = _read_only(_numbers(f"cells of {name}", block), np.int32)
+        if conn.size == 0:
+            conn = conn.reshape(0, element.n_nodes)
+        if conn.ndim != 2 or conn.shape[1] != element.n_nodes:
+            raise MeshError(f"cells of {name} must have shape (n_cells, {element.n_nodes}), not {conn.shape}")
+        if conn.size and (conn.min() < 0 or conn.max() >= n_points):
+            raise MeshError(f"a cell of {name} names point {conn.max()}, but there are {n_points} points (0-based)")
+        return conn
+
+    @staticmethod
+    def _checked_groups(kind: str, groups: Mapping[str, ArrayLike], count: int) -> Mapping[str, Indices]:
+        checked = {}
+        for name, members in groups.items():
+            numbers = np.unique(_numbers(f"{kind} group '{name}'", members).astype(np.int32))
+            if len(numbers) and (numbers[0] < 0 or numbers[-1] >= count):
+                raise MeshError(f"{kind} group '{name}' names {kind} {numbers[-1]}, but there are {count}")
+            numbers.setflags(write=False)
+            checked[name] = numbers
+        return MappingProxyType(checked)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Mesh, (self.points, dict(self.cells), dict(self.cell_groups), dict(self.point_groups))
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{len(block)} {name}" for name, block in self.cells.items())
+        return f"Mesh({self.n_points} points, {counts}; groups: {', '.join(self.group_names) or 'none'})"
+
+    @property
+    def n_points(self) -> int:
+        """Number of points."""
+        return len(self.points)
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells of all dimensions."""
+        return sum(map(len, self.cells.values()))
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space, 2 or 3."""
+        return int(self.points.shape[1])
+
+    @property
+    def offsets(self) -> dict[str, int]:
+        """Number of the first cell of each element."""
+        starts, total = {}, 0
+        for name, block in self.cells.items():
+            starts[name] = total
+            total += len(block)
+        return starts
+
+    @property
+    def solids(self) -> dict[str, Indices]:
+        """Connectivity of the cells that have the dimension of the space, by element."""
+        return {name: block for name, block in self.cells.items() if elements.get(name).dim == self.dim}
+
+    @property
+    def facets(self) -> dict[str, Indices]:
+        """Connectivity of the cells one dimension below the space, by element."""
+        return {name: block for name, block in self.cells.items() if elements.get(name).dim == self.dim - 1}
+
+    @property
+    def group_names(self) -> list[str]:
+        """Names of all groups: cell groups, then point groups not already named."""
+        return list(self.cell_groups) + [name for name in self.point_groups if name not in self.cell_groups]
+
+    def split(self, numbers: NDArray[Any]) -> dict[str, NDArray[np.intp]]:
+        """Return, by element, the rows of its block that the cell `numbers` name; elements without any are absent."""
+        rows = {}
+        for name, start in self.offsets.items():
+            inside = (numbers >= start) & (numbers < start + len(self.cells[name]))
+            if inside.any():
+                rows[name] = (numbers[inside] - start).astype(np.intp)
+        return rows
+
+    def cells_of(self, group: str, dim: int | None = None) -> dict[str, Indices]:
+        """Return the connectivity of a cell group by element, those of dimension `dim` only if it is given.
+
+        Raises
+        ------
+        MeshError
+            If there is no cell group of that name.
+        """
+        if group not in self.cell_groups:
+            raise MeshError(self._no_group("group of cells", group, self.cell_groups))
+        rows = self.split(self.cell_groups[group])
+        return {name: self.cells[name][r] for name, r in rows.items() if dim is None or elements.get(name).dim == dim}
+
+    def points_of(self, group: str) -> Indices:
+        """Return the sorted point numbers of a group: a point group, or else all nodes of a cell group.
+
+        Raises
+        ------
+        MeshError
+            If there is no group of that name; the message offers the nearest names.
+        """
+        if group in self.point_groups:
+            return self.point_groups[group]
+        if group not in self.cell_groups:
+            raise MeshError(self._no_group("group", group, self.group_names))
+        blocks = [block.ravel() for block in self.cells_of(group).values()]
+        return np.unique(np.concatenate(blocks)) if blocks else np.empty(0, np.int32)
+
+    def _no_group(self, kind: str, group: str, known: Iterable[str]) -> str:
+        if not self.group_names:
+            return f"the mesh has no groups at all, so none is '{group}': name groups in the mesher, or with Mesh.with_groups"
+        return unknown(kind, group, known)
+
+    def point(self, group: str) -> int:
+        """Return the number of the only point of a group.
+
+        Raises
+        ------
+        MeshError
+            If the group does not hold exactly one point.
+        """
+        numbers = self.points_of(group)
+        if len(numbers) != 1:
+            raise MeshError(f"group '{group}' holds {len(numbers)} points where exactly one is needed")
+        return int(numbers[0])
+
+    def replace(self, **changes: Any) -> Mesh:
+        """Return a mesh with some of `points`, `cells`, `cell_groups`, `point_groups` replaced."""
+        kept = {name: getattr(self, name) for name in ("points", "cells", "cell_groups", "point_groups")}
+        return Mesh(**{**kept, **changes})
+
+    def with_groups(
+        self, cells: Mapping[str, ArrayLike] | None = None, points: Mapping[str, ArrayLike] | None = None
+    ) -> Mesh:
+        """Return the mesh with further (or redefined) groups of cells and points."""
+        return self.replace(
+            cell_groups={**self.cell_groups, **(cells or {})},
+            point_groups={**self.point_groups, **(points or {})},
+        )
+
+    def merged_groups(self, name: str, members: Iterable[str]) -> Mesh:
+        """Return the mesh with a new cell group `name`, the union of the cell groups `members`."""
+        parts = []
+        for member in members:
+            self.cells_of(member)
+            parts.append(self.cell_groups[member])
+        return self.with_groups(cells={name: np.concatenate(parts)})

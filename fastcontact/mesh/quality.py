@@ -1,0 +1,231 @@
+"""How good a mesh is: angles, lengths, and cells that are flat or inside out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import MeshError
+from fastcontact.mesh import elements, quality_kernels
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+# A Jacobian below this fraction of the squared (cubed) longest edge is rounding, not area.
+_FLAT = 1e-12
+# Smallest over largest Jacobian of a cell, largest angle [degrees], volume over the cube of the longest edge beyond which
+# a cell is poor.
+EVEN, WIDE, THICK = 0.05, 175.0, 1e-4
+
+
+@dataclass(frozen=True)
+class MeshQuality:
+    """Figures of a mesh; angles and lengths are those of the straight-sided cells on the corner nodes.
+
+    Attributes
+    ----------
+    smallest_angle, largest_angle : float
+        Corner angles of all two-dimensional cells [degrees]; NaN without such cells.
+    shortest_edge, longest_edge : float
+        Edges of the solid cells [length]; NaN without cells.
+    worst_aspect : float
+        Largest ratio of longest to shortest edge in one solid cell.
+    measure : float
+        Area in 2D [length^2], volume in 3D [length^3], of the solid cells with their curved sides.
+    n_points : int
+        Number of points.
+    n_cells : dict of str to int
+        Number of cells by element, facets too.
+    n_bad : int
+        Number of solid cells that are degenerate or inverted; see `check_cells`.
+    dim : int
+        Dimension of the space.
+    """
+
+    smallest_angle: float
+    largest_angle: float
+    shortest_edge: float
+    longest_edge: float
+    worst_aspect: float
+    measure: float
+    n_points: int
+    n_cells: dict[str, int]
+    n_bad: int
+    dim: int
+
+    def __str__(self) -> str:
+        cells = ", ".join(f"{count} {name}" for name, count in self.n_cells.items()) or "no cells"
+        kind = "area" if self.dim == 2 else "volume"
+        return "\n".join(
+            [
+                f"{self.n_points} points, {cells}; degenerate or inverted: {self.n_bad}",
+                f"smallest angle {self.smallest_angle:.1f}, largest {self.largest_angle:.1f} degrees",
+                f"edges {self.shortest_edge:.6g} to {self.longest_edge:.6g} [length], "
+                f"worst aspect ratio {self.worst_aspect:.3g}",
+                f"{kind} {self.measure:.9g} [length^{self.dim}]",
+            ]
+        )
+
+
+def quality(mesh: Mesh) -> MeshQuality:
+    """Return the quality figures of a mesh.
+
+    Examples
+    --------
+    >>> mesh = Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2]]})
+    >>> round(quality(mesh).smallest_angle, 9), quality(mesh).measure
+    (45.0, 0.5)
+    """
+    angles = [_angles(mesh.points[block[:, : _corners(name)]]).ravel() for name, block in _surfaces(mesh)]
+    angle = np.concatenate(angles) if angles else np.array([np.nan])
+    lengths = [_edge_lengths(mesh, name) for name in mesh.solids]
+    length = np.concatenate([block.ravel() for block in lengths]) if lengths else np.array([np.nan])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        aspects = [(block.max(axis=1) / block.min(axis=1)).max() for block in lengths]
+    verdicts = [_verdict(mesh, name) for name in mesh.solids]
+    return MeshQuality(
+        smallest_angle=float(np.degrees(angle.min())),
+        largest_angle=float(np.degrees(angle.max())),
+        shortest_edge=float(length.min()),
+        longest_edge=float(length.max()),
+        worst_aspect=float(max(aspects, default=np.nan)),
+        measure=float(sum(verdict.measure.sum() for verdict in verdicts)),
+        n_points=mesh.n_points,
+        n_cells={name: len(block) for name, block in mesh.cells.items()},
+        n_bad=sum(int((verdict.flat | verdict.inverted).sum()) for verdict in verdicts),
+        dim=mesh.dim,
+    )
+
+
+def check_cells(mesh: Mesh) -> None:
+    """Check that every solid cell has a positive Jacobian at its default quadrature points.
+
+    Raises
+    ------
+    MeshError
+        If a cell is degenerate (its area or volume is nothing but rounding) or inverted (clockwise, or folded so
+        that the Jacobian is negative at a quadrature point), or stands there twice; the message names the first one
+        and says where.
+    """
+    for name in mesh.solids:
+        _check_twice(mesh, name)
+        verdict = _verdict(mesh, name)
+        for bad, what, remedy in (
+            (verdict.flat, "degenerate", "remove it or merge its points differently"),
+            (verdict.inverted, "inverted", "turn it with fastcontact.topology.oriented, or refine if it is curved"),
+        ):
+            if bad.any():
+                row = int(np.flatnonzero(bad)[0])
+                cell = _described(mesh, name, row, verdict.measure[row])
+                raise MeshError(f"{cell} is {what}, one of {int(bad.sum())} such cells: {remedy}")
+
+
+def poorest_cell(mesh: Mesh) -> str:
+    """Return a sentence about the poorest solid cell of a mesh if it spoils the solution, else an empty string.
+
+    A cell is poor whose Jacobian is nearly zero somewhere, in 2D one with an angle near 180 degrees (Babuska and Aziz,
+    1976: small angles do no harm), in 3D one that is nearly flat.
+    """
+    for name in mesh.solids:
+        measure, low, high, longest = _extremes(mesh, name)
+        ratio = low / high
+        row = int(np.argmin(ratio))
+        if ratio[row] < EVEN:
+            cell = _described(mesh, name, row, measure[row])
+            return f"{cell} is poor: its smallest Jacobian is {ratio[row]:.2g} of its largest; move its nodes or remesh"
+        if mesh.dim == 2:
+            angle = np.degrees(_angles(mesh.points[mesh.cells[name][:, : _corners(name)]]).max(axis=1))
+            row = int(np.argmax(angle))
+            if angle[row] > WIDE:
+                cell = _described(mesh, name, row, measure[row])
+                return f"{cell} is poor: it has an angle of {angle[row]:.1f} degrees; move its nodes or remesh"
+            continue
+        flatness = measure / longest**3
+        row = int(np.argmin(flatness))
+        if flatness[row] < THICK:
+            cell = _described(mesh, name, row, measure[row])
+            return f"{cell} is poor: its volume is only {flatness[row]:.1e} of its longest edge cubed; remesh there"
+    return ""
+
+
+def _check_twice(mesh: Mesh, name: str) -> None:
+    """Raise MeshError if two cells of an element have the same nodes: together they would be twice as stiff."""
+    nodes = mesh.cells[name].astype(np.int64)
+    # Sums tell most cells apart; only those with equal sums are compared node by node.
+    key = nodes.sum(axis=1) * mesh.n_points + (nodes * nodes % 1_000_003).sum(axis=1)
+    order = np.argsort(key, kind="stable")
+    alike = np.flatnonzero(key[order[1:]] == key[order[:-1]])
+    rows = np.unique(np.concatenate([order[alike], order[alike + 1]]))
+    _, first, count = np.unique(np.sort(nodes[rows], axis=1), axis=0, return_index=True, return_counts=True)
+    if (count > 1).any():
+        row = int(rows[first[count > 1].min()])
+        centre = ", ".join(f"{x:.6g}" for x in mesh.points[nodes[row]].mean(axis=0))
+        raise MeshError(
+            f"cell {mesh.offsets[name] + row} ({name} at ({centre})) stands in the mesh {int(count.max())} times, one of "
+            f"{int((count > 1).sum())} such cells: remove the copies"
+        )
+
+
+def _described(mesh: Mesh, name: str, row: int, measure: float) -> str:
+    """Number, element, place and size of a cell, in words."""
+    centre = mesh.points[mesh.cells[name][row, : _corners(name)]].mean(axis=0)
+    place = ", ".join(f"{x:.6g}" for x in centre)
+    kind = "area" if mesh.dim == 2 else "volume"
+    return f"cell {mesh.offsets[name] + row} ({name} at ({place}), {kind} {measure:.3g})"
+
+
+def _corners(name: str) -> int:
+    return elements.get(name).n_corners
+
+
+def _surfaces(mesh: Mesh) -> Iterator[tuple[str, NDArray[np.int32]]]:
+    return ((name, block) for name, block in mesh.cells.items() if elements.get(name).dim == 2)
+
+
+def _angles(corners: Array) -> Array:
+    """Corner angles (n_cells, n_corners) of polygons (n_cells, n_corners, dim) [radian]."""
+    ahead = np.roll(corners, -1, axis=1) - corners
+    behind = np.roll(corners, 1, axis=1) - corners
+    cosine = (ahead * behind).sum(axis=2)
+    if corners.shape[2] == 3:
+        return np.arctan2(np.linalg.norm(np.cross(ahead, behind), axis=2), cosine)
+    sine = ahead[..., 0] * behind[..., 1] - ahead[..., 1] * behind[..., 0]
+    # Counted inside the polygon whichever way round it is, so that a re-entrant corner has more than 180 degrees.
+    sine *= np.where(sine.sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
+    return np.arctan2(sine, cosine) % (2 * np.pi)
+
+
+def _edge_lengths(mesh: Mesh, name: str) -> Array:
+    """Lengths (n_cells, n_edges) of the straight edges of the cells [length]."""
+    ends = mesh.points[mesh.cells[name][:, elements.get(name).edges]]
+    return np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+
+
+@dataclass(frozen=True, eq=False)
+class _Verdict:
+    """Of each cell (n_cells,): area or volume, whether that is rounding only, whether a Jacobian is not positive."""
+
+    measure: Array
+    flat: NDArray[np.bool_]
+    inverted: NDArray[np.bool_]
+
+
+def _verdict(mesh: Mesh, name: str) -> _Verdict:
+    """Judge the cells of a solid element by their Jacobians at the default quadrature points."""
+    measure, low, high, longest = _extremes(mesh, name)
+    rounding = _FLAT * longest**mesh.dim
+    flat = np.maximum(np.abs(low), np.abs(high)) <= rounding
+    return _Verdict(measure, flat, (low <= rounding) & ~flat)
+
+
+def _extremes(mesh: Mesh, name: str) -> tuple[Array, Array, Array, Array]:
+    """Return, each (n_cells,), area or volume, smallest and largest Jacobian, longest edge of the cells of an element."""
+    element = elements.get(name)
+    _, gradients, weights = element.tables
+    low, high, measure, longest = np.empty((4, len(mesh.cells[name])))
+    edges = np.array(element.edges, np.intp)
+    quality_kernels.extremes(mesh.points, mesh.cells[name], gradients, weights, edges, low, high, measure, longest)
+    return measure, low, high, longest

@@ -1,0 +1,75 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Jacobians of solid cells at the points of a quadrature, and their longest edges: what tells bad cells from good."""
+
+import numpy as np
+
+from fastcontact._jit.decorators import kernel
+
+
+@kernel
+def _determinant_2d(x, slopes, q):
+    """Return det J of the cell with nodes x (2, n_nodes) at point q of the slopes (n_q, 2, n_nodes)."""
+    j00 = j01 = j10 = j11 = 0.0
+    for a in range(x.shape[1]):
+        r, s = slopes[q, 0, a], slopes[q, 1, a]
+        j00 += r * x[0, a]
+        j01 += r * x[1, a]
+        j10 += s * x[0, a]
+        j11 += s * x[1, a]
+    return j00 * j11 - j01 * j10
+
+
+@kernel
+def _determinant_3d(x, slopes, q):
+    """Return det J of the cell with nodes x (3, n_nodes) at point q of the slopes (n_q, 3, n_nodes)."""
+    j00 = j01 = j02 = j10 = j11 = j12 = j20 = j21 = j22 = 0.0
+    for a in range(x.shape[1]):
+        r, s, t = slopes[q, 0, a], slopes[q, 1, a], slopes[q, 2, a]
+        j00 += r * x[0, a]
+        j01 += r * x[1, a]
+        j02 += r * x[2, a]
+        j10 += s * x[0, a]
+        j11 += s * x[1, a]
+        j12 += s * x[2, a]
+        j20 += t * x[0, a]
+        j21 += t * x[1, a]
+        j22 += t * x[2, a]
+    return j00 * (j11 * j22 - j12 * j21) + j01 * (j12 * j20 - j10 * j22) + j02 * (j10 * j21 - j11 * j20)
+
+
+@kernel
+def extremes(points, cells, dN, weights, edges, low, high, measure, longest):
+    """Fill the smallest and largest det J, the area or volume, and the longest edge of each cell, all (n_cells,).
+
+    Parameters
+    ----------
+    points : (n_points, dim), cells : (n_cells, n_nodes)
+    dN : (n_q, n_nodes, dim), weights : (n_q,)
+        Shape derivatives at the points of a quadrature, and its weights.
+    edges : (n_edges, 2)
+        Local nodes at the ends of the edges, which count as straight.
+    """
+    n_q, n_nodes, dim = dN.shape
+    slopes = np.empty((n_q, dim, n_nodes))
+    for q in range(n_q):
+        for a in range(n_nodes):
+            for i in range(dim):
+                slopes[q, i, a] = dN[q, a, i]
+    x = np.empty((dim, n_nodes))
+    for c in range(cells.shape[0]):
+        for a in range(n_nodes):
+            for i in range(dim):
+                x[i, a] = points[cells[c, a], i]
+        smallest, largest, total = np.inf, -np.inf, 0.0
+        for q in range(n_q):
+            det = _determinant_2d(x, slopes, q) if dim == 2 else _determinant_3d(x, slopes, q)
+            smallest, largest = min(smallest, det), max(largest, det)
+            total += weights[q] * det
+        low[c], high[c], measure[c] = smallest, largest, total
+        square = 0.0
+        for e in range(edges.shape[0]):
+            own = 0.0
+            for i in range(dim):
+                own += (x[i, edges[e, 1]] - x[i, edges[e, 0]]) ** 2
+            square = max(square, own)
+        longest[c] = np.sqrt(square)

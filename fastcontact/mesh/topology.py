@@ -1,0 +1,233 @@
+"""Questions to the connectivity: outer facets, bodies, orientation, nodes in order along a line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import wraps
+from types import MappingProxyType
+from typing import TypeVar
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from fastcontact.errors import MeshError
+from fastcontact.mesh import elements, topology_kernels
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int32]
+Found = TypeVar("Found")
+
+
+def corner_areas(mesh: Mesh, name: str) -> Array:
+    """Return the signed area (n_cells,) of the corner polygons of the 2D cells of element `name` [length^2]."""
+    corners = mesh.points[mesh.cells[name][:, : elements.get(name).n_corners]]
+    x, y = corners[..., 0], corners[..., 1]
+    return 0.5 * (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
+
+
+def corner_volumes(mesh: Mesh, name: str) -> Array:
+    """Return the signed volume (n_cells,) of the 3D cells of element `name` on their corners alone [length^3].
+
+    Faces of four corners are bilinear. The sum is that of the linear element's quadrature, which is exact.
+    """
+    linear = elements.get(elements.get(name).linear)
+    _, gradients, weights = linear.tables
+    corners = mesh.points[mesh.cells[name][:, : linear.n_nodes]]
+    volumes = np.zeros(len(corners))
+    # One quadrature point at a time keeps the memory at a few arrays of n_cells.
+    for gradient, weight in zip(gradients, weights, strict=True):
+        a, b, c = np.moveaxis(np.einsum("cni,nj->cij", corners, gradient), 2, 0)
+        volumes += weight * np.einsum("ci,ci->c", np.cross(a, b), c)
+    return volumes
+
+
+def oriented(mesh: Mesh) -> tuple[Mesh, int]:
+    """Return the mesh with every solid cell the right way round, and how many cells were turned.
+
+    Two-dimensional cells run counter-clockwise; in three dimensions the outer facets of `elements` look outward.
+
+    Raises
+    ------
+    MeshError
+        If a cell that was inside out lies on the same side of a facet as its neighbour: the mesh is folded there, and
+        turning the cell would hide that.
+    """
+    measure = corner_areas if mesh.dim == 2 else corner_volumes
+    cells, turned = dict(mesh.cells), 0
+    for name in mesh.solids:
+        inside_out = measure(mesh, name) < 0
+        if inside_out.any():
+            block = mesh.cells[name].copy()
+            block[inside_out] = block[inside_out][:, elements.get(name).reversed]
+            cells[name] = block
+            turned += int(inside_out.sum())
+    if not turned:
+        return mesh, 0
+    mesh = mesh.replace(cells=cells)
+    _check_folds(mesh)
+    return mesh, turned
+
+
+def _check_folds(mesh: Mesh) -> None:
+    """Raise MeshError if two solid cells, all of them oriented, go round a common facet in the same direction."""
+    found, owners = [], []
+    for name, block in mesh.solids.items():
+        element = elements.get(name)
+        numbers = mesh.offsets[name] + np.arange(len(block))
+        for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
+            found.append(_direction(block[:, list(facet)[: elements.get(facet_element).n_corners]].astype(np.int64)))
+            owners.append(numbers)
+    keys, owner = np.concatenate(found), np.concatenate(owners)
+    order = np.lexsort(keys.T)
+    same = np.flatnonzero((keys[order[1:]] == keys[order[:-1]]).all(axis=1))
+    if len(same):
+        first, second = sorted((int(owner[order[same[0]]]), int(owner[order[same[0] + 1]])))
+        where = ", ".join(f"{x:.6g}" for x in mesh.points[keys[order[same[0]]][:2]].mean(axis=0))
+        raise MeshError(
+            f"cells {first} and {second} lie on the same side of the facet between them, near ({where}), one of "
+            f"{len(same)} such pairs: the mesh is folded there; move its nodes or remesh"
+        )
+
+
+def _direction(facets: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return three nodes (n, 3) that tell facets, and the way round them, apart: the lowest, the next, the last."""
+    first = facets.argmin(axis=1)
+    rows, count = np.arange(len(facets)), facets.shape[1]
+    # The two ends of a line are told apart by their order alone.
+    ahead, behind = (facets[rows, (first + k) % count] for k in (1, -1))
+    return np.column_stack([facets[rows, first], ahead, behind if count > 2 else first])
+
+
+def _remembered(function: Callable[[Mesh], Found]) -> Callable[[Mesh], Found]:
+    """Ask `function` once for every mesh: meshes do not change, and many parts of an analysis want the same of one."""
+    known: WeakKeyDictionary[Mesh, Found] = WeakKeyDictionary()
+
+    @wraps(function)
+    def asked(mesh: Mesh) -> Found:
+        if mesh not in known:
+            known[mesh] = function(mesh)
+        return known[mesh]
+
+    return asked
+
+
+@_remembered
+def bodies(mesh: Mesh) -> tuple[int, NDArray[np.int32]]:
+    """Return the number of bodies (sets of solid cells connected by nodes) and the body of each point, -1 for none."""
+    rows, columns, used = [], [], np.zeros(mesh.n_points, bool)
+    for block in mesh.solids.values():
+        rows.append(np.repeat(block[:, 0], block.shape[1]))
+        columns.append(block.ravel())
+        used[block] = True
+    if not rows:
+        return 0, np.full(mesh.n_points, -1, np.int32)
+    row, column = np.concatenate(rows), np.concatenate(columns)
+    graph = coo_array((np.ones(len(row), np.int8), (row, column)), shape=(mesh.n_points, mesh.n_points))
+    _, label = connected_components(graph, directed=False)
+    found, compact = np.unique(label[used], return_inverse=True)
+    body = np.full(mesh.n_points, -1, np.int32)
+    body[used] = compact
+    body.setflags(write=False)
+    return len(found), body
+
+
+@_remembered
+def outer_facets(mesh: Mesh) -> Mapping[str, Indices]:
+    """Return the facets that belong to exactly one solid cell, by facet element, normals pointing outward."""
+    found: dict[str, list[Indices]] = {}
+    for name, block in mesh.solids.items():
+        element = elements.get(name)
+        for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
+            found.setdefault(facet_element, []).append(block[:, list(facet)])
+    kept = {name: _single(np.concatenate(blocks), mesh.n_points) for name, blocks in found.items()}
+    return MappingProxyType({name: facets for name, facets in kept.items() if len(facets)})
+
+
+def _single(facets: Indices, n_points: int) -> Indices:
+    """Return the facets whose nodes no other facet has, in the order given."""
+    facets, alone = np.ascontiguousarray(facets), np.empty(len(facets), bool)
+    topology_kernels.alone(facets, n_points, alone)
+    kept = np.ascontiguousarray(facets[alone])
+    kept.setflags(write=False)
+    return kept
+
+
+@dataclass(frozen=True, eq=False)
+class OrderedLine:
+    """Nodes of a line of facets in order, with the length along it.
+
+    Attributes
+    ----------
+    points : ndarray of int (m,)
+        Point numbers from the start node on.
+    abscissa : ndarray (m,)
+        Length from the start node along the straight pieces between consecutive nodes [length].
+    """
+
+    points: Indices
+    abscissa: Array
+
+
+def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> OrderedLine:
+    """Return the nodes of a line group in order, as code_aster's NOEUD_ORDO and ABSC_CURV.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    group : str
+        A group of line cells that form one open line.
+    start : str or int, optional
+        The end to start from: a group with one point, or a point number; by default the end nearest to x = 0.
+
+    Raises
+    ------
+    MeshError
+        If the group holds no lines, branches, closes on itself, is in pieces, or `start` is not one of its ends.
+    """
+    blocks = mesh.cells_of(group, dim=1)
+    if not blocks:
+        raise MeshError(f"group '{group}' holds no line cells, so its nodes have no order along a line")
+    pieces = [block[:, [0, 2, 1]] if block.shape[1] == 3 else block for block in blocks.values()]
+    segments = np.concatenate([np.column_stack([p[:, i], p[:, i + 1]]) for p in pieces for i in range(p.shape[1] - 1)])
+    nodes, local = np.unique(segments, return_inverse=True)
+    local = local.reshape(segments.shape)
+    degree = np.bincount(local.ravel(), minlength=len(nodes))
+    ends = np.flatnonzero(degree == 1)
+    if len(ends) != 2 or degree.max() > 2:
+        raise MeshError(f"group '{group}' is not one open line: it has {len(ends)} ends, not 2")
+    if start is None:
+        first = ends[np.argmin(np.abs(mesh.points[nodes[ends], 0]))]
+    else:
+        number = mesh.point(start) if isinstance(start, str) else int(start)
+        matches = ends[nodes[ends] == number]
+        if not len(matches):
+            raise MeshError(
+                f"point {number} is not an end of '{group}': its ends are {nodes[ends[0]]}, {nodes[ends[1]]}"
+            )
+        first = matches[0]
+    order = _walk(local, len(nodes), int(first))
+    if len(order) != len(nodes):
+        raise MeshError(f"group '{group}' is in pieces: only {len(order)} of its {len(nodes)} nodes are connected")
+    points = nodes[order].astype(np.int32)
+    lengths = np.linalg.norm(np.diff(mesh.points[points], axis=0), axis=1)
+    return OrderedLine(points, np.concatenate([[0.0], np.cumsum(lengths)]))
+
+
+def _walk(segments: NDArray[np.intp], n_nodes: int, first: int) -> list[int]:
+    """Follow the segments from `first`, each node at most once."""
+    neighbours: list[list[int]] = [[] for _ in range(n_nodes)]
+    for a, b in segments.tolist():
+        neighbours[a].append(b)
+        neighbours[b].append(a)
+    order, previous, here = [first], -1, first
+    while True:
+        ahead = [n for n in neighbours[here] if n != previous]
+        if not ahead:
+            return order
+        previous, here = here, ahead[0]
+        order.append(here)

@@ -1,0 +1,56 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Facets that belong to one cell only."""
+
+import numpy as np
+
+from fastcontact._jit.decorators import kernel
+
+
+@kernel
+def _sorted_nodes(facets):
+    """Return the nodes (n_nodes, n_facets) of every facet, ascending."""
+    n, n_nodes = facets.shape
+    keys = np.empty((n_nodes, n), np.int32)
+    for f in range(n):
+        for a in range(n_nodes):
+            node, at = facets[f, a], a
+            while at > 0 and keys[at - 1, f] > node:
+                keys[at, f] = keys[at - 1, f]
+                at -= 1
+            keys[at, f] = node
+    return keys
+
+
+@kernel
+def _same(keys, f, g):
+    for a in range(keys.shape[0]):
+        if keys[a, f] != keys[a, g]:
+            return False
+    return True
+
+
+@kernel
+def alone(facets, n_points, found):
+    """Fill `found` (n_facets,) with whether no other one of the facets (n_facets, n_nodes) has the same nodes.
+
+    The facets are counted and put in their places by one node after the other, the lowest last: alike ones then follow each
+    other, in a time that does not depend on how many meet at a node.
+    """
+    keys, n = _sorted_nodes(facets), facets.shape[0]
+    order, other = np.empty(n, np.int32), np.empty(n, np.int32)
+    for f in range(n):
+        order[f] = f
+    for a in range(keys.shape[0] - 1, -1, -1):
+        place = np.zeros(n_points + 1, np.int64)
+        for f in range(n):
+            place[keys[a, f] + 1] += 1
+        for p in range(n_points):
+            place[p + 1] += place[p]
+        for k in range(n):
+            node = keys[a, order[k]]
+            other[place[node]] = order[k]
+            place[node] += 1
+        order, other = other, order
+    for k in range(n):
+        beside = k > 0 and _same(keys, order[k], order[k - 1])
+        found[order[k]] = not (beside or (k + 1 < n and _same(keys, order[k], order[k + 1])))

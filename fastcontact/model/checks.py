@@ -1,0 +1,115 @@
+"""Checks of a model before any numerics: supports, loads, overlapping bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import ContactError, ModelError
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import bodies
+from fastcontact.model.body_overlap import penetration
+from fastcontact.model.ramp import Table
+from fastcontact.model.rigid_motions import FreeMotions, body_name
+
+if TYPE_CHECKING:
+    from fastcontact.contact.formulations import Formulation
+
+Array = NDArray[np.float64]
+
+
+def check_motions(motions: FreeMotions) -> None:
+    """Raise ModelError if bodies can move without deforming, naming bodies and motions."""
+    if not len(motions):
+        return
+    total = len(motions)
+    listing = "; ".join(f"{name}: {', '.join(found)}" for name, found in motions.by_body().items())
+    raise ModelError(
+        f"{total} rigid-body motion{'s are' if total > 1 else ' is'} not supported: {listing}. "
+        "Fix or prescribe a displacement component that stops each, or let a load press the body against a contact"
+    )
+
+
+def check_ramps(ramped: Iterable[tuple[str, Table | None]], instants: Iterable[float]) -> None:
+    """Raise ModelError if the table of a load, support or relation (name, table) does not cover the instants."""
+    instants = list(instants)
+    for name, table in ramped:
+        outside = [t for t in instants if table is not None and not table[0][0] <= t <= table[-1][0]]
+        if outside and table is not None:
+            raise ModelError(
+                f"the ramp of {name} covers {table[0][0]:g} to {table[-1][0]:g}, but the analysis has the instant "
+                f"{outside[0]:g}: extend the table"
+            )
+
+
+def check_forces(mesh: Mesh, forces: Array, related: NDArray[np.bool_], name: str) -> None:
+    """Raise ModelError if forces (n_points, dim) act on points that no solid cell or relation (n_points,) holds."""
+    carried = related.copy()
+    for block in mesh.solids.values():
+        carried[block] = True
+    lost = np.flatnonzero(forces.any(axis=1) & ~carried)
+    if len(lost):
+        raise ModelError(
+            f"{name} acts on {len(lost)} points that belong to no solid cell (first: point {lost[0]}): "
+            "name a group of the body, or tie the points to it with couple or relate"
+        )
+
+
+def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: NDArray[np.bool_]) -> None:
+    """Raise ModelError if a support (name, group) holds only points that no solid cell or relation (n_points,) has."""
+    carried = related.copy()
+    for block in mesh.solids.values():
+        carried[block] = True
+    for name, group in supports:
+        points = mesh.points_of(group)
+        if not carried[points].any():
+            raise ModelError(
+                f"{name} holds {len(points)} points that belong to no solid cell (first: point {points[0]}): name a group "
+                "of the body"
+            )
+
+
+def check_penetration(name: str, pair: Formulation) -> None:
+    """Raise ContactError if the sides of contact pair `name` lie inside each other by more than an element before any load.
+
+    An interference that is meant is smaller, or a clearance.
+    """
+    if pair.terms.tied:
+        return
+    total, geometric = (
+        pair.nodal_gap(np.zeros_like(pair.points))[0],
+        pair.nodal_gap(np.zeros_like(pair.points), False)[0],
+    )
+    gap = np.where(pair.terms.excluded_nodes(pair.secondary), np.inf, np.maximum(total, geometric))
+    size = np.zeros(len(gap))
+    for block in pair.secondary.blocks:
+        long = np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
+        np.maximum.at(size, block.local, long[:, None])
+    row = int(np.argmin(gap / size))
+    if gap[row] < -size[row]:
+        point = pair.secondary.points[row]
+        raise ContactError(
+            f"contact '{name}' begins with a penetration of {-gap[row]:.4g} at point {point} {pair.points[point]}, more than "
+            f"the element there is long ({size[row]:.4g}): move a body apart, turn a surface that is inside out, or give an "
+            "interference that is meant as clearance"
+        )
+
+
+def check_overlap(mesh: Mesh, kinematics: str, paired: Iterable[tuple[str, str]]) -> None:
+    """Raise ModelError if bodies overlap in the reference configuration and no contact pair joins them.
+
+    `paired` holds the (secondary, primary) groups of the contact pairs.
+    """
+    _, body = bodies(mesh)
+    joined = {frozenset((int(body[mesh.points_of(a)[0]]), int(body[mesh.points_of(b)[0]]))) for a, b in paired}
+    size = float(np.ptp(mesh.points, axis=0).max())
+    for number, other, depth, where in penetration(mesh, kinematics, mesh.points):
+        if depth > 1e-6 * size and frozenset((number, other)) not in joined:
+            names = body_name(mesh, body, number), body_name(mesh, body, other)
+            raise ModelError(
+                f"body {names[0]} overlaps body {names[1]} by {depth:.3g} near {where} before any load, "
+                "and no contact pair joins them: add the contact or move one of them"
+            )

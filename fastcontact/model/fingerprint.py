@@ -1,0 +1,124 @@
+"""What makes a case the case it is, as short digests part by part: two models with equal ones have equal answers.
+
+Numbers count bit for bit, functions by their values at the points that they act on. Names of groups count, the order in
+which loads and supports were added does not. Left out is what may change when an analysis goes on: titles, the linear
+solver, tolerances and limits.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.model.model import ContactPair, Model
+
+Array = NDArray[np.float64]
+LENGTH = 16
+
+
+def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[str, str]:
+    """Return the digest of each part of a model, and of the options that change its answer.
+
+    Parameters
+    ----------
+    model : Model
+    options : mapping, optional
+        Plain values by name.
+
+    Returns
+    -------
+    dict of str to str
+        By what the part is called in messages: "the mesh", "the materials", "contact 'hertz'", ...
+    """
+    mesh = model.mesh
+    parts: dict[str, Any] = {
+        "the mesh": mesh,
+        "the kinematics": model.kinematics,
+        "the materials": model.materials,
+        "the supports": _unordered(model.supports, mesh),
+        "the loads": _unordered(model.loads, mesh),
+        "the relations": _unordered(model.relations, mesh),
+        "the springs": _unordered(model.springs, mesh),
+        "the list of contact pairs": [pair.name for pair in model.contact],
+        **{f"contact '{pair.name}'": pair for pair in model.contact},
+        **{f"the option {name}": value for name, value in (options or {}).items()},
+    }
+    return {name: _digest(part, mesh) for name, part in parts.items()}
+
+
+def different(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
+    """Return the parts that two fingerprints do not share."""
+    return [name for name in {**one, **other} if one.get(name) != other.get(name)]
+
+
+def _unordered(items: Iterable[Any], mesh: Mesh) -> list[str]:
+    return sorted(_digest(item, mesh) for item in items)
+
+
+def _digest(value: Any, mesh: Mesh) -> str:
+    hashed = hashlib.sha256()
+    _take(value, hashed.update, mesh, mesh.points)
+    return hashed.hexdigest()[:LENGTH]
+
+
+def _take(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: Array) -> None:
+    """Add a value to a digest; functions by their values at `points` (n, dim)."""
+    if isinstance(value, Mesh):
+        value = [value.points, value.cells, value.cell_groups, value.point_groups]
+    if isinstance(value, csr_array):
+        value = [value.data, value.indices.astype(np.int64), value.indptr.astype(np.int64)]
+    if isinstance(value, np.ndarray):
+        add(f"array {value.shape} {value.dtype.kind}".encode())
+        add(np.ascontiguousarray(value).tobytes())
+    elif isinstance(value, (bool, np.bool_, str)) or value is None:
+        add(f"{type(value).__name__} {value}".encode())
+    elif isinstance(value, (int, float, np.number)):
+        add(f"number {float(value)!r}".encode())
+    elif isinstance(value, Mapping):
+        _take(sorted(map(str, value)), add, mesh, points)
+        for key in sorted(value, key=str):
+            _take(value[key], add, mesh, points)
+    elif isinstance(value, (list, tuple, range)):
+        add(f"sequence {len(value)}".encode())
+        for entry in value:
+            _take(entry, add, mesh, points)
+    else:
+        _take_object(value, add, mesh, points)
+
+
+def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: Array) -> None:
+    """Add a description with fields, an obstacle or a function."""
+    add(type(value).__qualname__.encode())
+    points = _points_of(value, mesh, points)
+    fields = [field for field in dataclasses.fields(value) if field.init] if dataclasses.is_dataclass(value) else []
+    if hasattr(value, "distance"):
+        _take(list(value.distance(points)), add, mesh, points)
+        fields = [field for field in fields if not callable(getattr(value, field.name))]
+    elif not fields and callable(value):
+        _take(_called(value, points), add, mesh, points)
+    for field in fields:
+        add(field.name.encode())
+        _take(getattr(value, field.name), add, mesh, points)
+
+
+def _called(function: Callable[[Array], Any], points: Array) -> Any:
+    """Return the values (n,) of a function of position; its name where it has none at these points."""
+    try:
+        return np.asarray(function(points), float)
+    except Exception:  # whatever is wrong with a user's function, the check of the model says it better
+        return getattr(function, "__qualname__", "function")
+
+
+def _points_of(value: Any, mesh: Mesh, points: Array) -> Array:
+    """Return the positions where the functions of a load, support or contact pair count."""
+    group = value.secondary if isinstance(value, ContactPair) else getattr(value, "group", None)
+    if isinstance(group, str) and group in mesh.group_names:
+        return np.asarray(mesh.points[mesh.points_of(group)])
+    return points

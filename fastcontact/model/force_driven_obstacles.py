@@ -1,0 +1,178 @@
+"""Rigid obstacles driven by forces: each is a body of one more point, without stiffness, that only contact holds.
+
+The points of the mesh are followed by one for each such obstacle; its displacement is that of the obstacle. Components
+under a force are free motions like those of a body without supports, and get springs that end up slack like theirs (see
+`floating`); the others are prescribed. A gap against a rigid obstacle changes by ``n . (u - q)``, with q its
+displacement: the row of an obstacle is minus what the row of the gap makes of a common translation of all points.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+from scipy.sparse import bsr_array, csr_array, hstack
+
+from fastcontact.contact.constraints import Constraints
+from fastcontact.elasticity.relations import Relation
+from fastcontact.model.rigid_motions import FreeMotions
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Table = tuple[tuple[float, float], ...]
+# Force on an obstacle by component, None where the component is prescribed; empty for none at all.
+Driving = tuple[float | None, ...]
+
+
+class DrivenPair(Protocol):
+    """What is asked of a contact pair: name, force and motion by component, history."""
+
+    @property
+    def name(self) -> str:
+        """Name of the pair."""
+        ...
+
+    @property
+    def motion(self) -> tuple[float, ...]:
+        """Displacement at multiplier 1 [length]."""
+        ...
+
+    @property
+    def force(self) -> Driving:
+        """Force at multiplier 1 [force]."""
+        ...
+
+    @property
+    def ramp(self) -> Table | None:
+        """History of both."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """The obstacles of a model that forces drive; what has no extra points passes through unchanged.
+
+    Parameters
+    ----------
+    pairs : sequence of DrivenPair
+        Contact pairs with such an obstacle.
+    shape : (int, int)
+        Of the points of the mesh, (n_points, dim).
+    """
+
+    pairs: Sequence[DrivenPair]
+    shape: tuple[int, int]
+
+    def __len__(self) -> int:
+        return len(self.pairs)
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of displacement components, those of the obstacles last."""
+        return (self.shape[0] + len(self)) * self.shape[1]
+
+    @property
+    def loose(self) -> Mask:
+        """Which displacement components (n_dofs,) are free but have no stiffness: those under a force."""
+        mask = np.zeros(self.n_dofs, bool)
+        for number, pair in enumerate(self.pairs):
+            mask[self.dofs(number)] = [force is not None for force in pair.force]
+        return mask
+
+    def dofs(self, number: int) -> NDArray[np.intp]:
+        """Return the displacement components of an obstacle."""
+        return (self.shape[0] + number) * self.shape[1] + np.arange(self.shape[1])
+
+    def number(self, name: str) -> int | None:
+        """Return the number of the obstacle of contact pair `name`, None if no force drives it."""
+        return next((i for i, pair in enumerate(self.pairs) if pair.name == name), None)
+
+    def stiffness(self, K: bsr_array) -> bsr_array:
+        """Return K with empty rows and columns for the obstacles."""
+        if not self.pairs:
+            return K
+        indptr = np.r_[K.indptr, np.full(len(self), K.indptr[-1])].astype(K.indptr.dtype)
+        return bsr_array((K.data, K.indices, indptr), shape=(self.n_dofs, self.n_dofs))
+
+    def relations(self, relations: Sequence[Relation]) -> list[Relation]:
+        """Return relations whose rows have columns for the obstacles, too."""
+        return [dataclasses.replace(relation, rows=self._wider(relation.rows)) for relation in relations]
+
+    def _wider(self, rows: csr_array) -> csr_array:
+        return csr_array((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], self.n_dofs))
+
+    def supported(self, fixed: Mask) -> Mask:
+        """Return the supported components (n_points + n, dim) of points and obstacles."""
+        own = [[force is None for force in pair.force] for pair in self.pairs]
+        return np.vstack([fixed, np.array(own, bool).reshape(-1, self.shape[1])])
+
+    def prescribed(self, by_ramp: dict[Table | None, Array]) -> dict[Table | None, Array]:
+        """Return by history the displacements (n_points + n, dim) at multiplier 1, those of the obstacles included."""
+        return self._with(by_ramp, [pair.motion for pair in self.pairs])
+
+    def forces(self, by_ramp: dict[Table | None, Array]) -> dict[Table | None, Array]:
+        """Return by history the forces (n_points + n, dim) at multiplier 1, those on the obstacles included."""
+        return self._with(by_ramp, [tuple(force or 0.0 for force in pair.force) for pair in self.pairs])
+
+    def _with(
+        self, by_ramp: dict[Table | None, Array], values: Sequence[tuple[float, ...]]
+    ) -> dict[Table | None, Array]:
+        n, dim = self.shape
+        wider = {ramp: np.vstack([part, np.zeros((len(self), dim))]) for ramp, part in by_ramp.items()}
+        for number, (pair, value) in enumerate(zip(self.pairs, values, strict=True)):
+            if any(value):
+                part = wider.setdefault(pair.ramp, np.zeros((n + len(self), dim)))
+                part[n + number] = value
+        return wider
+
+    def motions(self, motions: FreeMotions) -> FreeMotions:
+        """Return free motions with those of the obstacles, one a component under a force."""
+        if not self.pairs:
+            return motions
+        loose = np.flatnonzero(self.loose)
+        count = len(motions)
+        displacement = np.zeros((self.n_dofs, count + len(loose)))
+        displacement[: len(motions.displacement), :count] = motions.displacement
+        displacement[loose, count + np.arange(len(loose))] = 1.0
+        labels = [
+            (f"obstacle '{self.pairs[dof // self.shape[1] - self.shape[0]].name}'", _translation(dof % self.shape[1]))
+            for dof in loose.tolist()
+        ]
+        parts = np.asarray(block_diag(motions.parts, np.eye(len(loose))), float)
+        return FreeMotions(displacement, parts, [*motions.labels, *labels])
+
+    def near_nullspace(self, modes: Array) -> Array:
+        """Return displacements (n_dofs, k) that cost little energy: `modes`, translations first, and obstacles with them."""
+        return np.vstack([modes, np.tile(np.eye(self.shape[1], modes.shape[1]), (len(self), 1))])
+
+    def constraints(self, name: str, part: Constraints, position: Array) -> Constraints:
+        """Return the constraints of pair `name`, set up with its obstacle at `position` (dim,), with the obstacle free.
+
+        Rows then have columns for all obstacles, and slip counts the motion of the obstacle.
+        """
+        if not self.pairs:
+            return part
+        number = self.number(name)
+        if number is None:
+            wider = tuple(self._wider(tangent) for tangent in part.tangents)
+            return dataclasses.replace(part, B=self._wider(part.B), tangents=wider)
+        B, normal = self._free(part.B, number)
+        tangents = tuple(self._free(tangent, number)[0] for tangent in part.tangents)
+        return dataclasses.replace(part, B=B, gap0=part.gap0 + normal @ position, tangents=tangents, drift=None)
+
+    def _free(self, rows: csr_array, number: int) -> tuple[csr_array, Array]:
+        """Return rows with those of the obstacle that they act against, and their direction (m, dim)."""
+        n, dim = self.shape
+        direction = rows @ np.tile(np.eye(dim), (n, 1))
+        own = np.zeros((rows.shape[0], len(self) * dim))
+        own[:, number * dim : (number + 1) * dim] = -direction
+        return csr_array(hstack([rows, csr_array(own)], format="csr")), direction
+
+
+def _translation(axis: int) -> str:
+    return f"translation along {'xyz'[axis]}"

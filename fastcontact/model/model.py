@@ -1,0 +1,751 @@
+"""Model: a mesh with kinematics, materials, supports, loads and contact pairs; checked whole before any numerics."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, vstack
+
+from fastcontact.contact.default_formulation import default_formulation
+from fastcontact.contact.formulations import FORMULATIONS, Formulation
+from fastcontact.contact.obstacles import MeshedSurface, Obstacle
+from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.side_checks import check_obstacle, check_sides
+from fastcontact.contact.surface import Surface, surface
+from fastcontact.elasticity.loads import (
+    BodyForce,
+    Load,
+    NodalForce,
+    Pressure,
+    TotalForce,
+    Traction,
+    Value,
+    axes_of,
+    check_number,
+    check_value,
+    evaluated,
+)
+from fastcontact.elasticity.materials import KINEMATICS, LinearElastic
+from fastcontact.elasticity.relations import Relation, stacked_rows
+from fastcontact.elasticity.springs import Springs, between, check_stiffness, grounded, stacked
+from fastcontact.elasticity.system import ConstrainedMotion
+from fastcontact.errors import ContactError, ModelError, unknown
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.quality import check_cells
+from fastcontact.model.checks import (
+    check_forces,
+    check_motions,
+    check_overlap,
+    check_penetration,
+    check_ramps,
+    check_supports,
+)
+from fastcontact.model.force_driven_obstacles import Driven, Driving
+from fastcontact.model.pair_options import TERMS, clearance_ramp, terms_of
+from fastcontact.model.ramp import Ramp, Table, checked_table, table_value
+from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
+
+Array = NDArray[np.float64]
+log = logging.getLogger("fastcontact")
+# Formulations that need no facets on the primary side.
+AGAINST_OBSTACLES = ("node_to_segment", "continuous")
+# A history of a single load: a ramp, whose table counts, or pairs (instant, multiplier).
+History = Ramp | Iterable[Iterable[float]] | None
+
+
+@dataclass(frozen=True)
+class Support:
+    """A prescribed displacement component of all nodes of a group: `value` [length] times the ramp.
+
+    `value` is a number or a function of position, `ramp` a history of its own or None.
+    """
+
+    group: str
+    component: int
+    value: Value
+    ramp: Table | None = None
+
+    @property
+    def name(self) -> str:
+        """What it is and where it acts, for messages."""
+        return f"the displacement {'xyz'[self.component]} prescribed on '{self.group}'"
+
+
+@dataclass(frozen=True)
+class ContactPair:
+    """Two groups of facets that may touch, or one and a rigid obstacle, with a formulation and its options.
+
+    With an `obstacle`, `primary` is empty; `motion` is the obstacle's displacement at multiplier 1 [length], and `ramp`
+    a history of its own or None. Components of `force` that are not None drive the obstacle at multiplier 1 [force].
+    """
+
+    name: str
+    secondary: str
+    primary: str
+    formulation: str
+    options: dict[str, Any] = field(default_factory=dict)
+    obstacle: Obstacle | None = None
+    motion: tuple[float, ...] = ()
+    ramp: Table | None = None
+    force: Driving = ()
+
+    @property
+    def eliminable(self) -> bool:
+        """Whether closed constraints can be eliminated: not where they give way by themselves."""
+        return self.formulation != "continuous" and not self.options.get("penalty")
+
+    @property
+    def clearance_ramp(self) -> Table | None:
+        """History of the clearance; None where it does not change."""
+        return clearance_ramp(self.name, self.options)
+
+    @property
+    def opposite(self) -> str:
+        """What the secondary side may touch, for messages."""
+        return self.primary if self.obstacle is None else "a rigid obstacle"
+
+
+class Model:
+    """An elastic contact problem.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    kinematics : str
+        ``"axisymmetric"`` (x is the radius, y the axis), ``"plane_strain"``, ``"plane_stress"`` or ``"3d"``.
+    case_text : str
+        Text kept in result files beside the numbers, usually the case file.
+
+    Raises
+    ------
+    ModelError
+        If the kinematics do not fit the mesh.
+    MeshError
+        If a cell is degenerate or turned inside out.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> model = fc.Model(fc.generate.half_spheres(size=10.0), kinematics="axisymmetric")
+    >>> model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    >>> model.fix("A1A2", "x")
+    >>> model.prescribe("A2B2", y=-2.0)
+    >>> model.prescribe("A1B1", y=+2.0)
+    >>> model.add_contact("hertz", secondary="CONT1", primary="CONT2")
+    """
+
+    def __init__(self, mesh: Mesh, kinematics: str, case_text: str = "") -> None:
+        if kinematics not in KINEMATICS:
+            raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
+        if (kinematics == "3d") != (mesh.dim == 3):
+            fitting = ", ".join(f"'{name}'" for name in KINEMATICS if (name == "3d") == (mesh.dim == 3))
+            raise ModelError(f"kinematics '{kinematics}' do not fit a mesh in {mesh.dim} dimensions: use {fitting}")
+        if not mesh.solids:
+            raise ModelError(f"the mesh has no solid cells, only {', '.join(mesh.cells) or 'points'}")
+        check_cells(mesh)
+        if kinematics == "axisymmetric":
+            radius = mesh.points[:, 0].min()
+            if radius < -1e-9 * np.abs(mesh.points).max():
+                raise ModelError(
+                    f"point {int(mesh.points[:, 0].argmin())} has the radius x = {radius:.6g} < 0: "
+                    "an axisymmetric model lies at x >= 0, with y along the axis"
+                )
+        self.mesh = mesh
+        self.kinematics = kinematics
+        self.case_text = case_text
+        self.units: dict[str, str] = {}  # names of the units of length, force, pressure where they are known
+        self.materials: list[tuple[LinearElastic, tuple[str, ...] | None]] = []
+        self.supports: list[Support] = []
+        self.loads: list[Load] = []
+        self.relations: list[Relation] = []
+        self.springs: list[Springs] = []
+        self.contact: list[ContactPair] = []
+
+    def __repr__(self) -> str:
+        pairs = ", ".join(f"{p.name}: {p.secondary} on {p.opposite}, {p.formulation}" for p in self.contact)
+        return f"Model({self.kinematics}, {self.mesh!r}, {self.n_dofs} degrees of freedom; contact: {pairs or 'none'})"
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of displacement components of all points."""
+        return self.mesh.n_points * self.mesh.dim
+
+    def add_material(self, material: LinearElastic, groups: Sequence[str] | str | None = None) -> None:
+        """Give a material to groups of solid cells, by default to all; groups override what was given to all before.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If a group is unknown or holds no solid cells. A cell with two materials shows when the model is checked.
+        """
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        for name in names or ():
+            if not self.mesh.cells_of(name, dim=self.mesh.dim):
+                raise ModelError(f"group '{name}' holds no solid cells, so it cannot have a material")
+        self.materials.append((material, names))
+
+    def fix(self, group: str, components: str) -> None:
+        """Hold displacement components (``"x"``, ``"y"``, ``"xy"``, in 3D also ``"z"``) of a group's nodes at zero."""
+        if not components:
+            raise ModelError(f"fix('{group}', ...) names no component: give for example 'x' or 'xy'")
+        self._support(group, dict.fromkeys(components, 0.0), None)
+
+    def prescribe(self, group: str, *, ramp: History = None, **components: Value) -> None:
+        """Prescribe displacement components of all nodes of a group, e.g. ``y=-2.0`` [length], times the ramp.
+
+        A component is a number, or a function from reference positions (n, dim) to displacements (n,). `ramp` is a
+        history of its own: pairs (instant, multiplier), or a `Ramp`, of which the table counts.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If the group is unknown, a component is not x, y (or z in 3D), or a value is not finite.
+        """
+        self._support(group, components, ramp)
+
+    def _support(self, group: str, components: Mapping[str, Value], ramp: History) -> None:
+        if not len(self.mesh.points_of(group)):
+            raise ModelError(f"group '{group}' is empty: no displacement can be prescribed on it")
+        for axis, value in axes_of(f"prescribe('{group}')", components, self.mesh.dim).items():
+            support = Support(group, axis, value, _table(ramp, f"the displacement prescribed on '{group}'"))
+            check_value(support.name, value)
+            self.supports.append(support)
+
+    def add_pressure(self, group: str, value: Value, *, ramp: History = None) -> None:
+        """Press on a group of outer facets with `value` [pressure], along their normals into the body.
+
+        Parameters
+        ----------
+        group : str
+        value : float or callable
+            Positive in compression; a number, or a function from positions (n, dim) to pressures (n,). Positions,
+            normals and areas are those of the reference configuration.
+        ramp : Ramp or iterable of (float, float), optional
+            A history of its own, as pairs (instant, multiplier); by default that of the analysis.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If the group is unknown, holds no outer facets, or the value is not finite.
+        """
+        self._add(Pressure(group, value, _table(ramp, f"the pressure on '{group}'")))
+
+    def add_traction(
+        self,
+        group: str,
+        *,
+        x: Value | None = None,
+        y: Value | None = None,
+        z: Value | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Load a group of facets with forces per reference area [pressure]; values and `ramp` as in `add_pressure`."""
+        axes = axes_of(f"the traction on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
+        self._add(Traction(group, axes, _table(ramp, f"the traction on '{group}'")))
+
+    def add_body_force(
+        self,
+        groups: Sequence[str] | str | None = None,
+        *,
+        x: Value | None = None,
+        y: Value | None = None,
+        z: Value | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Load groups of solid cells, by default all, with forces per volume [force / length^3], such as the weight.
+
+        Values and `ramp` as in `add_pressure`.
+        """
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        axes = axes_of("the body force", {"x": x, "y": y, "z": z}, self.mesh.dim)
+        self._add(BodyForce(names, axes, _table(ramp, "the body force")))
+
+    def add_force(
+        self,
+        group: str,
+        *,
+        x: float | None = None,
+        y: float | None = None,
+        z: float | None = None,
+        distribute: bool | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Load a group with forces [force]; `ramp` as in `add_pressure`.
+
+        Parameters
+        ----------
+        group : str
+        x, y, z : float
+            Components. In axisymmetry forces are those over the full circle; on facets a radial one is refused.
+        distribute : bool, optional
+            True: the total force, spread as a uniform traction over the facets of the group. False: the force on every
+            node of the group. By default True for a group of facets and False for a group of points.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If the group is unknown or empty, or a value is not finite.
+        """
+        self.mesh.points_of(group)
+        if distribute is None:
+            distribute = group in self.mesh.cell_groups and bool(self.mesh.cells_of(group, dim=self.mesh.dim - 1))
+        kind: type[TotalForce] | type[NodalForce] = TotalForce if distribute else NodalForce
+        axes = axes_of(f"the force on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
+        self._add(kind(group, axes, _table(ramp, f"the force on '{group}'")))
+
+    def _add(self, load: Load) -> None:
+        load.check(self.mesh, self.kinematics)
+        self.loads.append(load)
+
+    def couple(self, group: str, component: str) -> None:
+        """Let all nodes of a group move together in one displacement component, or several (``"xy"``).
+
+        Raises
+        ------
+        MeshError, ModelError
+            If the group is unknown or holds fewer than two nodes, or a component is not x, y (or z in 3D).
+        """
+        nodes = self.mesh.points_of(group)
+        if len(nodes) < 2:
+            raise ModelError(f"group '{group}' holds {len(nodes)} points: at least two are needed to couple")
+        for axis in axes_of(f"couple('{group}')", dict.fromkeys(component, 1.0), self.mesh.dim):
+            m = len(nodes) - 1
+            dofs = np.column_stack([np.full(m, nodes[0]), nodes[1:]]).astype(np.intp) * self.mesh.dim + axis
+            rows = csr_array((np.tile([-1.0, 1.0], m), dofs.ravel(), 2 * np.arange(m + 1)), shape=(m, self.n_dofs))
+            self.relations.append(Relation(f"couple('{group}', '{'xyz'[axis]}')", rows))
+
+    def relate(
+        self, terms: Iterable[tuple[str | int, str, float]], value: float = 0.0, *, ramp: History = None
+    ) -> None:
+        """Hold a linear combination of displacement components at `value` times the ramp.
+
+        Parameters
+        ----------
+        terms : iterable of (str or int, str, float)
+            Group or point number, component, coefficient. A group of several nodes stands for their sum; a long sum
+            costs much, since it ties every displacement in it to every other.
+        value : float
+            [length times the unit of the coefficients].
+        ramp : Ramp or iterable of (float, float), optional
+            As in `add_pressure`.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If a group, point or component is unknown, a number is not finite, or no displacement is left.
+        """
+        row: dict[int, float] = {}
+        listed = [(place, component, coefficient) for place, component, coefficient in terms]
+        name = "the relation of " + ", ".join(f"{component} of '{place}'" for place, component, _ in listed)
+        check_number(f"the value of {name}", value)
+        for place, component, coefficient in listed:
+            check_number(f"a coefficient of {name}", coefficient)
+            (axis,) = axes_of(name, {component: coefficient}, self.mesh.dim)
+            for node in self._nodes(place):
+                dof = int(node) * self.mesh.dim + axis
+                row[dof] = row.get(dof, 0.0) + float(coefficient)
+        row = {dof: coefficient for dof, coefficient in row.items() if coefficient}
+        if not row:
+            raise ModelError("a relation needs at least one displacement with a coefficient other than zero")
+        dofs = np.array(sorted(row), np.intp)
+        values = np.array([row[dof] for dof in dofs])
+        rows = csr_array((values, dofs, np.array([0, len(dofs)])), shape=(1, self.n_dofs))
+        self.relations.append(Relation(name, rows, float(value), _table(ramp, name)))
+
+    def add_spring(
+        self,
+        group: str | int,
+        to: str | int | None = None,
+        *,
+        x: float | None = None,
+        y: float | None = None,
+        z: float | None = None,
+        axial: float | None = None,
+    ) -> None:
+        """Hang every node of a group on the ground by springs, or join two nodes by them.
+
+        Parameters
+        ----------
+        group : str or int
+            Group or point number.
+        to : str or int, optional
+            Group of one node or point number: the springs then lie between the single node of `group` and this one.
+        x, y, z : float
+            Stiffness along the axes [force / length]; in axisymmetry over the full circle.
+        axial : float
+            Stiffness along the line between the two nodes [force / length], which keeps its reference direction.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If a group is unknown or has not the right number of nodes, or a stiffness is not a positive number.
+        """
+        name = f"the spring on '{group}'" if to is None else f"the spring between '{group}' and '{to}'"
+        given = {"x": x, "y": y, "z": z}
+        if axial is not None and to is None:
+            raise ModelError(f"{name} has an axial stiffness but no second node: name it by `to`, or give x, y or z")
+        axes = {} if axial is not None and set(given.values()) == {None} else axes_of(name, given, self.mesh.dim)
+        values = [*axes.values(), *([] if axial is None else [axial])]
+        for value in values:
+            check_number(f"the stiffness of {name}", value)
+        check_stiffness(name, values)
+        nodes = self._nodes(group)
+        if not len(nodes):
+            raise ModelError(f"group '{group}' is empty: no spring can be there")
+        if to is None:
+            self.springs.append(grounded(name, nodes, axes, self.n_dofs, self.mesh.dim))
+            return
+        ends = [*nodes, *self._nodes(to)]
+        if len(ends) != 2:
+            raise ModelError(f"{name} needs one node at each end, but finds {len(nodes)} and {len(ends) - len(nodes)}")
+        self.springs.append(between(name, self.mesh.points, int(ends[0]), int(ends[1]), axes, axial))
+
+    def holding_rows(self) -> csr_array:
+        """Return rows (m, n_dofs) that relations and springs want to vanish: motions in which they do are not held."""
+        relations = stacked_rows(self.relations, self.n_dofs)
+        return csr_array(vstack([relations, stacked(self.springs, self.n_dofs)], format="csr"))
+
+    def _nodes(self, place: str | int) -> NDArray[Any]:
+        if isinstance(place, str):
+            return self.mesh.points_of(place)
+        if not 0 <= place < self.mesh.n_points:
+            raise ModelError(f"point {place} is not in the mesh of {self.mesh.n_points} points (numbers from 0)")
+        return np.array([place])
+
+    def add_contact(
+        self, name: str, *, secondary: str, primary: str, formulation: str | None = None, **options: Any
+    ) -> None:
+        """Let the facets of group `secondary` come into contact with those of group `primary`.
+
+        Parameters
+        ----------
+        name : str
+            Name of the pair in the results.
+        secondary, primary : str
+            The side whose nodes or integration points are projected and carry the constraints, and the side
+            projected upon. Facets are oriented from the solid behind them.
+        formulation : str, optional
+            ``"node_to_segment"``, ``"continuous"`` or ``"mortar"``. By default mortar where facets are quadratic or the
+            nodes of the two sides do not lie opposite to each other, else node-to-segment; ``repr(model)`` and the log
+            tell which.
+        **options
+            What every formulation takes, in addition to the fields of the formulation itself:
+
+            - ``friction``: coefficient of Coulomb friction.
+            - ``kind``: ``"unilateral"`` (default) contact closes and opens. ``"bilateral"`` closes every gap that faces
+              the other side from the beginning and never opens, but slides without friction. In
+              ``"bilateral_once_closed"`` what is closed at the end of a load step never opens again. ``"tied"`` neither
+              opens nor slides: the two sides are paired once, as they lie, and their relative displacement stays zero,
+              also across initial gaps, which are kept (a rotation then strains by its angle times the gap).
+            - ``clearance``: added to the gap, a number or a function from reference positions (n, dim) on the secondary
+              side to lengths (n,); positive opens the gap, negative is an interference, as of a press fit [length].
+              ``clearance_primary``: the same on the primary side, at the positions faced. ``clearance_ramp``: their
+              history, as pairs (instant, multiplier); without one they are there from the beginning.
+            - ``excluded``: groups whose nodes carry no contact. Where the formulation has integration points, those
+              nearer to such a node than to any other take no part. ``frictionless``: groups whose nodes carry no
+              friction, likewise.
+            - ``penalty``: pressure by penetration [pressure / length], instead of none at all; results tell the
+              penetration. It does not soften friction.
+            - ``normals``: ``"facet"`` or ``"averaged"`` between the facets at a node, which curved sides that fit closely
+              need; ``projection_tolerance``: how far points may stand out beyond the end of the primary side, in facet
+              lengths.
+
+        Raises
+        ------
+        ContactError, ModelError
+            If a side is wrong, an option unknown or wrong, or the name taken.
+        """
+        if formulation is None:
+            sides = surface(self.mesh, secondary), surface(self.mesh, primary)
+            formulation, reason = default_formulation(*sides, self.mesh.points)
+            log.info("contact '%s': formulation %s, since %s", name, formulation, reason)
+        self._add_pair(ContactPair(name, secondary, primary, formulation, options))
+
+    def add_obstacle(
+        self,
+        name: str,
+        *,
+        secondary: str,
+        obstacle: Obstacle,
+        motion: Mapping[str, float] | None = None,
+        force: Mapping[str, float] | None = None,
+        ramp: History = None,
+        formulation: str = "continuous",
+        **options: Any,
+    ) -> None:
+        """Let the facets of group `secondary` come into contact with a rigid obstacle.
+
+        Parameters
+        ----------
+        name, secondary
+            As in `add_contact`.
+        obstacle : Obstacle
+            A shape of `fastcontact.obstacles`, or any object with their ``distance`` method.
+        motion : mapping of str to float, optional
+            Its displacement at multiplier 1, e.g. ``{"y": -0.1}`` [length]; it stands still without.
+        force : mapping of str to float, optional
+            The force on it at multiplier 1, e.g. ``{"y": -100.0}`` [force], in axisymmetry over the full circle. In
+            these components the obstacle is a rigid body that moves freely until contact holds it; in the others it
+            follows `motion`. Results tell where it is.
+        ramp : Ramp or iterable of (float, float), optional
+            A history of its own for motion and force; by default that of the analysis.
+        formulation : str
+            ``"node_to_segment"`` (then: node against obstacle) or ``"continuous"``.
+        **options
+            Fields of the formulation.
+
+        Raises
+        ------
+        ContactError, ModelError
+            If the group, an option, the motion or the force is wrong, or the name taken.
+        """
+        moves = axes_of(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
+        displacement = tuple(float(moves.get(axis, 0.0)) for axis in range(self.mesh.dim))  # type: ignore[arg-type]
+        if not np.isfinite(displacement).all():
+            raise ModelError(f"the motion {motion} of obstacle '{name}' must be finite numbers")
+        if isinstance(obstacle, MeshedSurface):
+            obstacle.check_apart(self.mesh)
+        obstacle.distance(self.mesh.points[:1])  # what does not fit this dimension shows at once
+        history = _table(ramp, f"the motion of obstacle '{name}'")
+        driving = self._driving(name, moves, force)
+        self._add_pair(ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving))
+
+    def _driving(self, name: str, moves: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
+        """Return the force on obstacle `name` by component, None for prescribed ones; empty without any."""
+        if not force:
+            return ()
+        forces = axes_of(f"the force on obstacle '{name}'", dict(force), self.mesh.dim)
+        for axis, value in forces.items():
+            check_number(f"the force {'xyz'[axis]} on obstacle '{name}'", value)
+            if axis in moves:
+                raise ModelError(
+                    f"obstacle '{name}' is both moved and pushed along {'xyz'[axis]}: name this component either in its "
+                    "motion or in its force"
+                )
+            if axis == 0 and self.kinematics == "axisymmetric":
+                raise ModelError(
+                    f"a force cannot move obstacle '{name}' along x, the radius: in axisymmetry give y only"
+                )
+        return tuple(float(forces[k]) if k in forces else None for k in range(self.mesh.dim))  # type: ignore[arg-type]
+
+    @property
+    def driven(self) -> Driven:
+        """The rigid obstacles that forces drive."""
+        return Driven([pair for pair in self.contact if pair.force], (self.mesh.n_points, self.mesh.dim))
+
+    def _add_pair(self, pair: ContactPair) -> None:
+        if pair.name in {other.name for other in self.contact}:
+            raise ContactError(f"there is already a contact pair '{pair.name}': names must differ")
+        bound = self.bind(pair)
+        if isinstance(bound.primary, RigidSide):
+            check_obstacle(self.mesh, pair.name, bound.secondary, bound.primary)
+        for other in self.contact:
+            if pair.primary and {pair.secondary, pair.primary} == {other.secondary, other.primary}:
+                raise ContactError(
+                    f"contact '{pair.name}' joins '{pair.secondary}' and '{pair.primary}', which contact '{other.name}' "
+                    "joins already: leave out one of the two"
+                )
+        self.contact.append(pair)
+
+    def bind(self, pair: ContactPair) -> Formulation:
+        """Return the formulation of a contact pair on this mesh; see `add_contact` for the errors."""
+        if pair.formulation not in FORMULATIONS:
+            raise ContactError(unknown("contact formulation", pair.formulation, FORMULATIONS))
+        kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
+        given = ("secondary", "primary", "points", "axisymmetric", "modulus", "terms")
+        known = [*TERMS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in given)]
+        for option in pair.options:
+            if option not in known:
+                raise ContactError(unknown(f"option of {pair.formulation}", option, known))
+        secondary = surface(self.mesh, pair.secondary)
+        primary: Surface | RigidSide
+        if pair.obstacle is not None:
+            if pair.formulation not in AGAINST_OBSTACLES:
+                raise ContactError(
+                    unknown("contact formulation for a rigid obstacle", pair.formulation, AGAINST_OBSTACLES)
+                )
+            primary = RigidSide(pair.obstacle, np.array(pair.motion))
+        else:
+            primary = surface(self.mesh, pair.primary)
+            check_sides(self.mesh, pair.name, secondary, primary)
+        modulus = min((m.E / (1 - m.nu**2) for m, _ in self.materials), default=1.0)
+        terms = terms_of(pair.name, pair.options, self.mesh, secondary, against_obstacle=pair.obstacle is not None)
+        own = {key: value for key, value in pair.options.items() if key not in TERMS}
+        axisymmetric = self.kinematics == "axisymmetric"
+        return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, terms=terms, **own)
+
+    def material_numbers(self) -> tuple[Array, dict[str, NDArray[np.int32]]]:
+        """Return moduli (n_materials, 4, 4), in 3D (n_materials, 6, 6), and by element every solid cell's material.
+
+        Raises
+        ------
+        ModelError
+            If cells are left without a material, or have two; their groups are named.
+        """
+        if not self.materials:
+            raise ModelError("no material: call add_material(LinearElastic(E=..., nu=...)) for the solid cells")
+        numbers = {name: np.full(len(block), -1, np.int32) for name, block in self.mesh.solids.items()}
+        for index, (_, groups) in enumerate(self.materials):
+            for name in numbers if groups is None else ():
+                self._check_material(index, None, numbers[name])
+                numbers[name][:] = index
+            for group in groups or ():
+                for name, rows in self.mesh.split(self.mesh.cell_groups[group]).items():
+                    if name in numbers:
+                        self._check_material(index, group, numbers[name][rows])
+                        numbers[name][rows] = index
+        self._check_all_have_material(numbers)
+        return np.stack([material.moduli(self.kinematics) for material, _ in self.materials]), numbers
+
+    def _check_material(self, index: int, group: str | None, given: NDArray[np.int32]) -> None:
+        """Refuse a material for cells that have another one already, which was not given to all cells."""
+        new = self.materials[index][0]
+        for number in np.unique(given[given >= 0]):
+            old, groups = self.materials[number]
+            if old != new and (groups is not None or group is None):
+                raise ModelError(
+                    f"{int((given == number).sum())} cells of {'the mesh' if group is None else repr(group)} have two "
+                    f"materials, E = {old.E:g}, nu = {old.nu:g} and E = {new.E:g}, nu = {new.nu:g}: give each group one; "
+                    "one for all other cells comes first, without groups"
+                )
+
+    def _check_all_have_material(self, numbers: dict[str, NDArray[np.int32]]) -> None:
+        without = {name: np.flatnonzero(values < 0) for name, values in numbers.items()}
+        total = sum(map(len, without.values()))
+        if not total:
+            return
+        offsets = self.mesh.offsets
+        cells = np.concatenate([rows + offsets[name] for name, rows in without.items()])
+        groups = [g for g, members in self.mesh.cell_groups.items() if np.isin(members, cells).any()]
+        named = f", in {', '.join(repr(g) for g in groups)}" if groups else ""
+        raise ModelError(f"{total} solid cells have no material{named}: add_material for their groups")
+
+    def prescribed(self) -> tuple[NDArray[np.bool_], Array]:
+        """Return (fixed, values), both (n_points, dim): supported components, and their displacement at ramp value 1.
+
+        Raises
+        ------
+        ModelError
+            If two supports ask for different values of one component at one node.
+        """
+        fixed, by_ramp = self.prescribed_by_ramp()
+        return fixed, sum(by_ramp.values(), np.zeros(self.mesh.points.shape))
+
+    def prescribed_by_ramp(self) -> tuple[NDArray[np.bool_], dict[Table | None, Array]]:
+        """Return supported components (n_points, dim), and by history their displacement at multiplier 1 [length].
+
+        Errors as for `prescribed`.
+        """
+        fixed = np.zeros(self.mesh.points.shape, bool)
+        by_ramp: dict[Table | None, Array] = {}
+        owner: dict[tuple[int, int], Support] = {}
+        for support in self.supports:
+            nodes, k = self.mesh.points_of(support.group), support.component
+            values = evaluated(support.value, self.mesh.points[nodes], support.name)
+            for node, value in zip(nodes[fixed[nodes, k]], values[fixed[nodes, k]], strict=True):
+                other = owner[int(node), k]
+                found = by_ramp[other.ramp][node, k]
+                if found != value or (other.ramp != support.ramp and value != 0.0):
+                    raise ModelError(
+                        f"'{support.group}' prescribes {'xyz'[k]} = {value:g} at point {node}, but "
+                        f"'{other.group}' prescribes {found:g} there"
+                        f"{' with another ramp' if found == value else ''}: remove one of the two"
+                    )
+            new = ~fixed[nodes, k]
+            total = by_ramp.setdefault(support.ramp, np.zeros(self.mesh.points.shape))
+            fixed[nodes, k], total[nodes[new], k] = True, values[new]
+            owner.update({(int(node), k): support for node in nodes[new]})
+        return fixed, by_ramp
+
+    def forces_by_ramp(self) -> dict[Table | None, Array]:
+        """Return by history the nodal forces (n_points, dim) of all loads at multiplier 1 [force].
+
+        Raises
+        ------
+        ModelError
+            If a load is a function that fails, or acts on points that nothing holds.
+        """
+        related = self._related()
+        by_ramp: dict[Table | None, Array] = {}
+        for load in self.loads:
+            forces = load.vector(self.mesh, self.kinematics)
+            check_forces(self.mesh, forces, related, load.name)
+            by_ramp[load.ramp] = by_ramp.get(load.ramp, 0.0) + forces
+        return by_ramp
+
+    def _related(self) -> NDArray[np.bool_]:
+        """Return which points (n_points,) relations and springs hold."""
+        related = np.zeros(self.mesh.n_points, bool)
+        related[self.holding_rows().indices // self.mesh.dim] = True
+        return related
+
+    def check(self, ramp: Ramp | None = None) -> None:
+        """Check the whole model, and its histories against `ramp`; `solve` does so before any numerics.
+
+        Raises
+        ------
+        MeshError, ModelError, ContactError
+            One clear line that names the culprit and the remedy.
+        """
+        self.material_numbers()
+        fixed, prescribed = self.prescribed_by_ramp()
+        forces = self.forces_by_ramp()
+        if ramp is not None:
+            items: list[Support | Load | Relation] = [*self.supports, *self.loads, *self.relations]
+            named = [(item.name, item.ramp) for item in items]
+            named += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]
+            named += [(f"the clearance of contact '{p.name}'", p.clearance_ramp) for p in self.contact]
+            check_ramps(named, ramp.instants)
+        self._check_relations(fixed, prescribed, ramp or Ramp((1.0,)))
+        check_supports(self.mesh, [(s.name, s.group) for s in self.supports], self._related())
+        for pair in self.contact:
+            check_penetration(pair.name, self.bind(pair))
+        check_overlap(
+            self.mesh, self.kinematics, [(p.secondary, p.primary) for p in self.contact if p.obstacle is None]
+        )
+        self._check_motions(fixed, list(self.driven.forces(forces).values()))
+
+    def _check_relations(self, fixed: NDArray[np.bool_], prescribed: Mapping[Table | None, Array], ramp: Ramp) -> None:
+        if not self.relations:
+            return
+        motion = ConstrainedMotion(fixed.ravel(), self.relations)
+        for instant in ramp.instants:
+            lift = combined(prescribed, ramp, instant, fixed.shape)
+            motion.lift(lift.ravel(), motion.values([multiplier(r.ramp, ramp, instant) for r in self.relations]))
+
+    def _check_motions(self, fixed: NDArray[np.bool_], forces: Sequence[Array]) -> None:
+        """Refuse motions without deformation that no supports, relations, springs or loads against a contact stop."""
+        driven = self.driven
+        motions = driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.holding_rows()))
+        if not len(motions):
+            return
+        at_rest, still = np.zeros(self.mesh.points.shape), np.zeros(self.mesh.dim)
+        parts = [driven.constraints(pair.name, self.bind(pair).conditions(at_rest), still) for pair in self.contact]
+        rows = [resisting(part)[0] @ motions.displacement for part in parts]
+        works = [generalised(motions, force.ravel()) for force in forces]
+        k = len(motions)
+        check_motions(
+            motions.combined(unstopped(np.vstack([*rows, np.empty((0, k))]), np.vstack([*works, np.empty((0, k))])))
+        )
+
+
+def multiplier(own: Table | None, ramp: Ramp, instant: float) -> float:
+    """Return the multiplier of a load at `instant`: that of its own history, or else of the ramp."""
+    return ramp.value(instant) if own is None else table_value(own, instant)
+
+
+def combined(by_ramp: Mapping[Table | None, Array], ramp: Ramp, instant: float, shape: tuple[int, ...]) -> Array:
+    """Return the sum of the parts at `instant`, each times its multiplier."""
+    return sum((multiplier(own, ramp, instant) * part for own, part in by_ramp.items()), np.zeros(shape))
+
+
+def _table(ramp: History, what: str) -> Table | None:
+    if ramp is None:
+        return None
+    return ramp.table if isinstance(ramp, Ramp) else checked_table(ramp, f"the ramp of {what}")

@@ -1,0 +1,111 @@
+"""The options of a contact pair that do not depend on its formulation, from what a user wrote to what surfaces need."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from fastcontact.contact.pair_options import KINDS, Field, Mask, Terms
+from fastcontact.contact.surface import Surface
+from fastcontact.elasticity.loads import check_number, check_value, evaluated
+from fastcontact.errors import ContactError, unknown
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.model.ramp import Ramp, Table, checked_table
+
+# Options that every contact pair takes, beside those of its formulation.
+TERMS = ("clearance", "clearance_primary", "clearance_ramp", "excluded", "frictionless", "kind", "penalty")
+
+
+def terms_of(name: str, options: Mapping[str, Any], mesh: Mesh, side: Surface, *, against_obstacle: bool) -> Terms:
+    """Return the terms of contact pair `name` with the secondary `side` from its options.
+
+    Raises
+    ------
+    ContactError, ModelError
+        If an option is wrong; the message names the pair.
+    """
+    if against_obstacle and "clearance_primary" in options:
+        raise ContactError(
+            f"a rigid obstacle has no nodes to measure from: give contact '{name}' the option 'clearance'"
+        )
+    if "clearance_ramp" in options and not {"clearance", "clearance_primary"} & set(options):
+        raise ContactError(f"contact '{name}' has a clearance_ramp, but no clearance that it could multiply")
+    clearance_ramp(name, options)
+    return Terms(
+        _length(f"the clearance of contact '{name}'", options.get("clearance")),
+        _length(f"the clearance_primary of contact '{name}'", options.get("clearance_primary")),
+        excluded=_nodes(name, "excluded", options, mesh, side),
+        frictionless=_nodes(name, "frictionless", options, mesh, side),
+        kind=_kind(name, options, against_obstacle),
+        penalty=_penalty(name, options),
+    )
+
+
+def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
+    """Return the kind of contact, which other options must not contradict."""
+    kind = options.get("kind", "unilateral")
+    if kind not in KINDS:
+        raise ContactError(unknown(f"kind of contact '{name}'", str(kind), KINDS))
+    if kind != "unilateral" and options.get("friction"):
+        raise ContactError(f"contact '{name}' is {kind}, which knows no friction: leave out 'friction' or 'kind'")
+    if kind == "tied" and against_obstacle:
+        raise ContactError(
+            f"contact '{name}' cannot be tied to a rigid obstacle: prescribe the displacements of the group, or couple them"
+        )
+    for option in ("clearance", "clearance_primary", "penalty"):
+        if kind == "tied" and option in options:
+            raise ContactError(
+                f"contact '{name}' is tied, which keeps the sides as they lie, exactly: leave out '{option}'"
+            )
+    return str(kind)
+
+
+def _penalty(name: str, options: Mapping[str, Any]) -> float | None:
+    if options.get("penalty") is None:
+        return None
+    check_number(f"the penalty of contact '{name}'", options["penalty"])
+    if not options["penalty"] > 0:
+        raise ContactError(
+            f"penalty = {options['penalty']} of contact '{name}' must be positive; leave it out for no penetration"
+        )
+    return float(options["penalty"])
+
+
+def clearance_ramp(name: str, options: Mapping[str, Any]) -> Table | None:
+    """Return the history of the clearance of contact pair `name`, None where it does not change."""
+    ramp = options.get("clearance_ramp")
+    if ramp is None:
+        return None
+    return ramp.table if isinstance(ramp, Ramp) else checked_table(ramp, f"the clearance_ramp of contact '{name}'")
+
+
+def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side: Surface) -> Mask | None:
+    """Return a mask (n_points,) of the nodes of the groups that an option names; None for no groups."""
+    groups = options.get(option)
+    if groups is None:
+        return None
+    groups = [groups] if isinstance(groups, str) else groups
+    if not isinstance(groups, Sequence) or not all(isinstance(group, str) for group in groups):
+        raise ContactError(f"{option} = {groups!r} of contact '{name}' must be a group or a list of groups")
+    mask = np.zeros(mesh.n_points, bool)
+    for group in groups:
+        mask[mesh.points_of(group)] = True
+        if not np.isin(side.points, mesh.points_of(group)).any():
+            raise ContactError(
+                f"group '{group}', {option} in contact '{name}', has no nodes on the secondary side '{side.group}': "
+                "only that side carries constraints; swap the sides or name other nodes"
+            )
+    if option == "excluded" and mask[side.points].all():
+        raise ContactError(f"contact '{name}' excludes all nodes of '{side.group}': nothing is left to touch")
+    return mask
+
+
+def _length(what: str, value: Any) -> Field | None:
+    """Return a number or a function of position as a function that checks what it returns; None for zero."""
+    if value is None:
+        return None
+    check_value(what, value)
+    return partial(evaluated, value, name=what)

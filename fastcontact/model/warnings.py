@@ -1,0 +1,228 @@
+"""What is doubtful about a model before it is solved: units that slipped, poor cells, integrals that are not exact.
+
+Each doubt is a sentence with its number, for a warning and the result file. A model that has them may be meant so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact._jit.parallel import on_one_blas_thread
+from fastcontact.elasticity.energy import integration_rule
+from fastcontact.elasticity.loads import BodyForce, Load, Pressure, Traction, Value, evaluated, facets_of
+from fastcontact.mesh import elements, quadrature
+from fastcontact.mesh.elements import Element
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.quality import poorest_cell
+from fastcontact.model.small_inverses import inverses
+
+if TYPE_CHECKING:
+    from fastcontact.model.model import Model
+
+Array = NDArray[np.float64]
+# Young's moduli that differ by more: steel against soft rubber is 200 000, MPa against Pa a million.
+MODULI = 3e5
+# A displacement of so many times the size of the model, a strain by the loads larger than that or smaller than this,
+# are more likely a slip than meant.
+DISPLACED, STRAINED, UNSTRAINED = 1.0, 1.0, 1e-12
+# Solids: aerogel to diamond [Pa]. Only here do units of the user matter, and only where a case names them.
+SOLIDS = (1e2, 2e12)
+PASCALS = {
+    "Pa": 1.0,
+    "kPa": 1e3,
+    "MPa": 1e6,
+    "GPa": 1e9,
+    "N/mm2": 1e6,
+    "N/mm^2": 1e6,
+    "psi": 6894.757,
+    "ksi": 6894757.0,
+}
+METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
+NEWTONS = {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "lbf": 4.448222}
+# So many cells are looked at to judge integrals.
+SOME = 1000
+# Relative error of the integral of a load, and of the stiffness (1.6 % on the best of pyramids), that is worth a warning.
+INTEGRAL, STIFFNESS = 1e-3, 5e-2
+# Nodes closer than this part of the size of the model are at one place.
+COINCIDENT = 1e-9
+# Large odd factors that make one number of three.
+MIXED = np.array([0x1E3779B97F4A7C15, 0x3F58476D1CE4E5B9, 0x14D049BB133111EB], np.int64)
+
+
+@on_one_blas_thread
+def doubts(model: Model) -> list[str]:
+    """Return what is doubtful about a model that `Model.check` has found complete."""
+    found = _moduli(model) + _named_units(model) + _proportions(model)
+    found += [text for text in (poorest_cell(model.mesh), _coincident(model)) if text]
+    return found + _stiffness(model.mesh) + [text for load in model.loads for text in _load_integral(model, load)]
+
+
+def _moduli(model: Model) -> list[str]:
+    values = [material.E for material, _ in model.materials]
+    ratio = max(values) / min(values)
+    if ratio <= MODULI:
+        return []
+    return [
+        f"Young's moduli differ by a factor of {ratio:.3g} (E = {min(values):g} and {max(values):g}): are both in the "
+        "same unit?"
+    ]
+
+
+def _named_units(model: Model) -> list[str]:
+    """Hold moduli against what solids have, and the names of units against each other, where they are known."""
+    units, texts = model.units, []
+    pascal = PASCALS.get(units.get("pressure", ""))
+    if pascal is not None:
+        for material, groups in model.materials:
+            if not SOLIDS[0] <= material.E * pascal <= SOLIDS[1]:
+                limit, what = (SOLIDS[1], "diamond") if material.E * pascal > SOLIDS[1] else (SOLIDS[0], "aerogel")
+                texts.append(
+                    f"Young's modulus E = {material.E:g} {units['pressure']} of {_named(groups)} is "
+                    f"{material.E * pascal / limit:.3g} times that of {what}: is it in another unit?"
+                )
+    metre, newton = METRES.get(units.get("length", "")), NEWTONS.get(units.get("force", ""))
+    if pascal is not None and metre is not None and newton is not None:
+        ratio = newton / metre**2 / pascal
+        if not 0.99 < ratio < 1.01:
+            texts.append(
+                f"the units do not fit each other: 1 {units['force']}/{units['length']}^2 is {ratio:.6g} "
+                f"{units['pressure']}; change one of the three"
+            )
+    return texts
+
+
+def _named(groups: tuple[str, ...] | None) -> str:
+    return "all cells" if groups is None else ", ".join(f"'{group}'" for group in groups)
+
+
+def _proportions(model: Model) -> list[str]:
+    """Hold prescribed displacements against the size of the model, and loads against its stiffness."""
+    size = float(np.ptp(model.mesh.points, axis=0).max())
+    _, prescribed = model.prescribed_by_ramp()
+    moved = max((float(np.abs(values).max(initial=0.0)) for values in prescribed.values()), default=0.0)
+    texts = []
+    if moved > DISPLACED * size:
+        texts.append(
+            f"a displacement of {moved:g} is prescribed, {moved / size:.3g} times the size of the model ({size:g}): are "
+            "mesh and displacement in the same unit?"
+        )
+    forces = [np.abs(force).sum() for force in model.forces_by_ramp().values()]
+    depth = 1.0 if model.mesh.dim == 2 and model.kinematics != "axisymmetric" else size
+    stiffness = min(material.E for material, _ in model.materials) * size * depth
+    strain = max(forces, default=0.0) / stiffness
+    if strain > STRAINED or 0.0 < strain < UNSTRAINED:
+        texts.append(
+            f"the loads strain the model by about {strain:.2g} (all forces over E times its size squared): are loads, "
+            "lengths and E in one set of units?"
+        )
+    return texts
+
+
+def _coincident(model: Model) -> str:
+    """Return a doubt where nodes of solid cells share a place and neither contact nor relations join them."""
+    mesh = model.mesh
+    lone = np.zeros(mesh.n_points, bool)
+    for block in mesh.solids.values():
+        lone[block] = True
+    for pair in model.contact:
+        for group in (pair.secondary, pair.primary):
+            lone[mesh.points_of(group) if group else []] = False
+    lone[model.holding_rows().indices // mesh.dim] = False
+    numbers = np.flatnonzero(lone)
+    low = mesh.points.min(axis=0)
+    # Counted from an odd place, so that round numbers do not lie on the borders of the grid.
+    grid = np.floor((mesh.points[numbers] - low) / (COINCIDENT * np.ptp(mesh.points, axis=0).max()) + 0.3183)
+    # Nodes at one place have the same sum, and hardly any others.
+    if len(np.unique((grid.astype(np.int64) * MIXED[: mesh.dim]).sum(axis=1))) == len(grid):
+        return ""
+    order = np.lexsort(grid.T)
+    same = np.flatnonzero((grid[order[1:]] == grid[order[:-1]]).all(axis=1))
+    if len(same) < mesh.dim:  # bodies that touch at a corner are no unmerged facet
+        return ""
+    first = sorted((int(numbers[order[same[0]]]), int(numbers[order[same[0] + 1]])))
+    place = ", ".join(f"{x:.6g}" for x in mesh.points[first[0]])
+    return (
+        f"{len(same)} nodes lie where another one is, and no contact joins them (first: points {first[0]} and {first[1]} "
+        f"at ({place})): merge them in the mesher or with generate.transform.merge_points, or define the contact"
+    )
+
+
+def _stiffness(mesh: Mesh) -> list[str]:
+    """Return a doubt where the quadrature of the stiffness misses much of it, on cells that are curved or distorted.
+
+    Judged by the trace of the stiffness of a scalar field, the integral of all squared gradients of shape functions.
+    """
+    off = total = 0.0
+    for name, block in mesh.solids.items():
+        element = elements.get(name)
+        if element.order == 1 and element.n_corners == element.dim + 1:
+            continue  # gradients are constant there
+        corners = mesh.points[_some(block)]
+        coarse, fine = (_traces(corners, element, *rule) for rule in (element.quadrature, integration_rule(element)))
+        off, total = off + float(np.abs(coarse - fine).sum()), total + float(fine.sum())
+    if not off > STIFFNESS * total:  # no number where a Jacobian is zero: other checks speak of such cells
+        return []
+    return [
+        f"the quadrature of the stiffness is not exact on curved or distorted cells: it is off by {off / total:.2%} of the "
+        "whole; use smaller cells, or better shaped ones"
+    ]
+
+
+def _traces(corners: Array, element: Element, xi: Array, weights: Array) -> Array:
+    """Return the integral (n_cells,) of the squared gradients of all shape functions of cells (n_cells, n_nodes, dim)."""
+    dN = element.gradient(xi)
+    J = np.einsum("qnk,cnd->qkdc", dN, corners, optimize=True)
+    inverse, determinant = inverses(np.moveaxis(J, 3, 1))
+    # Their sum over the nodes is that of the slopes' products with those of r, s and t: no gradient is formed.
+    metric = inverse.transpose(0, 1, 3, 2) @ inverse
+    squares = np.einsum("qnk,qnl->qkl", dN, dN)
+    return np.asarray((np.einsum("qckl,qkl->qc", metric, squares) * np.abs(determinant)).T @ weights)
+
+
+def _some(cells: NDArray[Any]) -> NDArray[Any]:
+    """Return at most about `SOME` of the cells: enough to judge them by."""
+    return cells[:: max(1, len(cells) // SOME)]
+
+
+def _load_integral(model: Model, load: Load) -> list[str]:
+    """Return a doubt where a load that is a function varies too much within a cell for the quadrature of loads."""
+    off = total = 0.0
+    for value in _functions(load):
+        for element, cells in _loaded(model, load):
+            coarse, fine = (
+                _integrals(model.mesh, element, _some(cells), value, load.name, finer) for finer in (False, True)
+            )
+            off, total = off + float(np.abs(coarse - fine).sum()), total + float(np.abs(fine).sum())
+    if off <= INTEGRAL * total:
+        return []
+    return [
+        f"{load.name} varies within single elements, so that its quadrature is not exact: it is off by {off / total:.2%} of "
+        "the whole; refine the mesh there"
+    ]
+
+
+def _functions(load: Load) -> list[Value]:
+    values = [load.value] if isinstance(load, Pressure) else list(getattr(load, "components", {}).values())
+    return [value for value in values if callable(value)]
+
+
+def _loaded(model: Model, load: Load) -> Iterator[tuple[str, NDArray[np.int32]]]:
+    if isinstance(load, BodyForce):
+        yield from load.cells(model.mesh)
+    elif isinstance(load, (Pressure, Traction)):
+        yield from facets_of(model.mesh, load.group).items()
+
+
+def _integrals(mesh: Mesh, element: str, cells: NDArray[np.int32], value: Value, name: str, finer: bool) -> Array:
+    """Return the integral (n_cells,) of a load over each cell, by about the rule of loads or by a finer one."""
+    reference = elements.get(element)
+    n = 9 if finer else 5
+    xi, weights = quadrature.gauss_line(n) if reference.dim == 1 else integration_rule(reference, n)
+    J = np.einsum("qnk,cnd->cqdk", reference.gradient(xi), mesh.points[cells])
+    x = np.einsum("qn,cnd->cqd", reference.shape(xi), mesh.points[cells])
+    measure = np.sqrt(np.linalg.det(np.einsum("cqdk,cqdl->cqkl", J, J)))
+    return np.asarray((evaluated(value, x, name) * measure) @ weights)

@@ -1,0 +1,1 @@
+"""Results of load steps: plain data, result files, tables, pictures."""

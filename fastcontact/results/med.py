@@ -1,0 +1,87 @@
+"""Results of all load steps as fields of a MED file, for Salome and code_aster."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import FileError, MeshError
+from fastcontact.mesh.files.med import AXES, add_field, add_mesh, new_file
+from fastcontact.mesh.files.targets import PathLike
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.results._layout import contact_pressure
+from fastcontact.results.step import StepResult
+
+Array = NDArray[np.float64]
+
+# Where each component stands in ours, xx yy zz xy yz xz: Salome and code_aster have xz before yz.
+STRESSES = {"SIXX": 0, "SIYY": 1, "SIZZ": 2, "SIXY": 3, "SIXZ": 5, "SIYZ": 4}
+
+
+def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *, mesh_name: str = "mesh") -> None:
+    """Write a mesh and nodal results at all instants, for Salome and ParaVis.
+
+    - DEPL (DX, DY [, DZ]): displacement [length].
+    - SIEF_NOEU (SIXX, SIYY, SIZZ, SIXY [, SIXZ, SIYZ]): stress [pressure]; in axisymmetry SIXX is radial,
+      SIYY axial, SIZZ hoop.
+    - SIEQ_NOEU (VMIS, VMIS_SG): equivalent stress, and with the sign of the trace [pressure].
+    - REAC_NODA (DX, DY [, DZ]): reactions [force]; in axisymmetry of the full circle, where code_aster gives
+      those of one radian.
+    - PRES_CONT (PRES): contact pressure [pressure], zero off the contact surfaces.
+
+    The instant is the load factor of the step, the order number its index.
+
+    Parameters
+    ----------
+    path : path-like
+    mesh : Mesh
+    steps : iterable of StepResult
+        Taken one after the other, so a generator will do.
+    mesh_name : str
+        Name of the mesh in the file, at most 64 bytes.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written, there is no step, or two steps have the same index.
+    MeshError
+        If a step does not belong to the mesh.
+    """
+    with new_file(path, mesh) as file:
+        add_mesh(file, mesh, mesh_name)
+        written: set[int] = set()
+        for step in steps:
+            if step.index in written:
+                raise FileError(f"two steps have the index {step.index}: give each its own to write '{path}'")
+            written.add(step.index)
+            for name, (components, field) in _fields(mesh, step).items():
+                add_field(file, name, components, field, (step.index, step.load_factor), mesh_name)
+        if not written:
+            raise FileError(f"there is no step to write to '{path}': solve first, or use write_med_mesh")
+
+
+def _fields(mesh: Mesh, step: StepResult) -> dict[str, tuple[tuple[str, ...], Array]]:
+    """Return components and values (n_points, n_components) of each field."""
+    directions = tuple(f"D{axis}" for axis in AXES[: mesh.dim])
+    stresses = tuple(STRESSES)[: 4 if mesh.dim == 2 else 6]
+    stress = _checked(mesh, step, "stress", (len(stresses),))
+    equivalent = [_checked(mesh, step, name, ()) for name in ("von_mises", "von_mises_signed")]
+    return {
+        "DEPL": (directions, _checked(mesh, step, "displacement", (mesh.dim,))),
+        "SIEF_NOEU": (stresses, stress[:, [STRESSES[name] for name in stresses]]),
+        "SIEQ_NOEU": (("VMIS", "VMIS_SG"), np.column_stack(equivalent)),
+        "REAC_NODA": (directions, _checked(mesh, step, "reaction", (mesh.dim,))),
+        "PRES_CONT": (("PRES",), contact_pressure(mesh, step)[:, None]),
+    }
+
+
+def _checked(mesh: Mesh, step: StepResult, name: str, shape: tuple[int, ...]) -> Array:
+    field = np.asarray(getattr(step, name), np.float64)
+    if field.shape != (mesh.n_points, *shape):
+        raise MeshError(
+            f"{name} of step {step.index} has shape {field.shape} where the mesh needs "
+            f"{(mesh.n_points, *shape)}: write results with the mesh they were computed on"
+        )
+    return field

@@ -1,0 +1,129 @@
+"""The deformed mesh coloured by its von Mises stress."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.results.plot._axes import UNITS, Units, new_axes
+from fastcontact.results.plot.solid import MOST_EDGES, draw_solid
+from fastcontact.results.step import StepResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+
+def deformed_shape(
+    mesh: Mesh,
+    step: StepResult,
+    *,
+    scale: float = 1.0,
+    edges: bool | None = None,
+    mirrored: bool = False,
+    title: str = "",
+    units: Units = UNITS,
+    view: tuple[float, float] = (25.0, -60.0),
+    ax: Axes | None = None,
+) -> Axes:
+    """Plot the deformed mesh coloured by the von Mises stress, its maximum marked.
+
+    In three dimensions its outer surface is drawn, as far as it faces the eye.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    step : StepResult
+    scale : float
+        Factor on the displacements.
+    edges : bool, optional
+        Draw the cells' edges; by default up to 5000 cells, or facets of the surface in 3D.
+    mirrored : bool
+        In 2D, draw the other half beyond x = 0, too: the full section of an axisymmetric body.
+    title, units
+        As in `pressure_profile`.
+    view : (float, float)
+        In 3D, height of the eye over the x-y plane and its direction around z [degrees].
+    ax : matplotlib Axes, optional
+        In 3D with ``projection="3d"``.
+
+    Returns
+    -------
+    matplotlib Axes
+    """
+    solid = mesh.dim == 3
+    place = mesh.points + scale * step.displacement
+    both = np.concatenate([place, place * [-1.0, 1.0]]) if mirrored and not solid else place
+    axes = new_axes(ax, (7.0, 7.0) if solid else _size(both), "3d" if solid else None)
+    field = (
+        draw_solid(axes, mesh, place, step.von_mises, edges, view) if solid else _draw(axes, mesh, place, step, edges)
+    )
+    if both is not place:
+        _draw(axes, mesh, place * [-1.0, 1.0], step, edges)
+    top = int(np.argmax(step.von_mises))
+    where = ", ".join(f"{x:.2f}" for x in mesh.points[top])
+    label = f"maximum {step.von_mises[top]:.1f} at ({where})"
+    axes.plot(*([x] for x in place[top]), "o", mfc="none", mec="red", ms=9, mew=1.5, label=label, zorder=10)
+    axes.figure.colorbar(field, ax=axes, label=f"von Mises stress [{units['pressure']}]", shrink=0.6 if solid else 0.8)
+    axes.set_aspect("equal")
+    axes.set_xlabel(f"x [{units['length']}]")
+    axes.set_ylabel(f"y [{units['length']}]")
+    if solid:
+        axes.set_zlabel(f"z [{units['length']}]")
+    axes.set_title(title or f"Deformed shape (displacements x {scale:g}), load factor {step.load_factor:g}")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.02 if solid else -0.09 if ax is not None else _below(both)))
+    return axes
+
+
+def _size(place: Array) -> tuple[float, float]:
+    """Return width and height of a picture that the body fills, beside colours, labels and title [inches]."""
+    width, height = np.ptp(place, axis=0) / np.ptp(place, axis=0).max()
+    return max(5.0 * float(width) + 2.2, 5.0), max(5.0 * float(height) + 2.0, 3.6)
+
+
+def _below(place: Array) -> float:
+    """Return where the legend begins, in heights of such axes: half an inch leaves room for the label of the axis."""
+    return -0.5 / (_size(place)[1] - 2.0)
+
+
+def _draw(ax: Axes, mesh: Mesh, place: Array, step: StepResult, edges: bool | None) -> Any:
+    """Draw the cells of a mesh in the plane at positions `place` (n_points, 2); return what carries the colours."""
+    from matplotlib.collections import PolyCollection
+    from matplotlib.tri import Triangulation
+
+    loops = [cells[:, _outline(name)] for name, cells in mesh.solids.items()]
+    triangles = np.concatenate([_fan(name, cells) for name, cells in mesh.solids.items()])
+    field = ax.tripcolor(
+        Triangulation(place[:, 0], place[:, 1], triangles), step.von_mises, shading="gouraud", cmap="viridis"
+    )
+    if edges if edges is not None else sum(map(len, loops)) <= MOST_EDGES:
+        for loop in loops:
+            outlines = list(place[loop])
+            ax.add_collection(PolyCollection(outlines, facecolors="none", edgecolors="black", lw=0.15, alpha=0.6))
+    return field
+
+
+def _outline(name: str) -> list[int]:
+    """Return the nodes of a 2D element in order around it."""
+    element = elements.get(name)
+    if element.order == 1:
+        return list(range(element.n_corners))
+    return [node for facet in element.facets for node in (facet[0], facet[2])]
+
+
+def _fan(name: str, cells: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return triangles (n, 3) that cover the cells: corner triangles and the inner rest for quadratic ones."""
+    outline = _outline(name)
+    if elements.get(name).order == 1:
+        parts = [(outline[0], outline[i], outline[i + 1]) for i in range(1, len(outline) - 1)]
+    else:
+        middle = outline[1::2]
+        parts = [(outline[i - 1], outline[i], outline[i + 1]) for i in range(0, len(outline) - 1, 2)]
+        parts[0] = (outline[-1], outline[0], outline[1])
+        parts += [(middle[0], middle[i], middle[i + 1]) for i in range(1, len(middle) - 1)]
+    return np.concatenate([cells[:, list(part)] for part in parts])

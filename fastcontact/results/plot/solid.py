@@ -1,0 +1,117 @@
+"""The outer surface of a solid in three dimensions, coloured by a field at the points."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.contact.search.closest import flat_triangles
+from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import outer_facets
+
+Array = NDArray[np.float64]
+
+# Cells or facets beyond which edges would only blacken the picture.
+MOST_EDGES = 5000
+# Each flat triangle between the nodes is cut into so many along its sides, to show how a field varies in it.
+CUTS = 2
+
+
+def draw_solid(ax: Any, mesh: Mesh, place: Array, values: Array, edges: bool | None, view: tuple[float, float]) -> Any:
+    """Draw the facets of the outer surface that face the eye; return what carries the colours.
+
+    Parameters
+    ----------
+    ax : matplotlib Axes
+        With ``projection="3d"``.
+    mesh : Mesh
+    place : ndarray (n_points, 3)
+        Positions of the points [length].
+    values : ndarray (n_points,)
+        Field for the colours.
+    edges : bool, optional
+        Draw the outlines of facets; by default up to MOST_EDGES.
+    view : (float, float)
+        Height and direction of the eye [degrees].
+    """
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    eye = _eye(*view)
+    pieces, colours, outlines = [], [], []
+    outer = outer_facets(mesh)
+    for name, facets in outer.items():
+        corners = place[facets]
+        flat = flat_triangles(facets.shape[1])
+        normal = _vector_area(corners[:, flat]).sum(axis=1)
+        seen = normal @ eye > 0
+        weights = _cut(CUTS if elements.get(name).order == 1 else 1)
+        triangles = np.einsum("pcw,ftwd->ftpcd", weights, corners[seen][:, flat])
+        pieces.append(triangles.reshape(-1, 3, 3))
+        centre = np.einsum("pw,ftw->ftp", weights.mean(axis=1), values[facets[seen]][:, flat])
+        colours.append(centre.ravel())
+        outlines.append(_outline(name, corners[seen], eye))
+    field = np.concatenate(colours)
+    norm = Normalize(float(values.min()), float(values.max()))
+    faces = colormaps["viridis"](norm(field))
+    polygons = list(np.concatenate(pieces))
+    lines = faces.copy()  # the colour of the face itself closes the hair cracks between neighbours
+    if edges if edges is not None else sum(map(len, outer.values())) <= MOST_EDGES:
+        strokes = np.concatenate(outlines)
+        polygons += list(strokes)
+        faces = np.vstack([faces, np.zeros((len(strokes), 4))])
+        lines = np.vstack([lines, np.tile([0.0, 0.0, 0.0, 0.6], (len(strokes), 1))])
+    ax.add_collection3d(Poly3DCollection(polygons, facecolors=faces, edgecolors=lines, linewidths=0.3))
+    ax.set_proj_type("ortho")
+    ax.view_init(elev=view[0], azim=view[1])
+    for setter, low, high in zip(
+        (ax.set_xlim, ax.set_ylim, ax.set_zlim), place.min(axis=0), place.max(axis=0), strict=True
+    ):
+        setter(low, high)
+    return ScalarMappable(norm, "viridis")
+
+
+def _eye(height: float, direction: float) -> Array:
+    """Return the unit vector towards the eye."""
+    h, d = np.radians([height, direction])
+    return np.array([np.cos(h) * np.cos(d), np.cos(h) * np.sin(d), np.sin(h)])
+
+
+def _vector_area(triangles: Array) -> Array:
+    """Return the vector areas (..., 3) of triangles (..., 3, 3) [length^2]."""
+    a, b, c = np.moveaxis(triangles, -2, 0)
+    return np.asarray(0.5 * np.cross(b - a, c - a))
+
+
+def _cut(n: int) -> Array:
+    """Return the weights (n * n, 3, 3) of the corners of the n * n equal pieces of a triangle."""
+    pieces = []
+    for i in range(n):
+        for j in range(n - i):
+            pieces.append([(i, j), (i + 1, j), (i, j + 1)])
+            if i + j < n - 1:
+                pieces.append([(i + 1, j), (i + 1, j + 1), (i, j + 1)])
+    steps = np.array(pieces, float) / n
+    return np.concatenate([1.0 - steps.sum(axis=2, keepdims=True), steps], axis=2)
+
+
+def _outline(name: str, corners: Array, eye: Array) -> Array:
+    """Return the sides of facets (n, 2, 3) as strokes between neighbouring nodes, a facet's length nearer to the eye.
+
+    What is nearer is drawn later, so that no piece of the facets beside it covers a stroke; in a parallel projection it
+    stays where it is in the picture.
+    """
+    element = elements.get(name)
+    ends = [(a, b) for a, b in element.edges]
+    if element.order == 2:
+        ends = [
+            side for k, (a, b) in enumerate(ends) for side in ((a, element.n_corners + k), (element.n_corners + k, b))
+        ]
+    size = np.linalg.norm(np.ptp(corners, axis=1), axis=1)
+    nearer = corners[:, np.array(ends)] + (size[:, None] * eye)[:, None, None]
+    return np.asarray(nearer.reshape(-1, 2, 3))

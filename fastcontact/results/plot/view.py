@@ -1,0 +1,45 @@
+"""Interactive view of a result in a window, by PyVista."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastcontact.errors import FastcontactError
+from fastcontact.results.step import StepResult
+
+
+def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "", screenshot: str | None = None) -> None:
+    """Show the deformed mesh coloured by its von Mises stress in a window that can be turned.
+
+    Parameters
+    ----------
+    results : io.result_reader.Results
+        An open result file.
+    step : StepResult
+    scale : float
+        Factor on the displacements.
+    title : str
+    screenshot : str, optional
+        Picture to write instead of opening a window.
+
+    Raises
+    ------
+    FastcontactError
+        If PyVista is not installed.
+    """
+    try:
+        import pyvista
+    except ImportError as error:
+        raise FastcontactError("the interactive view needs PyVista: pip install 'fastcontact[view]'") from error
+    grid = results.to_pyvista(step)
+    grid.points = grid.points + scale * grid.point_data["displacement"]
+    plotter: Any = pyvista.Plotter(off_screen=screenshot is not None)
+    plotter.add_mesh(
+        grid, scalars="von_mises", show_edges=grid.n_cells <= 5000, line_width=0.3, cmap="viridis",
+        scalar_bar_args={"vertical": True, "title": "von Mises stress"},
+    )  # fmt: skip
+    plotter.add_text(title or f"load factor {step.load_factor:g}", font_size=10)
+    if results.mesh.dim == 2:
+        plotter.view_xy()
+    plotter.add_axes()
+    plotter.show(screenshot=screenshot or False)

@@ -1,0 +1,363 @@
+"""Read a result file back: nothing but the file is needed, neither the model nor the mesh file."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import FileError
+from fastcontact.mesh.files.hdf5 import check_contents
+from fastcontact.mesh.files.replacing import existing_file
+from fastcontact.mesh.files.targets import PathLike
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.results import _layout as layout
+from fastcontact.results._packing import unpacked
+from fastcontact.results._step_checks import check_contact
+from fastcontact.results.step import ContactResult, StepResult
+
+_DAMAGED = "is truncated or damaged"
+
+
+def open_results(path: PathLike) -> Results:
+    """Open a result file.
+
+    Parameters
+    ----------
+    path : path-like
+        A file that ``ResultWriter`` wrote, or is still writing: then the steps complete by now are seen.
+
+    Returns
+    -------
+    Results
+        A sequence of ``StepResult``.
+
+    Raises
+    ------
+    FileError
+        If the file is missing, no result file, damaged, or written by a newer fastcontact.
+
+    Examples
+    --------
+    >>> last = open_results("punch.vtkhdf")[-1]  # doctest: +SKIP
+    """
+    return Results(path)
+
+
+class Results(Sequence[StepResult]):
+    """The steps of a result file, each read when asked for, and what the file says beside them.
+
+    Steps are plain NumPy data: they stay valid when the file is closed.
+
+    Attributes
+    ----------
+    path : pathlib.Path
+        The file.
+    schema : int
+        Version of the layout of the file.
+    mesh : Mesh
+        The mesh with its groups.
+    kinematics, case_text : str
+        Kinematics of the analysis and the case file, empty if there was none; that of the last steps if it changed.
+    versions : dict of str to str
+        Versions of the packages that computed the results.
+    load_factors : ndarray (n_steps,)
+        Pseudo-time of each step.
+    warnings : tuple of str
+        Every warning of the run and its steps, once.
+    log : object
+        Log of the run, None if there is none; ``{"failed_step": history}``, the iterations of the step (or the part of
+        it) that failed, if the run did not converge.
+    complete : bool
+        Whether the run came to its end: False after a crash, and while it goes on.
+    error : str
+        What stopped the run, empty if nothing did or nobody could write it down.
+    """
+
+    def __init__(self, path: PathLike) -> None:
+        self.path = Path(path)
+        self._file, self._below = _opened(self.path)
+        try:
+            with self._explained():
+                self._read_header(self._file["fastcontact"])
+        except BaseException:
+            self.close()
+            raise
+
+    def _read_header(self, own: Any) -> None:
+        self.schema = _integer(own, "schema")
+        self._n_steps = _integer(self._file["VTKHDF/Steps"], "NSteps")
+        self.mesh = _read_mesh(own["mesh"])
+        self.kinematics: str = _text(own["kinematics"])
+        self.case_text: str = _text(own["case"])
+        self.versions: dict[str, str] = _text(own["versions"])
+        self._rows = own["steps"][: self._n_steps]
+        if len(self._rows) != self._n_steps or self._rows.ndim != 1:
+            raise ValueError(f"only {len(self._rows)} of {self._n_steps} steps")
+        if not isinstance(self.kinematics, str) or not isinstance(self.case_text, str):
+            raise ValueError("its kinematics or its case is no text")
+        self.load_factors: NDArray[np.float64] = np.ascontiguousarray(self._rows["load_factor"])
+        run = self._run_record(own)
+        self.log: Any = (run or {}).get("log")
+        self.error: str = (run or {}).get("error", "")
+        self.complete = run is not None and not self.error
+        notes = [self._notes(number) for number in range(self._n_steps)]
+        self.case_text = next((note["case"] for note in reversed(notes) if "case" in note), self.case_text)
+        of_steps = [text for note in notes for text in note["warnings"]]
+        self.warnings: tuple[str, ...] = tuple(dict.fromkeys([*(run or {}).get("warnings", ()), *of_steps]))
+
+    def _run_record(self, own: Any) -> dict[str, Any] | None:
+        """Return how the run ended; None while it goes on, after a crash, and when steps have been added since."""
+        if "runs" not in own:  # schema 1
+            return _text(own["run"]) if "run" in own else None
+        rows = own["runs"][-1:]
+        if not len(rows) or rows["n_steps"][0] != self._n_steps or not rows["count"][0]:
+            return None
+        return self._note(int(rows["first"][0]), int(rows["count"][0]))
+
+    def __len__(self) -> int:
+        return self._n_steps
+
+    @overload
+    def __getitem__(self, number: int) -> StepResult: ...
+    @overload
+    def __getitem__(self, number: slice) -> list[StepResult]: ...
+    def __getitem__(self, number: int | slice) -> StepResult | list[StepResult]:
+        """Return a step by its position, from 0, or from the end if negative; a slice gives a list of steps.
+
+        Raises
+        ------
+        IndexError
+            If there is no such step.
+        FileError
+            If the file was closed or is damaged.
+        """
+        if isinstance(number, slice):
+            return [self._read_step(position) for position in range(*number.indices(self._n_steps))]
+        position = range(self._n_steps)[number] if -self._n_steps <= number < self._n_steps else -1
+        if position < 0:
+            raise IndexError(f"'{self.path}' has {self._n_steps} steps, so there is no step at position {number}")
+        return self._read_step(position)
+
+    def __enter__(self) -> Results:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        state = "complete" if self.complete else "incomplete"
+        return f"Results('{self.path}': {self._n_steps} steps, {state}, {self.kinematics}, {self.mesh!r})"
+
+    def close(self) -> None:
+        """Close the file; the steps already read stay valid, no further ones can be read."""
+        self._file.close()
+        self._below.close()
+
+    def to_pyvista(self, step: int | StepResult) -> Any:
+        """Return a step as a ``pyvista.UnstructuredGrid`` of the solid cells, with all fields and groups.
+
+        Parameters
+        ----------
+        step : int or StepResult
+            Position of a step, or a step of this mesh.
+
+        Raises
+        ------
+        FileError
+            If PyVista is not installed.
+        """
+        try:
+            import pyvista
+        except ImportError as error:
+            raise FileError("PyVista is not installed: pip install 'fastcontact[view]'") from error
+        if not isinstance(step, StepResult):
+            step = self[step]
+        cells = layout.solid_cells(self.mesh)
+        # VTK's older flat layout, which every PyVista takes: each cell's size before its nodes.
+        flat = np.insert(cells.connectivity, cells.offsets[:-1], np.diff(cells.offsets))
+        grid = pyvista.UnstructuredGrid(flat, cells.types, layout.padded(self.mesh.points, 3))
+        for name, values in (layout.point_fields(self.mesh, step) | layout.point_flags(self.mesh)).items():
+            grid.point_data[name] = values
+        for name, values in (layout.cell_fields(self.mesh) | step.cell_fields).items():
+            grid.cell_data[name] = values
+        return grid
+
+    def _notes(self, number: int) -> dict[str, Any]:
+        row = self._rows[number]
+        return self._note(int(row["notes_first"]), int(row["notes_count"]))
+
+    def _note(self, first: int, count: int) -> dict[str, Any]:
+        return json.loads(self._file["fastcontact/notes"][first : first + count].tobytes())
+
+    def _read_step(self, number: int) -> StepResult:
+        if not self._file:
+            raise FileError(f"'{self.path}' is closed: open it again to read more steps")
+        with self._explained():
+            notes = self._notes(number)
+            return StepResult(
+                index=int(self._rows["index"][number]),
+                load_factor=float(self._rows["load_factor"][number]),
+                displacement=self._field("displacement", number, self.mesh.dim),
+                stress=self._field("stress", number, 4 if self.mesh.dim == 2 else 6),
+                von_mises=self._field("von_mises", number),
+                von_mises_signed=self._field("von_mises_signed", number),
+                reaction=self._field("reaction", number, self.mesh.dim),
+                contact=self._contact(number, dict(notes["contact"])),
+                iterations=notes["iterations"],
+                warnings=tuple(notes["warnings"]),
+                cell_fields=self._cell_fields(number),
+                restart=self._restart(number) if number == self._n_steps - 1 else None,
+            )
+
+    def _restart(self, number: int) -> dict[str, Any] | None:
+        """Return the restart state of the last step; None where there is none, or steps were written since we opened."""
+        own, name = self._file["fastcontact"], layout.restart_table(number)
+        try:
+            kept = unpacked(own[name][()]) if name in own else {}
+        except (ValueError, LookupError, TypeError):
+            return None
+        return kept["restart"] if kept.get("step") == number else None
+
+    @property
+    def cell_field_names(self) -> list[str]:
+        """Names of the cell fields that change from step to step."""
+        static = layout.cell_fields(self.mesh)
+        return [name for name in self._file["VTKHDF/CellData"] if name not in static]
+
+    def _cell_fields(self, number: int) -> dict[str, NDArray[np.float64]]:
+        data, n = self._file["VTKHDF/CellData"], len(self._file["VTKHDF/Types"])
+        fields = {name: data[name][number * n : (number + 1) * n] for name in self.cell_field_names}
+        wrong = [name for name, values in fields.items() if values.shape != (n,) or values.dtype.kind not in "biuf"]
+        if wrong:
+            raise ValueError(f"{wrong[0]} of step {number} is cut off or of another kind")
+        return fields
+
+    def _field(self, name: str, number: int, width: int | None = None) -> NDArray[np.float64]:
+        n = self.mesh.n_points
+        data, rows = self._file["VTKHDF/PointData"][name], slice(number * n, (number + 1) * n)
+        values = data[rows] if width is None else data[rows, :width]
+        if values.shape != ((n,) if width is None else (n, width)) or values.dtype.kind != "f":
+            raise ValueError(f"{name} of step {number} is cut off or of another kind")
+        return values
+
+    def _contact(self, number: int, formulations: dict[str, str]) -> dict[str, ContactResult]:
+        if not formulations:
+            return {}
+        pairs = {_text(pair["name"]): pair for pair in self._file["fastcontact/contact"].values()}
+        found = {name: _read_contact(pairs[name], number, name, kind) for name, kind in formulations.items()}
+        for name, contact in found.items():
+            if contact.force.shape != (self.mesh.dim,) or contact.points.dtype.kind not in "iu":
+                raise ValueError(f"the contact table of '{name}' is of another kind")
+            check_contact(f"step {number}, contact '{name}'", contact, self.mesh)
+        return found
+
+    @contextlib.contextmanager
+    def _explained(self) -> Iterator[None]:
+        """Turn whatever a broken file makes of HDF5 and of our own reading into one sentence."""
+        try:
+            yield
+        except (FileError, Warning):
+            raise
+        except Exception as error:  # what HDF5, and numbers that make no sense, can raise has no end
+            raise FileError(
+                f"'{self.path}' {_DAMAGED} ({_reason(error)}): compute it again or restore a copy"
+            ) from error
+
+
+def _reason(error: Exception) -> str:
+    """Return the first line of what an error says."""
+    lines = str(error).splitlines()
+    return lines[0][:200] if lines else type(error).__name__
+
+
+def _opened(path: Path) -> tuple[Any, Any]:
+    """Return the open file, and that below it, once sure that it is one of ours and not from the future."""
+    import h5py
+
+    existing_file(path)
+    if not os.access(path, os.R_OK, effective_ids=os.access in os.supports_effective_ids):
+        raise FileError(f"'{path}' may not be read: ask its owner for the permission")
+    if not h5py.is_hdf5(path):
+        raise FileError(f"'{path}' is no HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
+    # A file object of our own: HDF5 would hand out again what this process has open, with what it knew of the file then.
+    below = open(path, "rb")  # noqa: SIM115
+    try:
+        file = h5py.File(below, "r")
+        if file.userblock_size or file.id.get_create_plist().get_sizes() != (8, 8):
+            raise ValueError("its addresses are none of ours")
+        check_contents(file, path, below)
+        schema = _integer(file["fastcontact"], "schema") if "fastcontact" in file else None
+        if schema is None:
+            raise FileError(f"'{path}' holds no fastcontact results: name a file that fastcontact wrote (.vtkhdf)")
+        if schema > layout.SCHEMA:
+            raise FileError(f"'{path}' has schema {schema}, this fastcontact reads up to {layout.SCHEMA}: update it")
+    except BaseException as error:
+        below.close()
+        if isinstance(error, FileError) or not isinstance(error, Exception):
+            raise
+        raise FileError(f"'{path}' {_DAMAGED} ({_reason(error)}): compute it again or restore a copy") from error
+    return file, below
+
+
+def _integer(group: Any, name: str) -> int:
+    if group.attrs.get_id(name).dtype.kind not in "iu":
+        raise ValueError(f"'{name}' of '{group.name}' is no whole number")
+    return int(group.attrs[name])
+
+
+def _text(dataset: Any) -> Any:
+    # One text where `check_contents` has seen it, and not in the pieces of a table.
+    if dataset.shape != () or dataset.id.get_offset() is None:
+        raise ValueError(f"'{dataset.name}' is no text")
+    return json.loads(dataset[()])
+
+
+def _read_mesh(stored: Any) -> Mesh:
+    return Mesh(
+        points=stored["points"][:, : _integer(stored, "dim")],
+        cells={name: stored["cells"][name][()] for name in _text(stored["elements"])},
+        cell_groups=_read_groups(stored["cell_groups"]),
+        point_groups=_read_groups(stored["point_groups"]),
+    )
+
+
+def _read_groups(group: Any) -> dict[str, NDArray[np.int32]]:
+    names = _text(group["names"])
+    if group["sizes"].shape != (len(names),):
+        raise ValueError(f"'{group.name}' has {len(names)} names for sizes of shape {group['sizes'].shape}")
+    members = np.split(group["members"][()], np.cumsum(group["sizes"][()])[:-1])
+    return dict(zip(names, members))
+
+
+def _read_contact(pair: Any, number: int, name: str, formulation: str) -> ContactResult:
+    step = pair["steps"][number]
+    first, count = int(step["first"]), int(step["count"])
+    rows = pair["rows"][first : first + count]
+    if len(rows) != count or first < 0:
+        raise ValueError(f"the contact table of '{name}' is cut off")
+    columns = {column: np.ascontiguousarray(rows[column]) for column in rows.dtype.names}
+    for mask in {"active", "sticking"} & set(columns):
+        columns[mask] = columns[mask].astype(bool)
+    inner, outer = step["radius"].tolist()
+    # Early files of schema 1 know no shear and no sticking, no dissipation, no obstacles: what they hold came without.
+    known = step.dtype.names
+    moved = step["obstacle_displacement"].copy() if "obstacle_displacement" in known else np.array([np.nan])
+    return ContactResult(
+        name=name,
+        formulation=formulation,
+        force=step["force"].copy(),
+        radius=(inner, outer),
+        dissipation=float(step["dissipation"]) if "dissipation" in known else 0.0,
+        obstacle_displacement=moved if np.isfinite(moved).all() else None,
+        **columns,
+    )

@@ -1,0 +1,346 @@
+"""Results as tables: NumPy structured arrays, one row a node or a step, and CSV files of them."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastcontact.errors import CaseError, ContactError, FileError, unknown
+from fastcontact.mesh.files.replacing import replacing
+from fastcontact.mesh.files.targets import PathLike
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import ordered_line
+from fastcontact.results.step import ContactResult, StepResult
+
+Table = NDArray[Any]
+Columns = dict[str, NDArray[Any]]
+
+AXES = ("x", "y", "z")
+STRESS_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
+
+# Columns of words; in any other column of a CSV file what looks like a number is one.
+WORDS = ("group",)
+
+
+def contact_table(contact: ContactResult, step: StepResult | None = None) -> Table:
+    """Return the state of a contact pair, one row for each secondary node in order along the surface.
+
+    Parameters
+    ----------
+    contact : ContactResult
+    step : StepResult, optional
+        The step the pair belongs to, for the fields at its nodes.
+
+    Returns
+    -------
+    structured ndarray (m,)
+        ``point``; ``x``, ``y`` (``z``), ``abscissa``, ``radius`` (distance from the axis), ``gap`` [length];
+        ``pressure`` [pressure]; ``multiplier`` [force or pressure]; ``force_x`` ... [force]; ``shear_x`` ...
+        [pressure]; ``active``, ``sticking``. With `step` also ``displacement_x`` ... [length],
+        ``stress_xx`` ..., ``von_mises``, ``von_mises_signed`` [pressure].
+    """
+    columns = {
+        "point": contact.points,
+        **_by_axis("", contact.coordinates),
+        "abscissa": contact.abscissa,
+        "radius": _radius(contact.coordinates),
+        "gap": contact.gap,
+        "pressure": contact.pressure,
+        "multiplier": contact.multiplier,
+        **_by_axis("force_", contact.force_vectors),
+        **_by_axis("shear_", contact.shear),
+        "active": contact.active,
+        "sticking": contact.sticking,
+    }
+    return _table(columns | (_fields(step, contact.points) if step is not None else {}))
+
+
+def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None = None) -> Table:
+    """Return the fields along a line of nodes, one row a node, in order.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    step : StepResult
+    group : str
+        A group of line cells that form one open line.
+    start : str or int, optional
+        The end to start from, as for ``topology.ordered_line``; by default the one nearest to x = 0.
+
+    Returns
+    -------
+    structured ndarray (m,)
+        ``point``; ``x``, ``y`` (``z``), ``abscissa``, ``radius``, ``displacement_x`` ... [length];
+        ``stress_xx`` ..., ``von_mises``, ``von_mises_signed`` [pressure].
+
+    Raises
+    ------
+    MeshError
+        If there is no such group, or it is no open line.
+    """
+    line = ordered_line(mesh, group, start)
+    coordinates = mesh.points[line.points]
+    columns = {
+        "point": line.points,
+        **_by_axis("", coordinates),
+        "abscissa": line.abscissa,
+        "radius": _radius(coordinates),
+    }
+    return _table(columns | _fields(step, line.points))
+
+
+def point_table(mesh: Mesh, step: StepResult, groups: str | Iterable[str]) -> Table:
+    """Return the fields at the points of some groups, one row a point, group by group.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    step : StepResult
+    groups : str or iterable of str
+        Names of groups, of points or of cells.
+
+    Returns
+    -------
+    structured ndarray (m,)
+        ``group``, then the columns of `line_table` but for ``abscissa``.
+
+    Raises
+    ------
+    MeshError
+        If there is no such group.
+    """
+    names = [groups] if isinstance(groups, str) else list(groups)
+    members = [mesh.points_of(name) for name in names]
+    points = np.concatenate([np.empty(0, np.int32), *members])
+    coordinates = mesh.points[points]
+    columns = {
+        "group": np.repeat(np.array(names, dtype=np.str_), [len(m) for m in members]),
+        "point": points,
+        **_by_axis("", coordinates),
+        "radius": _radius(coordinates),
+    }
+    return _table(columns | _fields(step, points))
+
+
+def history_table(steps: Iterable[StepResult], contact: str | None = None) -> Table:
+    """Return how an analysis went, one row a step.
+
+    Parameters
+    ----------
+    steps : iterable of StepResult
+        Steps of one analysis, such as an open result file: they are read one at a time.
+    contact : str, optional
+        The contact pair to follow; may be left out when there is one, or none at all.
+
+    Returns
+    -------
+    structured ndarray (n_steps,)
+        ``step``, ``load_factor``; of the pair ``force_x`` ... (resultant on the secondary side) [force],
+        ``radius_inside`` and ``radius_outside`` (bracket of the contact radius) [length], ``pressure_max``
+        [pressure]; ``von_mises_max`` [pressure].
+
+    Raises
+    ------
+    ContactError
+        If there is no such pair, or several and none is named.
+    """
+    rows: list[dict[str, float]] = []
+    for step in steps:
+        row = {"step": step.index, "load_factor": step.load_factor}
+        if pair := _pair(step, contact):
+            row |= {f"force_{axis}": float(force) for axis, force in zip(AXES, pair.force)}
+            row |= {"radius_inside": pair.radius[0], "radius_outside": pair.radius[1]}
+            row["pressure_max"] = pair.pressure_max
+        rows.append({**row, "von_mises_max": float(step.von_mises.max(initial=0.0))})
+    names = dict.fromkeys(name for row in rows for name in row)
+    columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
+    return _table(columns or {"step": np.empty(0, np.int64), "load_factor": np.empty(0)})
+
+
+def _pair(step: StepResult, name: str | None) -> ContactResult | None:
+    if name is None:
+        if len(step.contact) > 1:
+            raise ContactError(f"there are the contact pairs {', '.join(step.contact)}: name the one to follow")
+        return next(iter(step.contact.values()), None)
+    if name not in step.contact:
+        raise ContactError(unknown("contact pair", name, step.contact))
+    return step.contact[name]
+
+
+def with_theory(table: Table, name: str, function: Callable[[Any], ArrayLike], along: str = "radius") -> Table:
+    """Return the table with one more column, a function of another column.
+
+    Parameters
+    ----------
+    table : structured ndarray (m,)
+    name : str
+        Name of the new column.
+    function : callable
+        Maps the values (m,) of the column `along`, or one value at a time, to the new ones.
+    along : str
+        The column to sample along.
+
+    Returns
+    -------
+    structured ndarray (m,)
+
+    Raises
+    ------
+    CaseError
+        If there is no column `along`, there is a column `name` already, or the function gives another number
+        of values.
+
+    Examples
+    --------
+    >>> line = np.array([(0.0,), (2.0,)], dtype=[("radius", float)])
+    >>> with_theory(line, "square", lambda r: r**2)["square"]
+    array([0., 4.])
+    """
+    columns = _columns(table)
+    if along not in columns:
+        raise CaseError(unknown("column", along, columns))
+    if name in columns:
+        raise CaseError(f"the table has a column '{name}' already: give the theory another name")
+    where = columns[along]
+    try:
+        values = np.asarray(function(where), np.float64)
+    except (TypeError, ValueError):  # a function of one number, such as those of module math
+        values = np.array([float(np.asarray(function(value))) for value in where.tolist()])
+    if values.shape not in ((), where.shape):
+        raise CaseError(f"'{name}' gives {values.shape} values for the {where.shape} values of '{along}'")
+    return _table({**columns, name: np.broadcast_to(values, where.shape)})
+
+
+def write_csv(path: PathLike, table: Table, units: Mapping[str, str] | None = None) -> None:
+    """Write a table as comma-separated values (RFC 4180) with one header line.
+
+    Numbers are written so that `read_csv` returns the same bits.
+
+    Parameters
+    ----------
+    path : path-like
+        File to write, replaced if it exists.
+    table : structured ndarray (m,)
+    units : mapping of str to str, optional
+        Units by column, which the header then shows in brackets.
+
+    Raises
+    ------
+    CaseError
+        If `units` names a column that is not there.
+    FileError
+        If the file cannot be written.
+    """
+    columns, units = _columns(table), dict(units or {})
+    for name in units:
+        if name not in columns:
+            raise CaseError(unknown("column", name, columns))
+    header = [f"{name} [{units[name]}]" if name in units else name for name in columns]
+    texts = [[_text(value) for value in column.tolist()] for column in columns.values()]
+    with replacing(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(header)
+        writer.writerows(zip(*texts))
+
+
+def read_csv(path: PathLike) -> tuple[Table, dict[str, str]]:
+    """Read a table that `write_csv` wrote.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    table : structured ndarray (m,)
+        Columns of int64, float64, bool or str, by what stands in them.
+    units : dict of str to str
+        Units of the columns that have one.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read, is empty, two columns have one name or one has none, or a line has not as many values
+        as the header.
+    """
+    try:
+        with open(Path(path), encoding="utf-8", newline="") as file:
+            lines = [line for line in csv.reader(file) if line]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise FileError(f"'{path}' cannot be read ({error}): name a CSV file in UTF-8") from error
+    if not lines:
+        raise FileError(f"'{path}' is empty: a CSV file starts with the names of its columns")
+    header, rows = lines[0], lines[1:]
+    for number, row in enumerate(rows, start=2):
+        if len(row) != len(header):
+            raise FileError(f"'{path}': line {number} has {len(row)} values, but the header names {len(header)}")
+    columns, units = {}, {}
+    for position, title in enumerate(header):
+        named = re.fullmatch(r"(.*) \[(.*)\]", title, flags=re.DOTALL)
+        name = named[1] if named else title
+        if not name or name in columns:
+            raise FileError(f"'{path}': column {position + 1} has {f'the name {name!r} again' if name else 'no name'}")
+        if named:
+            units[name] = named[2]
+        texts = [row[position] for row in rows]
+        columns[name] = np.array(texts, dtype=np.str_) if name in WORDS else _values(texts)
+    return _table(columns), units
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        text = f"{value:.17g}"
+        return text if text.strip("-0123456789") else text + ".0"  # so that it stays a float
+    return str(value)
+
+
+def _values(texts: list[str]) -> NDArray[Any]:
+    """Return the values of a column as the narrowest of bool, int64, float64, str that holds them all."""
+    if texts and set(texts) <= {"true", "false"}:
+        return np.array([text == "true" for text in texts])
+    for kind in (np.int64, np.float64):
+        try:
+            return np.array([kind(text) for text in texts], dtype=kind if texts else np.float64)
+        except (ValueError, OverflowError):
+            continue
+    return np.array(texts, dtype=np.str_)
+
+
+def _table(columns: Mapping[str, NDArray[Any]]) -> Table:
+    """Return columns of equal length as one structured array."""
+    table = np.empty(len(next(iter(columns.values()))), dtype=[(name, c.dtype) for name, c in columns.items()])
+    for name, column in columns.items():
+        table[name] = column
+    return table
+
+
+def _columns(table: Table) -> Columns:
+    return {name: table[name] for name in table.dtype.names or ()}
+
+
+def _by_axis(prefix: str, vectors: NDArray[Any]) -> Columns:
+    return {f"{prefix}{axis}": vectors[:, i] for i, axis in enumerate(AXES[: vectors.shape[1]])}
+
+
+def _radius(coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the distance from the axis: of x = 0 in 2D, of the y axis in 3D [length]."""
+    return np.hypot.reduce(coordinates[:, ::2], axis=1) if coordinates.shape[1] == 3 else np.abs(coordinates[:, 0])
+
+
+def _fields(step: StepResult, points: NDArray[Any]) -> Columns:
+    """Return displacement, stress and von Mises stress at some points."""
+    stress = step.stress[points]
+    return {
+        **_by_axis("displacement_", step.displacement[points]),
+        **{f"stress_{name}": stress[:, i] for i, name in enumerate(STRESS_COMPONENTS[: stress.shape[1]])},
+        "von_mises": step.von_mises[points],
+        "von_mises_signed": step.von_mises_signed[points],
+    }

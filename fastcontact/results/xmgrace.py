@@ -1,0 +1,223 @@
+"""Curves as a project file of Grace (xmgrace 5.1), ready to look at: round axes, legend, titles."""
+
+from __future__ import annotations
+
+import math
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastcontact.errors import CaseError, unknown
+from fastcontact.mesh.files.replacing import replacing
+from fastcontact.mesh.files.targets import PathLike
+
+STYLES = ("line", "symbols", "line+symbols")
+
+# Black first; then colours that stay apart on paper and for colour-blind eyes (Okabe and Ito, 2008).
+COLOURS = (
+    ("white", 255, 255, 255),
+    ("black", 0, 0, 0),
+    ("vermilion", 213, 94, 0),
+    ("blue", 0, 114, 178),
+    ("bluish green", 0, 158, 115),
+    ("reddish purple", 204, 121, 167),
+    ("orange", 230, 159, 0),
+    ("sky blue", 86, 180, 233),
+)
+N_SYMBOLS, N_LINE_STYLES = 6, 5
+
+# Grace writes Latin-1; Greek comes from the Symbol font, letter for letter.
+_GREEK = dict(zip("αβγδεζηθικλμνξοπρςστυφχψωΓΔΘΛΞΠΣΦΨΩ", "abgdezhqiklmnxoprVstufcywGDQLXPSFYW"))
+_MARKUP = {letter: f"\\f{{Symbol}}{symbol}\\f{{}}" for letter, symbol in _GREEK.items()} | {
+    "\\": "\\\\",
+    '"': '\\"',
+}
+_PLAIN = str.maketrans(
+    {"\u2212": "-", "\u2013": "-", "\u2014": "-", "\u2018": "'", "\u2019": "'", "\u201c": '"', "\u201d": '"'}
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One curve of a picture.
+
+    Parameters
+    ----------
+    x, y : array_like (n,)
+        Where a value is not finite the point is left out.
+    legend : str
+        Text in the legend; empty for none.
+    style : {"line", "symbols", "line+symbols"}
+        A line for theory, symbols for what was computed at nodes.
+
+    Raises
+    ------
+    CaseError
+        If `x` and `y` are not two vectors of one length, or there is no such style.
+    """
+
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    legend: str = ""
+    style: str = "line"
+
+    def __post_init__(self) -> None:
+        x, y = (np.asarray(values, np.float64) for values in (self.x, self.y))
+        if x.ndim != 1 or x.shape != y.shape:
+            raise CaseError(f"curve '{self.legend}': x has shape {x.shape} and y {y.shape}, not both (n,)")
+        if self.style not in STYLES:
+            raise CaseError(unknown("curve style", self.style, STYLES))
+        finite = np.isfinite(x) & np.isfinite(y)
+        object.__setattr__(self, "x", x[finite])
+        object.__setattr__(self, "y", y[finite])
+
+
+def write_agr(
+    path: PathLike, curves: Sequence[Curve], *, title: str, subtitle: str = "", xlabel: str, ylabel: str
+) -> None:
+    """Write curves as a Grace project file.
+
+    Parameters
+    ----------
+    path : path-like
+        File to write, suffix ``.agr``; replaced if it exists.
+    curves : sequence of Curve
+        Drawn in this order, the last on top.
+    title, subtitle, xlabel, ylabel : str
+        Plain text: Grace's own markup in it is shown as it stands; Greek letters come out as such.
+
+    Raises
+    ------
+    CaseError
+        If no curve has a point to show.
+    FileError
+        If the file cannot be written.
+    """
+    shown = [curve for curve in curves if len(curve.x)]
+    if not shown:
+        raise CaseError(f"nothing to draw in '{path}': none of the {len(curves)} curves has a finite point")
+    x_axis = round_axis(np.concatenate([curve.x for curve in shown]))
+    y_axis = round_axis(np.concatenate([curve.y for curve in shown]))
+    lines = ["# Grace project file", "@version 50122", "@page size 792, 612"]
+    lines += [f'@map color {i} to ({r}, {g}, {b}), "{name}"' for i, (name, r, g, b) in enumerate(COLOURS)]
+    lines += ["@g0 on", "@g0 type XY", "@with g0"]
+    lines.append(f"@    world {x_axis[0]:.12g}, {y_axis[0]:.12g}, {x_axis[1]:.12g}, {y_axis[1]:.12g}")
+    lines.append("@    view 0.18, 0.15, 1.20, 0.85")
+    lines += [f'@    title "{escaped(title)}"', f'@    subtitle "{escaped(subtitle)}"']
+    lines += [*_axis("x", xlabel, x_axis), *_axis("y", ylabel, y_axis)]
+    lines += _legend(shown, x_axis, y_axis)
+    for number, curve in enumerate(shown):
+        lines += _set_style(number, curve)
+    for number, curve in enumerate(shown):
+        lines += [f"@target G0.S{number}", "@type xy"]
+        lines += [f"{x:.17g} {y:.17g}" for x, y in zip(curve.x.tolist(), curve.y.tolist())]
+        lines.append("&")
+    with replacing(path) as temporary, open(temporary, "w", encoding="latin-1") as file:
+        file.write("\n".join(lines) + "\n")
+
+
+def round_axis(values: ArrayLike) -> tuple[float, float, float]:
+    """Return first tick, last tick and tick distance of an axis that holds all values between round numbers.
+
+    Parameters
+    ----------
+    values : array_like (n,)
+        Finite numbers, at least one.
+
+    Returns
+    -------
+    (float, float, float)
+        The distance is 1, 2 or 5 times a power of ten; there are 4 to 10 intervals.
+
+    Examples
+    --------
+    >>> round_axis([0.3, 9.6])
+    (0.0, 10.0, 2.0)
+    """
+    numbers = np.asarray(values, np.float64)
+    low, high = float(numbers.min()), float(numbers.max())
+    size = max(abs(low), abs(high))
+    if high - low <= 1e-9 * size or size < 1e-300:  # one value only: show it in the middle of something
+        half = 0.5 * size if size >= 1e-300 else 1.0
+        low, high = low - half, high + half
+    raw = (high - low) / 8.0
+    power = 10.0 ** math.floor(math.log10(raw))
+    distance = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= raw * (1 - 1e-9))
+    # A hair of tolerance, so that 0.3 = 3 x 0.1 needs no further tick.
+    first, last = math.floor(low / distance + 1e-9), math.ceil(high / distance - 1e-9)
+    return first * distance, last * distance, distance
+
+
+def escaped(text: str) -> str:
+    """Return text as a Grace string that shows it literally, in Latin-1 with Greek from the Symbol font."""
+    plain = " ".join(text.translate(_PLAIN).split())
+    return "".join(_MARKUP.get(letter, letter) for known in map(_known, plain) for letter in known)
+
+
+def _known(letter: str) -> str:
+    """Return the letter if Grace has it, or else what comes nearest."""
+    if letter in _GREEK or (letter.isprintable() and ord(letter) < 256):
+        return letter
+    near = unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode("ascii")
+    return near if near.isprintable() and near else "?"
+
+
+def _axis(name: str, label: str, axis: tuple[float, float, float]) -> list[str]:
+    low, high, distance = axis
+    largest = max(abs(low), abs(high))
+    digits = max(math.floor(math.log10(largest)) - math.floor(math.log10(distance)), 0)  # that tell ticks apart
+    style = "exponential" if largest >= 1e6 or largest < 1e-3 else "general"
+    return [
+        f'@    {name}axis  label "{escaped(label)}"',
+        f"@    {name}axis  tick major {distance:.12g}",
+        f"@    {name}axis  tick minor ticks 1",
+        f"@    {name}axis  tick major grid on",
+        f"@    {name}axis  tick major color 1",
+        f"@    {name}axis  tick major linestyle 2",
+        f"@    {name}axis  tick major linewidth 0.5",
+        f"@    {name}axis  ticklabel format {style}",
+        f"@    {name}axis  ticklabel prec {digits if style == 'exponential' else max(digits + 1, 6)}",
+    ]
+
+
+def _legend(curves: Sequence[Curve], x_axis: tuple[float, ...], y_axis: tuple[float, ...]) -> list[str]:
+    """Place the legend in the upper corner with fewer points behind it."""
+    right = left = 0
+    for curve in curves:
+        along = (curve.x - x_axis[0]) / (x_axis[1] - x_axis[0])
+        upper = (curve.y - y_axis[0]) / (y_axis[1] - y_axis[0]) > 0.6
+        right += int((upper & (along > 0.55)).sum())
+        left += int((upper & (along < 0.45)).sum())
+    place = "0.82, 0.82" if right <= left else "0.21, 0.82"
+    state = "on" if any(curve.legend for curve in curves) else "off"
+    return [
+        f"@    legend {state}",
+        "@    legend loctype view",
+        f"@    legend {place}",
+        "@    legend box color 1",
+        "@    legend box pattern 1",
+        "@    legend box fill color 0",
+        "@    legend box fill pattern 1",
+        "@    legend char size 0.8",
+    ]
+
+
+def _set_style(number: int, curve: Curve) -> list[str]:
+    colour = 1 + number % (len(COLOURS) - 1)
+    symbol = 1 + number % N_SYMBOLS if "symbols" in curve.style else 0
+    line = 1 + number // (len(COLOURS) - 1) % N_LINE_STYLES if "line" in curve.style else 0
+    name = f"@    s{number}"
+    return [
+        f"{name} type xy",
+        f"{name} symbol {symbol}",
+        f"{name} symbol size 0.6",
+        f"{name} symbol color {colour}",
+        f"{name} line type {1 if line else 0}",
+        f"{name} line linestyle {line}",
+        f"{name} line linewidth 1.5",
+        f"{name} line color {colour}",
+        f'{name} legend "{escaped(curve.legend)}"',
+    ]

@@ -1,0 +1,1 @@
+"""Studies of many runs: mesh convergence with model error told from mesh error, and parameter sweeps."""

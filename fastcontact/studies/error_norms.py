@@ -1,0 +1,184 @@
+"""How far a finite-element solution is from a theory: the energy of the error and its mean square, by quadrature.
+
+For convergence studies against exact solutions such as `analytic.hertz_box`: nodal errors hide what happens between the
+nodes and often converge faster than the solution does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastcontact.elasticity import element_kernels
+from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
+from fastcontact.errors import ModelError
+from fastcontact.mesh import elements
+from fastcontact.mesh.elements import Element
+from fastcontact.model.model import Model
+
+Array = NDArray[np.float64]
+# Quadrature points worked on at a time, so that theories with large intermediate arrays fit the memory.
+AT_ONCE = 100_000
+
+
+class Theory(Protocol):
+    """An exact solution in the whole body."""
+
+    def displacement(self, points: Array) -> Array:
+        """Return the displacements (n, dim) at `points` (n, dim) [length]."""
+        ...
+
+    def stress(self, points: Array) -> Array:
+        """Return the stresses (n, 4), in three dimensions (n, 6), at `points`, ordered as in results [pressure]."""
+        ...
+
+
+@dataclass(frozen=True)
+class ErrorNorms:
+    """Norms of an error, and of the theory itself to compare them with.
+
+    The energy norm of stresses s is the square root of the integral of s : C^-1 : s, C being the elastic moduli: the
+    root of twice the elastic energy [(force length)^(1/2)]. That of displacements is the square root of the integral of
+    their square (L2) [length^(1 + dim/2)]. In axisymmetry integrals run over the full circle.
+
+    Attributes
+    ----------
+    energy, displacement : float
+        Of the solution minus the theory.
+    energy_of_theory, displacement_of_theory : float
+        Of the theory.
+    """
+
+    energy: float
+    displacement: float
+    energy_of_theory: float
+    displacement_of_theory: float
+
+    @property
+    def relative_energy(self) -> float:
+        """Energy norm of the error over that of the theory [1]."""
+        return self.energy / self.energy_of_theory
+
+    @property
+    def relative_displacement(self) -> float:
+        """L2 norm of the error of displacements over that of the theory [1]."""
+        return self.displacement / self.displacement_of_theory
+
+
+def error_against(
+    theory: Theory,
+    model: Model,
+    displacement: ArrayLike,
+    *,
+    groups: Sequence[str] | str | None = None,
+    n_points: int | None = None,
+) -> ErrorNorms:
+    """Return the norms of the difference between a finite-element solution and a theory.
+
+    Both are compared at the same quadrature points of the reference configuration; the stresses of the solution come
+    from the derivatives of its displacements there, without averaging (Zienkiewicz and Taylor, 2000, section 14.1).
+
+    Parameters
+    ----------
+    theory : Theory
+        Anything with methods ``displacement(points)`` and ``stress(points)``, such as `analytic.hertz_box`.
+    model : Model
+        Its mesh, kinematics and materials.
+    displacement : array_like (n_points, dim)
+        Of the solution, e.g. ``fc.solve(model)[-1].displacement`` [length].
+    groups : sequence of str or str, optional
+        Solid cells to integrate over, by default all.
+    n_points : int, optional
+        Points along each direction of a cell, three more than the order of the element by default: more than
+        the stiffness needs, so that the error is that of the solution.
+
+    Raises
+    ------
+    MeshError, ModelError
+        If a group is unknown or holds no solid cells, an array has the wrong shape, or the theory is not finite.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> model = fc.Model(fc.generate.block(origin=(0.0, -1.0)), "plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    >>> box = fc.analytic.hertz_box()
+    >>> interpolated = fc.error_against(box, model, box.displacement(model.mesh.points))
+    >>> round(interpolated.relative_energy, 2)
+    0.21
+    """
+    u = np.asarray(displacement, float)
+    if u.shape != model.mesh.points.shape:
+        raise ModelError(
+            f"displacement has shape {u.shape}: it must be {model.mesh.points.shape}, a row for each point"
+        )
+    if n_points is not None and n_points < 1:
+        raise ModelError(f"n_points = {n_points} points along each direction of a cell must be at least 1")
+    chosen = _rows(model, (groups,) if isinstance(groups, str) else groups)
+    total = np.zeros(4)
+    for name, rows in chosen.items():
+        for part in _portions(rows, elements.get(name), n_points):
+            total += _squares(theory, model, u, name, part, n_points)
+    return ErrorNorms(*(math.sqrt(square) for square in total))
+
+
+def _rows(model: Model, groups: Sequence[str] | None) -> dict[str, NDArray[np.intp]]:
+    """Return, by solid element, the cells to integrate over."""
+    mesh = model.mesh
+    if groups is None:
+        return {name: np.arange(len(block)) for name, block in mesh.solids.items()}
+    for group in groups:
+        if not mesh.cells_of(group, dim=mesh.dim):
+            raise ModelError(f"group '{group}' holds no solid cells to integrate over")
+    cells = np.unique(np.concatenate([mesh.cell_groups[group] for group in groups]))
+    return {name: rows for name, rows in mesh.split(cells).items() if name in mesh.solids}
+
+
+def _portions(rows: NDArray[np.intp], element: Element, n_points: int | None) -> Iterator[NDArray[np.intp]]:
+    at_once = max(1, AT_ONCE // len(integration_rule(element, n_points)[1]))
+    return (rows[first : first + at_once] for first in range(0, len(rows), at_once))
+
+
+def _squares(theory: Theory, model: Model, u: Array, name: str, rows: NDArray[np.intp], n_points: int | None) -> Array:
+    """Return the squares of the four norms over some cells, in the order of `ErrorNorms`."""
+    mesh, element = model.mesh, elements.get(name)
+    xi, weights = integration_rule(element, n_points)
+    N, dN = element.shape(xi), element.gradient(xi)
+    cells = mesh.cells[name][rows]
+    corners = mesh.points[cells]
+    places = np.einsum("qa,cad->cqd", N, corners)
+    volume = cell_volumes(mesh.points[cells], N, dN, model.kinematics == "axisymmetric") * weights
+    exact_u, exact = _exact(theory, places, 4 if mesh.dim == 2 else 6)
+    moduli, material = model.material_numbers()
+    stress = np.empty(exact.shape)
+    element_kernels.loops(mesh.dim).stress(
+        mesh.points, cells, np.ascontiguousarray(N), np.ascontiguousarray(dN), moduli, material[name][rows],
+        model.kinematics == "axisymmetric", u, stress,
+    )  # fmt: skip
+    elastic = np.array([(own.E, own.nu) for own, _ in model.materials])[material[name][rows]].T[:, :, None]
+    error_u = np.einsum("qa,cad->cqd", N, u[cells]) - exact_u
+    densities = (
+        elastic_energy(stress - exact, *elastic), (error_u**2).sum(axis=-1),
+        elastic_energy(exact, *elastic), (exact_u**2).sum(axis=-1),
+    )  # fmt: skip
+    return np.array([(density * volume).sum() for density in densities])
+
+
+def _exact(theory: Theory, places: Array, n_components: int) -> tuple[Array, Array]:
+    """Return displacements and stresses (n_cells, n_q, ...) of the theory at `places` (n_cells, n_q, dim)."""
+    points = places.reshape(-1, places.shape[2])
+    found = []
+    for name, size in (("displacement", points.shape[1]), ("stress", n_components)):
+        values = np.asarray(getattr(theory, name)(points), float)
+        if values.shape != (len(points), size):
+            raise ModelError(f"the theory's {name} has shape {values.shape} where {(len(points), size)} is needed")
+        if not np.isfinite(values).all():
+            where = points[np.flatnonzero(~np.isfinite(values).all(axis=1))[0]]
+            raise ModelError(f"the theory's {name} is not finite at {where}")
+        found.append(values.reshape(*places.shape[:2], size))
+    return found[0], found[1]

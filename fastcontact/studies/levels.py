@@ -1,0 +1,155 @@
+"""The family of meshes of a study: what makes the mesh of a level, and the mesh itself."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from fastcontact.errors import CaseError, FastcontactError, unknown
+from fastcontact.mesh import elements, generate
+from fastcontact.mesh.generate import Circle, circles, linearised, refined, to_quadratic
+from fastcontact.mesh.generate.quadratic import Curve
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.studies.settings import Settings, makeable, shape_of
+
+Arguments = dict[str, Any]
+Recipe = dict[str, Any]
+
+
+def _spheres(element: str, given: Mapping[str, Any]) -> tuple[Arguments, tuple[str, ...], tuple[str, ...]]:
+    R = float(given.get("R", 50.0))
+    if shape_of(element) == "triangles":
+        return {"size": R / 25}, ("size", "contact_size"), ()
+    return {"arc_sizes": (R / 250, R / 25), "segments": 15}, ("arc_sizes", "radial_sizes"), ("segments",)
+
+
+def _cylinder(element: str, given: Mapping[str, Any]) -> tuple[Arguments, tuple[str, ...], tuple[str, ...]]:
+    R = float(given.get("R", 50.0))
+    far = float(given.get("size", R / 10))
+    return {"size": far, "contact_size": min(R / 100, far)}, ("size", "contact_size"), ()
+
+
+def _counts(*names: str) -> Callable[..., tuple[Arguments, tuple[str, ...], tuple[str, ...]]]:
+    def rule(element: str, given: Mapping[str, Any]) -> tuple[Arguments, tuple[str, ...], tuple[str, ...]]:
+        return {}, (), names
+
+    return rule
+
+
+# By generator: defaults that depend on other arguments, arguments to halve, arguments to double.
+RULES = {
+    "half-spheres": _spheres,
+    "cylinder-on-block": _cylinder,
+    "block-on-block": _counts("divisions_lower", "divisions_upper"),
+    "box": _counts("divisions"),
+}
+
+
+def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
+    """Return what makes the mesh of a level: plain data, the same for equal meshes.
+
+    Raises
+    ------
+    CaseError
+        If the element cannot be made of the case's mesh, or nothing is known of the generator's arguments.
+    """
+    if element is not None and not makeable(settings, element):
+        raise CaseError(_not_makeable(settings, element))
+    if settings.generator is None:
+        curves = settings.curves
+        return {
+            "refinements": level,
+            "element": element,
+            "curves": None if curves is None else [[list(c.centre), c.radius, c.group] for c in curves],
+        }
+    element = element or "tri3"
+    shape = shape_of(element)
+    # Where level 0 is given by shape, it is that of quadratic cells; linear ones stand on the same nodes.
+    finer = level + int(shape in settings.arguments and elements.get(element).order == 1)
+    given = settings.arguments.get(shape, settings.arguments.get("", {}))
+    # Free triangles of other sizes lie in another pattern, and the largest pressure jumps with it: refined, they do not.
+    free = shape == "triangles"
+    return {
+        "generator": settings.generator,
+        "arguments": _finer(settings, element, given, 0 if free else finer),
+        "refinements": finer if free else 0,
+    }
+
+
+def _not_makeable(settings: Settings, element: str) -> str:
+    own = settings.own.element or "mixed cells"
+    if settings.generator is not None and "" not in settings.arguments:
+        shape = shape_of(element) or "triangles"
+        return f"there are no meshes of {element} in this study: give the arguments of level 0 in [study.{shape}]"
+    return (
+        f"meshes of {element} cannot be made from the case's {own}: give a generator and its arguments of level 0 in "
+        "[study], or choose an element on the same corners"
+    )
+
+
+def _finer(settings: Settings, element: str, given: Mapping[str, Any], level: int) -> Arguments:
+    """Return a generator's arguments with sizes halved and counts doubled `level` times."""
+    name = str(settings.generator)
+    if name not in generate.GENERATORS:
+        raise CaseError(unknown("study.generator", name, generate.GENERATORS))
+    signature = inspect.signature(generate.GENERATORS[name]).parameters
+    for key in given:
+        if key not in signature:
+            raise CaseError(unknown(f"argument of the generator {name} in [study]", key, signature))
+    defaults, halve, double = RULES[name](element, given) if name in RULES else ({}, (), ())
+    halve, double = settings.halve or halve, settings.double or double
+    if not (halve or double):
+        raise CaseError(
+            f"it is not known how the generator '{name}' makes finer meshes: name its arguments in [study] as "
+            "halve = [...] or double = [...]"
+        )
+    arguments = {**defaults, **given, **({"element": element} if "element" in signature else {})}
+    for names, factor in ((halve, 0.5**level), (double, 2**level)):
+        for key in names:
+            value = arguments.get(key, signature[key].default if key in signature else None)
+            if value is not None:
+                arguments[key] = _scaled(value, factor)
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in arguments.items()}
+
+
+def _scaled(value: Any, factor: float) -> Any:
+    return [entry * factor for entry in value] if isinstance(value, (list, tuple)) else value * factor
+
+
+def make_mesh(recipe: Recipe, base: Mesh | None) -> Mesh:
+    """Return the mesh of a recipe; `base` is the loaded mesh that is refined where no generator is named.
+
+    Raises
+    ------
+    MeshError
+        If the generator refuses its arguments or a cell cannot be refined.
+    """
+    if "generator" in recipe:
+        arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in recipe["arguments"].items()}
+        mesh = generate.GENERATORS[recipe["generator"]](**arguments)
+        return _refined(mesh, recipe["refinements"], circles(mesh) if recipe["refinements"] else [])
+    if base is None:
+        raise FastcontactError("a mesh that is refined needs the mesh to start from")
+    return _from_file(recipe, base)
+
+
+def _from_file(recipe: Recipe, base: Mesh) -> Mesh:
+    given = recipe["curves"]
+    curves = circles(base) if given is None else [Circle(tuple(c), radius, group) for c, radius, group in given]
+    element = recipe["element"]
+    orders = {elements.get(name).order for name in base.solids}
+    mesh = base
+    if element is not None and elements.get(element).order == 1 and orders != {1}:
+        mesh = linearised(mesh)
+    mesh = _refined(mesh, recipe["refinements"], curves)
+    if element is not None and elements.get(element).order == 2 and (orders == {1} or element not in mesh.solids):
+        mesh = to_quadratic(linearised(mesh), curves, centre_nodes=element == "quad9")
+    return mesh
+
+
+def _refined(mesh: Mesh, times: int, curves: Iterable[Curve]) -> Mesh:
+    kept = list(curves)
+    for _ in range(times):
+        mesh = refined(mesh, kept)
+    return mesh

@@ -1,0 +1,251 @@
+"""Quantities of interest: plain numbers from the last step of a run, and what a theory says of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.cases.case import Case
+from fastcontact.contact.integration import facet_measure
+from fastcontact.contact.surface import Surface, surface
+from fastcontact.mesh import elements, quadrature
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.quality import quality
+from fastcontact.mesh.topology import bodies
+from fastcontact.results.step import ContactResult, StepResult
+
+Array = NDArray[np.float64]
+
+TITLES = {
+    "force": "contact force",
+    "pressure_max": "largest pressure",
+    "pressure_pole": "pressure at the axis",
+    "contact_radius": "contact radius",
+    "von_mises_max": "largest von Mises stress",
+    "von_mises_depth": "depth of the largest von Mises stress",
+    "pressure_error": "pressure against theory at equal approach, relative L2 norm",
+    "pressure_error_equal_force": "pressure against theory at equal force, relative L2 norm",
+}
+UNIT_KINDS = {
+    "force": "force",
+    "pressure_max": "pressure",
+    "pressure_pole": "pressure",
+    "contact_radius": "length",
+    "von_mises_max": "pressure",
+    "von_mises_depth": "length",
+    "pressure_error": "",
+    "pressure_error_equal_force": "",
+}
+COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
+
+
+def title(quantity: str) -> str:
+    """Return a quantity in words; ``"C1.stress.yy"`` and the like stay as they are."""
+    return TITLES.get(quantity, quantity)
+
+
+def unit(quantity: str, units: dict[str, str]) -> str:
+    """Return the name of a quantity's unit, empty for ratios."""
+    kind = UNIT_KINDS.get(quantity)
+    if kind is None:
+        kind = "length" if ".displacement." in quantity else "pressure"
+    return units[kind] if kind else ""
+
+
+def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
+    """Return every quantity of interest of a solved case; forces, lengths and stresses in the case's units.
+
+    Parameters
+    ----------
+    case : Case
+    last : StepResult
+        State to measure.
+    pair : str or None
+        Contact pair; None leaves out what belongs to a contact.
+    """
+    found: dict[str, float] = {}
+    if pair is not None:
+        found |= _of_contact(case, last.contact[pair], pair)
+    value, where = peak(case.mesh, last.von_mises, case.model.kinematics == "axisymmetric")
+    found["von_mises_max"] = value
+    if pair is not None:
+        found["von_mises_depth"] = _depth(case, pair, where)
+    for name, point in case.probes.items():
+        found |= _of_probe(name, point, last)
+    return found
+
+
+def _of_contact(case: Case, contact: ContactResult, pair: str) -> dict[str, float]:
+    found = {
+        "force": float(np.linalg.norm(contact.force)),
+        "pressure_max": contact.pressure_max,
+        "contact_radius": contact_radius(contact),
+    }
+    at_axis = np.abs(contact.coordinates[:, 0]) <= 1e-9 * np.ptp(contact.coordinates, axis=0).max()
+    if at_axis.any():
+        found["pressure_pole"] = float(contact.pressure[at_axis][0])
+    theory = case.theories.get(pair, {}).get("theory")
+    if hasattr(theory, "pressure") and case.mesh.dim == 2:
+        side = secondary(case, pair)
+        found["pressure_error"] = pressure_error(case, side, contact, theory)
+        at_force = getattr(theory, "at_force", None)
+        if at_force is not None and found["force"] > 0:
+            same = at_force(found["force"])
+            found["pressure_error_equal_force"] = pressure_error(case, side, contact, same)
+    return found
+
+
+def secondary(case: Case, pair: str) -> Surface:
+    """Return the secondary surface of a contact pair."""
+    return surface(case.mesh, next(p.secondary for p in case.model.contact if p.name == pair))
+
+
+def contact_radius(contact: ContactResult) -> float:
+    """Return the distance from the axis at which the pressure goes to zero [length]; NaN without contact.
+
+    Near the edge of a smooth contact the square of the pressure is linear in the square of the distance (Hertz: over
+    the whole contact). A line through the closed nodes beyond 0.4 of the radius, but for the last two, where the edge
+    cuts through a facet, tells where it ends; the bracket of the outermost closed and the first open point bounds it.
+    Where the pressure does not fall towards the edge (a punch), the end of the bracket is the answer.
+    """
+    inside, outside = contact.radius
+    if not np.isfinite(inside):
+        return float("nan")
+    outside = outside if np.isfinite(outside) else inside
+    r = np.abs(contact.coordinates[:, 0])
+    used = np.flatnonzero(contact.active & (contact.pressure > 0) & (r > 0.4 * inside) & (r < outside))
+    used = used[np.argsort(r[used])]
+    if len(used) < 3:
+        return float(0.5 * (inside + outside))
+    kept = used[:-2] if len(used) >= 5 else used
+    slope, start = np.polyfit((r[kept] / outside) ** 2, (contact.pressure[kept] / contact.pressure.max()) ** 2, 1)
+    if slope >= 0:
+        return float(outside)
+    return float(np.clip(outside * np.sqrt(max(-start / slope, 0.0)), inside, outside))
+
+
+def pressure_error(case: Case, side: Surface, contact: ContactResult, theory: Any) -> float:
+    """Return the L2 norm of pressure minus theory over the secondary reference surface, relative to the theory's."""
+    element = elements.get(side.element)
+    xi, weights = quadrature.gauss_line(6)
+    shape = element.shape(xi)
+    points = case.mesh.points
+    area = facet_measure(side.facets, side.element, points, xi, case.model.kinematics == "axisymmetric") * weights
+    exact = theory.pressure(np.abs(points[side.facets][:, :, 0] @ shape.T))
+    off = contact.pressure[side.local] @ shape.T - exact
+    return float(np.sqrt((area * off**2).sum() / (area * exact**2).sum()))
+
+
+def peak(mesh: Mesh, values: Array, axisymmetric: bool) -> tuple[float, Array]:
+    """Return the largest value of a nodal field and where it is, between the nodes.
+
+    On the axis, a polynomial is fitted to the nodes along it that reach 97 % of the largest value, where there are
+    enough of them. Else a quadratic function is fitted to the nodes around the largest one (on the axis: even in the
+    radius); its vertex counts if it is a maximum within the ring of these nodes, and else the node does.
+    """
+    top = int(np.argmax(values))
+    on_axis = axisymmetric and abs(mesh.points[top, 0]) <= 1e-9 * np.abs(mesh.points).max()
+    found = _along_axis(mesh, values, top) if on_axis else None
+    if found is not None:
+        return found
+    ring = _around(mesh, top)
+    x = (mesh.points[ring] - mesh.points[top]).T
+    size = np.abs(x).max()
+    vertex = _vertex(x / size, values[ring], on_axis) if mesh.dim == 2 and size > 0 else None
+    if vertex is None:
+        return float(values[top]), mesh.points[top].copy()
+    return vertex[0], mesh.points[top] + size * vertex[1]
+
+
+def _along_axis(mesh: Mesh, values: Array, top: int) -> tuple[float, Array] | None:
+    """Return the maximum of a quartic through the axis nodes near `top` in its body; None with fewer than eight."""
+    line = np.flatnonzero(np.abs(mesh.points[:, 0]) <= 1e-9 * np.abs(mesh.points).max())
+    _, body = bodies(mesh)
+    line = line[body[line] == body[top]]
+    line = line[np.argsort(mesh.points[line, 1])]
+    low = values[line] < 0.97 * values[top]
+    here = int(np.flatnonzero(line == top)[0])
+    first = int(np.flatnonzero(low[:here])[-1]) + 1 if low[:here].any() else 0
+    last = here + int(np.flatnonzero(low[here:])[0]) if low[here:].any() else len(line)
+    near = line[first:last]
+    if len(near) < 8 or not first <= here - 2 or not here + 2 < last:
+        return None
+    y, size = mesh.points[near, 1] - mesh.points[top, 1], np.ptp(mesh.points[near, 1])
+    curve = np.polynomial.Polynomial.fit(y / size, values[near], 4)
+    turning = curve.deriv().roots()
+    inside = turning[np.isreal(turning)].real
+    inside = inside[(inside > (y / size).min()) & (inside < (y / size).max())]
+    if not len(inside):
+        return None
+    best = inside[np.argmax(curve(inside))]
+    return float(curve(best)), mesh.points[top] + np.array([0.0, best * size])
+
+
+def _around(mesh: Mesh, point: int) -> NDArray[np.int32]:
+    near = [block[(block == point).any(axis=1)].ravel() for block in mesh.solids.values()]
+    return np.unique(np.concatenate(near))
+
+
+def _vertex(x: Array, v: Array, on_axis: bool) -> tuple[float, Array] | None:
+    a, b = x
+    terms = [np.ones_like(a), b, b * b, a * a] if on_axis else [np.ones_like(a), b, b * b, a * a, a, a * b]
+    system = np.column_stack(terms)
+    if len(v) < len(terms) or np.linalg.cond(system) > 1e4:
+        return None
+    c = np.linalg.lstsq(system, v, rcond=None)[0]
+    c = np.append(c, np.zeros(6 - len(c)))
+    hessian = np.array([[2 * c[3], c[5]], [c[5], 2 * c[2]]])
+    if on_axis:
+        hessian[0, 0] = -1.0  # whatever the curvature across, the vertex is on the axis
+    if not (np.linalg.eigvalsh(hessian) < 0).all():
+        return None
+    place = np.linalg.solve(hessian, -np.array([c[4], c[1]]))
+    value = float(c[0] + 0.5 * (c[4] * place[0] + c[1] * place[1]))
+    if np.abs(place).max() > 1.0 or abs(value - v.max()) > 0.5 * np.ptp(v):
+        return None
+    return value, place
+
+
+def _depth(case: Case, pair: str, where: Array) -> float:
+    """Return the distance of a place from the nearer side of a contact pair."""
+    sides = next((p.secondary, p.primary) for p in case.model.contact if p.name == pair)
+    nodes = np.concatenate([case.mesh.points[case.mesh.points_of(side)] for side in sides])
+    return float(np.linalg.norm(nodes - where, axis=1).min())
+
+
+def _of_probe(name: str, point: int, last: StepResult) -> dict[str, float]:
+    found = {f"{name}.von_mises": float(last.von_mises[point])}
+    for component, value in zip(COMPONENTS, last.stress[point], strict=False):
+        found[f"{name}.stress.{component}"] = float(value)
+    for axis, value in zip("xyz", last.displacement[point], strict=False):
+        found[f"{name}.displacement.{axis}"] = float(value)
+    for contact in last.contact.values():
+        at = np.flatnonzero(contact.points == point)
+        if len(at):
+            found[f"{name}.pressure"] = float(contact.pressure[at[0]])
+    return found
+
+
+def mesh_size(case: Case, pair: str | None) -> float:
+    """Return the length of the shortest facet of the secondary surface, or without contact of the shortest edge."""
+    if pair is None:
+        return quality(case.mesh).shortest_edge
+    side = secondary(case, pair)
+    ends = case.mesh.points[side.facets]
+    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min())
+
+
+def of_theory(theory: Any) -> dict[str, float]:
+    """Return what a theory says of the quantities of interest, those it knows."""
+    found = {}
+    for quantity, attribute in (("force", "force"), ("pressure_max", "pressure_max"), ("contact_radius", "radius")):
+        if hasattr(theory, attribute):
+            found[quantity] = float(getattr(theory, attribute))
+    if hasattr(theory, "pressure"):
+        found["pressure_pole"] = float(theory.pressure(0.0))
+    if hasattr(theory, "von_mises_maximum"):
+        greatest = theory.von_mises_maximum()
+        found |= {"von_mises_max": greatest.value, "von_mises_depth": greatest.depth}
+    return {quantity: value for quantity, value in found.items() if np.isfinite(value) and value > 0}

@@ -1,0 +1,214 @@
+"""The ``[study]`` table of a case file: where the meshes of a study come from, and what to compare on them."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from fastcontact.cases.case import Case
+from fastcontact.contact.formulations import FORMULATIONS
+from fastcontact.errors import CaseError, unknown
+from fastcontact.mesh import elements
+from fastcontact.mesh.generate import Circle
+
+SHAPES = {"triangles": ("tri3", "tri6"), "quadrangles": ("quad4", "quad8", "quad9")}
+# What "all" stands for.
+ALL_ELEMENTS = ("quad4", "quad8", "tri3", "tri6")
+
+
+@dataclass(frozen=True)
+class Combination:
+    """An element and a contact formulation; `element` is None for the mesh's own cells where they are mixed."""
+
+    element: str | None
+    formulation: str | None
+
+    def __str__(self) -> str:
+        parts = (self.element or "mixed cells", (self.formulation or "no contact").replace("_", "-"))
+        return " ".join(parts)
+
+    @property
+    def rank(self) -> tuple[int, int, int]:
+        """The greater, the more accurate it usually is: pressure fields, quadratic cells, quadrangles."""
+        order = elements.get(self.element).order if self.element else 0
+        return int(self.formulation != "node_to_segment"), order, int((self.element or "").startswith("quad"))
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A study's settings, checked.
+
+    Attributes
+    ----------
+    data : dict
+        The parsed case file.
+    own : Combination
+        Element and formulation of the case itself.
+    pair : str or None
+        The contact pair that is measured.
+    generator : str or None
+        None where a mesh file is refined.
+    arguments : dict
+        Arguments of the generator on level 0, by shape (``"triangles"``, ``"quadrangles"``), or by ``""`` for the
+        case's own, whatever the element.
+    halve, double : tuple of str or None
+        Names of the generator's arguments to halve or double per level; None: the known ones.
+    curves : tuple of Circle or None
+        True shapes of a mesh file's boundary; None: the circles found.
+    load_steps : int or None
+        Load steps of the study; None: the case's.
+    options : dict
+        Options of the formulations, by formulation.
+    quantities : tuple of str
+        To fit and to show, besides the standard ones.
+    combinations : tuple of Combination
+        To compare where nothing else is asked.
+    parameters : dict
+        Named sets of linked paths for sweeps.
+    """
+
+    data: dict[str, Any]
+    own: Combination
+    pair: str | None
+    generator: str | None
+    arguments: dict[str, dict[str, Any]]
+    halve: tuple[str, ...] | None = None
+    double: tuple[str, ...] | None = None
+    curves: tuple[Circle, ...] | None = None
+    load_steps: int | None = None
+    options: dict[str, dict[str, Any]] = field(default_factory=dict)
+    quantities: tuple[str, ...] = ()
+    combinations: tuple[Combination, ...] = ()
+    parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+
+def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
+    """Return the settings of a case's studies; `data` stand for the parsed case file with some values changed.
+
+    Raises
+    ------
+    CaseError
+        If a value of ``[study]`` is wrong.
+    """
+    data = tomllib.loads(case.text) if data is None else data
+    study = data.get("study", {})
+    pair = study.get("contact") or next((pair.name for pair in case.model.contact), None)
+    if pair is not None and pair not in {p.name for p in case.model.contact}:
+        raise CaseError(unknown("contact pair in study.contact", pair, [p.name for p in case.model.contact]))
+    formulation = next((p.formulation for p in case.model.contact if p.name == pair), None)
+    solids = list(case.mesh.solids)
+    own = Combination(solids[0] if len(solids) == 1 else None, formulation)
+    generator, arguments = _generator(data, study)
+    for name in study.get("options", {}):
+        if name not in FORMULATIONS:
+            raise CaseError(unknown("formulation in study.options", name, FORMULATIONS))
+    combinations = tuple(_combination(entry) for entry in study.get("combinations", ())) or (own,)
+    return Settings(
+        data=data,
+        own=own,
+        pair=pair,
+        generator=generator,
+        arguments=arguments,
+        halve=tuple(study["halve"]) if "halve" in study else None,
+        double=tuple(study["double"]) if "double" in study else None,
+        curves=tuple(_circle(i, entry) for i, entry in enumerate(study["curves"])) if "curves" in study else None,
+        load_steps=study.get("load_steps"),
+        options=study.get("options", {}),
+        quantities=tuple(study.get("quantities", ())),
+        combinations=combinations,
+        parameters=study.get("parameters", {}),
+    )
+
+
+def _generator(data: dict[str, Any], study: dict[str, Any]) -> tuple[str | None, dict[str, dict[str, Any]]]:
+    by_shape = {shape: dict(study[shape]) for shape in SHAPES if shape in study}
+    generator = study.get("generator", data["mesh"].get("generator"))
+    if by_shape and generator is None:
+        raise CaseError(f"study.{next(iter(by_shape))} needs 'study.generator', the mesh maker it is meant for")
+    if not by_shape and "generator" in study and study["generator"] != data["mesh"].get("generator"):
+        raise CaseError("'study.generator' needs the arguments of level 0 in [study.triangles] or [study.quadrangles]")
+    if by_shape or generator is None:
+        return generator, by_shape
+    kept = {key: value for key, value in data["mesh"].items() if key not in ("generator", "element")}
+    return generator, {"": kept}
+
+
+def _circle(index: int, entry: Any) -> Circle:
+    try:
+        return Circle(tuple(entry["centre"]), float(entry["radius"]), entry.get("group"))
+    except (TypeError, KeyError, ValueError) as error:
+        raise CaseError(
+            f"study.curves[{index}] must be {{ group = 'NAME', centre = [x, y], radius = R }}, not {entry!r}"
+        ) from error
+
+
+def _combination(entry: Any) -> Combination:
+    words = entry.split() if isinstance(entry, str) else list(entry)
+    if len(words) != 2:
+        raise CaseError(f"an entry of study.combinations must name an element and a formulation, not {entry!r}")
+    return _checked(words[0], words[1].replace("-", "_"))
+
+
+def _checked(element: str | None, formulation: str | None) -> Combination:
+    if element is not None and element not in elements.ELEMENTS:
+        raise CaseError(unknown("element", element, elements.ELEMENTS))
+    if formulation is not None and formulation not in FORMULATIONS:
+        raise CaseError(unknown("contact formulation", formulation, FORMULATIONS))
+    return Combination(element, formulation)
+
+
+def combinations(
+    settings: Settings, names: Sequence[str] | None, formulations: Sequence[str] | None
+) -> tuple[Combination, ...]:
+    """Return the combinations to compare: every element with every formulation, or without both the case's choice.
+
+    Raises
+    ------
+    CaseError
+        If an element or a formulation is unknown, or cannot be made of this case's mesh.
+    """
+    if names is None and formulations is None:
+        return settings.combinations
+    chosen = [settings.own.element] if names is None else list(names)
+    if names is not None and list(names) == ["all"]:
+        chosen = [name for name in ALL_ELEMENTS if makeable(settings, name)]
+    how = [settings.own.formulation] if formulations is None else [name.replace("-", "_") for name in formulations]
+    if formulations is not None and list(formulations) == ["all"]:
+        how = list(FORMULATIONS)
+    if settings.pair is None and formulations is not None:
+        raise CaseError("this case has no contact pair, so there are no formulations to compare")
+    return tuple(_checked(element, formulation) for element in chosen for formulation in how)
+
+
+def one_combination(settings: Settings, element: str | None, formulation: str | None) -> Combination:
+    """Return the last combination of ``[study]`` with this element and formulation, where given; else make one of them.
+
+    Raises
+    ------
+    CaseError
+        If the element or the formulation is unknown.
+    """
+    formulation = formulation.replace("-", "_") if formulation else None
+    for known in reversed(settings.combinations):
+        if element in (None, known.element) and formulation in (None, known.formulation):
+            return known
+    last = settings.combinations[-1]
+    return _checked(element or last.element, formulation or last.formulation)
+
+
+def makeable(settings: Settings, element: str) -> bool:
+    """Whether meshes of this element can be made for the case."""
+    if settings.generator is None:
+        own = settings.own.element
+        return own is not None and elements.get(own).linear == elements.get(element).linear
+    if "" in settings.arguments:
+        own = settings.own.element
+        return own is None or elements.get(own).linear == elements.get(element).linear
+    return shape_of(element) in settings.arguments
+
+
+def shape_of(element: str) -> str:
+    """Return ``"triangles"`` or ``"quadrangles"``; empty for other cells."""
+    return next((shape for shape, members in SHAPES.items() if element in members), "")
