@@ -8,16 +8,16 @@ from starting import ROOT, finished, start
 
 # Each calls kernels itself, on sizes that compile in seconds rather than minutes.
 KERNEL_TESTS = (
-    "tests/unit/test_clip.py",
-    "tests/unit/test_coulomb.py",
-    "tests/unit/test_friction_kernels.py",
-    "tests/unit/test_linear_multigrid.py",
-    "tests/unit/test_norms.py",
-    "tests/unit/test_own_pivots.py",
-    "tests/unit/test_peeling.py",
-    "tests/unit/test_search.py",
-    "tests/unit/test_search_3d.py",
-    "tests/unit/test_symmetric_factors.py",
+    "tests/unit/contact/test_clip.py",
+    "tests/unit/analysis/test_coulomb.py",
+    "tests/unit/analysis/test_friction_kernels.py",
+    "tests/unit/linear/test_linear_multigrid.py",
+    "tests/unit/_jit/test_norms.py",
+    "tests/unit/linear/test_own_pivots.py",
+    "tests/unit/linear/test_peeling.py",
+    "tests/unit/contact/test_search.py",
+    "tests/unit/contact/test_search_3d.py",
+    "tests/unit/linear/test_symmetric_factors.py",
 )
 
 

@@ -7,7 +7,7 @@ import pytest
 import fastcontact as fc
 from fastcontact.cases.case import read_case
 
-CASES = sorted((Path(__file__).resolve().parents[2] / "data" / "cases").glob("*.toml"))
+CASES = sorted((Path(__file__).resolve().parents[3] / "data" / "cases").glob("*.toml"))
 
 
 @pytest.mark.filterwarnings("ignore::fastcontact.errors.FastcontactWarning")  # one case warns on purpose

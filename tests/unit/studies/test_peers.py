@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-FOLDER = Path(__file__).resolve().parents[2] / "bench" / "peers"
+FOLDER = Path(__file__).resolve().parents[3] / "bench" / "peers"
 # Of code_aster's training case, mesh-converged; the smallest mesh is 0.7 % stiffer.
 FORCE = 659_773.14
 

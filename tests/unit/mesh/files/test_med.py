@@ -20,7 +20,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.med import write_med_results
 from fastcontact.results.step import ContactResult, StepResult
 
-CASES = Path(__file__).resolve().parents[4] / "shared" / "cases"
+CASES = Path(__file__).resolve().parents[5] / "shared" / "cases"
 FLAT = {name: element for name, element in elements.ELEMENTS.items() if element.dim <= 2}
 
 

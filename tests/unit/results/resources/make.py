@@ -1,6 +1,6 @@
 """Write the result files of this version that later versions must read, with what they hold told in JSON beside them.
 
-    python tests/unit/io/resources/make.py
+    python tests/unit/results/resources/make.py
 
 To be run once when `_result_layout.SCHEMA` is raised, before the release; existing files are never replaced. Small runs
 with all that a file can hold: friction, an obstacle, cell fields, warnings, the restart state.
