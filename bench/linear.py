@@ -17,6 +17,7 @@ import argparse
 import json
 import resource
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +26,10 @@ import numpy as np
 from scipy.sparse import csr_array
 
 import fastcontact as fc
-from fastcontact.analysis.analysis import Analysis, near_nullspace
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.extrapolation import Extrapolation
+from fastcontact.analysis.load_step import load_step
+from fastcontact.analysis.problem import Problem, near_nullspace, prepare
+from fastcontact.contact.configuration import Configuration
 from fastcontact.linear.krylov import krylov_kernels
 from fastcontact.linear.multigrid import hierarchy
 from fastcontact.linear.solvers.amg import Amg
@@ -94,12 +96,12 @@ def bytes_per_iteration(solver: Amg) -> int:
     return K.nbytes + (0 if K.rest is None else K.rest.nbytes) + own + across
 
 
-def linear_solution(analysis: Analysis, tolerance: float) -> dict[str, Any]:
+def linear_solution(problem: Problem, tolerance: float) -> dict[str, Any]:
     """Solve for the full loads without contact; the second of two runs counts."""
-    solver = analysis.solver
+    solver = problem.solver
     solver.tolerance = tolerance
-    lift = analysis._lift(1.0)
-    loaded = solver.load(analysis.system.right(np.zeros_like(lift), lift))
+    lift = problem.load_at(1.0).lift
+    loaded = solver.load(problem.system.right(np.zeros_like(lift), lift))
     none = csr_array((0, len(lift))), np.empty(0)
     for _ in range(2):
         before = solver.counters.iterations
@@ -107,19 +109,13 @@ def linear_solution(analysis: Analysis, tolerance: float) -> dict[str, Any]:
     return {"cpu_s": cpu, "wall_s": wall, "iterations": solver.counters.iterations - before}
 
 
-def restart(analysis: Analysis, tolerance: float, ramp: fc.Ramp) -> None:
-    """Bring an analysis back to the beginning, with its matrices and hierarchy."""
-    analysis.solver.tolerance = tolerance
-    analysis.criteria, analysis.ramp = Criteria(geometry=tolerance), ramp
-    analysis.u = np.zeros_like(analysis.u)
-    analysis.active, analysis.pressure, analysis.extrapolation = {}, {}, Extrapolation()
-
-
-def steps(analysis: Analysis, count: int, tolerance: float, contact: dict[str, Any]) -> None:
-    """Run an analysis on a prepared hierarchy and add its work to `contact`."""
-    solver, ramp = analysis.solver, fc.linear_ramp(count)
+def steps(problem: Problem, count: int, tolerance: float, contact: dict[str, Any]) -> None:
+    """Run a problem on a prepared hierarchy and add its work to `contact`."""
+    solver, ramp = problem.solver, fc.linear_ramp(count)
     assert isinstance(solver, Amg)
-    restart(analysis, tolerance, ramp)
+    solver.tolerance = tolerance
+    problem = replace(problem, criteria=Criteria(geometry=tolerance), ramp=ramp)
+    state = problem.initial_state()
     cpu, before = 0.0, solver.counters.iterations
     inside = [0.0]
     solution = solver.solution
@@ -132,71 +128,73 @@ def steps(analysis: Analysis, count: int, tolerance: float, contact: dict[str, A
     solver.solution = measured
     updates = 0
     for index, instant in enumerate(ramp.instants, start=1):
-        result, seconds, _ = timed(lambda index=index, instant=instant: analysis.step(index, instant))
+        (state, result), seconds, _ = timed(
+            lambda at=state, index=index, instant=instant: load_step(problem, at, index, instant)
+        )
         cpu += seconds
         updates += result.iterations["geometry_updates"] + 1
     solver.solution = solution
     contact |= {"cpu_s": cpu, "solver_cpu_s": inside[0], "iterations": solver.counters.iterations - before,
-                "pairings": updates, "active": int(analysis.active["c"].sum()), "setups": solver.counters.setups}  # fmt: skip
+                "pairings": updates, "active": int(state.active["c"].sum()), "setups": solver.counters.setups}  # fmt: skip
 
 
-def prepared(problem: str, dofs: int) -> tuple[Analysis, float]:
-    """Return an analysis with its hierarchy, and the CPU seconds that took."""
-    model = {"box": box, "blocks": blocks, "sphere": sphere}[problem](dofs)
+def prepared(name: str, dofs: int) -> tuple[Problem, float]:
+    """Return a problem with its hierarchy, and the CPU seconds that took."""
+    model = {"box": box, "blocks": blocks, "sphere": sphere}[name](dofs)
     seconds: list[float] = []
-    prepare = Amg.prepare
+    prepare_solver = Amg.prepare
 
     def measured(*arguments: Any, **options: Any) -> Any:
-        result, cpu, _ = timed(lambda: prepare(*arguments, **options))
+        result, cpu, _ = timed(lambda: prepare_solver(*arguments, **options))
         seconds.append(cpu)
         return result
 
     Amg.prepare = measured  # type: ignore[method-assign]
     try:
-        analysis = Analysis(model, "amg", 1e-8, Criteria())
-        return analysis, seconds[-1]
+        problem = prepare(model, fc.linear_ramp(), Criteria(), linear_solver="amg", linear_tolerance=1e-8)
+        return problem, seconds[-1]
     finally:
-        Amg.prepare = prepare  # type: ignore[method-assign]
+        Amg.prepare = prepare_solver  # type: ignore[method-assign]
 
 
-def measure(problem: str, dofs: int, count: int, with_pyamg: bool) -> dict[str, Any]:
+def measure(name: str, dofs: int, count: int, with_pyamg: bool) -> dict[str, Any]:
     bandwidth = triad()
-    analysis, setup = prepared(problem, 5_000)  # compiles
-    analysis, setup = prepared(problem, dofs)
-    solver, model = analysis.solver, analysis.model
+    problem, setup = prepared(name, 5_000)  # compiles
+    problem, setup = prepared(name, dofs)
+    solver, model = problem.solver, problem.model
     assert isinstance(solver, Amg)
     n = model.n_dofs
-    found: dict[str, Any] = {"problem": problem, "n_dofs": n, "threads": numba.get_num_threads()}
+    found: dict[str, Any] = {"problem": name, "n_dofs": n, "threads": numba.get_num_threads()}
     found |= {"triad_GB_per_cpu_s": bandwidth, "setup_cpu_s": setup}
     if with_pyamg:
         import pyamg
         from scipy.sparse import bsr_matrix
 
         options = {"strength": ("symmetric", {"theta": 0.0}), "smooth": "energy", "max_coarse": 50}
-        K, modes = bsr_matrix(solver.K.restored()), analysis.system.unknowns_of(near_nullspace(model))
+        K, modes = bsr_matrix(solver.K.restored()), problem.system.unknowns_of(near_nullspace(model))
         _, found["pyamg_setup_cpu_s"], _ = timed(lambda: pyamg.smoothed_aggregation_solver(K, B=modes, **options))
-    L = linear_solution(analysis, 1e-8)
+    L = linear_solution(problem, 1e-8)
     per = 1e9 / (n * L["iterations"])
     L |= {"ns_per_dof_iteration_cpu": L["cpu_s"] * per, "ns_per_dof_iteration_wall": L["wall_s"] * per}
     L["GB_per_cpu_s"] = 1e-9 * bytes_per_iteration(solver) * L["iterations"] / L["cpu_s"]
     L["part_of_triad"] = L["GB_per_cpu_s"] / bandwidth
     found |= {"linear": L, "hierarchy": repr(solver)}
-    if problem == "blocks":
-        rows = analysis.pairs["c"].constraints(np.zeros(model.mesh.points.shape))
-        lift = analysis._lift(1.0)
-        B, gap0 = analysis.system.rows(rows.B, rows.gap0, lift)
+    if name == "blocks":
+        rows = problem.pairs["c"].constraints(Configuration.undeformed(model.mesh.points))
+        lift = problem.load_at(1.0).lift
+        B, gap0 = problem.system.rows(rows.B, rows.gap0, lift)
         use = np.flatnonzero(np.diff(B.indptr) > 0)
-        loaded = solver.load(analysis.system.right(np.zeros_like(lift), lift))
+        loaded = solver.load(problem.system.right(np.zeros_like(lift), lift))
         for _ in range(2):
             before = solver.counters.iterations
             _, cpu, _ = timed(lambda: loaded.solve(B[use], -gap0[use]))
         found["tied"] = {"cpu_s": cpu, "iterations": solver.counters.iterations - before, "equations": len(use)}
-    if problem == "sphere":
-        steps(analysis, 1, 1e-2, {})  # compiles
-        found["linear_1e-4"] = linear_solution(analysis, 1e-4)
+    if name == "sphere":
+        steps(problem, 1, 1e-2, {})  # compiles
+        found["linear_1e-4"] = linear_solution(problem, 1e-4)
         for name, number, tolerance in (("cold", 1, 1e-8), ("steps", count, 1e-8), ("steps_1e-4", count, 1e-4)):
             found[name] = {}
-            steps(analysis, number, tolerance, found[name])
+            steps(problem, number, tolerance, found[name])
             unit = found["linear_1e-4" if tolerance > 1e-6 else "linear"]
             found[name] |= {
                 "iterations_in_L": found[name]["iterations"] / unit["iterations"],

@@ -15,8 +15,9 @@ from scipy.sparse.linalg import splu
 
 import fastcontact as fc
 from fastcontact._jit import decorators as _jit
-from fastcontact.analysis.analysis import Analysis, near_nullspace
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.load_step import load_step
+from fastcontact.analysis.problem import near_nullspace, prepare
 from fastcontact.errors import FastcontactError, unknown
 from fastcontact.linear import choice as linear
 from fastcontact.studies.benchmark.timing import peak_bytes
@@ -62,31 +63,32 @@ def forma04c(dofs):
 PROBLEMS = {"sphere-on-block": (sphere_on_block, "amg"), "forma04c": (forma04c, "auto")}
 
 
-def matrix_of(analysis):
-    """Return the matrix of an analysis, also where its solver has taken that over."""
-    matrix = analysis.system.matrix
+def matrix_of(problem):
+    """Return the matrix of a problem, also where its solver has taken that over."""
+    matrix = problem.system.matrix
     return matrix if isinstance(matrix, bsr_array) else matrix.restored()
 
 
-def prepared(analysis, solver, matrix):
-    modes = analysis.system.unknowns_of(near_nullspace(analysis.model))
-    own = matrix is not analysis.system.matrix
-    solver.prepare(matrix, modes, analysis.system.involved(analysis.surface_dofs), own)
+def prepared(problem, solver, matrix):
+    modes = problem.system.unknowns_of(near_nullspace(problem.model))
+    own = matrix is not problem.system.matrix
+    solver.prepare(matrix, modes, problem.system.involved(problem.contact_dofs), own)
     return solver
 
 
-def fresh(analysis, name):
-    tolerance = analysis.criteria.geometry
-    return linear.make(name, dim=analysis.model.mesh.dim, n_dofs=analysis.model.n_dofs, tolerance=tolerance)
+def fresh(problem, name):
+    tolerance = problem.criteria.geometry
+    return linear.make(name, dim=problem.model.mesh.dim, n_dofs=problem.model.n_dofs, tolerance=tolerance)
 
 
 def started(model, name, count, tolerance=TOLERANCE):
-    return Analysis(model, name, tolerance, Criteria(geometry=tolerance), fc.linear_ramp(count))
+    criteria = Criteria(geometry=tolerance)
+    return prepare(model, fc.linear_ramp(count), criteria, linear_solver=name, linear_tolerance=tolerance)
 
 
-def linear_solution(analysis, solver):
-    lift = analysis._lift(1.0)
-    loaded = solver.load(analysis.system.right(np.zeros_like(lift), lift))
+def linear_solution(problem, solver):
+    lift = problem.load_at(1.0).lift
+    loaded = solver.load(problem.system.right(np.zeros_like(lift), lift))
     before = solver.counters.iterations
     loaded.solve(csr_array((0, len(lift))), np.empty(0))
     return solver.counters.iterations - before
@@ -98,9 +100,10 @@ def cpu(work):
     return result, time.process_time() - before
 
 
-def steps(analysis):
-    for index, instant in enumerate(analysis.ramp.instants, start=1):
-        analysis.step(index, instant)
+def steps(problem):
+    state = problem.initial_state()
+    for index, instant in enumerate(problem.ramp.instants, start=1):
+        state, _ = load_step(problem, state, index, instant)
 
 
 def detailed(problem, dofs, solver=None, tolerance=TOLERANCE):
@@ -114,27 +117,27 @@ def detailed(problem, dofs, solver=None, tolerance=TOLERANCE):
     return {"problem": problem, **found, "peak_bytes": peak_bytes(), "threads": _jit.threads()}
 
 
-def measured_linear(analysis, name):
+def measured_linear(problem, name):
     """Return iterations and the CPU seconds of preparation and solution; its solver is gone afterwards."""
-    matrix = matrix_of(analysis)
-    solver, setup = cpu(lambda: prepared(analysis, fresh(analysis, name), matrix))
-    iterations, solution = cpu(lambda: linear_solution(analysis, solver))
+    matrix = matrix_of(problem)
+    solver, setup = cpu(lambda: prepared(problem, fresh(problem, name), matrix))
+    iterations, solution = cpu(lambda: linear_solution(problem, solver))
     return iterations, setup, solution
 
 
 def figures(model, name, tolerance):
-    analysis = started(model, name, 1, tolerance)
-    iterations, setup, solution = measured_linear(analysis, name)
+    problem = started(model, name, 1, tolerance)
+    iterations, setup, solution = measured_linear(problem, name)
     L = setup + solution
-    _, cold = cpu(lambda: steps(analysis))
-    del analysis
-    analysis = started(model, name, 20, tolerance)
-    counters = analysis.solver.counters
+    _, cold = cpu(lambda: steps(problem))
+    del problem
+    problem = started(model, name, 20, tolerance)
+    counters = problem.solver.counters
     before = counters.iterations
-    _, twenty = cpu(lambda: steps(analysis))
+    _, twenty = cpu(lambda: steps(problem))
     return {
         "n_dofs": model.n_dofs,
-        **against_factorisation(analysis, setup + cold, setup + twenty),
+        **against_factorisation(problem, setup + cold, setup + twenty),
         "linear": {"cpu_s": L, "iterations": iterations, "setup_cpu_s": setup},
         "cold_step": {"cpu_s": setup + cold, "ratio_to_linear": (setup + cold) / L},
         "twenty_steps": {
@@ -144,12 +147,12 @@ def figures(model, name, tolerance):
     }  # fmt: skip
 
 
-def against_factorisation(analysis, cold, twenty):
+def against_factorisation(problem, cold, twenty):
     """Return what one factorisation takes, in two dimensions, and both times in units of it."""
-    if analysis.model.mesh.dim != 2:
+    if problem.model.mesh.dim != 2:
         return {}
-    name, factorise = ("cholmod", by_cholmod) if analysis.solver.name == "cholmod" else ("superlu", by_superlu)
-    one = factorise(matrix_of(analysis).tocsc())
+    name, factorise = ("cholmod", by_cholmod) if problem.solver.name == "cholmod" else ("superlu", by_superlu)
+    one = factorise(matrix_of(problem).tocsc())
     return {name: {"cpu_s": one, "cold_step": cold / one, "twenty_steps": twenty / one}}
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 import fastcontact as fc
-from fastcontact.analysis.analysis import Analysis, near_nullspace
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.problem import near_nullspace, prepare
 from fastcontact.linear import choice as linear
 
 SIZES = (1_500, 6_000, 20_000)
@@ -16,10 +16,10 @@ def works(size):
     model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
     model.fix("ZMIN", "xyz")
     model.prescribe("ZMAX", x=0.0, y=0.0, z=-0.01)
-    analysis = Analysis(model, "amg", 1e-8, Criteria())
-    K, modes = analysis.system.matrix.restored(), analysis.system.unknowns_of(near_nullspace(model))
-    lift = analysis._lift(1.0)
-    right = analysis.system.right(np.zeros_like(lift), lift)
+    problem = prepare(model, fc.linear_ramp(), Criteria(), linear_solver="amg", linear_tolerance=1e-8)
+    K, modes = problem.system.matrix.restored(), problem.system.unknowns_of(near_nullspace(model))
+    lift = problem.load_at(1.0).lift
+    right = problem.system.right(np.zeros_like(lift), lift)
 
     def solution(name):
         solver = linear.make(name, dim=3, n_dofs=model.n_dofs, tolerance=1e-8)

@@ -1,10 +1,13 @@
-"""Which displacements a pairing finds: all of them, or those of the contact surfaces, where all else may wait.
+"""The displacement components that a pairing solves for: all of them, or those of the contact surfaces alone.
 
-Both kinds of scope say the same things about vectors that hold their displacements, or their unknowns, alone.
+A direct solver condenses the stiffness to the contact surfaces; then all other displacements follow once, when the contact
+forces of the load step are known. Both kinds of active components have the same methods.
 """
 
 from __future__ import annotations
 
+import copy
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -12,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact._jit.norms_kernels import largest
+from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.system import System
 from fastcontact.linear.protocol import Loaded
 
@@ -19,147 +23,175 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
-class Scope(Protocol):
-    """See the module; `u` and `lift` (n,) below are of all displacements, `part` (k,) and `v` (l,) of the scope's.
+class ActiveDofs(Protocol):
+    """See the module; `u` and `lift` (n,) are of all components, `part` (k,) of the active ones, `v` (l,) unknowns [length].
 
     Attributes
     ----------
     compared : ndarray of int
-        Which of the scope's displacements contact looks at.
+        Which of the active components contact depends on.
     """
 
     compared: Indices
 
-    def begin(self, u: Array, lift: Array) -> Array:
-        """Begin a step at displacements `u` with what supports prescribe in it; return displacements to go on with."""
+    def for_step(self, u: Array, lift: Array) -> ActiveDofs:
+        """Return the active components in a load step that begins at `u`, with prescribed displacements `lift`."""
         ...
 
     def loaded(self, loaded: Loaded) -> Loaded:
-        """Return the prepared matrix and its right-hand side for the unknowns of the scope."""
+        """Return the prepared matrix and its right-hand side for the active unknowns."""
         ...
 
     def of(self, u: Array) -> Array:
-        """Return the displacements of the scope."""
+        """Return the active components of displacements."""
         ...
 
     def put(self, u: Array, part: Array) -> Array:
-        """Return all displacements once those of the scope are `part`."""
+        """Return all displacements once the active ones are `part`; may write into `u`."""
         ...
 
     def rows(self, rows: csr_array, offset: Array, lift: Array) -> tuple[csr_array, Array]:
-        """Return ``rows @ u + offset`` as rows and offset for the unknowns of the scope."""
+        """Return ``rows @ u + offset`` as rows and offset (m,) [length] for the active unknowns."""
         ...
 
     def unknowns(self, u: Array, lift: Array) -> Array:
-        """Return the unknowns of displacements that obey supports and relations."""
+        """Return the active unknowns of displacements that obey supports and relations."""
         ...
 
     def displacement(self, v: Array, lift: Array) -> Array:
-        """Return the displacements of the scope."""
+        """Return the active components."""
         ...
 
     def size(self, v: Array) -> float:
-        """Return the largest of all unknowns, those beyond the scope as they were when the step began."""
+        """Return the largest of all unknowns, those that are not active as they were when the step began."""
         ...
 
     def scale(self, u: Array, lift: Array) -> float:
-        """Return the largest displacement and the largest one that supports prescribe, added."""
+        """Return the sum of the largest displacement and the largest one that supports prescribe."""
         ...
 
 
-class Everything:
-    """All displacements; see `Scope`.
+def constraints_on_unknowns(dofs: ActiveDofs, constraints: Constraints, lift: Array, start: Array) -> Constraints:
+    """Return constraints on all displacements as constraints on the active unknowns.
+
+    Parameters
+    ----------
+    dofs : ActiveDofs
+    constraints : Constraints
+    lift : ndarray (n,)
+        Prescribed displacements [length].
+    start : ndarray (n,)
+        Displacements at the beginning of the load step, from where slip is measured [length].
+    """
+    B, gap0 = dofs.rows(constraints.B, constraints.gap0, lift)
+    drift = constraints.drift if constraints.drift is not None else np.zeros((len(constraints.tangents), 1))
+    slips = [own - T @ start for T, own in zip(constraints.tangents, drift, strict=True)]
+    pairs = [dofs.rows(T, slip, lift) for T, slip in zip(constraints.tangents, slips, strict=True)]
+    tangents = tuple(T for T, _ in pairs)
+    return replace(
+        constraints, B=B, gap0=gap0, tangents=tangents, drift=np.stack([s for _, s in pairs]) if pairs else None
+    )
+
+
+class AllDofs:
+    """All displacement components; see `ActiveDofs`.
 
     Parameters
     ----------
     system : System
-    dofs : ndarray of int
-        Displacements that constraints may involve.
+    contact_dofs : ndarray of int
+        Components that constraints may involve.
     """
 
-    def __init__(self, system: System, dofs: Indices) -> None:
-        self.compared = dofs
+    def __init__(self, system: System, contact_dofs: Indices) -> None:
+        self.compared = contact_dofs
         self.rows, self.unknowns, self.displacement = system.rows, system.unknowns, system.displacement
 
-    def begin(self, u: Array, lift: Array) -> Array:
-        """See `Scope`."""
-        return u
+    def for_step(self, u: Array, lift: Array) -> AllDofs:
+        """See `ActiveDofs`."""
+        return self
 
     def loaded(self, loaded: Loaded) -> Loaded:
-        """See `Scope`."""
+        """See `ActiveDofs`."""
         return loaded
 
     def of(self, u: Array) -> Array:
-        """See `Scope`."""
+        """See `ActiveDofs`."""
         return u
 
     def put(self, u: Array, part: Array) -> Array:
-        """See `Scope`."""
+        """See `ActiveDofs`."""
         return part
 
     def size(self, v: Array) -> float:
-        """See `Scope`."""
+        """See `ActiveDofs`."""
         return largest(v)
 
     def scale(self, u: Array, lift: Array) -> float:
-        """See `Scope`."""
+        """See `ActiveDofs`."""
         return largest(lift) + largest(u)
 
 
-class Surfaces:
-    """The displacements of contact surfaces, for solvers that know the compliance of their unknowns; see `Scope`.
+class SurfaceDofs:
+    """The components of the contact surfaces, for solvers that condense the stiffness to them; see `ActiveDofs`.
 
     Parameters
     ----------
     system : System
-    dofs : ndarray of int (k,)
-        Displacements that constraints may involve, ascending.
+    contact_dofs : ndarray of int (k,)
+        Components that constraints may involve, ascending.
     unknowns : ndarray of int (l,)
         Unknowns that they depend on, ascending; see `System.involved`.
     """
 
-    def __init__(self, system: System, dofs: Indices, unknowns: Indices) -> None:
-        self._system, self._dofs, self._unknowns = system, dofs, unknowns
-        self.compared = np.arange(len(dofs))
-        # Columns of constraints as places among the unknowns, or, where relations stand between, the displacements.
-        columns = unknowns if system.T is None else dofs
+    def __init__(self, system: System, contact_dofs: Indices, unknowns: Indices) -> None:
+        self._system, self._dofs, self._unknowns = system, contact_dofs, unknowns
+        self.compared = np.arange(len(contact_dofs))
+        # Columns of constraints as places among the unknowns, or, where relations stand between, the components.
+        columns = unknowns if system.T is None else contact_dofs
         self._place = np.full(len(system.free), -1, np.intp)
         self._place[columns] = np.arange(len(columns))
         self._columns = len(columns)
         if system.T is None:
-            self._own = np.searchsorted(dofs, unknowns)
+            self._own = np.searchsorted(contact_dofs, unknowns)
         else:
-            self._T = csr_array(system.T[dofs][:, unknowns])
+            self._T = csr_array(system.T[contact_dofs][:, unknowns])
 
-    def begin(self, u: Array, lift: Array) -> Array:
-        """See `Scope`."""
-        self._lift = lift[self._dofs]
-        self._prescribed = largest(lift)
+    # Of one load step, see `for_step`.
+    _lift: Array
+    _prescribed: float
+    _beyond: float
+    _unknown_beyond: float
+
+    def for_step(self, u: Array, lift: Array) -> SurfaceDofs:
+        """See `ActiveDofs`."""
+        step = copy.copy(self)
+        step._lift, step._prescribed = lift[self._dofs], largest(lift)
         beyond = u.copy()
         beyond[self._dofs] = 0.0
-        self._beyond = largest(beyond)
+        step._beyond = largest(beyond)
         beyond = self._system.unknowns(u, lift)
         beyond[self._unknowns] = 0.0
-        self._unknown_beyond = largest(beyond)
-        return u.copy()
+        step._unknown_beyond = largest(beyond)
+        return step
 
     def loaded(self, loaded: Loaded) -> Loaded:
-        """See `Scope`."""
+        """See `ActiveDofs`."""
         condensed = loaded.condensed()
         assert condensed is not None
         return condensed
 
     def of(self, u: Array) -> Array:
-        """See `Scope`."""
+        """See `ActiveDofs`."""
         return u[self._dofs]
 
     def put(self, u: Array, part: Array) -> Array:
-        """See `Scope`; changes `u` in place, which `begin` returned."""
+        """See `ActiveDofs`; writes into `u`."""
         u[self._dofs] = part
         return u
 
     def rows(self, rows: csr_array, offset: Array, lift: Array) -> tuple[csr_array, Array]:
-        """See `Scope`."""
+        """See `ActiveDofs`."""
         offset = offset + rows @ lift
         place = self._place[rows.indices]
         kept = (place >= 0) & (rows.data != 0.0)
@@ -171,11 +203,11 @@ class Surfaces:
         return own, offset
 
     def unknowns(self, u: Array, lift: Array) -> Array:
-        """See `Scope`."""
+        """See `ActiveDofs`."""
         return u[self._unknowns] - lift[self._unknowns]
 
     def displacement(self, v: Array, lift: Array) -> Array:
-        """See `Scope`."""
+        """See `ActiveDofs`."""
         part = self._lift.copy()
         if self._system.T is None:
             part[self._own] += v
@@ -184,9 +216,9 @@ class Surfaces:
         return part
 
     def size(self, v: Array) -> float:
-        """See `Scope`."""
+        """See `ActiveDofs`."""
         return max(self._unknown_beyond, largest(v))
 
     def scale(self, u: Array, lift: Array) -> float:
-        """See `Scope`."""
+        """See `ActiveDofs`."""
         return self._prescribed + max(self._beyond, largest(self.of(u)))

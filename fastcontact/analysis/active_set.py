@@ -17,106 +17,22 @@ is the method above from some start. A state counts as settled only from a finis
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Protocol
-
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
-from fastcontact.contact.constraints import Compliance
+from fastcontact.analysis.accuracy import Accuracy
+from fastcontact.analysis.solution import Equilibrium
+from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.protocol import Loaded
 
 Array = NDArray[np.float64]
-Active = NDArray[np.bool_]
+Mask = NDArray[np.bool_]
 # Unfinished solutions that may be left in all.
 EARLY = 40
 
 
-class State(Protocol):
-    """What every inequality solver returns; see `Equilibrium`."""
-
-    @property
-    def u(self) -> Array:
-        """See `Equilibrium`."""
-        ...
-
-    @property
-    def multiplier(self) -> Array:
-        """See `Equilibrium`."""
-        ...
-
-    @property
-    def gap(self) -> Array:
-        """See `Equilibrium`."""
-        ...
-
-    @property
-    def active(self) -> Active:
-        """See `Equilibrium`."""
-        ...
-
-    @property
-    def wanted(self) -> Active:
-        """See `Equilibrium`."""
-        ...
-
-    @property
-    def settled(self) -> bool:
-        """See `Equilibrium`."""
-        ...
-
-    @property
-    def iterations(self) -> int:
-        """See `Equilibrium`."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class Equilibrium:
-    """A solution under a set of active constraints.
-
-    Attributes
-    ----------
-    u : ndarray (n,)
-    multiplier, gap : ndarray (m,)
-        Of all constraints; the multiplier of inactive ones is zero.
-    active : ndarray of bool (m,)
-        The set this is the solution of.
-    wanted : ndarray of bool (m,)
-        The set its signs ask for; equal to `active` when every inequality holds.
-    iterations : int
-        Linear solutions made.
-    """
-
-    u: Array
-    multiplier: Array
-    gap: Array
-    active: Active
-    wanted: Active
-    iterations: int
-    sizes: list[int] = field(default_factory=list)
-
-    @property
-    def settled(self) -> bool:
-        """Whether all inequalities hold."""
-        return bool(np.array_equal(self.active, self.wanted))
-
-
 def solve(
-    loaded: Loaded,
-    B: csr_array,
-    gap0: Array,
-    usable: Active,
-    *,
-    compliance: Compliance | None = None,
-    held: Active | None = None,
-    active: Active,
-    gap_tolerance: float,
-    multiplier_tolerance: float = 1e-12,
-    max_iterations: int = 200,
-    guess: Array | None = None,
-    tolerance: float | None = None,
+    loaded: Loaded, constraints: Constraints, active: Mask, accuracy: Accuracy, guess: Array | None = None
 ) -> Equilibrium:
     """Find the displacement and the contact forces that satisfy every inequality.
 
@@ -124,75 +40,98 @@ def solve(
     ----------
     loaded : Loaded
         Matrix and right-hand side, from a linear solver.
-    B : csr_array (m, n)
-    gap0 : ndarray (m,)
-    usable : ndarray of bool (m,)
-        Constraints that may become active at all.
-    compliance : Compliance, optional
-        C above.
-    held : ndarray of bool (m,), optional
-        Constraints that are equations: always active, with multipliers of either sign.
+    constraints : Constraints
+        Rows for the unknowns of the solver; an empty row is a constraint that cannot become active.
     active : ndarray of bool (m,)
         Set to start from.
-    gap_tolerance : float
-        A gap above minus this counts as open or closed, not as penetration.
-    multiplier_tolerance : float
-        A multiplier above minus this fraction of the largest one counts as compression.
-    max_iterations : int
-        Linear solutions allowed; the result may then not be settled.
+    accuracy : Accuracy
     guess : ndarray (n,), optional
-        Displacement to start iterative solvers from.
-    tolerance : float, optional
-        Relative residual for iterative solvers where less than their own tolerance will do.
+        Unknowns to start iterative solvers from [length].
 
     Returns
     -------
     Equilibrium
     """
-    equations = usable & held if held is not None else np.zeros(len(gap0), bool)
-    active = (active & usable) | equations
+    signs = _Signs(constraints, accuracy)
+    active = (active & signs.usable) | signs.equations
     seen: set[bytes] = set()
-    single = False
-    sizes: list[int] = []
     left: set[bytes] = set()
+    one_by_one = False
     iteration = 1
     while True:
-        rows = np.flatnonzero(active)
-        C = compliance.block(rows) if compliance is not None else None
-        watch = None
-        if C is None and len(left) < EARLY and active.tobytes() not in left:
-            watch = _Watch(B, gap0, active, usable, equations, gap_tolerance, multiplier_tolerance)
-        u, forces = loaded.solve(B[rows], -gap0[rows], C, guess, watch, tolerance)
+        may_leave = constraints.normal_compliance is None and len(left) < EARLY and active.tobytes() not in left
+        watch = _Watch(signs, active) if may_leave else None
+        u, forces = _under(loaded, constraints, active, accuracy, guess, watch)
+        guess = u
         if watch is not None and watch.wanted is not None:
             left.add(active.tobytes())
-            active, guess = watch.wanted, u
+            active = watch.wanted
             continue
-        multiplier = np.zeros(len(gap0))
-        multiplier[rows] = forces
-        gap = gap0 + B @ u
-        if compliance is not None:
-            gap += compliance.apply(multiplier)
-        largest = np.abs(forces).max(initial=0.0)
-        wanted = np.where(active, multiplier > -multiplier_tolerance * largest, gap < -gap_tolerance) & usable
-        wanted |= equations
-        sizes.append(len(rows))
-        state = Equilibrium(u, multiplier, gap, active, wanted, iteration, sizes)
-        if state.settled or iteration == max_iterations:
-            return state
+        found = signs.of(u, forces, active, iteration)
+        if found.settled or iteration == accuracy.max_iterations:
+            return found
         seen.add(active.tobytes())
-        single = single or wanted.tobytes() in seen
-        if single:
-            active = active.copy()
-            first = np.flatnonzero(active != wanted)[0]
-            active[first] = wanted[first]
-        else:
-            active = wanted
-        guess = u
+        one_by_one = one_by_one or found.wanted.tobytes() in seen
+        active = _first_changed(active, found.wanted) if one_by_one else found.wanted
         iteration += 1
 
 
+def _under(
+    loaded: Loaded, constraints: Constraints, active: Mask, accuracy: Accuracy, guess: Array | None,
+    watch: _Watch | None,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return the unknowns (n,) and the multipliers of the active constraints, which hold as equations."""
+    rows = np.flatnonzero(active)
+    compliance = constraints.normal_compliance
+    C = compliance.block(rows) if compliance is not None else None
+    return loaded.solve(constraints.B[rows], -constraints.gap0[rows], C, guess, watch, accuracy.residual)
+
+
+def _first_changed(active: Mask, wanted: Mask) -> Mask:
+    """Return the active set with only the first of the wanted changes."""
+    active = active.copy()
+    first = np.flatnonzero(active != wanted)[0]
+    active[first] = wanted[first]
+    return active
+
+
+class _Signs:
+    """Which constraints a solution wants active: by the signs of gaps and multipliers, beyond their tolerances."""
+
+    def __init__(self, constraints: Constraints, accuracy: Accuracy) -> None:
+        self._constraints, self._accuracy = constraints, accuracy
+        self.usable = constraints.usable
+        none = np.zeros(len(constraints), bool)
+        self.equations: Mask = none if constraints.equality is None else self.usable & constraints.equality
+
+    def of(self, u: Array, forces: Array, active: Mask, iteration: int) -> Equilibrium:
+        """Return the solution with unknowns (n,) and forces of the active constraints, with the set it wants."""
+        multiplier = np.zeros(len(active))
+        multiplier[active] = forces
+        gap = self._constraints.gap0 + self._constraints.B @ u
+        compliance = self._constraints.normal_compliance
+        if compliance is not None:
+            gap += compliance.apply(multiplier)
+        pull = self._accuracy.multiplier * np.abs(forces).max(initial=0.0)
+        wanted = self._wanted(multiplier, gap, active, pull, self._accuracy.gap)
+        return Equilibrium(u, multiplier, gap, active, wanted, iteration)
+
+    def unfinished(self, u: Array, forces: Array, active: Mask, error: float) -> Mask:
+        """Return the set that an unfinished solution with errors of relative size `error` asks for."""
+        multiplier = np.zeros(len(active))
+        multiplier[active] = forces
+        gap = self._constraints.gap0 + self._constraints.B @ u
+        pull = max(self._accuracy.multiplier, error) * float(np.abs(forces).max(initial=0.0))
+        return self._wanted(
+            multiplier, gap, active, pull, max(self._accuracy.gap, error * float(np.abs(u).max(initial=0.0)))
+        )
+
+    def _wanted(self, multiplier: Array, gap: Array, active: Mask, pull: float, penetration: float) -> Mask:
+        return np.where(active, multiplier > -pull, gap < -penetration) & self.usable | self.equations
+
+
 class _Watch:
-    """Looks at unfinished solutions for a set of active constraints, and says when to leave; see `linear.Monitor`.
+    """Looks at unfinished solutions, and ends them when their signs ask for another set; see `linear.protocol.Monitor`.
 
     Attributes
     ----------
@@ -200,21 +139,12 @@ class _Watch:
         The set that the last solution looked at asks for; None where that is the present one.
     """
 
-    def __init__(
-        self, B: csr_array, gap0: Array, active: Active, usable: Active, equations: Active, gap_tolerance: float,
-        multiplier_tolerance: float,
-    ) -> None:  # fmt: skip
-        self.B, self.gap0, self.active, self.usable, self.equations = B, gap0, active, usable, equations
-        self.gap_tolerance, self.multiplier_tolerance = gap_tolerance, multiplier_tolerance
-        self.wanted: Active | None = None
+    def __init__(self, signs: _Signs, active: Mask) -> None:
+        self._signs, self._active = signs, active
+        self.wanted: Mask | None = None
 
     def __call__(self, u: Array, forces: Array, error: float) -> bool:
         """Return whether the signs ask for another set; errors of relative size `error` do not count."""
-        gap = self.gap0 + self.B @ u
-        open_gap = max(self.gap_tolerance, error * float(np.abs(u).max(initial=0.0)))
-        pull = max(self.multiplier_tolerance, error) * float(np.abs(forces).max(initial=0.0))
-        multiplier = np.zeros(len(gap))
-        multiplier[self.active] = forces
-        wanted = np.where(self.active, multiplier > -pull, gap < -open_gap) & self.usable | self.equations
-        self.wanted = None if np.array_equal(wanted, self.active) else wanted
+        wanted = self._signs.unfinished(u, forces, self._active, error)
+        self.wanted = None if np.array_equal(wanted, self._active) else wanted
         return self.wanted is not None

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.analysis.active_set import State
-from fastcontact.analysis.friction.friction import FrictionalEquilibrium
+from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.obstacles.rigid_side import RigidSide
@@ -14,83 +16,95 @@ from fastcontact.contact.pairing import normals
 from fastcontact.results.step import ContactResult
 
 Array = NDArray[np.float64]
-# Penetration under a penalty that is worth a warning, relative to the largest displacement.
-DEEP = 0.01
+Mask = NDArray[np.bool_]
 
 
 def contact_result(
-    name: str, pair: Formulation, part: Constraints, state: State, displacement: Array, rows: slice
-) -> ContactResult:
-    """Return the state of one pair, whose constraints `part` are the `rows` of the solution."""
+    name: str, pair: Formulation, part: Constraints, solution: Solution, rows: slice, at: Configuration,
+    axis: tuple[Array, Array] | None = None,
+) -> ContactResult:  # fmt: skip
+    """Return the state of one pair at the end of a load step.
+
+    Parameters
+    ----------
+    name : str
+    pair : Formulation
+    part : Constraints
+        Those of the pair in the last pairing.
+    solution : Solution
+        Of all pairs; those of this one are its `rows`.
+    rows : slice
+    at : Configuration
+        At the end of the step.
+    axis : (ndarray (dim,), ndarray (dim,)), optional
+        In space, where the bodies met first [length] and the normal there [-].
+    """
     points, dim = pair.secondary.points, pair.points.shape[1]
-    multiplier, active = state.multiplier[rows], state.active[rows]
-    excluded = pair.terms.excluded_nodes(pair.secondary)
-    own = pair.forces(multiplier)
-    field = np.where(excluded, 0.0, pair.pressure(own))
-    gap, normal = pair.nodal_gap(displacement)
-    closed = _closed_nodes(pair, part, active, gap, field) & ~excluded
-    forces = part.B.T @ multiplier
+    multiplier, active = solution.multiplier[rows], solution.active[rows]
+    excluded = pair.options.excluded_nodes(pair.secondary)
+    pressure = np.where(excluded, 0.0, part.pressure(multiplier))
+    gap, normal = pair.nodal_gap(at)
+    closed = _closed_nodes(pair, part, active, gap, pressure, at) & ~excluded
+    tangential = None
     shear, sticking, dissipation = np.zeros((len(points), dim)), closed.copy(), 0.0
-    if pair.tie is not None:
-        normal = pair.nodal_gap(np.zeros_like(displacement))[1]  # the equations are those of the bodies at rest
-        shear = _nodal_shear(pair, pair.tie.directions, pair.tie.forces(multiplier)[1], normal)
-    if isinstance(state, FrictionalEquilibrium) and part.tangents:
-        tangential, slip = state.tangential[rows], state.slip[rows]
-        for rows_along, along in zip(part.tangents, tangential.T, strict=True):
-            forces = forces + rows_along.T @ along
+    if part.tied is not None:
+        normal = pair.nodal_gap(replace(at, displacement=np.zeros_like(at.displacement)))[
+            1
+        ]  # the bodies at rest are tied
+        shear = _nodal_shear(part, part.tied.directions, part.tied.forces(multiplier)[1], normal)
+    if isinstance(solution, FrictionalEquilibrium) and part.tangents:
+        tangential, slip = solution.tangential[rows], solution.slip[rows]
         dissipation = float(-(tangential * slip).sum())
-        shear = _nodal_shear(pair, part.directions, tangential, normal, own)
-        sticking = closed & _mostly_sticking(pair, state.sticking[rows], multiplier, field)
-    forces = forces.reshape(-1, dim)[points]
+        shear = _nodal_shear(part, part.directions, tangential, normal, part.normal_forces(multiplier))
+        sticking = closed & _mostly_sticking(part, solution.sticking[rows], multiplier, pressure)
+    forces = _nodal_forces(part, multiplier, tangential).reshape(-1, dim)[points]
     total = forces.sum(axis=0)
     if pair.axisymmetric:
         total[0] = 0.0  # radial forces cancel over the full circle
+    coordinates = pair.points[points]
     return ContactResult(
         name=name,
         formulation=pair.name,
         points=points,
-        coordinates=pair.points[points],
-        abscissa=pair.secondary.abscissa if dim == 2 else _distance(pair, pair.points[points]),
+        coordinates=coordinates,
+        abscissa=pair.secondary.abscissa if axis is None else _distance(coordinates, axis),
         gap=gap,
-        pressure=np.where(closed, field if part.held is not None else np.maximum(field, 0.0), 0.0),
-        multiplier=field,
+        pressure=np.where(closed, pressure if part.equality is not None else np.maximum(pressure, 0.0), 0.0),
+        multiplier=pressure,
         force_vectors=forces,
         normal=normal,
         active=closed,
         force=total,
-        radius=_radius(_distance(pair, part.positions), active),
+        radius=_radius(_distance(part.positions, axis), active),
         shear=np.where(closed[:, None], shear, 0.0),
         sticking=sticking,
         dissipation=dissipation,
-        obstacle_displacement=pair.primary.now.copy() if isinstance(pair.primary, RigidSide) else None,
+        obstacle_displacement=at.obstacle.copy() if isinstance(pair.primary, RigidSide) else None,
     )
 
 
-def deep(pair: Formulation, contact: ContactResult, displacement: Array) -> list[str]:
-    """Return a warning where a penalty lets the sides penetrate by much of the largest displacement."""
-    size = float(np.abs(displacement).max(initial=0.0))
-    penalty, depth = pair.terms.penalty, contact.penetration
-    if penalty is None or depth <= DEEP * size:
-        return []
-    return [
-        f"contact '{contact.name}' penetrates by {depth:.4g}, which is {depth / size:.1%} of the largest displacement: "
-        f"raise its penalty from {penalty:.4g} to about {penalty * depth / (DEEP * size):.2g}, or leave it out"
-    ]
+def _nodal_forces(part: Constraints, multiplier: Array, tangential: Array | None) -> Array:
+    """Return the nodal contact forces (n_dofs,) of a pair, with friction if there are tangential forces (m, k)."""
+    forces = part.B.T @ multiplier
+    for rows, along in zip(part.tangents, () if tangential is None else tangential.T):
+        forces = forces + rows.T @ along
+    return np.asarray(forces)
 
 
 def _closed_nodes(
-    pair: Formulation, part: Constraints, active: NDArray[np.bool_], gap: Array, field: Array
-) -> NDArray[np.bool_]:
+    pair: Formulation, part: Constraints, active: Mask, gap: Array, pressure: Array, at: Configuration
+) -> Mask:
     """Return which secondary nodes are in contact: by their pressure, or because they never open again."""
-    if pair.terms.always_closed:
+    if pair.options.always_closed:
         return np.isfinite(gap)
-    closed = pair.closed_nodes(active, gap, field)
-    for_good = pair.closed_for_good(pair.points[pair.secondary.points])
+    assert part.nodal is not None
+    closed = part.nodal.closed_nodes(active, gap, pressure)
+    for_good = pair.never_opening(pair.points[pair.secondary.points], at)
     return closed if for_good is None else closed | for_good
 
 
 def _nodal_shear(
-    pair: Formulation,
+    part: Constraints,
     directions: tuple[Array, ...],
     tangential: Array,
     normal: Array,
@@ -101,32 +115,32 @@ def _nodal_shear(
     Frames turn from point to point: the traction is that of the Cartesian components of the forces, and its part along
     the nodal normals is no shear.
     """
+    assert part.nodal is not None
     forces = np.einsum("nk,ndk->nd", tangential, np.stack(directions, axis=2))
     if along_normal is not None:
         forces += along_normal[:, None] * normals(directions)
-    traction = np.column_stack([pair.pressure(component) for component in forces.T])
+    traction = np.column_stack([part.nodal.pressure(component) for component in forces.T])
     return traction - np.einsum("nd,nd->n", traction, normal)[:, None] * normal
 
 
-def _mostly_sticking(
-    pair: Formulation, sticking: NDArray[np.bool_], multiplier: Array, field: Array
-) -> NDArray[np.bool_]:
+def _mostly_sticking(part: Constraints, sticking: Mask, multiplier: Array, pressure: Array) -> Mask:
     """Return the nodes to which more force comes from sticking constraints than from sliding ones."""
-    if len(sticking) == len(field):
+    if len(sticking) == len(pressure):
         return sticking
-    return pair.pressure(np.where(sticking, multiplier, 0.0)) > 0.5 * field
+    assert part.nodal is not None
+    return part.nodal.pressure(np.where(sticking, multiplier, 0.0)) > 0.5 * pressure
 
 
-def _distance(pair: Formulation, positions: Array) -> Array:
-    """Return the distances (n,) of reference positions from the axis x = 0; in 3D from that of the first contact."""
-    if positions.shape[1] == 2:
+def _distance(positions: Array, axis: tuple[Array, Array] | None) -> Array:
+    """Return the distances (n,) of reference positions from the axis x = 0, or from another axis (place, direction)."""
+    if axis is None:
         return np.abs(positions[:, 0])
-    foot, axis = pair.first_contact
+    foot, direction = axis
     arm = positions - foot
-    return np.linalg.norm(arm - (arm @ axis)[:, None] * axis, axis=1)
+    return np.linalg.norm(arm - (arm @ direction)[:, None] * direction, axis=1)
 
 
-def _radius(distance: Array, active: NDArray[np.bool_]) -> tuple[float, float]:
+def _radius(distance: Array, active: Mask) -> tuple[float, float]:
     """Return the distance of the outermost active constraint and of the next one beyond it."""
     if not active.any():
         return float("nan"), float("nan")

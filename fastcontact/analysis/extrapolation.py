@@ -2,56 +2,66 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+# Gaps [length] and multipliers (m,) of a pair.
+GapsAndForces = tuple[Array, Array]
 # Loads that grow by more than so many last increments at once are not extrapolated to.
 FARTHEST = 2.0
 
 
+@dataclass(frozen=True, eq=False)
 class Extrapolation:
-    """Remembers the last two converged steps and extends them linearly.
+    """The last converged load steps, at most two, and the linear extension of them to the present load.
 
     Attributes
     ----------
     ratio : float
         The present load increment in units of the last one; zero where there is nothing to extend.
+    loads : tuple of ndarray
+        The loads of the present and of the last two steps.
+    states : tuple of (ndarray (n,), dict of str to GapsAndForces)
+        Displacements [length], and gaps and multipliers by pair, of the last two converged steps.
     """
 
-    def __init__(self) -> None:
-        self.ratio = 0.0
-        self._loads: list[Array] = []
-        self._states: list[tuple[Array, dict[str, tuple[Array, Array]]]] = []
+    ratio: float = 0.0
+    loads: tuple[Array, ...] = ()
+    states: tuple[tuple[Array, Mapping[str, GapsAndForces]], ...] = ()
 
-    def load(self, *parts: Array) -> None:
-        """Take the loads of the step that begins: prescribed displacements and forces, each its own array."""
+    def to(self, *parts: Array) -> Extrapolation:
+        """Return the extension to the loads of the next step: prescribed displacements and forces, each its own array."""
         moved = next((part for part in parts if part.any()), parts[0])
-        self._loads = [*self._loads[-2:], moved.copy()]
-        self.ratio = 0.0
-        if len(self._states) == 2 and len(self._loads) == 3 and len({len(load) for load in self._loads}) == 1:
-            now, last = self._loads[2] - self._loads[1], self._loads[1] - self._loads[0]
+        loads, ratio = (*self.loads[-2:], moved.copy()), 0.0
+        if len(self.states) == 2 and len(loads) == 3 and len({len(load) for load in loads}) == 1:
+            now, last = loads[2] - loads[1], loads[1] - loads[0]
             size = float(np.sum(last * last))
-            ratio = float(np.sum(now * last)) / size if size else 0.0
-            self.ratio = ratio if 0.0 < ratio <= FARTHEST else 0.0
+            found = float(np.sum(now * last)) / size if size else 0.0
+            ratio = found if 0.0 < found <= FARTHEST else 0.0
+        return Extrapolation(ratio, loads, self.states)
 
-    def converged(self, u: Array, contact: dict[str, tuple[Array, Array]]) -> None:
-        """Take the solution of the step: displacements (n,) and, by pair, gaps and multipliers (m,)."""
-        self._states = [*self._states[-1:], (u.copy(), contact)]
+    def converged(self, u: Array, contact: Mapping[str, GapsAndForces]) -> Extrapolation:
+        """Return it with the solution of the step: displacements (n,) [length], gaps and multipliers by pair."""
+        return replace(self, states=(*self.states[-1:], (u.copy(), contact)))
 
     def displacement(self, u: Array) -> Array:
-        """Return the displacements (n,) to start from; `u` are the last ones."""
+        """Return the displacements (n,) to start from [length]; `u` (n,) are the last ones."""
         if not self.ratio:
             return u
-        (before, _), (last, _) = self._states
+        (before, _), (last, _) = self.states
         return last + self.ratio * (last - before)
 
     def active(self, name: str, last_active: Mask) -> Mask:
-        """Return the active set to start a pair from; `last_active` (m,) is the last one."""
+        """Return the active set (m,) to start a pair from; `last_active` (m,) is the last one."""
         if not self.ratio:
             return last_active
-        (_, first), (_, second) = self._states
+        (_, first), (_, second) = self.states
         if name not in first or name not in second:
             return last_active
         (gap0, force0), (gap1, force1) = first[name], second[name]
@@ -60,3 +70,30 @@ class Extrapolation:
         with np.errstate(invalid="ignore"):  # gaps of nodes that face nothing are infinite
             gap, force = gap1 + self.ratio * (gap1 - gap0), force1 + self.ratio * (force1 - force0)
         return np.where(last_active, force > 0.0, gap < 0.0)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data, without the last displacements."""
+        return {
+            "loads": [_sparse(load) for load in self.loads[-2:]],
+            "before": self.states[0][0] if len(self.states) == 2 else None,
+            "contact": [{name: list(both) for name, both in contact.items()} for _, contact in self.states],
+        }
+
+    @classmethod
+    def from_dict(cls, kept: Mapping[str, Any], u: Array) -> Extrapolation:
+        """Return what `to_dict` kept; `u` (n,) are the last displacements [length]."""
+        displacements = [u] if kept["before"] is None else [kept["before"], u]
+        contacts = [{name: (both[0], both[1]) for name, both in contact.items()} for contact in kept["contact"]]
+        states = tuple(zip(displacements, contacts)) if contacts else ()
+        return cls(0.0, tuple(_dense(load) for load in kept["loads"]), states)
+
+
+def _sparse(values: Array) -> dict[str, Any]:
+    places = np.flatnonzero(values)
+    return {"size": len(values), "places": places, "values": values[places]}
+
+
+def _dense(kept: Mapping[str, Any]) -> Array:
+    values = np.zeros(kept["size"])
+    values[kept["places"]] = kept["values"]
+    return values

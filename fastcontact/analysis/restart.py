@@ -1,37 +1,32 @@
-"""What the next load step owes to the steps before it, as plain data: taken when a step ends, put back to go on from it.
+"""Restart data: what a later process needs to continue an analysis, as plain numbers, strings and arrays.
 
-`step_control` knows what a step changes in an analysis. Of that, a step result holds the displacements; the rest that a
-step does not set anew as it begins is here. What later iterates owe to earlier ones in their last digits is here too
-(where active sets, extrapolations and linear solvers start from), so that an analysis that goes on repeats an
-uninterrupted one bit for bit.
+It is the state at the end of a step, but for the displacements, which the result of the step holds; what the linear solver
+has learnt; and what tells the case from others. The state includes what later iterates owe to earlier ones in their last
+digits, so that an analysis that continues repeats an uninterrupted one bit for bit.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fastcontact._jit.parallel import on_one_blas_thread
-from fastcontact.analysis.analysis import Analysis
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.analysis.extrapolation import Extrapolation
+from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.state import State
 from fastcontact.errors import ModelError
 from fastcontact.model.fingerprint import different, fingerprint
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, table_value
 from fastcontact.results.step import StepResult
 
-Array = NDArray[np.float64]
 FORMAT = 1
 # Criteria that an answer depends on; others are limits and tolerances.
 ANSWER = ("geometry_updates", "keep_pairing")
 # Instants that differ by less than this part of their size are one.
 SAME_INSTANT = 1e-12
-# Numbers of an analysis that grow from step to step.
-NUMBERS = ("largest_force", "largest_work", "round_off")
 
 
 def identity(model: Model, ramp: Ramp, criteria: Criteria) -> dict[str, Any]:
@@ -59,39 +54,30 @@ def check(step: StepResult, case: dict[str, Any]) -> None:
         )
 
 
-def taken(analysis: Analysis, case: dict[str, Any]) -> dict[str, Any]:
-    """Return the state after a step; `case` from `identity`."""
-    solver, n = analysis.solver, analysis.model.n_dofs
-    state: dict[str, Any] = {
-        "format": FORMAT,
-        "case": case,
-        "numbers": {name: float(getattr(analysis, name)) for name in NUMBERS},
-        "obstacles": analysis.u[n:].copy(),
-        "active": dict(analysis.active),
-        "pressure": dict(analysis.pressure),
-        "pairs": {name: _of_pair(pair) for name, pair in analysis.pairs.items()},
-        "solver": {"kind": _kind(solver), "memory": solver.memory()},
-    }
+def taken(problem: Problem, state: State, case: dict[str, Any]) -> dict[str, Any]:
+    """Return what a later process needs to continue after a step; `case` from `identity`."""
+    solver, kept = problem.solver, state.to_dict(problem.model.n_dofs)
+    extrapolation = kept.pop("extrapolation")
+    kept = {"format": FORMAT, "case": case, **kept, "solver": {"kind": _kind(solver), "memory": solver.memory()}}
     if solver.iterative:  # only then do steps start from extrapolated ones
-        state["extrapolation"] = _of_extrapolation(analysis.extrapolation)
-    return state
+        kept["extrapolation"] = extrapolation
+    return kept
 
 
 @on_one_blas_thread
-def put_back(analysis: Analysis, step: StepResult) -> None:
-    """Let a fresh analysis go on after `step`, which `check` has found to fit."""
-    state = step.restart
-    assert state is not None
-    analysis.u = np.concatenate([step.displacement.ravel(), state["obstacles"]])
-    for name, value in state["numbers"].items():
-        setattr(analysis, name, value)
-    analysis.active, analysis.pressure = dict(state["active"]), dict(state["pressure"])
-    for name, kept in state["pairs"].items():
-        _to_pair(analysis.pairs[name], kept)
-    if state["solver"]["kind"] == _kind(analysis.solver):
-        analysis.solver.remember(state["solver"]["memory"])
-    if analysis.solver.iterative and "extrapolation" in state:
-        _to_extrapolation(analysis.extrapolation, state["extrapolation"], analysis.u)
+def put_back(problem: Problem, step: StepResult, touched: frozenset[str]) -> State:
+    """Return the state after `step`, which `check` has found to fit; the linear solver remembers what it had learnt.
+
+    `touched` are the contact pairs that were closed at the end of a step so far.
+    """
+    kept = step.restart
+    assert kept is not None
+    if kept["solver"]["kind"] == _kind(problem.solver):
+        problem.solver.remember(kept["solver"]["memory"])
+    state = State.from_dict(kept, step.displacement, touched)
+    if not problem.solver.iterative:
+        state = replace(state, extrapolation=Extrapolation())
+    return replace(state, solver=problem.solver.snapshot())
 
 
 def remaining(ramp: Ramp, last: StepResult | None) -> list[float]:
@@ -112,52 +98,3 @@ def _history(table: Sequence[Sequence[float]], end: float, other: Sequence[Seque
 def _kind(solver: Any) -> list[Any]:
     """Return what solvers that take each other's memory share."""
     return [getattr(solver, "name", type(solver).__name__), solver.tolerance]
-
-
-def _of_pair(pair: Any) -> dict[str, Any]:
-    kept: dict[str, Any] = {"closed": None, "now": None, "first_contact": None}
-    if pair._closed is not None:
-        kept["closed"] = list(pair._closed)
-    if isinstance(pair.primary, RigidSide):
-        kept["now"] = pair.primary.now.copy()
-    if "first_contact" in vars(pair):  # found in the first step, from where its obstacle stood then
-        kept["first_contact"] = list(pair.first_contact)
-    return kept
-
-
-def _to_pair(pair: Any, kept: dict[str, Any]) -> None:
-    if kept["closed"] is not None:
-        at, closed = kept["closed"]
-        pair._closed = at, closed
-    if kept["now"] is not None:
-        pair.primary.now = kept["now"].copy()
-    if kept["first_contact"] is not None:
-        vars(pair)["first_contact"] = tuple(kept["first_contact"])
-
-
-def _of_extrapolation(extrapolation: Any) -> dict[str, Any]:
-    """Return the last two loads, sparse as they are, and solutions, but for the last displacements."""
-    states = extrapolation._states
-    return {
-        "loads": [_sparse(load) for load in extrapolation._loads[-2:]],
-        "before": states[0][0] if len(states) == 2 else None,
-        "contact": [{name: list(both) for name, both in contact.items()} for _, contact in states],
-    }
-
-
-def _to_extrapolation(extrapolation: Any, kept: dict[str, Any], u: Array) -> None:
-    displacements = [u] if kept["before"] is None else [kept["before"], u]
-    contacts = [{name: tuple(both) for name, both in contact.items()} for contact in kept["contact"]]
-    extrapolation._loads = [_dense(load) for load in kept["loads"]]
-    extrapolation._states = list(zip(displacements, contacts)) if contacts else []
-
-
-def _sparse(values: Array) -> dict[str, Any]:
-    places = np.flatnonzero(values)
-    return {"size": len(values), "places": places, "values": values[places]}
-
-
-def _dense(kept: dict[str, Any]) -> Array:
-    values = np.zeros(kept["size"])
-    values[kept["places"]] = kept["values"]
-    return values

@@ -1,12 +1,12 @@
-"""What makes the end of an analysis doubtful: each a sentence with its number, for a warning and the result file."""
+"""Warnings about a finished analysis, each with its number; the result file keeps them."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.analysis.analysis import Analysis
-from fastcontact.analysis.contact_result import deep
+from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.state import State
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import element_kernels, recovery
@@ -18,6 +18,8 @@ from fastcontact.model.rigid_motions import body_name
 from fastcontact.results.step import ContactResult, StepResult
 
 Array = NDArray[np.float64]
+# Penetration under a penalty that is worth a warning, relative to the largest displacement.
+DEEP = 0.01
 # Equivalent strain beyond which linear kinematics are worth a warning.
 STRAIN = 0.1
 # Rotation [radian] beyond which they are: half its square is the strain that they leave out.
@@ -28,22 +30,35 @@ ACROSS = 4
 UNSETTLED = 1e-2
 
 
-def at_the_end(analysis: Analysis, last: StepResult) -> list[str]:
-    """Return the doubts about an analysis that has just made its `last` step."""
-    found = _interpenetration(analysis) + _large_strain(analysis, last.stress) + _large_rotation(analysis)
-    found += _carrying_springs(analysis)
-    found += [analysis.solver.gave_up] if analysis.solver.gave_up else []
-    loaded = analysis.loaded(last.load_factor)
-    for name, pair in analysis.pairs.items():
+def result_warnings(problem: Problem, state: State, last: StepResult) -> list[str]:
+    """Return the warnings about an analysis whose `last` step ended in a state."""
+    found = _interpenetration(problem, state) + _large_strain(problem, last.stress) + _large_rotation(problem, state)
+    found += _carrying_springs(problem, state)
+    found += [problem.solver.gave_up] if problem.solver.gave_up else []
+    load = problem.load_at(last.load_factor)
+    loaded = bool(load.force.any() or load.lift.any())
+    for name, pair in problem.pairs.items():
         contact = last.contact[name]
-        found += deep(pair, contact, analysis.u) + _lost(name, contact, name in analysis.touched, loaded)
+        found += _deep(pair, contact, state.u) + _lost(name, contact, name in state.touched, loaded)
         found += _unresolved(name, pair, contact)
-    return found + _unsettled(analysis)
+    return found + _unsettled(state)
 
 
-def _unsettled(analysis: Analysis) -> list[str]:
-    """Return a doubt where the last of a fixed number of geometry updates still changed much."""
-    update, change = analysis.unsettled or (0, 0.0)
+def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> list[str]:
+    """Return a warning where a penalty lets the sides penetrate by much of the largest displacement."""
+    size = float(np.abs(displacement).max(initial=0.0))
+    penalty, depth = pair.options.penalty, contact.penetration
+    if penalty is None or depth <= DEEP * size:
+        return []
+    return [
+        f"contact '{contact.name}' penetrates by {depth:.4g}, which is {depth / size:.1%} of the largest displacement: "
+        f"raise its penalty from {penalty:.4g} to about {penalty * depth / (DEEP * size):.2g}, or leave it out"
+    ]
+
+
+def _unsettled(state: State) -> list[str]:
+    """Return a warning where the last of a fixed number of geometry updates still changed much."""
+    update, change = state.unsettled or (0, 0.0)
     if change <= UNSETTLED:
         return []
     return [
@@ -52,18 +67,18 @@ def _unsettled(analysis: Analysis) -> list[str]:
     ]
 
 
-def _interpenetration(analysis: Analysis) -> list[str]:
-    mesh = analysis.model.mesh
+def _interpenetration(problem: Problem, state: State) -> list[str]:
+    mesh = problem.model.mesh
     _, body = bodies(mesh)
     joined = {
         frozenset((int(body[p.secondary.points[0]]), int(body[p.primary.points[0]])))
-        for p in analysis.pairs.values()
+        for p in problem.pairs.values()
         if isinstance(p.primary, Surface)
     }
     texts: list[str] = []
     seen: set[frozenset[int]] = set()
-    coordinates = mesh.points + analysis.displacement
-    inside = sorted(penetration(mesh, analysis.model.kinematics, coordinates), key=lambda entry: -entry[2])
+    coordinates = mesh.points + problem.displacement(state.u)
+    inside = sorted(penetration(mesh, problem.model.kinematics, coordinates), key=lambda entry: -entry[2])
     for number, other, depth, where in inside:
         both = frozenset((number, other))
         if both not in joined | seen and depth > 1e-9 * np.ptp(mesh.points, axis=0).max():
@@ -76,11 +91,11 @@ def _interpenetration(analysis: Analysis) -> list[str]:
     return texts
 
 
-def _carrying_springs(analysis: Analysis) -> list[str]:
-    if analysis.floating is None or analysis.settled is None:
+def _carrying_springs(problem: Problem, state: State) -> list[str]:
+    if problem.bodies is None or state.rigid is None:
         return []
-    told = analysis.floating.report(analysis.settled, analysis.largest_work)
-    if told["relative_to_load"] <= analysis.criteria.relative:
+    told = problem.bodies.report(state.rigid, state.largest_work)
+    if told["relative_to_load"] <= problem.criteria.relative:
         return []
     return [
         f"the springs that regularise {'; '.join(told['motions'])} still carry {told['relative_to_load']:.1e} of "
@@ -88,16 +103,16 @@ def _carrying_springs(analysis: Analysis) -> list[str]:
     ]
 
 
-def _large_strain(analysis: Analysis, stress: Array) -> list[str]:
-    softest = min(material.shear_modulus for material, _ in analysis.model.materials)
+def _large_strain(problem: Problem, stress: Array) -> list[str]:
+    softest = min(material.shear_modulus for material, _ in problem.model.materials)
     strain = float(recovery.von_mises(stress).max(initial=0.0) / (3 * softest))
     if strain <= STRAIN:
         return []
     return [f"the largest equivalent strain is {strain:.3f}, beyond the {STRAIN} where linear kinematics hold well"]
 
 
-def _large_rotation(analysis: Analysis) -> list[str]:
-    angle, where = largest_rotation(analysis.model.mesh, analysis.displacement)
+def _large_rotation(problem: Problem, state: State) -> list[str]:
+    angle, where = largest_rotation(problem.model.mesh, problem.displacement(state.u))
     if angle <= ROTATION:
         return []
     return [
@@ -124,7 +139,7 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
 
 
 def _lost(name: str, contact: ContactResult, touched: bool, loaded: bool) -> list[str]:
-    """Return a doubt where a pair never closed, or is open although the loads are still there."""
+    """Return a warning where a pair never closed, or is open although the loads are still there."""
     if contact.active.any():
         return []
     facing = contact.gap[np.isfinite(contact.gap)]
@@ -135,10 +150,10 @@ def _lost(name: str, contact: ContactResult, touched: bool, loaded: bool) -> lis
 
 
 def _unresolved(name: str, pair: Formulation, contact: ContactResult) -> list[str]:
-    """Return a doubt where too few elements lie across the radius of a contact."""
-    if pair.terms.always_closed or not contact.active.any():
+    """Return a warning where too few elements lie across the radius of a contact."""
+    if pair.options.always_closed or not contact.active.any():
         return []
-    count = across(pair.secondary, contact.active, pair.terms.excluded_nodes(pair.secondary))
+    count = across(pair.secondary, contact.active, pair.options.excluded_nodes(pair.secondary))
     if count is None or count >= ACROSS:
         return []
     return [

@@ -7,11 +7,12 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from fastcontact.analysis import restart, result_warnings, step_halving
-from fastcontact.analysis.analysis import Analysis
+from fastcontact.analysis import restart, step_halving
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.problem import Problem, prepare
+from fastcontact.analysis.result_warnings import result_warnings
 from fastcontact.errors import warn
-from fastcontact.model import warnings
+from fastcontact.model import warnings as model_warnings
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, linear_ramp
 from fastcontact.results.step import StepResult
@@ -122,31 +123,33 @@ def solve_steps(
     if not instants:
         return iter(())
     model.check(ramp)
-    prepare = partial(Analysis, model, linear_solver, linear_tolerance, criteria, ramp, linear_precision)
-    touched = {name: True for step in resume for name, found in step.contact.items() if found.active.any()}
-    return _marched(model, prepare, instants, case, last, touched)
+    prepared = partial(
+        prepare, ramp=ramp, criteria=criteria, linear_solver=linear_solver, linear_tolerance=linear_tolerance,
+        linear_precision=linear_precision,
+    )  # fmt: skip
+    touched = frozenset(name for step in resume for name, found in step.contact.items() if found.active.any())
+    return _marched(model, prepared, instants, case, last, touched)
 
 
 def _marched(
-    model: Model, prepare: Callable[[], Analysis], instants: list[float], case: dict[str, Any], last: StepResult | None,
-    touched: dict[str, bool],
+    model: Model, prepared: Callable[[Model], Problem], instants: list[float], case: dict[str, Any],
+    last: StepResult | None, touched: frozenset[str],
 ) -> Iterator[StepResult]:  # fmt: skip
     """Yield the steps at `instants`, the first of them after `last`; `touched` are the pairs that closed before."""
-    doubtful = warnings.doubts(model)
+    doubtful = model_warnings.doubts(model)
     for text in doubtful if last is None else ():
         warn(text)
-    analysis = prepare()
-    analysis.touched = touched
-    begin, before = analysis.ramp.table[0][0], 0
+    problem = prepared(model)
+    state = problem.initial_state() if last is None else restart.put_back(problem, last, touched)
+    begin, before = problem.ramp.table[0][0], 0
     if last is not None:
-        restart.put_back(analysis, last)
         begin, before, last = last.load_factor, last.index, None  # kept no longer
     for index, instant in enumerate(instants, start=before + 1):
-        step = step_halving.advance(analysis, index, begin, instant, analysis.criteria.max_halvings)
-        found = result_warnings.at_the_end(analysis, step) if instant == instants[-1] else []
+        state, step = step_halving.advance(problem, state, index, begin, instant)
+        found = result_warnings(problem, state, step) if instant == instants[-1] else []
         for text in found:
             warn(text)
         told = (*doubtful * (index == 1), *found)
-        yield replace(step, warnings=told, restart=restart.taken(analysis, case))
+        yield replace(step, warnings=told, restart=restart.taken(problem, state, case))
         del step  # before the next one is computed
         begin = instant

@@ -1,58 +1,21 @@
-"""Load steps that do not converge are cut in halves; what fails leaves the analysis as it was before."""
+"""Load steps that do not converge are cut in halves; a step that fails leaves its state as it was."""
 
 from __future__ import annotations
 
 import logging
 from dataclasses import replace
-from typing import Any
 
-from fastcontact.analysis.analysis import Analysis
+from fastcontact.analysis.load_step import load_step
+from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.state import State
 from fastcontact.errors import ConvergenceError
 from fastcontact.results.step import StepResult
 
 log = logging.getLogger("fastcontact")
-# What a step changes: of the analysis, of each of its pairs, of the primary side of a pair, of the extrapolation, of
-# the right-hand sides that a direct solver knows.
-# Arrays among it are replaced, never written into; dictionaries and lists are copied.
-_ANALYSIS = (
-    "u", "before", "external", "expected", "active", "pressure", "parts", "largest_force", "largest_work", "round_off",
-    "settled", "rubbing", "touched", "unsettled",
-)  # fmt: skip
-_PAIR = ("before", "_closed")
-_SIDE = ("now", "before")
-_EXTRAPOLATION = ("ratio", "_loads", "_states")
-_LOADS = ("_loads", "_solutions")
-
-State = list[tuple[Any, dict[str, Any]]]
 
 
-def snapshot(analysis: Analysis) -> State:
-    """Return all that a load step changes in `analysis`, for `restore`."""
-    found = [_kept(analysis, _ANALYSIS), _kept(analysis.extrapolation, _EXTRAPOLATION)]
-    if hasattr(analysis.solver, "known_loads"):
-        found.append(_kept(analysis.solver.known_loads, _LOADS))
-    for pair in analysis.pairs.values():
-        found += [_kept(pair, _PAIR), _kept(pair.terms, ("factor",)), _kept(pair.primary, _SIDE)]
-    return found
-
-
-def restore(state: State) -> None:
-    """Put back what `snapshot` returned; a state may be restored several times."""
-    for owner, values in state:
-        for name, value in values.items():
-            setattr(owner, name, _copied(value))
-
-
-def _kept(owner: Any, names: tuple[str, ...]) -> tuple[Any, dict[str, Any]]:
-    return owner, {name: _copied(getattr(owner, name)) for name in names if hasattr(owner, name)}
-
-
-def _copied(value: Any) -> Any:
-    return value.copy() if isinstance(value, (dict, list)) else value
-
-
-def advance(analysis: Analysis, index: int, begin: float, end: float, max_halvings: int = 0) -> StepResult:
-    """Solve the step `index` from instant `begin` to `end`, in halves of halves where it does not converge.
+def advance(problem: Problem, state: State, index: int, begin: float, end: float) -> tuple[State, StepResult]:
+    """Compute the step `index` from instant `begin` to `end`, in halves of halves where it does not converge.
 
     Parts of the step are steps of their own: friction slides along their path. The result is that at `end`, with the
     iterations and the dissipation of all parts; ``iterations["substeps"]`` lists the instants of their ends where it was cut.
@@ -60,24 +23,22 @@ def advance(analysis: Analysis, index: int, begin: float, end: float, max_halvin
     Raises
     ------
     ConvergenceError
-        If a part that was halved `max_halvings` times does not converge, or one that no halving can help; the analysis is
-        then as it was at `begin`.
+        If a part that was halved `Criteria.max_halvings` times does not converge, or one that no halving can help.
     """
-    state = snapshot(analysis)
-    try:
-        return _joined(_parts(analysis, index, begin, end, max_halvings, 0))
-    except ConvergenceError:
-        restore(state)
-        raise
+    state, parts = _parts(problem, state, index, (begin, end), 0)
+    return state, _joined(parts)
 
 
-def _parts(analysis: Analysis, index: int, begin: float, end: float, limit: int, halved: int) -> list[StepResult]:
+def _parts(
+    problem: Problem, state: State, index: int, span: tuple[float, float], halved: int
+) -> tuple[State, list[StepResult]]:
+    begin, end = span
     middle = 0.5 * (begin + end)
-    state = snapshot(analysis)
     try:
-        return [analysis.step(index, end)]
+        state, result = load_step(problem, state, index, end)
+        return state, [result]
     except ConvergenceError as error:
-        if halved == limit or not begin < middle < end or not error.smaller_steps_help:
+        if halved == problem.criteria.max_halvings or not begin < middle < end or not error.smaller_steps_help:
             where = f"from {begin:.6g} to {end:.6g}"
             often = "once" if halved == 1 else f"{halved} times"
             part = (
@@ -86,9 +47,9 @@ def _parts(analysis: Analysis, index: int, begin: float, end: float, limit: int,
             raise ConvergenceError(f"{error} ({part})", error.history, smaller_steps_help=False) from error
         reason = str(error).split(". ")[0]
         log.warning("step %d from %.6g to %.6g does not converge, cut in halves: %s", index, begin, end, reason)
-    restore(state)
-    first = _parts(analysis, index, begin, middle, limit, halved + 1)
-    return first + _parts(analysis, index, middle, end, limit, halved + 1)
+    state, first = _parts(problem, state, index, (begin, middle), halved + 1)
+    state, second = _parts(problem, state, index, (middle, end), halved + 1)
+    return state, first + second
 
 
 def _joined(parts: list[StepResult]) -> StepResult:

@@ -1,7 +1,8 @@
-"""Bodies that only contact holds: springs make their stiffness regular, and the solution is moved until they are slack.
+"""Bodies held by contact alone: weak springs make their stiffness matrix regular.
 
-Each free motion gets one spring at one node, about as stiff as the body there. The springs hang on a rigid position y
-of the bodies; for every y the contact problem is regular. The elongations w(y) that it leaves are, but for their sign
+Each free rigid motion gets one spring at one node, about as stiff as the body there. The springs are fixed to a rigid
+position y of the bodies; for every y the contact problem is regular. A Newton iteration moves y until the spring forces
+vanish. The elongations w(y) that it leaves are, but for their sign
 and stiffness, the gradient of a convex function of y (the Moreau envelope of the energy: Moreau, 1965; Rockafellar,
 1976). Newton's method with a line search brings them to zero; then the springs carry nothing, and the solution is that
 without them.
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.linalg import qr
 from scipy.sparse import bsr_array
 
-from fastcontact.analysis.active_set import State
+from fastcontact.analysis.solution import Solution
 from fastcontact.elasticity.system import System
 from fastcontact.model.rigid_motions import FreeMotions
 
@@ -34,16 +35,16 @@ UNRESISTED = 1e-9
 
 
 @dataclass(frozen=True)
-class Settled:
+class RigidPosition:
     """A contact solution with slack springs.
 
     Attributes
     ----------
-    state : State
+    state : Solution
         For the springs at `position`; its iterations are those of all positions tried.
     position : ndarray (k,)
         Rigid displacement at each spring [length].
-    left : ndarray (k,)
+    spring_force : ndarray (k,)
         Force still carried by each spring [force].
     positions : int
         Positions tried.
@@ -51,14 +52,14 @@ class Settled:
         Whether the springs are slack.
     """
 
-    state: State
+    state: Solution
     position: Array
-    left: Array
+    spring_force: Array
     positions: int
     slack: bool
 
 
-class Floating:
+class UnsupportedBodies:
     """Springs on the free motions of a system.
 
     Parameters
@@ -87,7 +88,7 @@ class Floating:
         diagonal = np.where(diagonal > 0, diagonal, typical)  # rigid obstacles have no stiffness of their own
         self._dim = system.matrix.blocksize[0]
         self.names = motions.names()
-        self.dofs = _sturdy(system.unknowns_of(motions.displacement), diagonal, avoid)
+        self.dofs = _spring_dofs(system.unknowns_of(motions.displacement), diagonal, avoid)
         self._places = [
             f"{'xyz'[dof % self._dim]} of {self._owner(motions, dof, weightless)}" for dof in self.dofs.tolist()
         ]
@@ -109,21 +110,21 @@ class Floating:
         """Return the displacements (n_dofs,) of the rigid position (k,)."""
         return np.asarray(self.motions.displacement @ position)
 
-    def report(self, settled: Settled, load: float) -> dict[str, Any]:
+    def report(self, found: RigidPosition, load: float) -> dict[str, Any]:
         """Return what was regularised, and by how much, as plain numbers and strings.
 
         Keys: ``motions``, names of the free motions; ``springs``, their places; ``spring_stiffness`` [force / length];
         ``force_left``, what each spring still carries [force]; ``relative_to_load``, the largest over the load;
         ``positions``, rigid positions tried.
         """
-        left = np.abs(settled.left)
+        left = np.abs(found.spring_force)
         return {
             "motions": self.names,
             "springs": self._places,
             "spring_stiffness": self.stiffness,
             "force_left": left.tolist(),
             "relative_to_load": float(left.max() / load) if load else 0.0,
-            "positions": settled.positions,
+            "positions": found.positions,
         }
 
     def _owner(self, motions: FreeMotions, dof: int, weightless: NDArray[np.bool_]) -> str:
@@ -133,14 +134,14 @@ class Floating:
         column = int(np.argmax(np.abs(motions.displacement[dof])))
         return motions.labels[int(np.argmax(np.abs(motions.parts[:, column])))][0]
 
-    def unheld(self, settled: Settled) -> list[str]:
-        """Return the names of the free motions that the springs still hold most."""
-        work = np.abs(self._at_springs.T @ settled.left)
+    def moving(self, found: RigidPosition) -> list[str]:
+        """Return the names of the free motions that the springs still resist most."""
+        work = np.abs(self._at_springs.T @ found.spring_force)
         return [name for name, w in zip(self.names, work, strict=True) if w > 0.1 * work.max()]
 
     def settle(
-        self, solve_at: Callable[[Array], State], start: Array, load: float, noise: float, round_off: float
-    ) -> Settled:
+        self, solve_at: Callable[[Array], Solution], start: Array, load: float, noise: float, round_off: float
+    ) -> RigidPosition:
         """Find the position at which the springs are slack.
 
         Parameters
@@ -157,7 +158,7 @@ class Floating:
 
         Returns
         -------
-        Settled
+        RigidPosition
             The best found if the springs do not become slack, or a contact problem does not settle.
         """
         search = _Search(solve_at, self.dofs, start)
@@ -175,14 +176,14 @@ class Floating:
                 if search.left >= 0.5 * before and search.left <= tolerable:
                     break
         slack = search.settled and search.left <= tolerable
-        state = dataclasses.replace(search.state, iterations=search.iterations)  # type: ignore[type-var]
-        return Settled(state, search.position, self.stiffness * search.elongation, search.positions, slack)
+        state = dataclasses.replace(search.state, iterations=search.iterations)
+        return RigidPosition(state, search.position, self.stiffness * search.elongation, search.positions, slack)
 
 
 class _Search:
     """Where the search for the position stands."""
 
-    def __init__(self, solve_at: Callable[[Array], State], dofs: NDArray[np.intp], start: Array) -> None:
+    def __init__(self, solve_at: Callable[[Array], Solution], dofs: NDArray[np.intp], start: Array) -> None:
         self._solve_at, self._dofs = solve_at, dofs
         self.positions = self.iterations = 0
         self.settled = True
@@ -194,7 +195,7 @@ class _Search:
         """Largest elongation [length]."""
         return float(np.abs(self.elongation).max())
 
-    def _at(self, position: Array) -> tuple[State, Array]:
+    def _at(self, position: Array) -> tuple[Solution, Array]:
         state = self._solve_at(position)
         self.positions += 1
         self.iterations += state.iterations
@@ -232,7 +233,7 @@ def _step(derivative: Array, elongation: Array) -> Array:
     return np.asarray(step + free.T @ (free @ elongation))
 
 
-def _sturdy(motions: Array, diagonal: Array, avoid: NDArray[np.intp]) -> NDArray[np.intp]:
+def _spring_dofs(motions: Array, diagonal: Array, avoid: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return k unknowns that determine the motions (n, k): the stiffest ones far apart, none of `avoid` if possible."""
     weights = np.sqrt(np.maximum(diagonal, 0.0))
     weights[avoid] *= 1e-3

@@ -1,9 +1,9 @@
-"""What a contact pair asks of the displacements: ``gap >= 0, multiplier >= 0, product 0``, row by row."""
+"""The conditions of contact, row by row: ``gap >= 0``, ``multiplier >= 0``, ``gap * multiplier = 0``."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 class Compliance(Protocol):
@@ -25,12 +26,35 @@ class Compliance(Protocol):
         ...
 
 
-class Forces(Protocol):
-    """What the solution of an inequality problem says about forces; see `analysis.active_set.State`."""
+class NodalField(Protocol):
+    """What the forces of constraints mean at the secondary nodes."""
+
+    def pressure(self, force: Array) -> Array:
+        """Return nodal pressures (n_nodes,) per reference area [pressure] from normal forces (m,) [force]."""
+        ...
+
+    def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
+        """Return the nodes in contact (n_nodes,) for active constraints (m,), nodal gaps [length], pressures [pressure]."""
+        ...
+
+    def initially_active(self, gap: Array, pressure: Array) -> Mask | None:
+        """Return the set (m,) to start from, from gaps (m,) [length] and the last nodal pressures (n_nodes,) [pressure].
+
+        None where constraints are the same in every pairing: then the last set is better.
+        """
+        ...
+
+
+class Tied(Protocol):
+    """Linear equations in the place of contact; see `tied.TiedPair`."""
 
     @property
-    def multiplier(self) -> Array:
-        """Normal forces (m,) [force]."""
+    def directions(self) -> tuple[Array, ...]:
+        """Tangents (m, dim) at the places of the formulation."""
+        ...
+
+    def forces(self, multiplier: Array) -> tuple[Array, Array]:
+        """Return normal (m,) and tangential (m, k) forces at the places of the formulation [force]."""
         ...
 
 
@@ -41,27 +65,33 @@ class Constraints:
     Attributes
     ----------
     B : csr_array (m, n_dofs)
-        Rows; an empty row is a constraint that cannot close now.
+        Rows [-]; an empty row is a constraint that cannot close now.
     gap0 : ndarray (m,)
         Gap at u = 0 [length].
     positions : ndarray (m, dim)
         Where the gap is measured, on the reference surface [length].
     compliance : Compliance, optional
-        C; None stands for zero.
+        C [length / force]; None stands for zero.
     tangents : tuple of csr_array (m, n_dofs)
-        Tangential motion relative to the primary side, a matrix for each tangent; empty without friction.
+        Tangential motion relative to the primary side, a matrix for each tangent [-]; empty without friction.
     directions : tuple of ndarray (m, dim)
-        The tangents themselves.
+        The tangents themselves [-].
     drift : ndarray (len(tangents), m), optional
         Slip of the step that the motion of a rigid primary side makes by itself [length]; None stands for zero.
     friction : ndarray (m,), optional
-        Coefficient of friction of each constraint; None stands for zero.
-    held : ndarray of bool (m,), optional
+        Coefficient of friction of each constraint [-]; None stands for zero.
+    equality : ndarray of bool (m,), optional
         Constraints that hold as equations, with multipliers of either sign; None stands for none.
     softness : ndarray (m,), optional
         Compliance of each constraint along its normal alone, beside C [length / force]; None stands for zero.
-    loose : ndarray (1 + len(tangents), m, h), optional
+    low_rank_compliance : ndarray (1 + len(tangents), m, h), optional
         Z of a compliance ``Z Z.T`` beside C, of normal forces and then of tangential ones; None stands for zero.
+    areas : ndarray (m,), optional
+        Area that each constraint stands for [area]; infinite where it does nothing.
+    nodal : NodalField, optional
+        What normal forces mean at the secondary nodes.
+    tied : Tied, optional
+        Where the constraints are the equations of a tied pair.
     """
 
     B: csr_array
@@ -72,42 +102,95 @@ class Constraints:
     directions: tuple[Array, ...] = ()
     friction: Array | None = None
     drift: Array | None = None
-    held: NDArray[np.bool_] | None = None
+    equality: Mask | None = None
     softness: Array | None = None
-    loose: Array | None = None
+    low_rank_compliance: Array | None = None
+    areas: Array | None = None
+    nodal: NodalField | None = None
+    tied: Tied | None = None
+
+    def __len__(self) -> int:
+        return len(self.gap0)
+
+    @property
+    def usable(self) -> Mask:
+        """Constraints (m,) that may close at all."""
+        return np.asarray(np.diff(self.B.indptr) > 0)
 
     @property
     def normal_compliance(self) -> Compliance | None:
         """All compliance along the normals: C and `softness`."""
         return self.compliance if self.softness is None else _Softened(self.compliance, self.softness)
 
-    def force(self, state: Forces) -> Array:
-        """Return the nodal contact forces (n_dofs,) of a solution."""
-        total: Array = self.B.T @ state.multiplier
-        for tangent, along in zip(self.tangents, getattr(state, "tangential", np.empty((0, 0))).T, strict=True):
+    @property
+    def coefficients(self) -> Array:
+        """Coefficients of friction (m,), zero where there are none [-]."""
+        return np.zeros(len(self)) if self.friction is None else self.friction
+
+    def gaps_at_rest(self) -> Array:
+        """Return gaps and slips (1 + k, m) at u = 0 [length]."""
+        drift = np.zeros((len(self.tangents), len(self))) if self.drift is None else self.drift
+        return np.vstack([self.gap0, drift])
+
+    def force(self, multiplier: Array, tangential: Array | None = None) -> Array:
+        """Return the nodal contact forces (n_dofs,) of normal forces (m,) and tangential ones (m, k) [force]."""
+        total: Array = self.B.T @ multiplier
+        for tangent, along in zip(self.tangents, () if tangential is None else tangential.T, strict=True):
             total += tangent.T @ along
         return total
 
+    def normal_forces(self, multiplier: Array) -> Array:
+        """Return the normal forces (m,) at the places of the formulation [force]."""
+        return multiplier if self.tied is None else self.tied.forces(multiplier)[0]
 
-def stacked(parts: list[Constraints]) -> Constraints:
-    """Return the constraints of several pairs as one."""
-    if len(parts) == 1:
-        return parts[0]
-    compliance = None
-    if any(part.compliance is not None for part in parts):
-        compliance = _BlockDiagonal(parts)
-    return Constraints(
-        csr_array(vstack([part.B for part in parts], format="csr")),
-        np.concatenate([part.gap0 for part in parts]),
-        np.vstack([part.positions for part in parts]),
-        compliance,
-        _stacked_tangents(parts),
-        _stacked_directions(parts),
-        np.concatenate([np.zeros(len(p.gap0)) if p.friction is None else p.friction for p in parts]),
-        _stacked_drift(parts),
-        _stacked_vectors([part.held for part in parts], parts, bool),
-        _stacked_vectors([part.softness for part in parts], parts, float),
-        _stacked_loose(parts),
+    def pressure(self, multiplier: Array) -> Array:
+        """Return nodal pressures (n_nodes,) per reference area from the multipliers (m,) [pressure]."""
+        assert self.nodal is not None
+        return self.nodal.pressure(self.normal_forces(multiplier))
+
+    def initially_active(self, u: Array, pressure: Array) -> Mask | None:
+        """Return the set (m,) to start from; see `NodalField`. `u` (n_dofs,) are displacements [length]."""
+        assert self.nodal is not None
+        return self.nodal.initially_active(self.gap0 + self.B @ u, pressure)
+
+
+@dataclass(frozen=True, eq=False)
+class StackedConstraints(Constraints):
+    """The constraints of several pairs, one below the other.
+
+    Attributes
+    ----------
+    parts : dict of str to Constraints
+        Those of each pair, by its name.
+    """
+
+    parts: Mapping[str, Constraints] = field(default_factory=dict)
+
+    def rows(self) -> dict[str, slice]:
+        """Return the rows of each pair, by its name."""
+        ends = np.cumsum([0, *(len(part) for part in self.parts.values())]).tolist()
+        return {name: slice(first, end) for name, first, end in zip(self.parts, ends[:-1], ends[1:], strict=True)}
+
+
+def stacked(parts: Mapping[str, Constraints]) -> StackedConstraints:
+    """Return the constraints of pairs, by their names, as one."""
+    one = list(parts.values())
+    if len(one) == 1:
+        own = {entry.name: getattr(one[0], entry.name) for entry in fields(Constraints)}
+        return StackedConstraints(**own, parts=parts)
+    return StackedConstraints(
+        csr_array(vstack([part.B for part in one], format="csr")),
+        np.concatenate([part.gap0 for part in one]),
+        np.vstack([part.positions for part in one]),
+        _BlockDiagonal(one) if any(part.compliance is not None for part in one) else None,
+        _stacked_tangents(one),
+        _stacked_directions(one),
+        np.concatenate([np.zeros(len(part)) if part.friction is None else part.friction for part in one]),
+        _stacked_drift(one),
+        _stacked_vectors([part.equality for part in one], one, bool),
+        _stacked_vectors([part.softness for part in one], one, float),
+        _stacked_low_rank(one),
+        parts=parts,
     )
 
 
@@ -115,7 +198,7 @@ def _stacked_vectors(found: Sequence[NDArray[Any] | None], parts: list[Constrain
     """Return vectors (m,) of all parts as one, zero where a part has none; None where no part has one."""
     if all(vector is None for vector in found):
         return None
-    zero: list[NDArray[Any]] = [np.zeros(len(part.gap0), kind) for part in parts]
+    zero: list[NDArray[Any]] = [np.zeros(len(part), kind) for part in parts]
     return np.concatenate([own if vector is None else vector for own, vector in zip(zero, found, strict=True)])
 
 
@@ -124,7 +207,7 @@ def _stacked_drift(parts: list[Constraints]) -> Array | None:
     count = max(len(part.tangents) for part in parts)
     if all(part.drift is None for part in parts):
         return None
-    return np.hstack([np.zeros((count, len(p.gap0))) if p.drift is None else p.drift for p in parts])
+    return np.hstack([np.zeros((count, len(part))) if part.drift is None else part.drift for part in parts])
 
 
 def _stacked_tangents(parts: list[Constraints]) -> tuple[csr_array, ...]:
@@ -145,13 +228,15 @@ def _stacked_directions(parts: list[Constraints]) -> tuple[Array, ...]:
     )
 
 
-def _stacked_loose(parts: list[Constraints]) -> Array | None:
+def _stacked_low_rank(parts: list[Constraints]) -> Array | None:
     """Return the compliances beside C side by side."""
-    if all(part.loose is None for part in parts):
+    if all(part.low_rank_compliance is None for part in parts):
         return None
     count = 1 + max(len(part.tangents) for part in parts)
-    none = [np.zeros((count, len(part.gap0), 0)) for part in parts]
-    own = [empty if part.loose is None else part.loose for part, empty in zip(parts, none, strict=True)]
+    own = [
+        np.zeros((count, len(part), 0)) if part.low_rank_compliance is None else part.low_rank_compliance
+        for part in parts
+    ]
     total, first, last = np.zeros((count, sum(z.shape[1] for z in own), sum(z.shape[2] for z in own))), 0, 0
     for z in own:
         total[:, first : first + z.shape[1], last : last + z.shape[2]] = z
@@ -179,7 +264,7 @@ class _BlockDiagonal:
 
     def __init__(self, parts: list[Constraints]) -> None:
         self._parts = [part.compliance for part in parts]
-        self._start = np.cumsum([0] + [len(part.gap0) for part in parts])
+        self._start = np.cumsum([0] + [len(part) for part in parts])
 
     def block(self, rows: NDArray[np.intp]) -> Array:
         values = np.zeros((len(rows), len(rows)))

@@ -1,4 +1,4 @@
-"""What a user asks of a contact pair, whatever its formulation: clearance, and who takes part."""
+"""Options of a contact pair that all formulations share: clearance, excluded nodes, kind of contact, penalty."""
 
 from __future__ import annotations
 
@@ -20,17 +20,15 @@ KINDS = ("unilateral", "bilateral", "bilateral_once_closed", "tied")
 Field = Callable[[Array], Array]
 
 
-@dataclass(eq=False)
-class Terms:
-    """The terms of a contact pair that all formulations keep.
+@dataclass(frozen=True, eq=False)
+class PairOptions:
+    """The options of a contact pair that do not depend on its formulation.
 
     Attributes
     ----------
     clearance, clearance_primary : callable, optional
         What is added to the gap: functions from reference positions (n, dim) on the secondary and on the primary side
         to lengths (n,), positive where the gap opens, negative for an interference [length].
-    factor : float
-        What both are multiplied with now.
     excluded, frictionless : ndarray of bool (n_points,), optional
         Nodes without contact, and without friction.
     kind : str
@@ -41,7 +39,6 @@ class Terms:
 
     clearance: Field | None = None
     clearance_primary: Field | None = None
-    factor: float = 1.0
     excluded: Mask | None = None
     frictionless: Mask | None = None
     kind: str = "unilateral"
@@ -85,8 +82,10 @@ class Terms:
         slippery = np.zeros(len(candidates.nodes), bool) if without is None else candidates.belonging_to(without)
         return np.where(slippery, 0.0, friction)
 
-    def added_gap(self, candidates: Candidates, pairing: Pairing, primary: object, reference: Array) -> Array:
-        """Return what clearances add to the gaps (n,) of candidates, zero where they face nothing [length]."""
+    def added_gap(
+        self, candidates: Candidates, pairing: Pairing, primary: object, reference: Array, factor: float
+    ) -> Array:
+        """Return what clearances times a factor add to the gaps (n,) of candidates, zero where nothing is faced [length]."""
         added = np.zeros(len(candidates.nodes))
         rows = np.flatnonzero(pairing.paired)
         if not len(rows):
@@ -97,7 +96,7 @@ class Terms:
         if self.clearance_primary is not None and isinstance(primary, Surface):
             at = places(primary, pairing.facet[rows], pairing.xi[rows])
             added[rows] += self.clearance_primary(np.einsum("nk,nkd->nd", at.shape, reference[at.nodes]))
-        return self.factor * added
+        return factor * added
 
 
 def spread(side: Surface, excluded: Mask, givers: NDArray[np.intp]) -> csr_array:

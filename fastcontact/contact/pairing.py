@@ -78,12 +78,14 @@ def pair(
     coordinates: Array,
     projection_tolerance: float,
     normals: str | None = "facet",
+    obstacle: Array | None = None,
 ) -> Pairing:
-    """Project candidate positions (n, dim) on the closest facet of `primary` at nodal `coordinates`.
+    """Project candidate positions (n, dim) on the closest facet of `primary` at nodal `coordinates` [length].
 
     A candidate farther out than `projection_tolerance` facet lengths beyond the end of its facet is not paired
     (TOLE_PROJ_EXT of code_aster). With `normals` ``"averaged"``, the normal is interpolated between nodal means of
-    the facets' normals, so that it does not jump where facets meet, and the candidates are projected along it.
+    the facets' normals, so that it does not jump where facets meet, and the candidates are projected along it. A rigid
+    obstacle is displaced by `obstacle` (dim,) [length].
 
     Raises
     ------
@@ -91,7 +93,8 @@ def pair(
         If a projection does not converge; see `search.closest`.
     """
     if isinstance(primary, RigidSide):
-        _, normal, paired, offset = primary.facing(candidates)
+        at = np.zeros(candidates.shape[1]) if obstacle is None else obstacle
+        _, normal, paired, offset = primary.facing(candidates, at)
         nowhere = np.zeros(len(candidates), np.intp)
         return Pairing(nowhere, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)
     found = closest_of_kinds(candidates, primary.corners(coordinates))

@@ -46,7 +46,7 @@ def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface) -> 
 def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSide) -> None:
     """Raise ContactError for an obstacle of contact `name` that no facet of the secondary side faces."""
     centres, outward, _ = _facet_frames(mesh, secondary)
-    _, normal, paired, _ = obstacle.facing(centres)
+    _, normal, paired, _ = obstacle.facing(centres, np.zeros(mesh.dim))
     along = np.einsum("id,id->i", outward, normal)[paired]
     if len(along) and (along >= 0).all():
         raise ContactError(

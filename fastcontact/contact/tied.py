@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, eye_array, vstack
 
-from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._projection import Projection
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ ZERO = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Tie:
+class TiedPair:
     """The equations of a tied pair.
 
     Attributes
@@ -36,18 +36,22 @@ class Tie:
         The tangents.
     positions : ndarray (q, dim)
         Where the equations hold, about, on the reference surface [length].
+    nodal : NodalField
+        What forces at the places of the formulation mean at its nodes.
     """
 
     moments: csr_array
     rows: tuple[csr_array, ...]
     directions: tuple[Array, ...]
     positions: Array
+    nodal: NodalField
 
     def constraints(self) -> Constraints:
         """Return the equations."""
         B = csr_array(vstack(self.rows, format="csr"))
         positions = np.tile(self.positions, (len(self.rows), 1))
-        return Constraints(B, np.zeros(B.shape[0]), positions, held=np.ones(B.shape[0], bool))
+        always = np.ones(B.shape[0], bool)
+        return Constraints(B, np.zeros(B.shape[0]), positions, equality=always, nodal=self.nodal, tied=self)
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
         """Return normal (m,) and tangential (m, k) forces at the places of the formulation."""
@@ -55,13 +59,14 @@ class Tie:
         return parts[0], np.column_stack(parts[1:])
 
 
-def tie(part: Constraints) -> Tie:
+def tied(part: Constraints) -> TiedPair:
     """Return the equations that tie what the constraints `part`, with tangents, pair."""
     moments = _moments(part)
     size = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), 1e-300)
     positions = abs(moments) @ part.positions / size[:, None]
     rows = tuple(_cleaned(csr_array(moments @ along)) for along in (part.B, *part.tangents))
-    return Tie(moments, rows, part.directions, positions)
+    assert part.nodal is not None
+    return TiedPair(moments, rows, part.directions, positions, part.nodal)
 
 
 def _moments(part: Constraints) -> csr_array:

@@ -160,6 +160,14 @@ class LinearSolver(Protocol):
         """Take the right-hand side f (n,)."""
         ...
 
+    def snapshot(self) -> Any:
+        """Return what later solutions owe to the loads so far: part of the state of an analysis; None for nothing."""
+        ...
+
+    def put_back(self, snapshot: Any) -> None:
+        """Continue from a `snapshot` of this solver; None for the beginning."""
+        ...
+
     def memory(self) -> dict[str, Any]:
         """Return what the last digits of later solutions owe to earlier ones: plain numbers, strings and arrays."""
         ...

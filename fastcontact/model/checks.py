@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.contact.configuration import Configuration
 from fastcontact.errors import ContactError, ModelError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies
@@ -77,13 +78,11 @@ def check_penetration(name: str, pair: Formulation) -> None:
 
     An interference that is meant is smaller, or a clearance.
     """
-    if pair.terms.tied:
+    if pair.options.tied:
         return
-    total, geometric = (
-        pair.nodal_gap(np.zeros_like(pair.points))[0],
-        pair.nodal_gap(np.zeros_like(pair.points), False)[0],
-    )
-    gap = np.where(pair.terms.excluded_nodes(pair.secondary), np.inf, np.maximum(total, geometric))
+    at_rest = Configuration.undeformed(pair.points)
+    total, geometric = pair.nodal_gap(at_rest)[0], pair.nodal_gap(at_rest, with_clearance=False)[0]
+    gap = np.where(pair.options.excluded_nodes(pair.secondary), np.inf, np.maximum(total, geometric))
     size = np.zeros(len(gap))
     for block in pair.secondary.blocks:
         long = np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)

@@ -1,9 +1,10 @@
-"""Rigid obstacles driven by forces: each is a body of one more point, without stiffness, that only contact holds.
+"""Rigid obstacles moved by forces: each is a body of one more point, without stiffness, that contact alone holds.
 
 The points of the mesh are followed by one for each such obstacle; its displacement is that of the obstacle. Components
-under a force are free motions like those of a body without supports, and get springs that end up slack like theirs (see
-`floating`); the others are prescribed. A gap against a rigid obstacle changes by ``n . (u - q)``, with q its
-displacement: the row of an obstacle is minus what the row of the gap makes of a common translation of all points.
+under a force are free rigid motions like those of a body without supports, and get weak springs like theirs (see
+`analysis.unsupported_bodies`); the others are prescribed. A gap against a rigid obstacle changes by
+``n . (u - q)``, with q its displacement: the row of an obstacle is minus what the row of the gap makes of a common
+translation of all points.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ class DrivenPair(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Driven:
+class ForceDrivenObstacles:
     """The obstacles of a model that forces drive; what has no extra points passes through unchanged.
 
     Parameters
@@ -77,7 +78,7 @@ class Driven:
         return (self.shape[0] + len(self)) * self.shape[1]
 
     @property
-    def loose(self) -> Mask:
+    def without_stiffness(self) -> Mask:
         """Which displacement components (n_dofs,) are free but have no stiffness: those under a force."""
         mask = np.zeros(self.n_dofs, bool)
         for number, pair in enumerate(self.pairs):
@@ -87,6 +88,10 @@ class Driven:
     def dofs(self, number: int) -> NDArray[np.intp]:
         """Return the displacement components of an obstacle."""
         return (self.shape[0] + number) * self.shape[1] + np.arange(self.shape[1])
+
+    def positions(self, u: Array) -> dict[str, Array]:
+        """Return by contact pair the displacements (dim,) of the obstacles, from all displacements u (n_dofs,) [length]."""
+        return {pair.name: u[self.dofs(number)] for number, pair in enumerate(self.pairs)}
 
     def number(self, name: str) -> int | None:
         """Return the number of the obstacle of contact pair `name`, None if no force drives it."""
@@ -134,16 +139,16 @@ class Driven:
         """Return free motions with those of the obstacles, one a component under a force."""
         if not self.pairs:
             return motions
-        loose = np.flatnonzero(self.loose)
+        free = np.flatnonzero(self.without_stiffness)
         count = len(motions)
-        displacement = np.zeros((self.n_dofs, count + len(loose)))
+        displacement = np.zeros((self.n_dofs, count + len(free)))
         displacement[: len(motions.displacement), :count] = motions.displacement
-        displacement[loose, count + np.arange(len(loose))] = 1.0
+        displacement[free, count + np.arange(len(free))] = 1.0
         labels = [
             (f"obstacle '{self.pairs[dof // self.shape[1] - self.shape[0]].name}'", _translation(dof % self.shape[1]))
-            for dof in loose.tolist()
+            for dof in free.tolist()
         ]
-        parts = np.asarray(block_diag(motions.parts, np.eye(len(loose))), float)
+        parts = np.asarray(block_diag(motions.parts, np.eye(len(free))), float)
         return FreeMotions(displacement, parts, [*motions.labels, *labels])
 
     def near_nullspace(self, modes: Array) -> Array:

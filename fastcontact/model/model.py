@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
+from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.default_formulation import default_formulation
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
 from fastcontact.contact.obstacles import MeshedSurface, Obstacle
@@ -46,8 +47,8 @@ from fastcontact.model.checks import (
     check_ramps,
     check_supports,
 )
-from fastcontact.model.force_driven_obstacles import Driven, Driving
-from fastcontact.model.pair_options import TERMS, clearance_ramp, terms_of
+from fastcontact.model.force_driven_obstacles import Driving, ForceDrivenObstacles
+from fastcontact.model.pair_options import SHARED_OPTIONS, clearance_ramp, pair_options
 from fastcontact.model.ramp import Ramp, Table, checked_table, table_value
 from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
 
@@ -535,9 +536,9 @@ class Model:
         return tuple(float(forces[k]) if k in forces else None for k in range(self.mesh.dim))  # type: ignore[arg-type]
 
     @property
-    def driven(self) -> Driven:
+    def driven(self) -> ForceDrivenObstacles:
         """The rigid obstacles that forces drive."""
-        return Driven([pair for pair in self.contact if pair.force], (self.mesh.n_points, self.mesh.dim))
+        return ForceDrivenObstacles([pair for pair in self.contact if pair.force], (self.mesh.n_points, self.mesh.dim))
 
     def _add_pair(self, pair: ContactPair) -> None:
         if pair.name in {other.name for other in self.contact}:
@@ -553,13 +554,16 @@ class Model:
                 )
         self.contact.append(pair)
 
-    def bind(self, pair: ContactPair) -> Formulation:
-        """Return the formulation of a contact pair on this mesh; see `add_contact` for the errors."""
+    def bind(self, pair: ContactPair, supported: NDArray[np.bool_] | None = None) -> Formulation:
+        """Return the formulation of a contact pair on this mesh; see `add_contact` for the errors.
+
+        `supported` (n_points, dim) are the displacement components that supports prescribe, where they are known.
+        """
         if pair.formulation not in FORMULATIONS:
             raise ContactError(unknown("contact formulation", pair.formulation, FORMULATIONS))
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
-        given = ("secondary", "primary", "points", "axisymmetric", "modulus", "terms")
-        known = [*TERMS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in given)]
+        given = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "supported")
+        known = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in given)]
         for option in pair.options:
             if option not in known:
                 raise ContactError(unknown(f"option of {pair.formulation}", option, known))
@@ -575,10 +579,14 @@ class Model:
             primary = surface(self.mesh, pair.primary)
             check_sides(self.mesh, pair.name, secondary, primary)
         modulus = min((m.E / (1 - m.nu**2) for m, _ in self.materials), default=1.0)
-        terms = terms_of(pair.name, pair.options, self.mesh, secondary, against_obstacle=pair.obstacle is not None)
-        own = {key: value for key, value in pair.options.items() if key not in TERMS}
+        options = pair_options(
+            pair.name, pair.options, self.mesh, secondary, against_obstacle=pair.obstacle is not None
+        )
+        own = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
         axisymmetric = self.kinematics == "axisymmetric"
-        return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, terms=terms, **own)
+        return kind(
+            secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, supported=supported, **own
+        )
 
     def material_numbers(self) -> tuple[Array, dict[str, NDArray[np.int32]]]:
         """Return moduli (n_materials, 4, 4), in 3D (n_materials, 6, 6), and by element every solid cell's material.
@@ -725,8 +733,8 @@ class Model:
         motions = driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.holding_rows()))
         if not len(motions):
             return
-        at_rest, still = np.zeros(self.mesh.points.shape), np.zeros(self.mesh.dim)
-        parts = [driven.constraints(pair.name, self.bind(pair).conditions(at_rest), still) for pair in self.contact]
+        at_rest, still = Configuration.undeformed(self.mesh.points), np.zeros(self.mesh.dim)
+        parts = [driven.constraints(pair.name, self.bind(pair).constraints(at_rest), still) for pair in self.contact]
         rows = [resisting(part)[0] @ motions.displacement for part in parts]
         works = [generalised(motions, force.ravel()) for force in forces]
         k = len(motions)

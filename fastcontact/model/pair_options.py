@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact.contact.pair_options import KINDS, Field, Mask, Terms
+from fastcontact.contact.pair_options import KINDS, Field, Mask, PairOptions
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.loads import check_number, check_value, evaluated
 from fastcontact.errors import ContactError, unknown
@@ -16,11 +16,13 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.ramp import Ramp, Table, checked_table
 
 # Options that every contact pair takes, beside those of its formulation.
-TERMS = ("clearance", "clearance_primary", "clearance_ramp", "excluded", "frictionless", "kind", "penalty")
+SHARED_OPTIONS = ("clearance", "clearance_primary", "clearance_ramp", "excluded", "frictionless", "kind", "penalty")
 
 
-def terms_of(name: str, options: Mapping[str, Any], mesh: Mesh, side: Surface, *, against_obstacle: bool) -> Terms:
-    """Return the terms of contact pair `name` with the secondary `side` from its options.
+def pair_options(
+    name: str, options: Mapping[str, Any], mesh: Mesh, side: Surface, *, against_obstacle: bool
+) -> PairOptions:
+    """Return the options of contact pair `name` with the secondary `side`, as formulations need them.
 
     Raises
     ------
@@ -34,7 +36,7 @@ def terms_of(name: str, options: Mapping[str, Any], mesh: Mesh, side: Surface, *
     if "clearance_ramp" in options and not {"clearance", "clearance_primary"} & set(options):
         raise ContactError(f"contact '{name}' has a clearance_ramp, but no clearance that it could multiply")
     clearance_ramp(name, options)
-    return Terms(
+    return PairOptions(
         _length(f"the clearance of contact '{name}'", options.get("clearance")),
         _length(f"the clearance_primary of contact '{name}'", options.get("clearance_primary")),
         excluded=_nodes(name, "excluded", options, mesh, side),

@@ -147,12 +147,12 @@ def resisting(constraints: Constraints) -> tuple[csr_array, Array]:
     """Return rows and gaps at u = 0 that must stay >= 0 if nothing slides: gaps, and edges of the friction cone.
 
     A contact force lies in the cone of the rows: normal, and with friction ``n + mu t`` and ``n - mu t`` for each
-    tangent t. What is held for good resists both ways.
+    tangent t. Equations resist both ways.
     """
     rows, gap0 = _edges(constraints)
-    if constraints.held is None:
+    if constraints.equality is None:
         return rows, gap0
-    backwards = np.flatnonzero(np.tile(constraints.held, len(gap0) // len(constraints.held)))
+    backwards = np.flatnonzero(np.tile(constraints.equality, len(gap0) // len(constraints.equality)))
     both = csr_array(vstack([rows, -rows[backwards]], format="csr"))
     return both, np.concatenate([gap0, -gap0[backwards]])
 

@@ -21,7 +21,7 @@ from fastcontact.cases.case import Case, build_case
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import FastcontactError, FastcontactWarning
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.model.pair_options import TERMS
+from fastcontact.model.pair_options import SHARED_OPTIONS
 from fastcontact.studies import quantities
 from fastcontact.studies.levels import Recipe, make_mesh
 from fastcontact.studies.settings import Combination, Settings
@@ -105,7 +105,7 @@ def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
         entry["formulation"] = combination.formulation
         if combination.formulation != own:
             known = {f.name for f in dataclasses.fields(FORMULATIONS[combination.formulation])}
-            known |= {"secondary", "primary", "formulation", "friction", *TERMS}
+            known |= {"secondary", "primary", "formulation", "friction", *SHARED_OPTIONS}
             for key in [key for key in entry if key not in known]:
                 del entry[key]
         entry.update(settings.options.get(combination.formulation, {}))

@@ -56,7 +56,7 @@ def test_every_key_of_case_files_is_listed():
 
 def test_every_option_of_contact_pairs_is_listed():
     page = text("howto/contact-options.md")
-    for option in (*pair_options.TERMS, "formulation", "friction", "normals", "projection_tolerance"):
+    for option in (*pair_options.SHARED_OPTIONS, "formulation", "friction", "normals", "projection_tolerance"):
         assert f"| `{option}` |" in page, option
 
 

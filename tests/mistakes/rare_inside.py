@@ -16,10 +16,11 @@ from scipy.sparse import bsr_array, csr_array
 
 import fastcontact as fc
 from fastcontact import generate
-from fastcontact.analysis.unsupported_bodies import Floating
+from fastcontact.analysis.unsupported_bodies import UnsupportedBodies
 from fastcontact.cases.case import read_case
 from fastcontact.cli import _study, bench, cases
 from fastcontact.cli._outputs import check_outputs
+from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import _cut_faces
 from fastcontact.elasticity.system import System
 from fastcontact.linear.elimination import elimination
@@ -53,8 +54,8 @@ def out_of_balance(patch):
 
 
 def not_slack(patch):
-    settle = Floating.settle
-    patch.setattr(Floating, "settle", lambda *given: replace(settle(*given), slack=False))
+    settle = UnsupportedBodies.settle
+    patch.setattr(UnsupportedBodies, "settle", lambda *given: replace(settle(*given), slack=False))
     model = lifted()
     model.loads.clear()
     model.add_force("UPPER_TOP", y=-10.0)
@@ -103,7 +104,7 @@ def distorted_facets(patch):
     model = fc.Model(mesh, "3d")
     model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
     model.add_contact("pair", secondary="B_ZMIN", primary="A_ZMAX", formulation="mortar")
-    model.bind(model.contact[0]).constraints(np.zeros_like(mesh.points))
+    model.bind(model.contact[0]).constraints(Configuration.undeformed(mesh.points))
 
 
 def stuck(patch):

@@ -1,6 +1,7 @@
 """Mistakes that few make in models, formulations and pictures: what is done, the kind of error, a pattern of the message."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 from library import Mistake, blocks, pair_of, square, with_load
@@ -8,7 +9,7 @@ from library import Mistake, blocks, pair_of, square, with_load
 import fastcontact as fc
 from fastcontact import topology
 from fastcontact._jit import decorators as _jit
-from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.configuration import Configuration
 from fastcontact.linear import choice as linear
 from fastcontact.mesh.generate import block, box, half_spheres
 from fastcontact.mesh.mesh import Mesh
@@ -86,7 +87,12 @@ def solver_without_package(patch):
 
 
 def formulation_without_areas():
-    Formulation.areas(blocks().bind(blocks().contact[0]))
+    model = blocks()
+    pair = model.bind(replace(model.contact[0], options={**model.contact[0].options, "penalty": 1.0}))
+    at_rest = Configuration.undeformed(model.mesh.points)
+    part = replace(pair.unilateral(at_rest), areas=None)
+    pair.unilateral = lambda at: part
+    pair.constraints(at_rest)
 
 
 def solid_stress_on_axis():

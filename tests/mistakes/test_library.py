@@ -7,7 +7,7 @@ import library
 import pytest
 
 from fastcontact import errors
-from fastcontact.analysis import analysis
+from fastcontact.analysis import problem
 
 KINDS = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, errors.FastcontactError)]
 
@@ -30,7 +30,7 @@ def test_a_mistake_in_a_call(mistake, monkeypatch):
         def numerics(*_):
             raise RuntimeError("numerics started")
 
-        monkeypatch.setattr(analysis, "stiffness", numerics)
+        monkeypatch.setattr(problem, "stiffness", numerics)
     if mistake.kind is errors.FastcontactWarning and mistake.name not in library.AFTER:
         with pytest.warns(errors.FastcontactWarning, match=mistake.pattern) as caught, pytest.raises(RuntimeError):
             mistake.make()

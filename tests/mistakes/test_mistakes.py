@@ -9,7 +9,7 @@ from accidents import ACCIDENTS
 from catalogue import CASES, COMMANDS
 from spoilt import MESHES
 
-from fastcontact.analysis import analysis
+from fastcontact.analysis import problem
 from fastcontact.cli import main
 
 DATA = Path(__file__).parents[2] / "data"
@@ -25,7 +25,7 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "empty.med").touch()
     (tmp_path / "truncated.med").write_bytes(mesh.read_bytes()[: mesh.stat().st_size // 2])
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(analysis, "stiffness", lambda *_: pytest.fail("numerics started"))
+    monkeypatch.setattr(problem, "stiffness", lambda *_: pytest.fail("numerics started"))
     return tmp_path
 
 

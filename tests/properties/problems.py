@@ -8,10 +8,10 @@ import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
 from images import Image, Job, model_of
+from stepping import Stepping
 from two_bodies import boxes
 
 import fastcontact as fc
-from fastcontact.analysis.analysis import Analysis
 
 FORMULATIONS = (
     ("node_to_segment", ()),
@@ -129,17 +129,9 @@ def recipes(friction: bool = False, kinematics: tuple[str, ...] = PLANES, elemen
     return st.builds(Blocks, **{**choices, **{name: st.just(value) for name, value in fixed.items()}})
 
 
-class Watched(Analysis):
-    """An analysis that keeps what it found last: constraints and their solution."""
-
-    def _contact(self, *arguments):
-        self.constraints, self.state = super()._contact(*arguments)
-        return self.constraints, self.state
-
-
-def analysis_of(job: Job, ramp: fc.Ramp | None = None, solver: str = "direct", **criteria) -> Watched:
+def analysis_of(job: Job, ramp: fc.Ramp | None = None, solver: str = "direct", **criteria) -> Stepping:
     """Return the analysis of a job, before its first step."""
-    return Watched(model_of(job, Image())[0], solver, 1e-12, fc.Criteria(**criteria), ramp)
+    return Stepping(model_of(job, Image())[0], solver, 1e-12, fc.Criteria(**criteria), ramp)
 
 
 def carried(step: fc.StepResult, recipe: Blocks) -> bool:

@@ -30,7 +30,7 @@ def solved(recipe):
 def test_forces_balance(recipe):
     analysis, step = solved(recipe)
     internal = (analysis.K @ step.displacement.ravel()).reshape(-1, recipe.dim)
-    contact = analysis.constraints.force(analysis.state).reshape(-1, recipe.dim)
+    contact = analysis.settled.force.reshape(-1, recipe.dim)
     size = np.abs(internal).max()
     assert np.abs(internal - contact - step.reaction).max() < BALANCE * size
     # Reactions act where supports are, contact forces on the two sides of the contact.
@@ -57,7 +57,7 @@ def test_forces_balance(recipe):
 )
 def test_what_touches_neither_overlaps_nor_pulls(recipe):
     analysis, step = solved(recipe)
-    state, constraints = analysis.state, analysis.constraints
+    state, constraints = analysis.settled.solution, analysis.settled.constraints
     length, force = np.abs(step.displacement).max(), np.abs(state.multiplier).max()
     usable = np.diff(constraints.B.indptr) > 0
     assert state.gap[usable].min() >= -COMPLEMENTARITY * length
@@ -79,7 +79,7 @@ def test_what_touches_neither_overlaps_nor_pulls(recipe):
 @given(recipe=recipes(friction=True) | recipes(kinematics=("3d",), friction=True))
 def test_friction_stays_in_its_cone_and_acts_against_the_slip(recipe):
     analysis, step = solved(recipe)
-    state = analysis.state
+    state = analysis.settled.solution
     length, force = np.abs(step.displacement).max(), np.abs(state.multiplier).max()
     bound = recipe.friction * state.multiplier
     rubbing = np.linalg.norm(state.tangential, axis=1)

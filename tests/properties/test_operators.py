@@ -8,6 +8,7 @@ from problems import FORMULATIONS, analysis_of, examples, recipes
 from scipy.sparse import bsr_array, csr_array
 
 import fastcontact as fc
+from fastcontact.contact.configuration import Configuration
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.linear import choice as linear
 from fastcontact.linear.elimination.elimination import eliminate
@@ -22,7 +23,7 @@ def constrained(recipe):
     """A stiffness without its supports (n, n), near rigid motions (n, k) and contact rows (m, n)."""
     analysis = analysis_of(recipe.job())
     system, model = analysis.system, analysis.model
-    constraints = analysis.pairs["pair 0"].constraints(np.zeros_like(analysis.displacement))
+    constraints = analysis.pairs["pair 0"].constraints(Configuration.displaced(np.zeros_like(analysis.displacement)))
     B = system.rows(constraints.B, constraints.gap0, np.zeros(model.n_dofs))[0]
     rows = csr_array(B)[np.diff(csr_array(B).indptr) > 0]
     modes = rigid_modes(model.mesh.points, "plane_strain" if recipe.dim == 2 else "3d")

@@ -109,7 +109,7 @@ def test_work_is_strain_energy_and_friction(recipe, levels):
         except fc.ConvergenceError:
             assume(False)
         now = step.displacement.ravel()
-        state, constraints, change = analysis.state, analysis.constraints, now - u
+        state, constraints, change = analysis.settled.solution, analysis.settled.constraints, now - u
         opened = constraints.gap0 + constraints.B @ u
         turned = 0.0 if constraints.drift is None else float((state.tangential * constraints.drift.T).sum())
         new = 0.5 * now @ (K @ now)

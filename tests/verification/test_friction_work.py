@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis.analysis import Analysis
 from fastcontact.mesh.generate import box, renamed, union
 
 E, FRICTION, PRESSURE, SLIP = 1e5, 0.3, 1.0, 0.1
@@ -77,7 +77,7 @@ def test_a_block_slides_at_101_hundredths_of_its_limit_until_springs_hold_it(dim
 
 def analysed(model, ramp, **criteria):
     """Return the steps and, for every step, the elastic energy."""
-    analysis = Analysis(model, "direct", 1e-10, fc.Criteria(**criteria), ramp)
+    analysis = Stepping(model, "direct", 1e-10, fc.Criteria(**criteria), ramp)
     steps = [analysis.step(index, instant) for index, instant in enumerate(ramp.instants, start=1)]
     displacements = [step.displacement.ravel() for step in steps]
     return steps, [0.5 * u @ (analysis.K @ u) for u in displacements], analysis.K

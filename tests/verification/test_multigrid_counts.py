@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
+from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis.analysis import Analysis
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.contact.configuration import Configuration
 
 
 def with_material(mesh):
@@ -44,7 +45,7 @@ def sphere(size, formulation="node_to_segment"):
 
 
 def prepared(model, tolerance=1e-8, steps=1):
-    return Analysis(model, "amg", tolerance, Criteria(geometry=tolerance), fc.linear_ramp(steps))
+    return Stepping(model, "amg", tolerance, Criteria(geometry=tolerance), fc.linear_ramp(steps))
 
 
 def counted(analysis, work):
@@ -54,7 +55,7 @@ def counted(analysis, work):
 
 
 def linear_iterations(analysis):
-    lift = analysis._lift(1.0)
+    lift = analysis.load_at(1.0).lift
     loaded = analysis.solver.load(analysis.system.right(np.zeros_like(lift), lift))
     return counted(analysis, lambda: loaded.solve(csr_array((0, len(lift))), np.empty(0)))
 
@@ -63,8 +64,8 @@ def linear_iterations(analysis):
 def test_linear_and_tied_solutions_take_the_same_few_iterations_at_any_size(n):
     analysis = prepared(blocks(n))
     assert linear_iterations(analysis) <= 13
-    lift = analysis._lift(1.0)
-    rows = analysis.pairs["c"].constraints(np.zeros(analysis.model.mesh.points.shape))
+    lift = analysis.load_at(1.0).lift
+    rows = analysis.pairs["c"].constraints(Configuration.undeformed(analysis.model.mesh.points))
     B, gap0 = analysis.system.rows(rows.B, rows.gap0, lift)
     all_rows = np.flatnonzero(np.diff(B.indptr) > 0)
     loaded = analysis.solver.load(analysis.system.right(np.zeros_like(lift), lift))

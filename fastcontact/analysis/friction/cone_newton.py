@@ -78,12 +78,12 @@ class Law:
     Attributes
     ----------
     mu : ndarray (m,)
-    held : ndarray of bool (m,), optional
+    equality : ndarray of bool (m,), optional
         Constraints that are equations: closed whatever their force.
     """
 
     mu: Array
-    held: Mask | None = None
+    equality: Mask | None = None
 
     def trial(self, y: Array, gaps: Array) -> tuple[Array, Array, Array, Array]:
         """Return n - g, t - s, the length of the latter and the radius of the disc."""
@@ -94,13 +94,13 @@ class Law:
         """Return the left-hand sides (1 + k, m) of the equations."""
         n, t, reach, radius = self.trial(y, gaps)
         inside = np.divide(radius, reach, out=np.ones_like(reach), where=reach > radius)
-        pushed = np.maximum(n, 0.0) if self.held is None else np.where(self.held, n, np.maximum(n, 0.0))
+        pushed = np.maximum(n, 0.0) if self.equality is None else np.where(self.equality, n, np.maximum(n, 0.0))
         return np.vstack([y[0] - pushed, y[1:] - t * inside])
 
     def state(self, y: Array, gaps: Array) -> tuple[Mask, Mask]:
         """Return which constraints are closed, and which of those stick."""
         n, _, reach, radius = self.trial(y, gaps)
-        closed = n > 0 if self.held is None else (n > 0) | self.held
+        closed = n > 0 if self.equality is None else (n > 0) | self.equality
         return closed, (n > 0) & (reach <= radius) & (self.mu > 0)
 
     def slide(self, y: Array, gaps: Array, sliding: NDArray[np.intp]) -> tuple[Array, Array]:

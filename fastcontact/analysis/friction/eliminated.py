@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, vstack
 
+from fastcontact.analysis.accuracy import Accuracy
 from fastcontact.analysis.friction.cone_newton import EXACT, Forces, Law, newton
 from fastcontact.analysis.friction.slip_directions import aligning, idle
+from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Drag, Oblique
 
@@ -28,44 +30,38 @@ ENOUGH = 10.0
 
 
 def solve(
-    loaded: Oblique, rows: tuple[csr_array, ...], free: Array, mu: Array, usable: Mask, *, closed: Mask,
-    held: Mask | None, forces: Array | None, u: Array, tolerance: float, patience: int | None = None,
-) -> tuple[Array, Forces] | None:  # fmt: skip
+    loaded: Oblique, constraints: Constraints, closed: Mask, accuracy: Accuracy, u: Array, forces: Array | None
+) -> tuple[Array, Forces] | None:
     """Return displacement and forces, or None where the method fails.
 
     Parameters
     ----------
     loaded : Oblique
-    rows : tuple of csr_array (m, n)
-        Normal rows, then those along each of k tangents.
-    free : ndarray (1 + k, m)
-        Gaps and slips at u = 0.
-    mu : ndarray (m,)
-    usable, closed : ndarray of bool (m,)
-        Constraints that may close, and those to start from as closed and sticking.
-    held : ndarray of bool (m,), optional
-        Constraints that are equations, without friction.
-    forces : ndarray (1 + k, m), optional
-        To start from.
+    constraints : Constraints
+        See `friction.solve`; without compliance.
+    closed : ndarray of bool (m,)
+        Constraints to start from as closed and sticking.
+    accuracy : Accuracy
+        Its residual is that of the linear solutions.
     u : ndarray (n,)
-        Displacement to start from.
-    tolerance : float
-        Relative residual of linear solutions.
-    patience : int, optional
-        Newton iterations after which whatever was found will do.
+        Unknowns to start from [length].
+    forces : ndarray (1 + k, m), optional
+        Forces to start from [force].
     """
-    problem = Eliminated(loaded, rows, free, mu, usable, held, u, tolerance)
+    tolerance, steps = accuracy.residual or 0.0, accuracy.max_newton_steps
+    problem = Eliminated(loaded, constraints, u, tolerance)
     y, gaps = problem.start(forces)
     try:
         if forces is None or not forces.any():
             sticking = closed if closed.any() else gaps[0] < 0.0
-            state = sticking if held is None else sticking | held, sticking
+            equality = constraints.equality
+            state = sticking if equality is None else sticking | equality, sticking
         else:
             state = problem.law.state(y, gaps)
         # At least once, for forces and displacement to start from are not in balance.
         y, gaps = problem.step(y, gaps, *state)
-        found = newton(problem, y, gaps, max(EXACT, ENOUGH * tolerance), None if patience is None else patience - 1)
-        if not found.settled and patience is None:
+        found = newton(problem, y, gaps, max(EXACT, ENOUGH * tolerance), None if steps is None else steps - 1)
+        if not found.settled and steps is None:
             return None
         if found.y is not problem.reached:  # between two steps: displacements are known at their ends
             problem.step(found.y, found.gaps, found.closed, found.sticking)
@@ -85,12 +81,11 @@ class Eliminated:
         Forces that it led to, scaled.
     """
 
-    def __init__(
-        self, loaded: Oblique, rows: tuple[csr_array, ...], free: Array, mu: Array, usable: Mask, held: Mask | None,
-        u: Array, tolerance: float,
-    ) -> None:  # fmt: skip
+    def __init__(self, loaded: Oblique, constraints: Constraints, u: Array, tolerance: float) -> None:
+        usable, mu = constraints.usable, constraints.coefficients
+        rows, free = (constraints.B, *constraints.tangents), constraints.gaps_at_rest()
         self._loaded, self._usable, self._tolerance = loaded, usable, tolerance
-        k, m = len(rows) - 1, len(mu)
+        k, m = len(rows) - 1, len(constraints)
         yielding = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
         own = _own(rows, yielding)
         self._turn = aligning(own) if k == 2 else None
@@ -105,7 +100,8 @@ class Eliminated:
         self._free = np.vstack([free[0], np.where(still, 0.0, free[1:])])
         self._slips = ~still
         self._unit = 1.0 / np.sqrt(np.where(own[0, 0] > 0.0, own[0, 0], 1.0))
-        self.law = Law(np.where(usable, mu, 0.0), None if held is None else held & usable)
+        equality = constraints.equality
+        self.law = Law(np.where(usable, mu, 0.0), None if equality is None else equality & usable)
         self.u = u
         self.round_off = float(
             16 * np.finfo(float).eps * np.abs(self._unit * self._gaps(u))[:, usable].max(initial=0.0)

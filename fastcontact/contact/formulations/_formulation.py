@@ -1,4 +1,4 @@
-"""What a contact formulation is: constraints from a configuration, nodal pressures from multipliers."""
+"""The base of all contact formulations: from the configuration of a pair to its constraints."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints
-from fastcontact.contact.formulations._held_nodes import held_nodes
+from fastcontact.contact.formulations._supported_nodes import supported_nodes
 from fastcontact.contact.obstacles.rigid_side import RigidSide
-from fastcontact.contact.pair_options import Terms
+from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair, rows_along, tangents
 from fastcontact.contact.projection import interpolated, nodal_normals, places
 from fastcontact.contact.surface import Surface
-from fastcontact.contact.tied import Tie, tie
+from fastcontact.contact.tied import TiedPair, tied
 from fastcontact.errors import ContactError, unknown
 
 Array = NDArray[np.float64]
@@ -29,7 +30,7 @@ ON_SYMMETRY = 0.05
 
 @dataclass(eq=False)
 class Formulation(ABC):
-    """A contact formulation bound to one pair of surfaces.
+    """A contact formulation bound to one pair of surfaces; it does not change after it is made.
 
     Sub-classes are dataclasses; their further fields are the options that a user may set by name.
 
@@ -44,21 +45,16 @@ class Formulation(ABC):
     modulus : float
         Typical stiffness of the bodies, E / (1 - nu^2) [pressure].
     friction : float
-        Coefficient of Coulomb friction, zero for none.
+        Coefficient of Coulomb friction, zero for none [-].
     projection_tolerance : float
         How far a point may stand out beyond the end of its facet and still be paired, in facet lengths.
     normals : str, optional
         ``"facet"``: of the primary facet at the projection; ``"averaged"``: interpolated between nodal means. By default
         the former in 2D and the latter in 3D, where a point opposite an edge between facets often flips for ever.
-    terms : Terms
-        What the pair is asked to do whatever its formulation, e.g. its clearance.
-
-    Attributes
-    ----------
+    options : PairOptions
+        Options of the pair that do not depend on its formulation, e.g. its clearance.
     supported : ndarray of bool (n_points, dim), optional
-        Components that supports prescribe, where they are known.
-    before : ndarray (n_points, dim), optional
-        Displacement at the beginning of the step [length]; None stands for zero.
+        Displacement components that supports prescribe, where they are known.
     """
 
     secondary: Surface
@@ -70,13 +66,11 @@ class Formulation(ABC):
     friction: float = 0.0
     projection_tolerance: float = 0.5
     normals: str | None = None
-    terms: Terms = field(default_factory=Terms, repr=False)
-    supported: NDArray[np.bool_] | None = field(default=None, init=False, repr=False)
-    before: Array | None = field(default=None, init=False, repr=False)
-    _closed: tuple[Array, NDArray[np.bool_]] | None = field(default=None, init=False, repr=False)
+    options: PairOptions = field(default_factory=PairOptions, repr=False)
+    supported: NDArray[np.bool_] | None = field(default=None, repr=False)
 
     name: ClassVar[str]
-    # Re-pair after every active-set iteration (True), or after the active set has settled (False).
+    # Pair again after every active-set iteration (True), or after the active set has settled (False).
     geometry_in_loop: ClassVar[bool]
 
     def __post_init__(self) -> None:
@@ -91,95 +85,67 @@ class Formulation(ABC):
 
     @classmethod
     def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:
-        """Return the class that does this formulation in 2 or 3 dimensions with the options of a user."""
+        """Return the class that implements this formulation in 2 or 3 dimensions with the options of a user."""
         return cls
 
     @abstractmethod
-    def constraints(self, displacement: Array) -> Constraints:
-        """Pair on the configuration displaced by `displacement` (n_points, dim) and return the constraints."""
+    def unilateral(self, at: Configuration) -> Constraints:
+        """Pair the two sides and return constraints that may open and close, without penalty."""
 
-    def areas(self) -> Array:
-        """Return the area (m,) that each constraint of the last pairing stands for; infinite where it does nothing.
+    def constraints(self, at: Configuration) -> Constraints:
+        """Pair the two sides and return the constraints of the kind of contact asked for.
 
         Raises
         ------
         ContactError
-            If constraints of this formulation stand for no areas.
+            If the pair has a penalty, and the constraints of its formulation stand for no areas.
         """
-        raise ContactError(f"formulation '{self.name}' knows no penalty: leave out the option")
-
-    def conditions(self, displacement: Array) -> Constraints:
-        """Return the constraints as the terms of the pair have them: penalised, held for good, or tied."""
-        if self.tie is not None:
-            return self.tie.constraints()
-        part = self.constraints(displacement)
-        softness = None if self.terms.penalty is None else 1.0 / (self.terms.penalty * self.areas())
-        return replace(part, held=self.closed_for_good(part.positions), softness=softness)
+        if self.tied is not None:
+            return self.tied.constraints()
+        part = self.unilateral(at)
+        softness = None
+        if self.options.penalty is not None:
+            if part.areas is None:
+                raise ContactError(f"formulation '{self.name}' knows no penalty: leave out the option")
+            softness = 1.0 / (self.options.penalty * part.areas)
+        return replace(part, equality=self.never_opening(part.positions, at), softness=softness)
 
     @cached_property
-    def tie(self) -> Tie | None:
+    def tied(self) -> TiedPair | None:
         """The equations of a tied pair, on the bodies as they lie before any load."""
-        return tie(self.constraints(np.zeros_like(self.points))) if self.terms.tied else None
+        return tied(self.unilateral(Configuration.undeformed(self.points))) if self.options.tied else None
 
-    def closed_for_good(self, positions: Array) -> NDArray[np.bool_] | None:
-        """Return which places (m,) at reference `positions` (m, dim) never open again; None if all may."""
-        if self.terms.always_closed:
+    def never_opening(self, positions: Array, at: Configuration) -> NDArray[np.bool_] | None:
+        """Return which reference places (m, dim) [length] never open again, (m,); None if all may."""
+        if self.options.always_closed:
             return np.ones(len(positions), bool)
-        if self._closed is None:
+        if at.never_opening is None:
             return None
         from scipy.spatial import cKDTree
 
-        at, closed = self._closed
-        return np.asarray(closed[cKDTree(at).query(positions)[1]])
-
-    def end_step(self, part: Constraints, active: NDArray[np.bool_]) -> None:
-        """Take note of the constraints `part` that are closed at the end of a load step."""
-        if self.terms.kind == "bilateral_once_closed":
-            self._closed = part.positions, active.copy()
-
-    def forces(self, multiplier: Array) -> Array:
-        """Return the normal forces (m,) of the formulation's own constraints from the multipliers of `conditions`."""
-        return multiplier if self.tie is None else self.tie.forces(multiplier)[0]
-
-    def initially_active(
-        self, constraints: Constraints, pressure: Array, displacement: Array
-    ) -> NDArray[np.bool_] | None:
-        """Return the set to start from, given the last nodal `pressure`; None: constraints are the same as before."""
-        return None
-
-    @abstractmethod
-    def pressure(self, multiplier: Array) -> Array:
-        """Return nodal pressures (n_nodes,) per reference area from the multipliers (m,) [pressure]."""
-
-    @abstractmethod
-    def closed_nodes(self, active: NDArray[np.bool_], gap: Array, pressure: Array) -> NDArray[np.bool_]:
-        """Return which secondary nodes are in contact, from the active constraints and the nodal gap and pressure."""
+        places_before, closed = at.never_opening
+        return np.asarray(closed[cKDTree(places_before).query(positions)[1]])
 
     def assembled(
-        self, candidates: Candidates, pairing: Pairing, compliance: Compliance | None, deformed: Array
+        self, candidates: Candidates, pairing: Pairing, compliance: Compliance | None, at: Configuration
     ) -> Constraints:
-        """Return the constraints of candidates paired at `deformed`, with tangential rows where there is friction."""
+        """Return the constraints of paired candidates, with tangential rows where there is friction."""
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
-        gap0 += self.terms.added_gap(candidates, pairing, self.primary, self.points)
+        gap0 += self.options.added_gap(candidates, pairing, self.primary, self.points, at.clearance_factor)
         positions = candidates.positions(self.points)
-        if not (self.friction or self.terms.tied):
+        if not (self.friction or self.options.tied):
             return Constraints(B, gap0, positions, compliance)
         directions = tuple(tangents(pairing.normal))
         along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
         if isinstance(self.primary, RigidSide):
-            drift = -np.stack([t @ (self.primary.now - self.primary.before) for t in directions])
+            drift = -np.stack([t @ (at.obstacle - at.obstacle_start) for t in directions])
         else:
-            drift = self._approach(candidates, pairing, directions, deformed)
-        friction = self.terms.coefficients(self.friction, candidates)
-        loose = self._loose(candidates, pairing, directions) if self.friction else None
-        return Constraints(B, gap0, positions, compliance, along, directions, friction, drift, loose=loose)
+            drift = self._closing_slip(candidates, pairing, directions, at)
+        friction = self.options.coefficients(self.friction, candidates)
+        return Constraints(B, gap0, positions, compliance, along, directions, friction, drift)
 
-    def _loose(self, candidates: Candidates, pairing: Pairing, directions: tuple[Array, ...]) -> Array | None:
-        """Return what supports leave undetermined of tangential forces, see `Constraints.loose`."""
-        return None
-
-    def held_along(self, axis: int, candidates: Candidates, pairing: Pairing) -> NDArray[np.bool_]:
-        """Return which secondary nodes (m,) supports keep from slipping along an axis; see `_held_nodes`."""
+    def supported_along(self, axis: int, candidates: Candidates, pairing: Pairing) -> NDArray[np.bool_]:
+        """Return which secondary nodes (n_nodes,) supports keep from slipping along an axis; see `_supported_nodes`."""
         m = len(self.secondary.points)
         if self.supported is None or not self.supported[self.secondary.points, axis].any():
             return np.zeros(m, bool)
@@ -190,10 +156,10 @@ class Formulation(ABC):
             facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
             rows = rows[supported[facing.nodes].any(axis=1)]
             opposite = np.isin(self.secondary.points, candidates.nodes[rows][candidates.shape[rows] != 0.0])
-        return held_nodes(self.secondary, supported[self.secondary.points], opposite)
+        return supported_nodes(self.secondary, supported[self.secondary.points], opposite)
 
-    def _approach(
-        self, candidates: Candidates, pairing: Pairing, directions: tuple[Array, ...], deformed: Array
+    def _closing_slip(
+        self, candidates: Candidates, pairing: Pairing, directions: tuple[Array, ...], at: Configuration
     ) -> Array:
         """Return the slip (k, n) to add so that closing a gap is none, though the normal leans.
 
@@ -202,6 +168,7 @@ class Formulation(ABC):
         bodies close their gaps without any.
         """
         assert isinstance(self.primary, Surface)
+        deformed, start = self.points + at.displacement, self.points + at.start
         drift = np.zeros((len(directions), len(pairing.paired)))
         rows = np.flatnonzero(pairing.paired)
         facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
@@ -212,7 +179,6 @@ class Formulation(ABC):
         theirs = interpolated(nodal_normals(self.primary, deformed), facing)
         mean = theirs - ours / np.linalg.norm(ours, axis=1, keepdims=True)
         mean /= np.linalg.norm(mean, axis=1, keepdims=True)
-        start = self.points if self.before is None else self.points + self.before
         apart = np.einsum("nk,nkd->nd", shape, start[nodes])
         apart -= np.einsum("nk,nkd->nd", facing.shape, start[facing.nodes])
         opening = np.einsum("nd,nd->n", mean, apart)
@@ -220,28 +186,28 @@ class Formulation(ABC):
             drift[k, rows] = np.einsum("nd,nd->n", along[rows], mean) * opening
         return drift
 
-    @cached_property
-    def first_contact(self) -> tuple[Array, Array]:
-        """Where the bodies meet first, and the normal faced there, both (dim,).
+    def first_contact(self, at: Configuration) -> tuple[Array, Array]:
+        """Return where the bodies meet first [length], and the normal faced there [-], both (dim,).
 
-        The secondary node with the smallest gap before any load; of equally close ones that nearest to the origin.
+        The secondary node with the smallest gap before any displacement of the bodies; of equally close ones that nearest to
+        the origin.
         """
         positions = self.points[self.secondary.points]
-        gap, normal = self.nodal_gap(np.zeros_like(self.points))
+        gap, normal = self.nodal_gap(replace(at, displacement=np.zeros_like(self.points)))
         close = np.flatnonzero(gap <= gap.min() + 1e-9 * np.ptp(positions, axis=0).max())
         first = close[np.argmin(np.linalg.norm(positions[close], axis=1))]
         return positions[first], normal[first]
 
-    def nodal_gap(self, displacement: Array, with_clearance: bool = True) -> tuple[Array, Array]:
-        """Return the gap (n_nodes,) of the secondary nodes in the displaced configuration, and the normals faced.
+    def nodal_gap(self, at: Configuration, with_clearance: bool = True) -> tuple[Array, Array]:
+        """Return the gaps (n_nodes,) of the secondary nodes [length], and the normals (n_nodes, dim) that they face [-].
 
         Infinite where a node faces no primary facet. Clearances count unless they are left out.
         """
         nodes = Candidates(self.secondary.points[:, None], np.ones((len(self.secondary.points), 1)))
-        deformed = self.points + displacement
+        deformed = self.points + at.displacement
         tolerance = max(self.projection_tolerance, ON_SYMMETRY)
-        pairing = pair(nodes.positions(deformed), self.primary, deformed, tolerance, self.normals)
+        pairing = pair(nodes.positions(deformed), self.primary, deformed, tolerance, self.normals, at.obstacle)
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
         if with_clearance:
-            gap0 += self.terms.added_gap(nodes, pairing, self.primary, self.points)
-        return np.where(pairing.paired, gap0 + G @ displacement.ravel(), np.inf), pairing.normal
+            gap0 += self.options.added_gap(nodes, pairing, self.primary, self.points, at.clearance_factor)
+        return np.where(pairing.paired, gap0 + G @ at.displacement.ravel(), np.inf), pairing.normal

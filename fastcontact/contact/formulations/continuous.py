@@ -1,22 +1,6 @@
 r"""Continuous contact: a pressure field on the secondary facets, contact decided at integration points.
 
-The multiplier field :math:`\lambda_h` has the order of the facets. At every integration point the pressure is
-
-.. math:: p = [\lambda_h - \rho g]_+
-
-and the field is its projection, :math:`\int (\lambda_h - p) N_j = 0` for every node j (Alart and Curnier, 1991; with
-integration points, Ben Dhia and Zarroug, 2002; code_aster, R5.03.52). Both are the stationarity of one augmented
-Lagrangian. With the point forces :math:`y = w p` as unknowns it becomes a linear complementarity problem
-
-.. math:: y \ge 0, \quad g + C y \ge 0, \quad y^T (g + C y) = 0, \quad
-          C = \tfrac{1}{\rho} \left( W^{-1} - P (P^T W P)^{-1} P^T \right)
-
-with P the shape functions at the points and W their areas. C is positive semidefinite and vanishes on the fields that
-the shape functions can represent, so the multiplier itself is not softened; it only decides what is finer than the
-field. The primal-dual active set solves this exactly (as a semismooth Newton method), for every rho > 0, with the
-pairing renewed in every iteration. No multiplier can stay undetermined as long as :math:`P^T W P` is regular: that
-takes at least as many points with a weight on a facet as it has nodes, and is checked. Integrals run over the reference
-surface.
+The integration points stay where they are on the secondary facets; see `_pressure_field` for the equations.
 """
 
 from __future__ import annotations
@@ -29,13 +13,13 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import splu
 
+from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
-from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.formulations._held_nodes import compliant
+from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
 from fastcontact.contact.formulations._projection import Projection
 from fastcontact.contact.integration import facet_measure, fine_rule, gauss_rule
 from fastcontact.contact.pair_options import spread
-from fastcontact.contact.pairing import Candidates, Pairing, filled_up, normals, pair
+from fastcontact.contact.pairing import Candidates, filled_up, pair
 from fastcontact.contact.surface import FacetBlock
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh import elements, quadrature
@@ -45,7 +29,7 @@ RULES = ("gauss", "simpson", "node")
 
 
 @dataclass(eq=False)
-class Continuous(Formulation):
+class Continuous(PressureFieldFormulation):
     """Continuous contact with a multiplier field.
 
     Parameters
@@ -57,8 +41,6 @@ class Continuous(Formulation):
     n_gauss : int, optional
         Gauss points in each direction of a facet, on triangles 3, 6, 12 or 16 points in all for 2 to 5; by default 3 on
         linear and 4 on quadratic facets. They must determine the field.
-    augmentation : float
-        rho times the length of the shortest facet (the root of the smallest area) over the modulus of the bodies [1].
     normals : str
         ``"averaged"`` by default: with normals that jump between facets, a point opposite a node can flip for ever.
     """
@@ -67,20 +49,13 @@ class Continuous(Formulation):
 
     integration: str = "gauss"
     n_gauss: int | None = None
-    augmentation: float = 1.0
 
     name: ClassVar[str] = "continuous"
-    geometry_in_loop: ClassVar[bool] = True
     _candidates: Candidates = field(init=False, repr=False)
-    _local: NDArray[np.intp] = field(init=False, repr=False)
-    _projection: Projection = field(init=False, repr=False)
-    _field: csr_array = field(init=False, repr=False)
-    _own: NDArray[np.intp] = field(init=False, repr=False)
+    _field: PressureField = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.augmentation > 0:
-            raise ContactError(f"augmentation = {self.augmentation} must be positive; 1 suits most problems")
         nodes, local, shapes, areas, shortest = [], [], [], [], np.inf
         for block in self.secondary.blocks:
             xi, weights = self._rule(block.element)
@@ -91,20 +66,20 @@ class Continuous(Formulation):
             size = facet_measure(block.facets, block.element, self.points, xi, False) @ weights
             shortest = min(shortest, size.min() ** (1 / xi.shape[1]))
         self._candidates = Candidates(filled_up(nodes), filled_up(shapes))
-        self._local = filled_up(local)
         rho = self.augmentation * self.modulus / shortest
-        self._project(np.where(self.terms.out(self._candidates), 0.0, np.concatenate(areas)), float(rho))
+        areas_of_points = np.where(self.options.out(self._candidates), 0.0, np.concatenate(areas))
+        self._field = self._pressure_field(filled_up(local), areas_of_points, float(rho))
 
-    def _project(self, areas: Array, rho: float) -> None:
-        """Set up the multiplier field and its compliance."""
+    def _pressure_field(self, local: NDArray[np.intp], areas: Array, rho: float) -> PressureField:
+        """Set up the pressure field and its compliance; `local` (m, n) are the nodes of each point's facet."""
         shape = self._candidates.shape
         row = np.broadcast_to(np.arange(len(shape))[:, None], shape.shape)
         size = (len(shape), len(self.secondary.points))
-        P = coo_array((shape.ravel(), (row.ravel(), self._local.ravel())), shape=size).tocsr()
-        self._field = self._determined(P, areas)
-        P = P @ self._field
+        P = coo_array((shape.ravel(), (row.ravel(), local.ravel())), shape=size).tocsr()
+        nodes, independent = self._determined(P, areas)
+        P = P @ nodes
         mass = splu((P.T @ diags_array(areas) @ P).tocsc())
-        self._projection = Projection(csr_array(P), areas, rho, mass)
+        return PressureField(Projection(csr_array(P), areas, rho, mass), nodes, independent, local, renewed=False)
 
     def _rule(self, element: str) -> quadrature.Rule:
         if self.integration not in RULES:
@@ -144,15 +119,15 @@ class Continuous(Formulation):
             areas[np.abs(areas) < 1e-3 * areas[:, 2:]] = 0.0
         return areas.ravel()
 
-    def _determined(self, P: csr_array, areas: Array) -> csr_array:
-        """Return the matrix (n_nodes, k) from independent multipliers to nodal values of the field.
+    def _determined(self, P: csr_array, areas: Array) -> tuple[csr_array, NDArray[np.intp]]:
+        """Return the matrix (n_nodes, k) from independent to nodal values of the field, and the nodes (k,) of the former.
 
         The identity, but for a quadratic line that ends on the axis when the points are the nodes: that end has no
         area and its value no equation. The field is even about the axis, which gives it by the two other nodes.
         """
         size = P.shape[1]
         seen = np.asarray((P.T @ diags_array(areas) @ P).diagonal())
-        excluded = self.terms.excluded_nodes(self.secondary)
+        excluded = self.options.excluded_nodes(self.secondary)
         blind = np.flatnonzero((seen == 0.0) | excluded)
         values = eye_array(size, format="lil")
         lines = [block.local for block in self.secondary.blocks if block.element == "line3"]
@@ -162,41 +137,17 @@ class Continuous(Formulation):
                     values[facet[end], facet[end]] = 0.0
                     values[facet[end], facet[2]] = 4.0 / 3.0
                     values[facet[end], facet[other]] = -1.0 / 3.0
-        self._own = kept = np.setdiff1d(np.arange(size), blind)
-        return csr_array((values.tocsr() @ spread(self.secondary, excluded, kept))[:, kept])
+        kept = np.setdiff1d(np.arange(size), blind)
+        return csr_array((values.tocsr() @ spread(self.secondary, excluded, kept))[:, kept]), kept
 
-    def constraints(self, displacement: Array) -> Constraints:
+    def unilateral(self, at: Configuration) -> Constraints:
         """Pair the integration points on the displaced configuration and return their gaps."""
-        deformed = self.points + displacement
+        deformed = self.points + at.displacement
         positions = self._candidates.positions(deformed)
-        pairing = pair(positions, self.primary, deformed, self.projection_tolerance, self.normals)
-        usable = self._projection.areas > 1e-12 * self._projection.areas.max()
-        pairing.paired[~usable] = False
-        return self.assembled(self._candidates, pairing, self._projection, deformed)
-
-    def _loose(self, candidates: Candidates, pairing: Pairing, directions: tuple[Array, ...]) -> Array | None:
-        """Return the compliance of fields that do no work on any slip, where supports hold nodes."""
-        factors = []
-        for axis in range(directions[0].shape[1]):
-            columns = np.flatnonzero(self.held_along(axis, candidates, pairing)[self._own])
-            if len(columns):
-                Z = compliant(self._projection, columns)
-                factors.append(np.stack([along[:, axis, None] * Z for along in (normals(directions), *directions)]))
-        return np.concatenate(factors, axis=2) if factors else None
-
-    def areas(self) -> Array:
-        """Return the areas of the integration points."""
-        return np.where(self._projection.areas > 0, self._projection.areas, np.inf)
-
-    def pressure(self, multiplier: Array) -> Array:
-        """Return the multiplier field at the nodes; it may be slightly negative beyond the edge of the contact."""
-        return self._field @ self._projection.field(multiplier)
-
-    def closed_nodes(self, active: NDArray[np.bool_], gap: Array, pressure: Array) -> NDArray[np.bool_]:
-        """Return the nodes where ``pressure - rho gap`` is positive, on facets with an active point."""
-        touched = np.zeros(len(gap), bool)
-        touched[self._local[active]] = True
-        return touched & (pressure - self._projection.rho * np.where(np.isfinite(gap), gap, np.inf) > 0)
+        pairing = pair(positions, self.primary, deformed, self.projection_tolerance, self.normals, at.obstacle)
+        areas = self._field.projection.areas
+        pairing.paired[~(areas > 1e-12 * areas.max())] = False
+        return self.of_points(self._candidates, pairing, self._field, at)
 
 
 def _simpson(element: str) -> quadrature.Rule:

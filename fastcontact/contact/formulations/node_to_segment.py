@@ -9,14 +9,15 @@ corner forces of six-node triangles vanish and those of eight-node quadrangles p
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import SuperLU, splu
 
+from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.integration import fine_rule, mass_matrix, nodal_areas
@@ -52,39 +53,51 @@ class NodeToSegment(Formulation):
                 "whose corner nodes carry no pressure: use formulation 'continuous' or 'mortar', or swap the sides"
             )
 
-    def constraints(self, displacement: Array) -> Constraints:
+    def unilateral(self, at: Configuration) -> Constraints:
         """Pair on the displaced configuration and return one gap per secondary node."""
-        deformed = self.points + displacement
+        deformed = self.points + at.displacement
         positions = self._candidates.positions(deformed)
-        pairing = pair(positions, self.primary, deformed, self.projection_tolerance, self.normals)
-        pairing.paired[self.terms.out(self._candidates)] = False
-        return self.assembled(self._candidates, pairing, None, deformed)
+        pairing = pair(positions, self.primary, deformed, self.projection_tolerance, self.normals, at.obstacle)
+        pairing.paired[self.options.out(self._candidates)] = False
+        areas = self._nodal.areas
+        usable = np.where(areas > 1e-12 * areas.max(), areas, np.inf)
+        return replace(self.assembled(self._candidates, pairing, None, at), areas=usable, nodal=self._nodal)
 
-    def areas(self) -> Array:
-        """Return the integrals of the nodes' shape functions."""
-        areas = self._areas
-        return np.where(areas > 1e-12 * areas.max(), areas, np.inf)
-
-    def pressure(self, multiplier: Array) -> Array:
-        """Return nodal forces over nodal areas; on quadratic facets, solve with the surface mass matrix instead.
-
-        The nodal areas of quadratic facets are not positive (zero at the axis), so division by them means nothing.
-        """
+    @cached_property
+    def _nodal(self) -> NodalForces:
+        areas = nodal_areas(self.secondary, self.points, self.axisymmetric)
         if self.secondary.order == 1:
-            return multiplier / self._areas
-        return self._mass.solve(multiplier)
+            return NodalForces(areas)
+        return NodalForces(areas, splu(mass_matrix(self.secondary, self.points, self.axisymmetric).tocsc()))
 
-    @cached_property
-    def _areas(self) -> Array:
-        return nodal_areas(self.secondary, self.points, self.axisymmetric)
 
-    @cached_property
-    def _mass(self) -> Any:
-        return splu(mass_matrix(self.secondary, self.points, self.axisymmetric).tocsc())
+@dataclass(frozen=True, eq=False)
+class NodalForces:
+    """Pressures from the contact forces of the nodes; see `constraints.NodalField`.
+
+    Attributes
+    ----------
+    areas : ndarray (n_nodes,)
+        Integrals of the nodes' shape functions [area].
+    mass : SuperLU, optional
+        Factors of the mass matrix of quadratic facets: their nodal areas are not positive (zero at the axis), so that
+        division by them means nothing.
+    """
+
+    areas: Array
+    mass: SuperLU | None = None
+
+    def pressure(self, force: Array) -> Array:
+        """Return nodal forces over nodal areas; on quadratic facets, solve with the mass matrix of the surface instead."""
+        return force / self.areas if self.mass is None else self.mass.solve(force)
 
     def closed_nodes(self, active: NDArray[np.bool_], gap: Array, pressure: Array) -> NDArray[np.bool_]:
         """Return the active constraints: there is one per node."""
         return active
+
+    def initially_active(self, gap: Array, pressure: Array) -> NDArray[np.bool_] | None:
+        """Return None: there is one constraint per node in every pairing."""
+        return None
 
 
 FORMULATION = NodeToSegment

@@ -127,6 +127,15 @@ class FactorSolver:
         """Return the prepared matrix with right-hand side `f`."""
         return LoadedFactor(self, f, self.known_loads.solution(f, self.back_substitute))
 
+    def snapshot(self) -> Any:
+        """See `LinearSolver.snapshot`."""
+        return self.known_loads.snapshot()
+
+    def put_back(self, snapshot: Any) -> None:
+        """See `LinearSolver.put_back`."""
+        if snapshot is not None:
+            self.known_loads.put_back(snapshot)
+
     def memory(self) -> dict[str, Any]:
         """See `LinearSolver.memory`: columns of ``K^-1`` asked for, and right-hand sides that others are made of."""
         return {"asked": list(self.compliance.asked), "loads": self.known_loads.memory()}

@@ -48,6 +48,14 @@ class KnownLoads:
     def _keep(self, f: Array, u: Array) -> None:
         self._loads, self._solutions = [*self._loads[1 - KEPT :], f], [*self._solutions[1 - KEPT :], u]
 
+    def snapshot(self) -> tuple[list[Array], list[Array]]:
+        """Return what is kept now, for `put_back`; arrays are replaced, never written into."""
+        return self._loads, self._solutions
+
+    def put_back(self, snapshot: tuple[list[Array], list[Array]]) -> None:
+        """Keep again what was kept when the snapshot was taken."""
+        self._loads, self._solutions = snapshot
+
     def memory(self) -> list[dict[str, Array | NDArray[np.intp]]]:
         """Return the right-hand sides kept, few of whose entries are not zero: ``places`` and ``values``."""
         places = [np.flatnonzero(f) for f in self._loads]

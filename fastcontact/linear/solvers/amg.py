@@ -74,6 +74,13 @@ class Amg(Multigrid):
         """Return the prepared matrix with right-hand side `f`."""
         return _Loaded(self, f)
 
+    def snapshot(self) -> Any:
+        """See `LinearSolver.snapshot`: nothing, for the hierarchy improves and never depends on the loads."""
+        return None
+
+    def put_back(self, snapshot: Any) -> None:
+        """See `LinearSolver.put_back`."""
+
     def memory(self) -> dict[str, Any]:
         """See `LinearSolver.memory`: what the hierarchy is tied for, how it was strengthened, columns of ``K^-1``."""
         tied = None

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.analysis import active_set
+from fastcontact.analysis.accuracy import Accuracy
+from fastcontact.contact.constraints import Constraints
 from fastcontact.linear import choice as linear
 
 
@@ -48,10 +50,9 @@ def random_problem(seed, n=8, m=5):
 def solve(K, f, B, gap0, C=None, start=None, solver="direct", **options):
     loaded = linear.make(solver, dim=2, n_dofs=len(f), tolerance=1e-13)
     loaded.prepare(bsr_array(K, blocksize=(2, 2)), np.ones((len(f), 1)))
-    return active_set.solve(
-        loaded.load(f), csr_array(B), gap0, np.ones(len(gap0), bool), compliance=C,
-        active=np.zeros(len(gap0), bool) if start is None else start, gap_tolerance=1e-12, **options,
-    )  # fmt: skip
+    constraints = Constraints(csr_array(B), gap0, np.zeros((len(gap0), 2)), C)
+    begin = np.zeros(len(gap0), bool) if start is None else start
+    return active_set.solve(loaded.load(f), constraints, begin, Accuracy(gap=1e-12, **options))
 
 
 @settings(max_examples=60, deadline=None)
@@ -84,12 +85,11 @@ def test_rows_that_repeat_each_other_do_no_harm():
 
 
 def test_an_unusable_constraint_stays_open():
-    K, f, B, gap0, _ = random_problem(3)
+    K, f, _, gap0, _ = random_problem(3)
     loaded = linear.make("direct", dim=2, n_dofs=8)
     loaded.prepare(bsr_array(K, blocksize=(2, 2)), np.ones((8, 1)))
-    state = active_set.solve(
-        loaded.load(f), csr_array(B), gap0, np.zeros(5, bool), active=np.ones(5, bool), gap_tolerance=1e-12
-    )
+    constraints = Constraints(csr_array((5, 8)), gap0, np.zeros((5, 2)))
+    state = active_set.solve(loaded.load(f), constraints, np.ones(5, bool), Accuracy(gap=1e-12))
     assert state.u == pytest.approx(np.linalg.solve(K, f))
     assert not state.multiplier.any()
 

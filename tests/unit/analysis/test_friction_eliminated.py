@@ -3,15 +3,16 @@
 import numpy as np
 import pytest
 from scipy.sparse import csr_array, random_array, vstack
+from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis.analysis import Analysis
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.friction import eliminated
+from fastcontact.contact.configuration import Configuration
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear import choice as linear
 from fastcontact.linear.krylov.gcr import KEPT, ConjugateResiduals
 from fastcontact.linear.multigrid import solver
+from fastcontact.linear.protocol import Drag
 from fastcontact.linear.solvers import amg
 
 BOTH = {"secondary": "CONT_SPHERE", "primary": "CONT_BLOCK"}
@@ -58,7 +59,7 @@ def test_small_blocks_slide_in_any_direction():
 def test_elimination_and_compliance_agree_and_no_column_is_asked_for(formulation, mu):
     model = rubbing(formulation, mu)
     exact = fc.solve(model, fc.linear_ramp(6), linear_solver="direct")
-    analysis = Analysis(model, "amg", 1e-10, Criteria(), fc.linear_ramp(6))
+    analysis = Stepping(model, "amg", 1e-10, Criteria(), fc.linear_ramp(6))
     slid = 0
     for index, (one, instant) in enumerate(zip(exact, analysis.ramp.instants, strict=True), start=1):
         other = analysis.step(index, instant)
@@ -119,11 +120,11 @@ def test_conjugate_residuals_solve_what_is_not_symmetric_and_never_grow(n):
 
 
 def test_oblique_equations_with_springs_against_a_dense_solution():
-    analysis = Analysis(rubbing(), "amg", 1e-12, Criteria())
+    analysis = Stepping(rubbing(), "amg", 1e-12, Criteria())
     solver, n = analysis.solver, analysis.model.n_dofs
     rng = np.random.default_rng(5)
     f = np.where(analysis.system.free, rng.normal(size=n), 0.0)
-    constraints = analysis.pairs["pair"].constraints(np.zeros_like(analysis.model.mesh.points))
+    constraints = analysis.pairs["pair"].constraints(Configuration.undeformed(analysis.model.mesh.points))
     near = np.argsort(constraints.gap0)[:4]
     normal, first, second = (
         analysis.system.rows(rows[near], np.zeros(4), np.zeros(n))[0] for rows in (constraints.B, *constraints.tangents)
@@ -131,9 +132,7 @@ def test_oblique_equations_with_springs_against_a_dense_solution():
     through, c = csr_array(normal + 0.3 * first), 1e-3 * rng.normal(size=4)
     springs = csr_array(50.0 * second.T @ second)
     push = -0.2 * np.asarray(second.T @ np.ones(4))
-    u, multiplier = solver.load(f).oblique(
-        normal, c, np.arange(4), np.zeros(n), 1e-12, linear.Drag(through, springs, push)
-    )
+    u, multiplier = solver.load(f).oblique(normal, c, np.arange(4), np.zeros(n), 1e-12, Drag(through, springs, push))
     out = analysis.system.matrix @ u + springs @ u - f - push - through.T @ multiplier
     assert np.abs(normal @ u - c).max() < 1e-12
     assert np.abs(out).max() < 1e-8 * np.abs(f).max()
@@ -143,10 +142,10 @@ def test_an_iteration_that_does_not_end_is_told(monkeypatch):
     from fastcontact.linear.elimination import nonsymmetric
 
     monkeypatch.setattr(nonsymmetric, "MAX_ITERATIONS", 1)
-    analysis = Analysis(rubbing(), "amg", 1e-12, Criteria())
+    analysis = Stepping(rubbing(), "amg", 1e-12, Criteria())
     n = analysis.model.n_dofs
     rows = csr_array((np.ones(2), ([0, 0], np.flatnonzero(analysis.system.free)[[0, 40]])), shape=(1, n))
-    drag = linear.Drag(csr_array(2.0 * rows))
+    drag = Drag(csr_array(2.0 * rows))
     f = np.where(analysis.system.free, 1.0, 0.0)
     with pytest.raises(ConvergenceError, match=r"conjugate residuals stand at .* times the tolerance"):
         analysis.solver.load(f).oblique(rows, np.zeros(1), np.zeros(1, np.int64), np.zeros(n), 1e-12, drag)
@@ -181,7 +180,7 @@ def test_factors_that_took_over_solve_friction_on_its_compliance(monkeypatch):
 
 
 def test_nothing_is_eliminated_once_factors_have_taken_over():
-    analysis = Analysis(small_blocks(), "amg", 1e-10, Criteria())
+    analysis = Stepping(small_blocks(), "amg", 1e-10, Criteria())
     n = analysis.model.n_dofs
     analysis.solver.give_up(solver.StallError("stalled"))
     none = csr_array((0, n))
@@ -195,8 +194,8 @@ def test_constraints_that_repeat_each_other_are_solved_on_their_compliance(caplo
     caplog.set_level("INFO", "fastcontact")
     model = small_blocks(0.0)
     once = fc.solve(model, fc.linear_ramp(1), linear_solver="amg")[-1]
-    analysis = Analysis(model, "amg", 1e-10, Criteria())
-    constraints = analysis.pairs["pair"].constraints(np.zeros_like(model.mesh.points))
+    analysis = Stepping(model, "amg", 1e-10, Criteria())
+    constraints = analysis.pairs["pair"].constraints(Configuration.undeformed(model.mesh.points))
     rows = np.flatnonzero(once.contact["pair"].active)[:2]
     n = model.n_dofs
     B, offset = analysis.system.rows(constraints.B[rows], constraints.gap0[rows], np.zeros(n))

@@ -8,8 +8,9 @@ from scipy.sparse.linalg import splu
 import fastcontact as fc
 from fastcontact.analysis.friction import cone_newton, coulomb, friction
 from fastcontact.analysis.friction.slip_directions import aligning, idle, own_compliance
-from fastcontact.contact.formulations._held_nodes import compliant
+from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations._projection import Projection
+from fastcontact.contact.formulations._supported_nodes import compliant
 from fastcontact.contact.pairing import normals, tangents
 
 
@@ -121,7 +122,7 @@ def test_a_kept_pairing_forgets_the_steps_and_a_new_one_does_not():
 
 def test_a_kept_pairing_serves_friction_through_steps():
     model = spheres(friction=0.02)
-    (along,) = model.bind(model.contact[0]).constraints(np.zeros_like(model.mesh.points)).directions
+    (along,) = model.bind(model.contact[0]).constraints(Configuration.undeformed(model.mesh.points)).directions
     normal, slid = normals([along]), 0
     for step in fc.solve(model, fc.linear_ramp(5), criteria=fc.Criteria(keep_pairing=True)):
         contact = step.contact["pair"]

@@ -3,9 +3,9 @@
 import gc
 
 import pytest
+from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis.analysis import Analysis
 from fastcontact.analysis.criteria import Criteria
 
 
@@ -21,7 +21,7 @@ def test_no_cycle_keeps_a_finished_analysis(solver, formulation):
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation=formulation)
 
     def solved():
-        analysis = Analysis(model, solver, 1e-10, Criteria(geometry_updates=2), fc.linear_ramp(1))
+        analysis = Stepping(model, solver, 1e-10, Criteria(geometry_updates=2), fc.linear_ramp(1))
         return analysis.step(1, 1.0).index
 
     solved()

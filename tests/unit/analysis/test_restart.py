@@ -1,14 +1,15 @@
 """An analysis that goes on after some steps ends as if it had never stopped, and only with the case that it was."""
 
 import warnings
+from dataclasses import fields
 
 import numpy as np
 import pytest
+from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis import restart, step_halving
-from fastcontact.analysis.analysis import Analysis
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.state import State
 from fastcontact.mesh.generate import block, box, renamed, union
 
 FRICTIONLESS, FRICTION = 1e-12, 1e-10
@@ -268,26 +269,29 @@ def test_a_step_without_its_state_is_refused():
 
 
 def test_all_that_a_step_changes_is_kept_or_set_anew():
-    """A name that `step_control` learns must be looked at here."""
-    anew = {"before", "external", "expected", "parts", "settled", "rubbing", "unsettled"}  # as a step begins
-    kept = {"u", "active", "pressure", *restart.NUMBERS}
+    """A field that the state learns must be looked at here."""
+    anew = {"rigid", "unsettled"}  # as a step begins
     told = {"touched"}  # by the steps so far
-    assert set(step_halving._ANALYSIS) == anew | kept | told
-    assert set(step_halving._PAIR) == {"before", "_closed"}
-    assert set(step_halving._SIDE) == {"now", "before"}
-    assert set(step_halving._EXTRAPOLATION) == {"ratio", "_loads", "_states"}
-    assert set(step_halving._LOADS) == {"_loads", "_solutions"}  # the solver's memory
+    learnt = {"solver"}  # from what the solver remembers
+    names = {"u": "obstacles", "gap_round_off": "numbers", "largest_force": "numbers", "largest_work": "numbers"}
+    of_pairs = {"obstacles": "now", "never_opening": "closed", "first_contact": "first_contact"}
+    (step,) = fc.solve(spheres(), fc.linear_ramp(1), linear_solver="amg")
+    for field in fields(State):
+        if field.name in of_pairs:
+            assert of_pairs[field.name] in step.restart["pairs"]["hertz"]
+        elif field.name not in anew | told | learnt:
+            assert names.get(field.name, field.name) in step.restart, field.name
 
 
 def test_a_strengthened_multigrid_cycle_is_remembered():
     """Bounds raised, precision changed, ties of the last solution: what a fresh solver would not know."""
     model, ramp = spheres("continuous"), fc.linear_ramp(3)
-    analysis = Analysis(model, "amg", 1e-10, Criteria(), ramp)
+    analysis = Stepping(model, "amg", 1e-10, Criteria(), ramp)
     analysis.step(1, 0.5)
     analysis.solver._strengthen(4)
     analysis.solver.hierarchy.raise_bounds(1.3)
     memory = analysis.solver.memory()
-    other = Analysis(model, "amg", 1e-10, Criteria(), ramp)
+    other = Stepping(model, "amg", 1e-10, Criteria(), ramp)
     other.solver.remember(memory)
     assert other.solver.precision == "double"
     assert other.solver.hierarchy.bounds == analysis.solver.hierarchy.bounds

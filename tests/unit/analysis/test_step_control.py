@@ -1,11 +1,13 @@
 """Load steps cut in halves: the same end as with those steps asked for, and nothing left of what failed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis import step_halving
-from fastcontact.analysis.analysis import Analysis
+from fastcontact.analysis import geometry_loop
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.mesh.generate import block
 
@@ -24,7 +26,7 @@ def spheres(friction=0.3, **options):
 
 
 def analysis_of(steps=1, **criteria):
-    return Analysis(spheres(), "direct", 1e-10, Criteria(**criteria), fc.linear_ramp(steps))
+    return Stepping(spheres(), "direct", 1e-10, Criteria(**criteria), fc.linear_ramp(steps))
 
 
 def close(found, expected, relative=1e-10):
@@ -107,15 +109,16 @@ MODELS = {
 @pytest.mark.parametrize("solver", ["direct", "amg"])
 @pytest.mark.parametrize("name", list(MODELS))
 def test_a_failed_step_leaves_no_trace(name, solver):
-    analyses = [Analysis(MODELS[name](), solver, 1e-10, Criteria(), fc.linear_ramp(4)) for _ in range(2)]
+    analyses = [Stepping(MODELS[name](), solver, 1e-10, Criteria(), fc.linear_ramp(4)) for _ in range(2)]
     for analysis in analyses:
         for index in (1, 2, 3):
             analysis.step(index, index / 4)
     disturbed, undisturbed = analyses
-    generous, disturbed.criteria = disturbed.criteria, Criteria(max_geometry_updates=0)
+    generous, strict = disturbed.problem, Criteria(max_geometry_updates=0, max_halvings=1)
+    disturbed.problem = replace(generous, criteria=strict)
     with pytest.raises(fc.ConvergenceError):
-        step_halving.advance(disturbed, 4, 0.75, 1.0, 1)
-    disturbed.criteria = generous
+        disturbed.advance(4, 0.75, 1.0)
+    disturbed.problem = generous
     step, expected = disturbed.step(4, 1.0), undisturbed.step(4, 1.0)
     np.testing.assert_array_equal(step.displacement, expected.displacement)
     for pair, contact in step.contact.items():
@@ -126,11 +129,11 @@ def test_a_failed_step_leaves_no_trace(name, solver):
 
 def test_parts_that_converged_before_one_failed_are_taken_back():
     model = spheres(friction=0.0)
-    analysis = Analysis(model, "direct", 1e-10, Criteria(max_geometry_updates=FEW), fc.linear_ramp(1))
+    analysis = Stepping(model, "direct", 1e-10, Criteria(max_geometry_updates=FEW), fc.linear_ramp(1))
     with pytest.raises(fc.ConvergenceError, match=r"the part from 0\.25 to 0\.3125 fails"):
-        step_halving.advance(analysis, 1, 0.0, 1.0, 4)
+        analysis.advance(1, 0.0, 1.0)
     assert not analysis.u.any()
-    analysis.criteria = Criteria()
+    analysis.problem = replace(analysis.problem, criteria=Criteria())
     (expected,) = fc.solve(model, fc.linear_ramp(1), linear_solver="direct")
     step = analysis.step(1, 1.0)
     np.testing.assert_array_equal(step.displacement, expected.displacement)
@@ -163,16 +166,16 @@ def test_a_step_that_fails_says_which_one_it_is():
 
 def test_what_fails_inside_a_pairing_is_told_with_the_pairings_before_it(monkeypatch):
     """A linear solver that gives up knows of no pairings; the history of the step does."""
-    analysis = analysis_of()
-    solve, calls = Analysis._inequalities, []
+    analysis = analysis_of(max_halvings=0)
+    solve, calls = geometry_loop.solve_inequalities, []
 
-    def failing(self, *arguments, **options):
+    def failing(*arguments):
         calls.append(1)
         if len(calls) == 3:
             raise fc.ConvergenceError("conjugate gradients stand still")
-        return solve(self, *arguments, **options)
+        return solve(*arguments)
 
-    monkeypatch.setattr(Analysis, "_inequalities", failing)
+    monkeypatch.setattr(geometry_loop, "solve_inequalities", failing)
     with pytest.raises(fc.ConvergenceError, match=r"stand still \(step 1 from 0 to 1\)") as caught:
-        step_halving.advance(analysis, 1, 0.0, 1.0, 0)
+        analysis.advance(1, 0.0, 1.0)
     assert [entry["settled"] for entry in caught.value.history] == [True, True]

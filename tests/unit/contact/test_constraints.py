@@ -37,23 +37,43 @@ def part(m, seed, compliance=False, tangents=0, **given):
 def parts():
     random = np.random.default_rng(9)
     return [
-        part(2, 1, held=np.array([True, False])),
-        part(3, 2, compliance=True, tangents=2, friction=np.full(3, 0.3), loose=random.normal(size=(3, 3, 2))),
+        part(2, 1, equality=np.array([True, False])),
+        part(
+            3,
+            2,
+            compliance=True,
+            tangents=2,
+            friction=np.full(3, 0.3),
+            low_rank_compliance=random.normal(size=(3, 3, 2)),
+        ),
         part(4, 3, softness=np.full(4, 0.1)),
-        part(2, 4, compliance=True, tangents=2, drift=random.normal(size=(2, 2)), loose=random.normal(size=(3, 2, 1))),
+        part(
+            2,
+            4,
+            compliance=True,
+            tangents=2,
+            drift=random.normal(size=(2, 2)),
+            low_rank_compliance=random.normal(size=(3, 2, 1)),
+        ),
     ]
 
 
+def stack(parts):
+    return stacked({f"pair {k}": each for k, each in enumerate(parts)})
+
+
 def test_one_part_stays_what_it_is(parts):
-    assert stacked(parts[:1]) is parts[0]
+    whole = stack(parts[:1])
+    assert whole.B is parts[0].B
+    assert whole.rows() == {"pair 0": slice(0, 2)}
 
 
 def test_rows_and_numbers_follow_each_other(parts):
-    whole = stacked(parts)
+    whole = stack(parts)
     np.testing.assert_array_equal(whole.B.toarray(), np.vstack([p.B.toarray() for p in parts]))
     np.testing.assert_array_equal(whole.gap0, np.concatenate([p.gap0 for p in parts]))
     assert whole.friction.tolist() == [0.0] * 2 + [0.3] * 3 + [0.0] * 6
-    assert whole.held.tolist() == [True] + [False] * 10
+    assert whole.equality.tolist() == [True] + [False] * 10
     assert whole.softness.tolist() == [0.0] * 5 + [0.1] * 4 + [0.0] * 2
     np.testing.assert_array_equal(whole.drift[:, 9:], parts[3].drift)
     assert not whole.drift[:, :9].any()
@@ -68,14 +88,14 @@ def test_rows_and_numbers_follow_each_other(parts):
 
 
 def test_what_no_part_has_the_whole_has_not():
-    whole = stacked([part(2, 1), part(3, 2)])
+    whole = stack([part(2, 1), part(3, 2)])
     assert whole.compliance is None
     assert whole.tangents == whole.directions == ()
-    assert whole.drift is whole.held is whole.softness is whole.loose is None
+    assert whole.drift is whole.equality is whole.softness is whole.low_rank_compliance is None
 
 
 def test_compliances_do_not_couple_parts(parts):
-    whole = stacked(parts)
+    whole = stack(parts)
     C = np.zeros((11, 11))
     C[2:5, 2:5], C[9:, 9:] = parts[1].compliance.C, parts[3].compliance.C
     rows = np.array([0, 2, 4, 5, 9, 10])
@@ -88,8 +108,8 @@ def test_compliances_do_not_couple_parts(parts):
 
 
 def test_factors_of_compliances_lie_side_by_side(parts):
-    Z = stacked(parts).loose
+    Z = stack(parts).low_rank_compliance
     assert Z.shape == (3, 11, 3)
-    np.testing.assert_array_equal(Z[:, 2:5, :2], parts[1].loose)
-    np.testing.assert_array_equal(Z[:, 9:, 2:], parts[3].loose)
-    assert np.count_nonzero(Z) == parts[1].loose.size + parts[3].loose.size
+    np.testing.assert_array_equal(Z[:, 2:5, :2], parts[1].low_rank_compliance)
+    np.testing.assert_array_equal(Z[:, 9:, 2:], parts[3].low_rank_compliance)
+    assert np.count_nonzero(Z) == parts[1].low_rank_compliance.size + parts[3].low_rank_compliance.size

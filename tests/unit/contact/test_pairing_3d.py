@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
+from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations.continuous import Continuous
 from fastcontact.contact.formulations.node_to_segment import NodeToSegment
 from fastcontact.contact.integration import facet_measure, fine_rule, gauss_rule, mass_matrix, nodal_areas
@@ -151,7 +152,7 @@ def test_too_many_points_on_triangles_are_refused():
 @pytest.mark.parametrize("element", SOLIDS)
 def test_every_rule_determines_the_field_and_keeps_its_resultant(element, options):
     pair_ = bound(Continuous, element, **options)
-    projection = pair_._projection
+    projection = pair_.constraints(Configuration.undeformed(pair_.points)).nodal.projection
     field = np.random.default_rng(3).normal(size=projection.P.shape[1])
     forces = projection.areas * (projection.P @ field)
     assert projection.field(forces) == pytest.approx(field, abs=1e-10)
@@ -184,7 +185,7 @@ def test_closed_rules_on_triangles():
 
 def test_the_axis_of_first_contact():
     pair_ = bound(NodeToSegment)
-    foot, axis = pair_.first_contact
+    foot, axis = pair_.first_contact(Configuration.undeformed(pair_.points))
     assert foot == pytest.approx([0, 0, 0], abs=1e-12)
     assert axis == pytest.approx([0, 1, 0], abs=1e-12)
 

@@ -6,10 +6,11 @@ import logging
 import numpy as np
 import pytest
 from scipy.sparse import bsr_array, csr_array, diags_array
+from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis.analysis import Analysis
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.contact.configuration import Configuration
 from fastcontact.errors import ModelError
 from fastcontact.linear import choice as linear
 
@@ -17,10 +18,10 @@ from fastcontact.linear import choice as linear
 @pytest.fixture(scope="module")
 def problem(forma04):
     model = forma04(fc.generate.half_spheres("tri3", size=6.0))
-    analysis = Analysis(model, "direct", 1e-12, Criteria())
+    analysis = Stepping(model, "direct", 1e-12, Criteria())
     rng = np.random.default_rng(0)
     f = np.where(analysis.system.fixed, 0.0, rng.normal(size=model.n_dofs))
-    constraints = analysis.pairs["hertz"].constraints(np.zeros(model.mesh.points.shape))
+    constraints = analysis.pairs["hertz"].constraints(Configuration.undeformed(model.mesh.points))
     B = constraints.B[:4].copy()
     B.data[analysis.system.fixed[B.indices]] = 0.0
     B.eliminate_zeros()
@@ -28,7 +29,7 @@ def problem(forma04):
 
 
 def prepared(name, analysis):
-    from fastcontact.analysis.analysis import near_nullspace
+    from fastcontact.analysis.problem import near_nullspace
 
     solver = linear.make(name, dim=2, n_dofs=analysis.model.n_dofs, tolerance=1e-12)
     solver.prepare(analysis.system.matrix, analysis.system.unknowns_of(near_nullspace(analysis.model)))
@@ -91,7 +92,7 @@ def test_auto_looks_at_what_the_contact_asks_of_a_solver(options, solver, monkey
     model.fix("LOWER_BOTTOM", "xy")
     model.prescribe("UPPER_TOP", x=0.0, y=-1e-3)
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
-    assert Analysis(model, "auto", 1e-10, Criteria()).solver.name == solver
+    assert Stepping(model, "auto", 1e-10, Criteria()).solver.name == solver
 
 
 def test_an_unknown_solver_is_refused():

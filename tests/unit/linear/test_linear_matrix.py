@@ -5,9 +5,9 @@ import sys
 import numpy as np
 import pytest
 from scipy.sparse import bsr_array
+from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis.analysis import Analysis
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.linear import choice as linear
 from fastcontact.linear.multigrid import split_matrix_kernels
@@ -109,7 +109,7 @@ def test_numbers_that_somebody_else_holds_stay_where_they_are():
 
 def test_an_analysis_knows_the_stiffness_that_its_solver_owns(forma04):
     model = forma04(fc.generate.half_spheres("tri3", size=6.0))
-    one, other = (Analysis(model, name, 1e-10, Criteria()) for name in ("direct", "amg"))
+    one, other = (Stepping(model, name, 1e-10, Criteria()) for name in ("direct", "amg"))
     assert isinstance(one.system.matrix, bsr_array)
     assert isinstance(other.system.matrix, Given)
     u = np.random.default_rng(0).normal(size=model.n_dofs)

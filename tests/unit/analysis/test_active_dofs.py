@@ -1,13 +1,16 @@
 """Pairings that find the displacements of contact surfaces alone: what they say is what all displacements say."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
+from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis.active_dofs import Everything, Surfaces
-from fastcontact.analysis.analysis import Analysis
+from fastcontact.analysis.active_dofs import AllDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.contact.configuration import Configuration
 from fastcontact.linear import choice as linear
 
 
@@ -23,32 +26,28 @@ def started(related=False, friction=0.0, name="direct"):
         model.couple("CONT2", "y")
     model.prescribe("A2B2", y=-2.0)
     model.add_contact("c", secondary="CONT1", primary="CONT2", formulation="node_to_segment", friction=friction)
-    return Analysis(model, name, 1e-14, Criteria(geometry=1e-8), fc.linear_ramp(2))
+    return Stepping(model, name, 1e-14, Criteria(geometry=1e-8), fc.linear_ramp(2))
 
 
-class NotCondensing:
-    """A solver that is asked for all displacements every time."""
-
-    def __init__(self, solver):
-        self._solver = solver
-        self.condenses = False
-
-    def __getattr__(self, name):
-        return getattr(self._solver, name)
+def contact_dofs(analysis):
+    """The components of the points on both sides, which are named in the model."""
+    mesh = analysis.model.mesh
+    points = np.union1d(mesh.points_of("CONT1"), mesh.points_of("CONT2"))
+    return (points[:, None] * mesh.dim + np.arange(mesh.dim)).ravel()
 
 
 @pytest.fixture(params=[False, True], ids=["supports", "relations"])
 def both(request):
     analysis = started(request.param)
-    everything = Everything(analysis.system, analysis.surface_dofs)
-    surfaces = analysis.scope
-    assert isinstance(surfaces, Surfaces)
+    everything = AllDofs(analysis.system, contact_dofs(analysis))
+    surfaces = analysis.dofs
+    assert isinstance(surfaces, SurfaceDofs)
     return analysis, everything, surfaces
 
 
 def obeying(analysis, seed=1):
     """Random displacements that obey supports and relations, and what these prescribe."""
-    lift = analysis._lift(0.7)
+    lift = analysis.load_at(0.7).lift
     v = np.where(analysis.system.free, np.random.default_rng(seed).normal(size=len(lift)), 0.0)
     return analysis.system.displacement(v, lift), lift
 
@@ -56,8 +55,8 @@ def obeying(analysis, seed=1):
 def test_rows_are_those_for_all_unknowns(both):
     analysis, everything, surfaces = both
     u, lift = obeying(analysis)
-    surfaces.begin(u, lift)
-    part = analysis.pairs["c"].conditions(np.zeros((len(u) // 2, 2)))
+    surfaces = surfaces.for_step(u, lift)
+    part = analysis.pairs["c"].constraints(Configuration.displaced(np.zeros((len(u) // 2, 2))))
     B, offset = everything.rows(part.B, part.gap0, lift)
     own, offset_too = surfaces.rows(part.B, part.gap0, lift)
     np.testing.assert_array_equal(offset_too, offset)
@@ -70,15 +69,14 @@ def test_rows_are_those_for_all_unknowns(both):
 def test_displacements_and_sizes_are_those_of_all(both):
     analysis, everything, surfaces = both
     u, lift = obeying(analysis)
-    copy = surfaces.begin(u, lift)
-    assert copy is not u
+    surfaces, copy = surfaces.for_step(u, lift), u.copy()
     v = surfaces.unknowns(u, lift)
     np.testing.assert_allclose(surfaces.displacement(v, lift), surfaces.of(u), atol=1e-14)
     assert surfaces.scale(u, lift) == everything.scale(u, lift)
     assert surfaces.size(v) == everything.size(everything.unknowns(u, lift))
     assert surfaces.size(100.0 + v) == (100.0 + v).max()
     changed = surfaces.put(copy, surfaces.of(u) + 100.0)
-    dofs = analysis.surface_dofs
+    dofs = contact_dofs(analysis)
     np.testing.assert_array_equal(changed[dofs], u[dofs] + 100.0)
     np.testing.assert_array_equal(np.delete(changed, dofs), np.delete(u, dofs))
 
@@ -87,7 +85,7 @@ def test_displacements_and_sizes_are_those_of_all(both):
 @pytest.mark.parametrize("name", ["direct", "cholmod"])
 def test_steps_end_where_those_of_all_displacements_end(name, friction):
     analysis, other = started(friction=friction, name=name), started(friction=friction, name=name)
-    other.scope = Everything(other.system, other.surface_dofs)
+    other.problem = replace(other.problem, dofs=AllDofs(other.system, contact_dofs(other)))
     for index, instant in enumerate(analysis.ramp.instants, start=1):
         result, expected = analysis.step(index, instant), other.step(index, instant)
         scale = np.abs(expected.displacement).max()
@@ -98,10 +96,8 @@ def test_steps_end_where_those_of_all_displacements_end(name, friction):
         np.testing.assert_allclose(sizes, same, atol=1e-9)
 
 
-def test_solvers_without_a_compliance_find_all_displacements():
-    analysis = started()
-    analysis.solver = NotCondensing(analysis.solver)
-    assert isinstance(analysis._scope(analysis.solver.last), Everything)
+def test_solvers_that_do_not_condense_find_all_displacements():
+    assert isinstance(started(name="amg").dofs, AllDofs)
 
 
 def test_the_condensed_problem_is_that_of_all_unknowns():

@@ -1,8 +1,8 @@
-"""Tangential multipliers at nodes that supports hold, as on an axis or in a plane of symmetry.
+"""Tangential multipliers at supported nodes, as on an axis or in a plane of symmetry.
 
 There the slip of a facet has one nodal value less than its multiplier field: a field that alternates from node to node
 and dies out along the surface does no work on any slip, and nothing would determine it. Such fields are made compliant,
-as those are that the multiplier field cannot represent: the shear at the held node then vanishes, as symmetry wants.
+as those are that the multiplier field cannot represent: the shear at the supported node then vanishes, as symmetry wants.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-def held_nodes(side: Surface, supported: Mask, opposite: Mask) -> Mask:
+def supported_nodes(side: Surface, supported: Mask, opposite: Mask) -> Mask:
     """Return which nodes (m,) of a side have no slip along an axis, while a neighbour on every facet has.
 
     Parameters
@@ -28,10 +28,10 @@ def held_nodes(side: Surface, supported: Mask, opposite: Mask) -> Mask:
     opposite : ndarray of bool (m,)
         Nodes that face such nodes of the other side.
     """
-    held = supported & opposite
-    whole = [block.local[held[block.local].all(axis=1)].ravel() for block in side.blocks]
-    held[np.concatenate(whole)] = False
-    return held
+    found = supported & opposite
+    whole = [block.local[found[block.local].all(axis=1)].ravel() for block in side.blocks]
+    found[np.concatenate(whole)] = False
+    return found
 
 
 def compliant(projection: Projection, columns: NDArray[np.intp]) -> Array:

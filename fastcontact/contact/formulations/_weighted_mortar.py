@@ -12,13 +12,14 @@ linear between the corners, also on quadratic facets; only corners have gaps.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._cut_faces import face_overlap
 from fastcontact.contact.formulations._cut_lines import line_overlap
@@ -38,7 +39,7 @@ Mask = NDArray[np.bool_]
 MULTIPLIERS = ("standard", "dual")
 # What faces the other side with less than this fraction of its area is left out.
 LEAST = 1e-3
-# A direction in which less than this part of a motion is free is held by supports.
+# A direction in which less than this part of a motion is free counts as supported.
 FREE = 0.1
 
 
@@ -62,7 +63,6 @@ class WeightedMortar(Formulation):
     name: ClassVar[str] = "mortar"
     geometry_in_loop: ClassVar[bool] = True
     _whole: list[Array] = field(init=False, repr=False)
-    _weight: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -91,73 +91,83 @@ class WeightedMortar(Formulation):
             self.secondary, self.primary, self.points, deformed, self.axisymmetric, self.projection_tolerance
         )
 
-    def constraints(self, displacement: Array) -> Constraints:
+    def unilateral(self, at: Configuration) -> Constraints:
         """Cut and pair on the displaced configuration and return one mean gap per node."""
-        deformed = self.points + displacement
+        deformed = self.points + at.displacement
         overlap = self._overlap(deformed)
         covered = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
         kept = self._taking_part(covered)
         own, across = self._weighted(overlap, covered, kept)
-        weight = np.asarray(own.sum(axis=1)).ravel()
-        self._weight = np.where(weight > 0.0, weight, np.inf)
-        mean = scaled(csr_array(own - across), 1.0 / self._weight)
+        sums = np.asarray(own.sum(axis=1)).ravel()
+        weight = np.where(sums > 0.0, sums, np.inf)
+        mean = scaled(csr_array(own - across), 1.0 / weight)
         normal = self._mean_normals(overlap, deformed)
         B = rows_of(mean, normal)
-        gap0 = B @ self.points.ravel() + self._clearance(own, across)
-        positions = self.points[self.secondary.points]
-        if not (self.friction or self.terms.tied):
-            return Constraints(B, gap0, positions)
+        gap0 = B @ self.points.ravel() + at.clearance_factor * self._clearance(own, across, weight)
+        part = Constraints(B, gap0, self.points[self.secondary.points], areas=weight, nodal=self._nodal(weight))
+        if not (self.friction or self.options.tied):
+            return part
         directions = tuple(tangents_by_axes(normal))
-        sliding = self._sliding(overlap, covered, kept, mean)
-        along = tuple(self._along(direction, sliding) for direction in directions)
-        nodes = Candidates(self.secondary.points[:, None], np.ones((len(positions), 1)))
-        friction = self.terms.coefficients(self.friction, nodes)
-        drift = self._approach_of_nodes(sliding, normal, directions, deformed)
-        return Constraints(B, gap0, positions, None, along, directions, friction, drift)
+        sliding = self._sliding(overlap, covered, kept, mean, weight)
+        nodes = Candidates(self.secondary.points[:, None], np.ones((len(part), 1)))
+        return replace(
+            part,
+            tangents=tuple(self._along(direction, sliding) for direction in directions),
+            directions=directions,
+            friction=self.options.coefficients(self.friction, nodes),
+            drift=self._closing_slip_of_nodes(sliding, normal, directions, at),
+        )
 
-    def _approach_of_nodes(
-        self, sliding: list[csr_array], normal: Array, directions: tuple[Array, ...], deformed: Array
+    def _nodal(self, weight: Array) -> WeightedPressures:
+        """Return what forces mean at the nodes; `weight` (m,) are the areas of the gaps [area]."""
+        blocks = self.secondary.blocks if self.multipliers == "standard" else ()
+        return WeightedPressures(weight, [(elements.get(block.element), block.local) for block in blocks])
+
+    def _closing_slip_of_nodes(
+        self, sliding: list[csr_array], normal: Array, directions: tuple[Array, ...], at: Configuration
     ) -> Array:
-        """Return the slip (k, m) to add so that closing a gap is none, though the normal leans.
+        """Return the slip (k, m) to add so that closing a gap is none, though the normal leans [length].
 
         As in `Formulation`, for mean gaps.
         """
-        between = normal - nodal_normals(self.secondary, deformed)
+        between = normal - nodal_normals(self.secondary, self.points + at.displacement)
         between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), 1e-300)  # zero where nothing is faced
-        start = self.points if self.before is None else self.points + self.before
+        start = self.points + at.start
         apart = np.stack([motion @ start[:, axis] for axis, motion in enumerate(sliding)], axis=1)
         closing = np.einsum("nd,nd->n", between, apart)
         return np.stack([closing * np.einsum("nd,nd->n", along, between) for along in directions])
 
-    def _sliding(self, overlap: Overlap, covered: list[Array], kept: Mask, mean: csr_array) -> list[csr_array]:
+    def _sliding(
+        self, overlap: Overlap, covered: list[Array], kept: Mask, mean: csr_array, weight: Array
+    ) -> list[csr_array]:
         """Return the relative motions (m, n_points) of nodes that count as slip along each axis; mostly the mean one.
 
-        Where supports hold a node along the axis, its slip is that of the other side alone, of which its neighbours
-        leave next to nothing: those take over its friction. Where all nodes of a facet are held each keeps its own.
+        Where supports prescribe a node along the axis, its slip is that of the other side alone, of which its neighbours
+        leave next to nothing: those take over its friction. Where all nodes of a facet are supported each keeps its own.
         """
         motions = []
         for axis in range(self.points.shape[1]):
-            held = self._held(axis)
-            if not (held & kept).any():
+            supported = self._supported(axis)
+            if not (supported & kept).any():
                 motions.append(mean)
                 continue
-            own, across = self._weighted(overlap, covered, kept & ~held)
-            motions.append(scaled(csr_array(own - across), 1.0 / self._weight))
+            own, across = self._weighted(overlap, covered, kept & ~supported)
+            motions.append(scaled(csr_array(own - across), 1.0 / weight))
         return motions
 
-    def _held(self, axis: int) -> Mask:
-        """Return the nodes (m,) that supports hold along an axis, without those of facets that they hold whole."""
+    def _supported(self, axis: int) -> Mask:
+        """Return the nodes (m,) supported along an axis, without those of facets whose nodes are all supported."""
         if self.supported is None:
             return np.zeros(len(self.secondary.points), bool)
-        held: Mask = self.supported[self.secondary.points, axis].copy()
-        alone = [block.local[held[block.local].all(axis=1)].ravel() for block in self.secondary.blocks]
-        held[np.concatenate(alone)] = False
-        return held
+        found: Mask = self.supported[self.secondary.points, axis].copy()
+        whole = [block.local[found[block.local].all(axis=1)].ravel() for block in self.secondary.blocks]
+        found[np.concatenate(whole)] = False
+        return found
 
     def _along(self, direction: Array, sliding: list[csr_array]) -> csr_array:
         """Return rows (m, n_dofs) of the slip along a tangent (m, dim); none where supports hold most of it."""
-        held = np.stack([self._held(axis) for axis in range(direction.shape[1])], axis=1)
-        free = np.einsum("md,md->m", direction**2, ~held) >= FREE
+        supported = np.stack([self._supported(axis) for axis in range(direction.shape[1])], axis=1)
+        free = np.einsum("md,md->m", direction**2, ~supported) >= FREE
         rows: csr_array | None = None
         for axis, motion in enumerate(sliding):
             component = np.zeros_like(direction)
@@ -207,7 +217,7 @@ class WeightedMortar(Formulation):
             lost = ~enough[block.local].any(axis=1) & (weights.sum(axis=1) > LEAST * full.sum(axis=1))
             most = np.argmax(total[block.local[lost]], axis=1)
             rescued[block.local[lost][np.arange(len(most)), most]] = True
-        return (enough | rescued) & (whole > 0.0) & ~self.terms.excluded_nodes(self.secondary)
+        return (enough | rescued) & (whole > 0.0) & ~self.options.excluded_nodes(self.secondary)
 
     def _mean_normals(self, overlap: Overlap, deformed: Array) -> Array:
         """Return unit means (m, dim) of the primary normals that the nodes face; the last axis for nodes without."""
@@ -226,32 +236,46 @@ class WeightedMortar(Formulation):
         length = np.linalg.norm(mean, axis=1, keepdims=True)
         return np.where(length > 0, mean / np.where(length > 0, length, 1.0), np.eye(mean.shape[1])[-1])
 
-    def _clearance(self, own: csr_array, across: csr_array) -> Array:
+    def _clearance(self, own: csr_array, across: csr_array, weight: Array) -> Array:
         """Return what clearances add to the mean gaps (m,), interpolated between the nodes of both sides [length]."""
         added = np.zeros(own.shape[0])
         for matrix, side, clearance in (
-            (own, self.secondary, self.terms.clearance), (across, self.primary, self.terms.clearance_primary)
+            (own, self.secondary, self.options.clearance), (across, self.primary, self.options.clearance_primary)
         ):  # fmt: skip
             if clearance is not None:
                 values = np.zeros(len(self.points))
                 values[side.points] = clearance(self.points[side.points])
-                added += matrix @ values / self._weight
-        return self.terms.factor * added
+                added += matrix @ values / weight
+        return added
 
-    def areas(self) -> Array:
-        """Return the weights of the gaps."""
-        return self._weight
 
-    def pressure(self, multiplier: Array) -> Array:
-        """Return forces over the areas they stand for; at mid nodes without a multiplier, the mean of their corners."""
-        pressure = multiplier / self._weight
-        if self.multipliers == "standard":
-            for block in self.secondary.blocks:
-                element = elements.get(block.element)
-                linear = elements.get(element.linear).shape(element.nodes)[element.n_corners :]
-                pressure[block.local[:, element.n_corners :]] = pressure[block.local[:, : element.n_corners]] @ linear.T
+@dataclass(frozen=True, eq=False)
+class WeightedPressures:
+    """Pressures of weighted gaps at the nodes; see `constraints.NodalField`.
+
+    Attributes
+    ----------
+    weight : ndarray (m,)
+        Area that each gap stands for, infinite where it does nothing [area].
+    interpolated : list of (Element, ndarray of int (n_facets, n_nodes))
+        Kinds of facets, and their nodes, on which only corners have multipliers.
+    """
+
+    weight: Array
+    interpolated: list[tuple[elements.Element, NDArray[np.integer]]]
+
+    def pressure(self, force: Array) -> Array:
+        """Return forces over areas; at mid nodes without a multiplier, the mean of their corners."""
+        pressure = force / self.weight
+        for element, local in self.interpolated:
+            linear = elements.get(element.linear).shape(element.nodes)[element.n_corners :]
+            pressure[local[:, element.n_corners :]] = pressure[local[:, : element.n_corners]] @ linear.T
         return pressure
 
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
         """Return the active nodes, and mid nodes without a multiplier that have a pressure."""
         return active | (pressure > 0)
+
+    def initially_active(self, gap: Array, pressure: Array) -> Mask | None:
+        """Return None: there is one gap per node in every pairing."""
+        return None

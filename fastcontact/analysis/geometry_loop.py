@@ -1,0 +1,207 @@
+"""Settle the contact geometry of a load step: pair, constrain, solve, mix, until the surfaces stand still."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact._jit.norms_kernels import largest, largest_difference
+from fastcontact.analysis.anderson import Anderson
+from fastcontact.analysis.extrapolation import Extrapolation
+from fastcontact.analysis.inequalities import Step, solve_inequalities
+from fastcontact.analysis.iterate import Iterate, initially_active, pair_surfaces
+from fastcontact.analysis.messages import active_set_cycles, geometry_moves, nearest_nodes
+from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.solution import Solution
+from fastcontact.analysis.tolerances import PATIENT_UPDATES, Tolerances
+from fastcontact.contact.constraints import StackedConstraints
+from fastcontact.errors import ConvergenceError
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+# One active-set iteration per pairing is cheapest near the solution but may cycle; after so many, settle the set first.
+SEMISMOOTH_UPDATES = 8
+# Earlier geometries that are mixed into the next one.
+MIXED = 5
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How the geometry of a load step is updated.
+
+    Attributes
+    ----------
+    until_settled : bool
+        Update until the displacement stands still; otherwise a fixed number of times.
+    limit : int
+        Updates allowed, or that fixed number.
+    semismooth : bool
+        Pair again after every active-set iteration at first.
+    extrapolate : bool
+        Begin with displacements that are extrapolated along the load, and with inexact solutions.
+    """
+
+    until_settled: bool
+    limit: int
+    semismooth: bool
+    extrapolate: bool
+
+    @classmethod
+    def of(cls, problem: Problem) -> Plan:
+        """Return the plan that the criteria, the formulations and the linear solver of a problem ask for."""
+        criteria = problem.criteria
+        fixed = 0 if criteria.keep_pairing else criteria.geometry_updates
+        free = fixed is None and problem.bodies is None
+        return cls(
+            until_settled=fixed is None,
+            limit=criteria.max_geometry_updates if fixed is None else fixed,
+            semismooth=free and any(pair.geometry_in_loop for pair in problem.pairs.values()),
+            extrapolate=free and problem.solver.iterative,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class SettledContact:
+    """The contact of a load step when its geometry has settled.
+
+    Attributes
+    ----------
+    constraints : StackedConstraints
+    solution : Solution
+    iterate : Iterate
+    unsettled : (int, float), optional
+        A fixed number of updates, and the relative change by the last one.
+    """
+
+    constraints: StackedConstraints
+    solution: Solution
+    iterate: Iterate
+    unsettled: tuple[int, float] | None = None
+
+    @property
+    def force(self) -> Array:
+        """Nodal contact forces (n_dofs,) [force]."""
+        return self.constraints.force(self.solution.multiplier, getattr(self.solution, "tangential", None))
+
+
+def settle_geometry(step: Step, extrapolation: Extrapolation, expected: float) -> SettledContact:
+    """Alternate between pairing the surfaces and solving their inequalities until both stand still.
+
+    Parameters
+    ----------
+    step : Step
+    extrapolation : Extrapolation
+    expected : float
+        Displacement to expect in the first step, if forces alone act [length].
+
+    Raises
+    ------
+    ConvergenceError
+        If the active set or the geometry does not settle.
+    """
+    iterate = Iterate.of(step.state)
+    try:
+        return _settle(step, iterate, extrapolation, expected)
+    except ConvergenceError as error:
+        error.history = error.history or iterate.history
+        raise
+
+
+def _settle(step: Step, iterate: Iterate, extrapolation: Extrapolation, expected: float) -> SettledContact:
+    problem, plan = step.problem, Plan.of(step.problem)
+    tolerances = Tolerances(problem.solver, problem.criteria, plan.extrapolate, step.state.gap_round_off, expected)
+    mixing = _Mixing(Anderson(MIXED, step.dofs.compared, problem.solver.iterative))
+    if plan.extrapolate:
+        iterate.u = extrapolation.displacement(iterate.u)
+    for update in range(plan.limit + 1):
+        single = plan.semismooth and update < SEMISMOOTH_UPDATES
+        constraints = pair_surfaces(problem, step.state, step.load, iterate)
+        active = initially_active(constraints, iterate, extrapolation if plan.extrapolate and update == 0 else None)
+        accuracy = tolerances.accuracy(step.dofs.scale(iterate.u, step.load.lift), single)
+        solution, part = solve_inequalities(step, constraints, iterate, active, accuracy)
+        moved = _move(step, iterate, constraints, solution, part)
+        if not (solution.settled or single or tolerances.inexact):
+            _raise_cycling(problem, constraints, solution, iterate)
+        if not plan.until_settled:
+            continue
+        if solution.settled and moved.change <= tolerances.enough(update, moved.size) and not tolerances.inexact:
+            return SettledContact(constraints, solution, iterate)
+        mixed = mixing.next(moved.before, part, solution, tolerances.inexact)
+        iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
+        tolerances.tighten(moved.relative)
+        if plan.extrapolate and update == PATIENT_UPDATES:
+            # Nodes that flip between facets may do so for ever from one start and not from another.
+            iterate.u, iterate.active = step.state.u.copy(), dict(step.state.active)
+            mixing.restart()
+    if plan.until_settled:
+        changed = step.dofs.put(np.zeros_like(iterate.u), part - moved.before)
+        raise ConvergenceError(geometry_moves(problem, iterate.history, changed, plan.limit), iterate.history)
+    fixed = plan.limit and not problem.criteria.keep_pairing
+    return SettledContact(constraints, solution, iterate, (plan.limit, moved.relative) if fixed else None)
+
+
+@dataclass(frozen=True, eq=False)
+class _Moved:
+    """By how much (change) the active displacements differ from those `before` [length], and how large all are (size)."""
+
+    before: Array
+    change: float
+    size: float
+
+    @property
+    def relative(self) -> float:
+        return self.change / self.size if self.size else 0.0
+
+
+def _move(step: Step, iterate: Iterate, constraints: StackedConstraints, solution: Solution, part: Array) -> _Moved:
+    """Let the iterate take the active displacements `part` (k,) of a solution."""
+    before = step.dofs.of(iterate.u)
+    iterate.u = step.dofs.put(iterate.u, part)
+    # Rigid motions of bodies that only contact holds do not count.
+    size = max(step.dofs.size(solution.u), largest(step.load.lift))
+    moved = _Moved(before, largest_difference(part, before), size)
+    iterate.remember(constraints, solution)
+    iterate.history.append(
+        {
+            "displacement_change": moved.relative,
+            "active": int(solution.active.sum()),
+            "active_set_iterations": solution.iterations,
+            "settled": solution.settled,
+        }
+    )
+    return moved
+
+
+def _raise_cycling(problem: Problem, constraints: StackedConstraints, solution: Solution, iterate: Iterate) -> NoReturn:
+    nodes = nearest_nodes(problem, constraints, np.flatnonzero(solution.active != solution.wanted))
+    iterate.history[-1]["nodes"] = nodes
+    raise ConvergenceError(active_set_cycles(problem, constraints, solution, nodes), iterate.history)
+
+
+class _Mixing:
+    """Anderson mixing of the geometries that belong to one active set.
+
+    Parameters
+    ----------
+    accelerated : Anderson
+    """
+
+    def __init__(self, accelerated: Anderson) -> None:
+        self._accelerated = accelerated
+        self._known: Mask | None = None
+
+    def restart(self) -> None:
+        """Forget the geometries so far."""
+        self._accelerated.restart()
+
+    def next(self, before: Array, part: Array, solution: Solution, inexact: bool) -> Array | None:
+        """Return the active displacements (k,) to pair at next; None for those of the solution [length]."""
+        same = self._known is not None and np.array_equal(self._known, solution.active)
+        self._known = solution.active if solution.settled else None
+        if inexact or not same:
+            self._accelerated.restart()
+        # An inexact solution stands still where it is not right yet.
+        return None if inexact else self._accelerated.mixed(before, part)

@@ -1,0 +1,130 @@
+"""The inequalities of one pairing: active set without friction, friction cone with it, rigid positions where needed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.analysis import active_set
+from fastcontact.analysis.accuracy import Accuracy
+from fastcontact.analysis.active_dofs import ActiveDofs, constraints_on_unknowns
+from fastcontact.analysis.friction import friction
+from fastcontact.analysis.iterate import Iterate
+from fastcontact.analysis.messages import no_contact_stops, not_balanced
+from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.solution import Solution
+from fastcontact.analysis.state import State
+from fastcontact.analysis.unsupported_bodies import UnsupportedBodies
+from fastcontact.contact.constraints import Constraints
+from fastcontact.errors import ConvergenceError
+from fastcontact.linear.protocol import Loaded
+from fastcontact.model.rigid_motions import generalised, resisting, stopped_at
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What stays the same through all pairings of a load step.
+
+    Attributes
+    ----------
+    problem : Problem
+    state : State
+        At the beginning of the step.
+    load : StepLoad
+    loaded : Loaded
+        The matrix with the right-hand side of the step, for the active unknowns.
+    dofs : ActiveDofs
+    """
+
+    problem: Problem
+    state: State
+    load: StepLoad
+    loaded: Loaded
+    dofs: ActiveDofs
+
+
+def solve_inequalities(
+    step: Step, constraints: Constraints, iterate: Iterate, active: Mask, accuracy: Accuracy
+) -> tuple[Solution, Array]:
+    """Solve the inequalities of a pairing.
+
+    Parameters
+    ----------
+    step : Step
+    constraints : Constraints
+    iterate : Iterate
+        Keeps the solution with friction, and the rigid position of unsupported bodies.
+    active : ndarray of bool (m,)
+        Set to start from.
+    accuracy : Accuracy
+
+    Returns
+    -------
+    solution : Solution
+    part : ndarray (k,)
+        The active displacements [length].
+    """
+    if step.problem.bodies is not None:
+        return _with_unsupported_bodies(step, step.problem.bodies, constraints, iterate, active, accuracy)
+    solution = _solve(step, constraints, iterate, active, accuracy, step.load.lift)
+    return solution, step.dofs.displacement(solution.u, step.load.lift)
+
+
+def _solve(
+    step: Step, constraints: Constraints, iterate: Iterate, active: Mask, accuracy: Accuracy, lift: Array
+) -> Solution:
+    """Solve in the unknowns that supports and relations leave; `lift` (n_dofs,) is what they prescribe [length]."""
+    own = constraints_on_unknowns(step.dofs, constraints, lift, step.state.u)
+    u = step.dofs.unknowns(iterate.u, lift)
+    if not constraints.tangents:
+        return active_set.solve(step.loaded, own, active, accuracy, u)
+    iterate.frictional = friction.solve(step.loaded, own, active, accuracy, u, iterate.frictional)
+    return iterate.frictional
+
+
+def _with_unsupported_bodies(
+    step: Step, bodies: UnsupportedBodies, constraints: Constraints, iterate: Iterate, active: Mask, accuracy: Accuracy
+) -> tuple[Solution, Array]:
+    """Solve for bodies held by contact alone; return the solution and all displacements (n_dofs,)."""
+    problem, state, lift = step.problem, step.state, step.load.lift
+    known = active
+
+    def solve_at(position: Array) -> Solution:
+        nonlocal known
+        solution = _solve(step, constraints, iterate, known, accuracy, lift + bodies.rigid(position))
+        known = solution.wanted
+        return solution
+
+    start = iterate.u[bodies.dofs]
+    if not iterate.history:
+        moved = _approach(step, bodies, constraints, iterate.u)
+        start = start if active.any() else start + moved
+    noise = 10 * problem.solver.tolerance
+    found = bodies.settle(solve_at, start, state.largest_work, noise, state.gap_round_off)
+    if found.state.settled and not found.slack:
+        raise ConvergenceError(not_balanced(bodies, found, state.largest_work), iterate.history)
+    iterate.rigid = found
+    at = lift + bodies.rigid(found.position)
+    return found.state, problem.system.displacement(found.state.u, at)
+
+
+def _approach(step: Step, bodies: UnsupportedBodies, constraints: Constraints, u: Array) -> Array:
+    """Return how far (k,) rigid bodies move until the loads hold them in contact [length].
+
+    Raises
+    ------
+    ConvergenceError
+        If no contact stops them.
+    """
+    work = generalised(bodies.motions, step.load.force)
+    rows, gap0 = resisting(constraints)
+    size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
+    found = stopped_at(rows @ bodies.motions.displacement, gap0 + rows @ u, work, size)
+    if found is None:
+        raise ConvergenceError(no_contact_stops(bodies, work), smaller_steps_help=False)
+    return found

@@ -1,0 +1,96 @@
+"""The iterate of a load step: what one pairing hands to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.analysis.extrapolation import Extrapolation
+from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.analysis.state import State
+from fastcontact.analysis.unsupported_bodies import RigidPosition
+from fastcontact.contact.constraints import Constraints, StackedConstraints, stacked
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(eq=False)
+class Iterate:
+    """Where a load step stands between two pairings; it belongs to the geometry loop, which changes it.
+
+    Attributes
+    ----------
+    u : ndarray (n_dofs,)
+        Displacements, those that are not active as they were when the step began [length].
+    active : dict of str to ndarray of bool (m,)
+        By contact pair, the set that the last solution wants active.
+    pressure : dict of str to ndarray (n_nodes,)
+        By contact pair, the last nodal pressures [pressure].
+    frictional : FrictionalEquilibrium, optional
+        The last solution with friction.
+    rigid : RigidPosition, optional
+        The last position of unsupported bodies.
+    history : list of dict
+        An entry for each pairing.
+    """
+
+    u: Array
+    active: dict[str, Mask]
+    pressure: dict[str, Array]
+    frictional: FrictionalEquilibrium | None = None
+    rigid: RigidPosition | None = None
+    history: list[dict[str, Any]] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, state: State) -> Iterate:
+        """Return the iterate that a load step begins with."""
+        return cls(state.u.copy(), dict(state.active), dict(state.pressure))
+
+    def remember(self, constraints: StackedConstraints, solution: Solution) -> None:
+        """Keep, by pair, which constraints the solution wants active, and its nodal pressures."""
+        for name, rows in constraints.rows().items():
+            self.active[name] = solution.wanted[rows]
+            self.pressure[name] = constraints.parts[name].pressure(solution.multiplier[rows])
+
+
+def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Iterate) -> StackedConstraints:
+    """Pair the two sides of every contact pair on the deformed configuration, or on the undeformed one if that is kept."""
+    displacement, u = problem.displacement(iterate.u), iterate.u
+    if len(problem.driven):
+        u = np.where(problem.system.fixed, load.lift, u)
+    paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
+    positions, parts = problem.driven.positions(u), {}
+    still = np.zeros(problem.model.mesh.dim)
+    for name, pair in problem.pairs.items():
+        part = pair.constraints(problem.configuration(name, state, load, paired_at, u))
+        parts[name] = problem.driven.constraints(name, part, positions.get(name, still))
+    return stacked(parts)
+
+
+def initially_active(constraints: StackedConstraints, iterate: Iterate, extrapolation: Extrapolation | None) -> Mask:
+    """Return the set (m,) to start from: that of the last solution, extrapolated in the first pairing of a step."""
+    sets = [_start_of(name, part, iterate, extrapolation) for name, part in constraints.parts.items()]
+    return np.concatenate(sets)
+
+
+def _start_of(name: str, part: Constraints, iterate: Iterate, extrapolation: Extrapolation | None) -> Mask:
+    if part.equality is not None and part.equality.all():
+        return part.equality
+    if name not in iterate.active:
+        return np.zeros(len(part), bool)
+    found = part.initially_active(iterate.u, iterate.pressure[name])
+    if found is not None:
+        return found
+    last = iterate.active[name]
+    return last if extrapolation is None else extrapolation.active(name, last)
+
+
+def gaps_and_forces(constraints: StackedConstraints, solution: Solution) -> Mapping[str, tuple[Array, Array]]:
+    """Return gaps [length] and multipliers [force] (m,) by pair."""
+    return {name: (solution.gap[rows], solution.multiplier[rows]) for name, rows in constraints.rows().items()}

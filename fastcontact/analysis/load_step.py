@@ -1,0 +1,135 @@
+"""One load step: predict, settle the contact geometry, balance, recover. This page is the place to begin reading.
+
+The loads of a step are prescribed displacements and forces. The contact geometry is settled first: the surfaces are paired
+on the deformed configuration, the inequalities of contact are solved, and both are repeated until the displacement stands
+still. The contact forces are then known; all displacements, the reactions and the stresses follow from them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from fastcontact._jit import parallel
+from fastcontact._jit.norms_kernels import largest
+from fastcontact.analysis.balance import balance
+from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
+from fastcontact.analysis.inequalities import Step
+from fastcontact.analysis.iterate import gaps_and_forces
+from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.recover import contact_results, counted, first_contacts, never_opening, recover
+from fastcontact.analysis.state import State
+from fastcontact.linear.protocol import Loaded
+from fastcontact.model.rigid_motions import generalised
+from fastcontact.results.step import ContactResult, StepResult
+
+Array = NDArray[np.float64]
+
+
+@parallel.on_one_blas_thread
+def load_step(problem: Problem, state: State, index: int, instant: float) -> tuple[State, StepResult]:
+    """Return the state and the result at the end of a load step.
+
+    Parameters
+    ----------
+    problem : Problem
+    state : State
+        At the end of the step before; it stays as it is.
+    index : int
+        Number of the step, 1 for the first one.
+    instant : float
+        Pseudo-time of its end.
+
+    Raises
+    ------
+    ConvergenceError
+        If the step does not converge.
+    """
+    load = problem.load_at(instant)
+    loaded = with_loads(problem, state, load)
+    solved_before = problem.solver.counters.iterations
+    start, expected = predict(problem, state, load, loaded)
+    settled = settle(problem, start, load, loaded, expected) if problem.pairs else None
+    u, contact_force = displace(problem, start, load, loaded, settled)
+    forces = balance(problem, u, contact_force, load.force, start.largest_force)
+    if settled is not None:
+        settled.iterate.history[-1]["residual"] = forces.relative
+    forces.check(index, problem.criteria.relative, settled.iterate.history if settled is not None else ())
+    iterations = counted(settled, problem.solver.counters.iterations - solved_before)
+    end = replace(start, u=u, largest_force=forces.largest, obstacles=problem.obstacles_at(load, u))
+    end, contact = (end, {}) if settled is None else after_contact(problem, start, load, settled, end)
+    if problem.bodies is not None and end.rigid is not None:
+        iterations["regularised"] = problem.bodies.report(end.rigid, end.largest_work)
+    end = replace(end, solver=problem.solver.snapshot())
+    return end, recover(problem, end, contact, forces.reaction, iterations, (index, instant))
+
+
+def with_loads(problem: Problem, state: State, load: StepLoad) -> Loaded:
+    """Return the prepared matrix with the right-hand side of the step; the solver continues from the state."""
+    problem.solver.put_back(state.solver)
+    return problem.solver.load(problem.system.right(load.force, load.lift))
+
+
+def predict(problem: Problem, state: State, load: StepLoad, loaded: Loaded) -> tuple[State, float]:
+    """Return the state from which the step starts, and the displacement to expect [length].
+
+    The latter matters in the first step if forces alone act: nothing else tells how large displacements will be.
+    """
+    round_off, largest_work, expected = state.gap_round_off, state.largest_work, 0.0
+    zero = np.zeros(len(load.lift))
+    if problem.pairs and load.force.any() and not (state.u.any() or load.lift.any()):
+        expected = largest(loaded.everywhere(zero))
+    if problem.pairs and problem.model.springs:
+        # Weak springs alone would let bodies move far; contact takes that back, but not its round-off.
+        alone = largest(loaded.everywhere(zero))
+        round_off = max(round_off, 16 * np.finfo(float).eps * alone)
+    if problem.bodies is not None:
+        work = generalised(problem.bodies.motions, load.force)
+        largest_work = max(largest_work, float(np.abs(work).max()))
+    start = replace(
+        state, gap_round_off=round_off, largest_work=largest_work, rigid=None, unsettled=None,
+        largest_force=max(state.largest_force, largest(load.force)),
+        extrapolation=state.extrapolation.to(load.lift, load.force),
+    )  # fmt: skip
+    return start, expected
+
+
+def settle(problem: Problem, start: State, load: StepLoad, loaded: Loaded, expected: float) -> SettledContact:
+    """Settle the contact geometry on the displacement components that contact depends on."""
+    dofs = problem.dofs.for_step(start.u, load.lift)
+    step = Step(problem, start, load, dofs.loaded(loaded), dofs)
+    return settle_geometry(step, start.extrapolation, expected)
+
+
+def displace(
+    problem: Problem, start: State, load: StepLoad, loaded: Loaded, settled: SettledContact | None
+) -> tuple[Array, Array]:
+    """Return all displacements [length] and the contact forces [force], both (n_dofs,)."""
+    system, lift = problem.system, load.lift
+    if settled is None:
+        none = csr_array((0, len(lift))), np.empty(0)
+        v = loaded.solve(*none, guess=system.unknowns(start.u, lift))[0]
+        return system.displacement(v, lift), np.zeros(len(lift))
+    contact_force, rigid = settled.force, settled.iterate.rigid
+    if problem.bodies is not None and rigid is not None:
+        lift = lift + problem.bodies.rigid(rigid.position)
+    v = loaded.everywhere(system.reduced(contact_force), settled.solution.u)
+    return system.displacement(v, lift), contact_force
+
+
+def after_contact(
+    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State
+) -> tuple[State, dict[str, ContactResult]]:
+    """Return the end of the step with what contact leaves to later steps, and the results of all contact pairs."""
+    end = replace(
+        end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
+        unsettled=settled.unsettled, first_contact=first_contacts(problem, start, load, end.u),
+        extrapolation=start.extrapolation.converged(end.u, gaps_and_forces(settled.constraints, settled.solution)),
+        never_opening=never_opening(problem, start, settled),
+    )  # fmt: skip
+    results = contact_results(problem, start, load, settled, end)
+    touched = {name for name, found in results.items() if found.active.any()}
+    return replace(end, touched=end.touched | touched), results

@@ -1,0 +1,103 @@
+"""What a load step that does not converge says: the culprit with its nodes, and the remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.analysis.unsupported_bodies import RigidPosition, UnsupportedBodies
+from fastcontact.contact.constraints import StackedConstraints
+
+Array = NDArray[np.float64]
+Nodes = dict[str, list[int]]
+
+
+def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Array, limit: int) -> str:
+    """Return the message for a geometry that did not settle; `change` (n_dofs,) is that of the last update [length].
+
+    The nodes that moved most are added to the last entry of the history.
+    """
+    last = history[-1]
+    last["nodes"] = _most_moved(problem, change)
+    return (
+        f"the contact geometry did not settle in {limit} updates: the displacement still changes by "
+        f"{last['displacement_change']:.1e} of its largest component, most at "
+        f"{_named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. Allow more "
+        f"(max_geometry_updates), use more load steps, a finer mesh on the primary side, {_smoother(problem)}or a "
+        "fixed number of updates"
+    )
+
+
+def active_set_cycles(problem: Problem, constraints: StackedConstraints, solution: Solution, nodes: Nodes) -> str:
+    """Return the message for constraints that did not settle; `nodes` are those next to them."""
+    if isinstance(solution, FrictionalEquilibrium):
+        return (
+            f"contact with friction did not settle in {solution.iterations} Newton iterations from several starts: its "
+            f"equations are {solution.residual:.1e} of the largest force off. With the coefficient of friction "
+            f"{constraints.coefficients.max():g} there may be no solution to find: use more load steps or less friction"
+        )
+    count = int((solution.active != solution.wanted).sum())
+    many = "1 constraint still changes" if count == 1 else f"{count} constraints still change"
+    what = f"{many}, at {_named_nodes(problem, nodes)}" if count else "sliding constraints still turn"
+    other = ", the direct linear solver" if problem.solver.iterative else ""
+    return (
+        f"the active set did not settle in {solution.iterations} iterations: {what}. Use more load steps{other} or more "
+        "iterations (max_active_set_iterations)"
+    )
+
+
+def no_contact_stops(bodies: UnsupportedBodies, work: Array) -> str:
+    """Return the message for loads that pull bodies away; `work` (k,) is their resultant on each free motion [force]."""
+    return (
+        f"the loads pull bodies away, no contact stops them ({'; '.join(bodies.names)}; resultant up to "
+        f"{np.abs(work).max():.3g}): reverse the loads or add supports"
+    )
+
+
+def not_balanced(bodies: UnsupportedBodies, found: RigidPosition, load: float) -> str:
+    """Return the message for bodies whose springs still carry force under a load [force]."""
+    return (
+        f"contact does not hold {'; '.join(bodies.moving(found))}: after {found.positions} positions "
+        f"tried, a force of {np.abs(found.spring_force).max():.3g} is still missing for equilibrium under a load of "
+        f"{load:.3g}. Add a support, or use more load steps"
+    )
+
+
+def nearest_nodes(problem: Problem, constraints: StackedConstraints, rows: NDArray[np.intp]) -> Nodes:
+    """Return, by contact pair, the secondary nodes next to constraints, counted through the pairs."""
+    found: Nodes = {}
+    for name, own in constraints.rows().items():
+        mine = rows[(rows >= own.start) & (rows < own.stop)] - own.start
+        if len(mine):
+            points = problem.pairs[name].secondary.points
+            apart = constraints.parts[name].positions[mine][:, None] - problem.model.mesh.points[points][None]
+            found[name] = np.unique(points[np.linalg.norm(apart, axis=2).argmin(axis=1)]).tolist()
+    return found
+
+
+def _most_moved(problem: Problem, change: Array) -> Nodes:
+    """Return, by contact pair, the three secondary nodes whose displacement changes (n_dofs,) most."""
+    size = np.linalg.norm(change.reshape(problem.shape), axis=1)
+    sides = {name: pair.secondary.points for name, pair in problem.pairs.items()}
+    return {name: points[np.argsort(-size[points], kind="stable")[:3]].tolist() for name, points in sides.items()}
+
+
+def _named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
+    """Return nodes by contact pair in words, with the places of the first three."""
+    texts = []
+    for name, points in nodes.items():
+        listed = ", ".join(f"{p} {np.array2string(problem.model.mesh.points[p], precision=4)}" for p in points[:3])
+        more = f" and {len(points) - 3} more" if len(points) > 3 else ""
+        texts.append(f"points {listed}{more} of contact '{name}'")
+    return "; ".join(texts)
+
+
+def _smoother(problem: Problem) -> str:
+    """Return the advice for pairs that may flip between the facets at a node."""
+    faceted = [name for name, pair in problem.pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
+    return f'normals="averaged" for contact {faceted[0]!r}, ' if faceted else ""

@@ -1,0 +1,228 @@
+"""The problem that an analysis solves: built once from a model, never changed after."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact._jit import parallel
+from fastcontact.analysis.active_dofs import ActiveDofs, AllDofs, SurfaceDofs
+from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.state import State
+from fastcontact.analysis.unsupported_bodies import UnsupportedBodies
+from fastcontact.contact.configuration import Configuration
+from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.elasticity.springs import stiffened
+from fastcontact.elasticity.stiffness import rigid_modes, stiffness
+from fastcontact.elasticity.system import System
+from fastcontact.linear import choice
+from fastcontact.linear.protocol import LinearSolver
+from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
+from fastcontact.model.model import Model, combined, multiplier
+from fastcontact.model.ramp import Ramp, Table
+from fastcontact.model.rigid_motions import free_motions
+
+Array = NDArray[np.float64]
+ByRamp = Mapping[Table | None, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class StepLoad:
+    """The loads at the end of a load step.
+
+    Attributes
+    ----------
+    lift : ndarray (n_dofs,)
+        What supports and relations prescribe, see `System.lift` [length].
+    force : ndarray (n_dofs,)
+        External forces [force].
+    obstacles : dict of str to ndarray (dim,)
+        By contact pair, the prescribed displacement of its rigid obstacle [length].
+    clearance_factors : dict of str to float
+        By contact pair, what its clearances are multiplied with.
+    """
+
+    lift: Array
+    force: Array
+    obstacles: Mapping[str, Array]
+    clearance_factors: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A model prepared for analysis.
+
+    Attributes
+    ----------
+    model : Model
+    ramp : Ramp
+    criteria : Criteria
+    solver : LinearSolver
+        Prepared with the stiffness matrix; its snapshot is part of the state.
+    pairs : dict of str to Formulation
+        The contact pairs.
+    moduli : ndarray (n_materials, n_components, n_components)
+        Elastic moduli [pressure].
+    material : dict of str to ndarray of int (n_cells,)
+        By element, the material of every solid cell.
+    system : System
+        Stiffness, supports and relations.
+    bodies : UnsupportedBodies, optional
+        Bodies held by contact alone, if there are any.
+    dofs : ActiveDofs
+        The displacement components that a pairing solves for.
+    contact_dofs : ndarray of int
+        Components that constraints may involve.
+    driven : ForceDrivenObstacles
+        Rigid obstacles that forces move.
+    prescribed, forces : dict of ramp table to ndarray (n_points + n_driven, dim)
+        By history, displacements [length] and nodal forces [force] at multiplier 1.
+    """
+
+    model: Model
+    ramp: Ramp
+    criteria: Criteria
+    solver: LinearSolver
+    pairs: Mapping[str, Formulation]
+    moduli: Array
+    material: dict[str, NDArray[np.int32]]
+    system: System
+    bodies: UnsupportedBodies | None
+    dofs: ActiveDofs
+    contact_dofs: NDArray[np.intp]
+    driven: ForceDrivenObstacles
+    prescribed: ByRamp
+    forces: ByRamp
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of points, those of driven obstacles included, and dimension."""
+        return self.driven.n_dofs // self.model.mesh.dim, self.model.mesh.dim
+
+    def load_at(self, instant: float) -> StepLoad:
+        """Return the loads at an instant of the ramp."""
+        prescribed = combined(self.prescribed, self.ramp, instant, self.shape)
+        factors = [multiplier(relation.ramp, self.ramp, instant) for relation in self.model.relations]
+        lift = self.system.lift(prescribed.ravel(), self.system.values(factors))
+        obstacles, clearances = {}, {}
+        for pair in self.model.contact:
+            side = self.pairs[pair.name].primary
+            if isinstance(side, RigidSide):
+                obstacles[pair.name] = multiplier(pair.ramp, self.ramp, instant) * side.motion
+            if pair.clearance_ramp is not None:
+                clearances[pair.name] = multiplier(pair.clearance_ramp, self.ramp, instant)
+        force = combined(self.forces, self.ramp, instant, self.shape).ravel()
+        return StepLoad(lift, force, obstacles, clearances)
+
+    def displacement(self, u: Array) -> Array:
+        """Return the displacements (n_points, dim) of the mesh of all displacements u (n_dofs,) [length]."""
+        return u[: self.model.n_dofs].reshape(-1, self.model.mesh.dim)
+
+    def obstacles_at(self, load: StepLoad, u: Array) -> dict[str, Array]:
+        """Return by contact pair the displacements (dim,) of rigid obstacles, those that forces drive where u has them."""
+        return {**load.obstacles, **self.driven.positions(u)}
+
+    def configuration(self, name: str, state: State, load: StepLoad, displacement: Array, u: Array) -> Configuration:
+        """Return the configuration of a contact pair.
+
+        Parameters
+        ----------
+        name : str
+            Of the pair.
+        state : State
+            At the beginning of the load step.
+        load : StepLoad
+        displacement : ndarray (n_points, dim)
+            Of the mesh [length].
+        u : ndarray (n_dofs,)
+            All displacements, for the obstacles that forces drive [length].
+        """
+        still = np.zeros(self.model.mesh.dim)
+        return Configuration(
+            displacement,
+            self.displacement(state.u),
+            self.obstacles_at(load, u).get(name, still),
+            state.obstacles.get(name, still),
+            load.clearance_factors.get(name, 1.0),
+            state.never_opening.get(name),
+        )
+
+    def initial_state(self) -> State:
+        """Return the state before the first load step."""
+        # Gaps are differences of coordinates and no more accurate than those.
+        round_off = 8 * np.finfo(float).eps * float(np.abs(self.model.mesh.points).max())
+        return State(np.zeros(self.driven.n_dofs), round_off, solver=self.solver.snapshot())
+
+
+@parallel.on_one_blas_thread
+def prepare(
+    model: Model,
+    ramp: Ramp,
+    criteria: Criteria,
+    *,
+    linear_solver: str = "auto",
+    linear_tolerance: float = 1e-10,
+    linear_precision: str | None = None,
+) -> Problem:
+    """Assemble a model that was checked before, and prepare the linear solver; see `run.solve` for the parameters."""
+    mesh, driven = model.mesh, model.driven
+    solver = choice.make(
+        linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, tolerance=linear_tolerance, precision=linear_precision,
+        columns=not all(pair.eliminable for pair in model.contact),
+    )  # fmt: skip
+    supported, prescribed = model.prescribed_by_ramp()
+    pairs = {pair.name: model.bind(pair, supported) for pair in model.contact}
+    moduli, material = model.material_numbers()
+    K = stiffened(stiffness(mesh, model.kinematics, moduli, material), model.springs)
+    system = System(
+        driven.stiffness(K),
+        driven.supported(supported).ravel(),
+        driven.relations(model.relations),
+        driven.without_stiffness,
+    )
+    contact_dofs = _contact_dofs(mesh, pairs, len(driven))
+    involved = system.involved(contact_dofs)
+    motions = driven.motions(free_motions(mesh, model.kinematics, supported, model.holding_rows()))
+    bodies = UnsupportedBodies(motions, system, involved) if len(motions) else None
+    involved = _prepare_solver(solver, system, bodies, driven.near_nullspace(near_nullspace(model)), involved)
+    return Problem(
+        model, ramp, criteria, solver, pairs, moduli, material, system, bodies,
+        SurfaceDofs(system, contact_dofs, involved) if pairs and bodies is None and solver.condenses
+        else AllDofs(system, contact_dofs),
+        contact_dofs, driven, driven.prescribed(prescribed), driven.forces(model.forces_by_ramp()),
+    )  # fmt: skip
+
+
+def _prepare_solver(
+    solver: LinearSolver, system: System, bodies: UnsupportedBodies | None, modes: Array, involved: NDArray[np.intp]
+) -> NDArray[np.intp]:
+    """Give the linear solver the matrix, with the springs of unsupported bodies; return the unknowns of contact."""
+    matrix = system.matrix if bodies is None else bodies.with_springs(system.matrix)
+    if bodies is not None:
+        involved = np.union1d(involved, bodies.dofs)
+    kept = solver.prepare(matrix, system.unknowns_of(modes), involved, own=True)
+    if matrix is system.matrix:
+        system.keep(kept)
+    return involved
+
+
+def _contact_dofs(mesh: Any, pairs: Mapping[str, Formulation], n_driven: int) -> NDArray[np.intp]:
+    """Return the displacement components of all points on contact surfaces, and of obstacles that forces drive."""
+    sides = [side.points for pair in pairs.values() for side in (pair.secondary, pair.primary)]
+    points = np.unique(np.concatenate(sides)) if sides else np.empty(0, np.intp)
+    moved = mesh.n_points + np.arange(n_driven)
+    return (np.concatenate([points, moved])[:, None].astype(np.intp) * mesh.dim + np.arange(mesh.dim)).ravel()
+
+
+def near_nullspace(model: Model) -> Array:
+    """Return the displacements (n_dofs, k) that cost little energy, for multigrid: rigid-body modes of the mesh [-].
+
+    One set serves all bodies, since aggregates do not span them. In axisymmetry the in-plane motions are no rigid-body
+    modes of the ring, but away from the axis they cost little, and aggregates of two unknowns a node need them.
+    """
+    return rigid_modes(model.mesh.points, "plane_strain" if model.mesh.dim == 2 else model.kinematics)

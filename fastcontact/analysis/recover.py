@@ -1,0 +1,104 @@
+"""Recover the result of a load step from its displacements: stresses, contact results, work of the solvers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.analysis.contact_result import contact_result
+from fastcontact.analysis.geometry_loop import SettledContact
+from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.state import State
+from fastcontact.elasticity import recovery
+from fastcontact.results.step import ContactResult, StepResult
+
+Array = NDArray[np.float64]
+
+
+def recover(
+    problem: Problem, end: State, contact: dict[str, ContactResult], reaction: Array, iterations: dict[str, Any],
+    place: tuple[int, float],
+) -> StepResult:  # fmt: skip
+    """Return the result of a load step.
+
+    Parameters
+    ----------
+    problem : Problem
+    end : State
+        At the end of the step.
+    contact : dict of str to ContactResult
+    reaction : ndarray (n_dofs of the mesh,)
+        [force]
+    iterations : dict
+        See `StepResult`.
+    place : (int, float)
+        Number of the step, and its pseudo-time.
+    """
+    mesh, u = problem.model.mesh, problem.displacement(end.u)
+    stress = recovery.nodal_stress(mesh, problem.model.kinematics, problem.moduli, problem.material, u)
+    von_mises = recovery.von_mises(stress)
+    return StepResult(
+        *place, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises), reaction.reshape(-1, mesh.dim),
+        contact, iterations,
+    )  # fmt: skip
+
+
+def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> dict[str, tuple[Array, Array]]:
+    """Return by contact pair in space where the bodies meet first [length], and the normal there; once found it stays."""
+    if problem.model.mesh.dim == 2:
+        return {}
+    return {
+        name: start.first_contact[name]
+        if name in start.first_contact
+        else pair.first_contact(problem.configuration(name, start, load, problem.displacement(u), u))
+        for name, pair in problem.pairs.items()
+    }
+
+
+def contact_results(
+    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State
+) -> dict[str, ContactResult]:
+    """Return the results of all contact pairs.
+
+    Parameters
+    ----------
+    problem : Problem
+    start : State
+        At the beginning of the step.
+    load : StepLoad
+    settled : SettledContact
+    end : State
+        At the end of the step; of it the displacements and the places of first contact are needed.
+    """
+    displacement = problem.displacement(end.u)
+    return {
+        name: contact_result(
+            name, problem.pairs[name], settled.constraints.parts[name], settled.solution, rows,
+            problem.configuration(name, start, load, displacement, end.u), end.first_contact.get(name),
+        )
+        for name, rows in settled.constraints.rows().items()
+    }  # fmt: skip
+
+
+def never_opening(
+    problem: Problem, start: State, settled: SettledContact
+) -> dict[str, tuple[Array, NDArray[np.bool_]]]:
+    """Return by contact pair that is bilateral once closed the places of its constraints, and which are closed for good."""
+    found = dict(start.never_opening)
+    for name, rows in settled.constraints.rows().items():
+        if problem.pairs[name].options.kind == "bilateral_once_closed":
+            found[name] = settled.constraints.parts[name].positions, settled.solution.active[rows].copy()
+    return found
+
+
+def counted(settled: SettledContact | None, linear_iterations: int) -> dict[str, Any]:
+    """Return the work of a load step, see `StepResult.iterations`."""
+    history = settled.iterate.history if settled is not None else []
+    return {
+        "geometry_updates": max(len(history) - 1, 0),
+        "active_set_iterations": sum(entry["active_set_iterations"] for entry in history),
+        "linear_iterations": linear_iterations,
+        "history": history,
+    }

@@ -1,0 +1,102 @@
+"""Solutions of the inequalities of contact, without friction and with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """A solution under a set of active constraints.
+
+    Attributes
+    ----------
+    u : ndarray (n,)
+        Unknowns [length].
+    multiplier : ndarray (m,)
+        Of all constraints, zero for inactive ones [force].
+    gap : ndarray (m,)
+        Of all constraints [length].
+    active : ndarray of bool (m,)
+        The set that this is the solution for.
+    wanted : ndarray of bool (m,)
+        The set that the signs of this solution ask for; equal to `active` when every inequality holds.
+    iterations : int
+        Linear solutions made.
+    """
+
+    u: Array
+    multiplier: Array
+    gap: Array
+    active: Mask
+    wanted: Mask
+    iterations: int
+
+    @property
+    def settled(self) -> bool:
+        """Whether all inequalities hold."""
+        return bool(np.array_equal(self.active, self.wanted))
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionalEquilibrium:
+    """A solution with friction; the normal part as in `Equilibrium`.
+
+    Attributes
+    ----------
+    u : ndarray (n,)
+        Unknowns [length].
+    multiplier : ndarray (m,)
+        Normal forces [force].
+    gap : ndarray (m,)
+        [length].
+    tangential : ndarray (m, k)
+        Tangential forces on the secondary side, along the k tangents [force].
+    slip : ndarray (m, k)
+        Slip of the step along the k tangents [length].
+    active, sticking : ndarray of bool (m,)
+    settled : bool
+        Whether all inequalities hold.
+    residual : float
+        By how much they do not, over the largest force.
+    iterations : int
+        Newton iterations.
+    directions : tuple of ndarray (m, dim)
+        The k tangents.
+    """
+
+    u: Array
+    multiplier: Array
+    gap: Array
+    tangential: Array
+    slip: Array
+    active: Mask
+    sticking: Mask
+    settled: bool
+    residual: float
+    iterations: int
+    directions: tuple[Array, ...] = ()
+
+    def forces_along(self, directions: tuple[Array, ...], m: int) -> Array | None:
+        """Return normal and tangential forces (1 + k, m) along other tangents (m, dim); None for other constraints.
+
+        From one pairing to the next tangents may turn by any angle: only the plane that they span is the contact's.
+        """
+        if self.tangential.shape != (m, len(directions)):
+            return None
+        vectors = sum(t[:, None] * along for t, along in zip(self.tangential.T, self.directions, strict=True))
+        return np.vstack([self.multiplier, *((vectors * along).sum(axis=1) for along in directions)])
+
+    @property
+    def wanted(self) -> Mask:
+        """The set to start the next solution from."""
+        return self.active
+
+
+Solution = Equilibrium | FrictionalEquilibrium

@@ -1,0 +1,129 @@
+"""The state of an analysis: everything that a load step changes, in one place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.analysis.extrapolation import Extrapolation
+from fastcontact.analysis.unsupported_bodies import RigidPosition
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """The state at the end of a load step, or before the first one.
+
+    A load step returns a new state and leaves this one as it is: arrays are replaced, never written into. So a state is its
+    own snapshot, and its `to_dict` is what a restart stores.
+
+    Attributes
+    ----------
+    u : ndarray (n_dofs,)
+        Displacements of all points, then of the obstacles that forces drive [length].
+    active : dict of str to ndarray of bool (m,)
+        By contact pair, the constraints to start from as active.
+    pressure : dict of str to ndarray (n_nodes,)
+        By contact pair, the last nodal pressures [pressure].
+    obstacles : dict of str to ndarray (dim,)
+        By contact pair, the displacement of its rigid obstacle [length].
+    never_opening : dict of str to (ndarray (m, dim), ndarray of bool (m,))
+        By contact pair that is bilateral once closed, places of constraints [length] and which of them are closed for good.
+    first_contact : dict of str to (ndarray (dim,), ndarray (dim,))
+        By contact pair in space, where the bodies met first [length] and the normal there [-].
+    extrapolation : Extrapolation
+        The last two converged steps.
+    gap_round_off : float
+        Gaps are no more accurate than this [length].
+    largest_force, largest_work : float
+        Of all steps so far: the largest force [force], and the largest force of loads on a free rigid motion [force].
+    touched : frozenset of str
+        Contact pairs that were closed at the end of a step.
+    unsettled : (int, float), optional
+        The fixed number of geometry updates of the last step, and the relative change by the last one.
+    rigid : RigidPosition, optional
+        Rigid position of unsupported bodies in the last step.
+    solver : object
+        What the linear solver keeps from step to step, see `LinearSolver.snapshot`.
+    """
+
+    u: Array
+    gap_round_off: float
+    active: Mapping[str, Mask] = field(default_factory=dict)
+    pressure: Mapping[str, Array] = field(default_factory=dict)
+    obstacles: Mapping[str, Array] = field(default_factory=dict)
+    never_opening: Mapping[str, tuple[Array, Mask]] = field(default_factory=dict)
+    first_contact: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
+    extrapolation: Extrapolation = field(default_factory=Extrapolation)
+    largest_force: float = 0.0
+    largest_work: float = 0.0
+    touched: frozenset[str] = frozenset()
+    unsettled: tuple[int, float] | None = None
+    rigid: RigidPosition | None = None
+    solver: Any = None
+
+    def to_dict(self, n_dofs: int) -> dict[str, Any]:
+        """Return what a later process needs to continue, beside the displacements of the `n_dofs` components of the mesh."""
+        return {
+            "numbers": {
+                "largest_force": float(self.largest_force),
+                "largest_work": float(self.largest_work),
+                "round_off": float(self.gap_round_off),
+            },
+            "obstacles": self.u[n_dofs:].copy(),
+            "active": dict(self.active),
+            "pressure": dict(self.pressure),
+            "pairs": {
+                name: {
+                    "closed": _listed(self.never_opening.get(name)),
+                    "now": self.obstacles[name].copy() if name in self.obstacles else None,
+                    "first_contact": _listed(self.first_contact.get(name)),
+                }
+                for name in self.active
+            },
+            "extrapolation": self.extrapolation.to_dict(),
+        }
+
+    @classmethod
+    def from_dict(cls, kept: Mapping[str, Any], displacement: Array, touched: frozenset[str]) -> State:
+        """Return the state that `to_dict` kept.
+
+        Parameters
+        ----------
+        kept : mapping
+        displacement : ndarray (n_points, dim)
+            At the end of the last step [length].
+        touched : frozenset of str
+            Contact pairs that were closed at the end of a step.
+        """
+        u = np.concatenate([displacement.ravel(), kept["obstacles"]])
+        pairs, numbers = kept["pairs"], kept["numbers"]
+        found = {
+            key: {name: own[key] for name, own in pairs.items() if own[key] is not None}
+            for key in ("closed", "now", "first_contact")
+        }
+        return cls(
+            u,
+            numbers["round_off"],
+            active=dict(kept["active"]),
+            pressure=dict(kept["pressure"]),
+            obstacles={name: now.copy() for name, now in found["now"].items()},
+            never_opening={name: (both[0], both[1]) for name, both in found["closed"].items()},
+            first_contact={name: (both[0], both[1]) for name, both in found["first_contact"].items()},
+            extrapolation=Extrapolation.from_dict(kept["extrapolation"], u)
+            if "extrapolation" in kept
+            else Extrapolation(),
+            largest_force=numbers["largest_force"],
+            largest_work=numbers["largest_work"],
+            touched=touched,
+        )
+
+
+def _listed(both: tuple[Array, Any] | None) -> list[Any] | None:
+    return None if both is None else list(both)

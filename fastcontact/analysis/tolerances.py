@@ -1,0 +1,74 @@
+"""How accurate each solution of a load step has to be: loose at first with an iterative solver, tight at the end."""
+
+from __future__ import annotations
+
+from fastcontact.analysis.accuracy import Accuracy
+from fastcontact.analysis.criteria import Criteria
+from fastcontact.linear.protocol import LinearSolver
+
+# Relative residual of the first solution of a step by an iterative solver, and of later ones in units of the relative
+# change of the displacement and of the last residual: more accuracy than the pairing itself has is lost.
+FIRST_RESIDUAL, RESIDUAL = 1e-2, 0.03
+# Newton iterations with friction as long as the residual is larger than the last one: errors turn slips to and fro.
+INEXACT_NEWTON_STEPS = 3
+# Pairings after which errors of whole solutions are taken for what they are.
+PATIENT_UPDATES = 25
+
+
+class Tolerances:
+    """The tolerances of a load step.
+
+    Parameters
+    ----------
+    solver : LinearSolver
+    criteria : Criteria
+    begin_inexact : bool
+        Whether the first solutions may have a larger residual than the last one.
+    round_off : float
+        Gaps are no more accurate than this [length].
+    expected : float
+        Displacement to expect in the first step, if forces alone act [length].
+    """
+
+    def __init__(
+        self, solver: LinearSolver, criteria: Criteria, begin_inexact: bool, round_off: float, expected: float
+    ) -> None:
+        self._solver, self._criteria, self._round_off, self._expected = solver, criteria, round_off, expected
+        self._residual = max(solver.tolerance, FIRST_RESIDUAL) if begin_inexact else solver.tolerance
+
+    @property
+    def inexact(self) -> bool:
+        """Whether a solution to the present residual is not the last one of a step."""
+        return self._solver.iterative and self._residual > self._solver.tolerance
+
+    def tighten(self, relative_change: float) -> None:
+        """Lower the residual to what the last relative change of the displacement is worth."""
+        self._residual = max(self._solver.tolerance, RESIDUAL * min(self._residual, relative_change))
+
+    def accuracy(self, scale: float, single_iteration: bool) -> Accuracy:
+        """Return the accuracy of a solution.
+
+        Parameters
+        ----------
+        scale : float
+            Size of the displacements [length].
+        single_iteration : bool
+            Whether the surfaces are paired again after every active-set iteration.
+        """
+        noise = max(10 * self._solver.tolerance, self._residual if self._solver.iterative else 0.0)
+        limit = 1 if single_iteration else self._criteria.max_active_set_iterations
+        return Accuracy(
+            gap=max(noise * (scale or self._expected), self._round_off),
+            multiplier=noise,
+            residual=max(self._residual, self._solver.tolerance),
+            max_iterations=limit,
+            max_newton_steps=1 if limit == 1 else INEXACT_NEWTON_STEPS if self.inexact else None,
+        )
+
+    def enough(self, update: int, size: float) -> float:
+        """Return the change of the displacement, whose size is given, below which the geometry has settled [length]."""
+        # Iterative solvers leave a noise of their tolerance; asking for less would never end.
+        accuracy = max(self._criteria.geometry, self._solver.tolerance)
+        if update >= PATIENT_UPDATES:
+            accuracy = max(accuracy, self._solver.error)
+        return max(accuracy * size, self._round_off)

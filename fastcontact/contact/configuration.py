@@ -1,0 +1,49 @@
+"""Where the two sides of a contact pair stand when they are paired, and where they stood as the load step began."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Configuration:
+    """The configuration in which a contact pair is paired.
+
+    Attributes
+    ----------
+    displacement : ndarray (n_points, dim)
+        Displacement of all points of the mesh [length].
+    start : ndarray (n_points, dim)
+        The same at the beginning of the load step, from where slip is measured [length].
+    obstacle, obstacle_start : ndarray (dim,)
+        Displacement of a rigid obstacle, now and at the beginning of the load step [length].
+    clearance_factor : float
+        What the clearances of the pair are multiplied with.
+    never_opening : (ndarray (k, dim), ndarray of bool (k,)), optional
+        Reference places of constraints at the end of the load step before [length], and which of them never open again;
+        None where all may open.
+    """
+
+    displacement: Array
+    start: Array
+    obstacle: Array
+    obstacle_start: Array
+    clearance_factor: float = 1.0
+    never_opening: tuple[Array, Mask] | None = None
+
+    @classmethod
+    def displaced(cls, displacement: Array) -> Configuration:
+        """Return the configuration displaced by `displacement` (n_points, dim) [length] in one step from rest."""
+        still = np.zeros(displacement.shape[1])
+        return cls(displacement, np.zeros_like(displacement), still, still)
+
+    @classmethod
+    def undeformed(cls, points: Array) -> Configuration:
+        """Return the configuration before any load, of a mesh with `points` (n_points, dim) [length]."""
+        return cls.displaced(np.zeros_like(points))

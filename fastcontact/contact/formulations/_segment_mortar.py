@@ -1,0 +1,97 @@
+r"""Mortar contact in the plane with a pressure field, integrated exactly over the pieces where two facets face each other.
+
+The gap between facets that do not match has a kink wherever a node of the primary side stands opposite. Here every
+secondary facet is cut there, in each pairing, and every piece gets Gauss points of its own (Puso and Laursen, 2004;
+Popp, Gee and Wall, 2009). A uniform pressure then passes between meshes that do not match without error, which neither
+node-to-segment nor quadrature over whole facets achieves. Pieces that face nothing carry nothing, and the pressure field
+is projected over the rest: where the primary surface ends inside a facet, the pressure ends there too.
+
+The pressure at a point and the complementarity are those of `_pressure_field`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array, diags_array
+from scipy.sparse.linalg import splu
+
+from fastcontact.contact.configuration import Configuration
+from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.formulations._cut_lines import line_points
+from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
+from fastcontact.contact.formulations._projection import Projection
+from fastcontact.contact.integration import facet_measure
+from fastcontact.contact.pair_options import spread
+from fastcontact.contact.pairing import Candidates, Pairing, pair
+from fastcontact.contact.surface import Surface
+from fastcontact.errors import ContactError
+from fastcontact.mesh import quadrature
+
+Array = NDArray[np.float64]
+# A facet that faces less than this part of its length takes no part: its multipliers would have next to no equation.
+COVERED = 1e-3
+
+
+@dataclass(eq=False)
+class SegmentMortar(PressureFieldFormulation):
+    """Mortar contact with exact integration over cut lines; further parameters as in `PressureFieldFormulation`.
+
+    Parameters
+    ----------
+    n_gauss : int, optional
+        Gauss points per piece; by default 3 on linear and 4 on quadratic facets.
+    multipliers : str
+        ``"standard"``: the multiplier field is that of the facets.
+    """
+
+    projection_tolerance: float = 1e-6
+    normals: str = "averaged"
+    n_gauss: int | None = None
+    multipliers: str = "standard"
+
+    name: ClassVar[str] = "mortar"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.n_gauss is not None and self.n_gauss < 2:
+            raise ContactError(f"n_gauss = {self.n_gauss} points per piece do not integrate it exactly: use at least 2")
+        facets, element = self.secondary.facets, self.secondary.element
+        xi, weights = quadrature.gauss_line(3)
+        lengths = facet_measure(facets, element, self.points, xi, False) @ weights
+        self._rho = self.augmentation * self.modulus / float(lengths.min())
+
+    def unilateral(self, at: Configuration) -> Constraints:
+        """Cut and pair on the displaced configuration and return the gaps of the integration points."""
+        deformed = self.points + at.displacement
+        assert isinstance(self.primary, Surface)
+        block, borders = self.secondary.blocks[0], self.options.borders(self.secondary)
+        n_gauss = block.facets.shape[1] + 1 if self.n_gauss is None else self.n_gauss
+        points = line_points(block, self.primary, self.points, deformed, self.axisymmetric, n_gauss, borders)
+        facet, shape, area = points.facet, points.shape, points.area
+        candidates = Candidates(self.secondary.facets[facet], shape)
+        found = pair(candidates.positions(deformed), self.primary, deformed, self.projection_tolerance, self.normals)
+        total = np.bincount(facet, weights=area)
+        covered = np.bincount(facet, weights=np.where(found.paired, area, 0.0))
+        kept = found.paired & (covered > COVERED * total)[facet] & (area > 0) & ~self.options.out(candidates)
+        pairing = Pairing(found.facet, found.xi, found.normal, kept)
+        field = self._pressure_field(facet, shape, np.where(kept, area, 0.0))
+        return self.of_points(candidates, pairing, field, at)
+
+    def _pressure_field(self, facet: NDArray[np.intp], shape: Array, area: Array) -> PressureField:
+        """Set up the pressure field on the nodes of facets that take part, from points (m,), shapes (m, n), areas (m,)."""
+        column = self.secondary.local[facet]
+        row = np.broadcast_to(np.arange(len(shape))[:, None], shape.shape)
+        size = (len(shape), len(self.secondary.points))
+        P = coo_array((shape.ravel(), (row.ravel(), column.ravel())), shape=size).tocsr()
+        seen = np.zeros(size[1], bool)
+        seen[column[area > 0]] = True
+        excluded = self.options.excluded_nodes(self.secondary)
+        independent = np.flatnonzero(seen & ~excluded)
+        nodes = csr_array(spread(self.secondary, excluded, independent)[:, independent])
+        P = csr_array(P @ nodes)
+        mass = splu((P.T @ diags_array(area) @ P).tocsc()) if len(independent) else None
+        return PressureField(Projection(P, area, self._rho, mass), nodes, independent, column, renewed=True)

@@ -1,0 +1,52 @@
+"""Load steps one by one, for tests that look inside an analysis."""
+
+from __future__ import annotations
+
+from unittest.mock import patch
+
+import fastcontact as fc
+from fastcontact.analysis import load_step as page
+from fastcontact.analysis import step_halving
+from fastcontact.analysis.problem import prepare
+
+
+class Stepping:
+    """A problem and its present state."""
+
+    def __init__(self, model, solver="direct", tolerance=1e-10, criteria=None, ramp=None):
+        self.problem = prepare(
+            model, ramp or fc.linear_ramp(), criteria or fc.Criteria(), linear_solver=solver, linear_tolerance=tolerance
+        )
+        self.state = self.problem.initial_state()
+        self.settled = None
+
+    def __getattr__(self, name):
+        return getattr(self.__dict__["problem"], name)
+
+    @property
+    def K(self):
+        return self.problem.system.K
+
+    @property
+    def u(self):
+        return self.state.u
+
+    @property
+    def displacement(self):
+        return self.problem.displacement(self.state.u)
+
+    def step(self, index, instant):
+        """Go on to the end of a load step; `settled` is then its contact."""
+
+        def watched(*given, settle=page.settle_geometry):
+            self.settled = settle(*given)
+            return self.settled
+
+        with patch.object(page, "settle_geometry", watched):
+            self.state, result = page.load_step(self.problem, self.state, index, instant)
+        return result
+
+    def advance(self, index, begin, end):
+        """The same, cut in halves where it does not converge."""
+        self.state, result = step_halving.advance(self.problem, self.state, index, begin, end)
+        return result
