@@ -20,8 +20,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.analysis.accuracy import Accuracy
-from fastcontact.analysis.solution import Equilibrium
+from fastcontact.analysis.solution import Accuracy, Equilibrium
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.protocol import Loaded
 

@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.analysis import active_set
-from fastcontact.analysis.accuracy import Accuracy
 from fastcontact.analysis.active_dofs import ActiveDofs, constraints_on_unknowns
 from fastcontact.analysis.friction import friction
 from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.messages import no_contact_stops, not_balanced
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.solution import Solution
+from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.state import State
 from fastcontact.analysis.unsupported_bodies import UnsupportedBodies
 from fastcontact.contact.constraints import Constraints

@@ -62,14 +62,14 @@ class Iterate:
 def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Iterate) -> StackedConstraints:
     """Pair the two sides of every contact pair on the deformed configuration, or on the undeformed one if that is kept."""
     displacement, u = problem.displacement(iterate.u), iterate.u
-    if len(problem.driven):
+    if len(problem.force_driven):
         u = np.where(problem.system.fixed, load.lift, u)
     paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
-    positions, parts = problem.driven.positions(u), {}
+    positions, parts = problem.force_driven.positions(u), {}
     still = np.zeros(problem.model.mesh.dim)
     for name, pair in problem.pairs.items():
         part = pair.constraints(problem.configuration(name, state, load, paired_at, u))
-        parts[name] = problem.driven.constraints(name, part, positions.get(name, still))
+        parts[name] = problem.force_driven.constraints(name, part, positions.get(name, still))
     return stacked(parts)
 
 

@@ -78,7 +78,7 @@ class Problem:
         The displacement components that a pairing solves for.
     contact_dofs : ndarray of int
         Components that constraints may involve.
-    driven : ForceDrivenObstacles
+    force_driven : ForceDrivenObstacles
         Rigid obstacles that forces move.
     prescribed, forces : dict of ramp table to ndarray (n_points + n_driven, dim)
         By history, displacements [length] and nodal forces [force] at multiplier 1.
@@ -95,14 +95,14 @@ class Problem:
     bodies: UnsupportedBodies | None
     dofs: ActiveDofs
     contact_dofs: NDArray[np.intp]
-    driven: ForceDrivenObstacles
+    force_driven: ForceDrivenObstacles
     prescribed: ByRamp
     forces: ByRamp
 
     @property
     def shape(self) -> tuple[int, int]:
         """Number of points, those of driven obstacles included, and dimension."""
-        return self.driven.n_dofs // self.model.mesh.dim, self.model.mesh.dim
+        return self.force_driven.n_dofs // self.model.mesh.dim, self.model.mesh.dim
 
     def load_at(self, instant: float) -> StepLoad:
         """Return the loads at an instant of the ramp."""
@@ -125,7 +125,7 @@ class Problem:
 
     def obstacles_at(self, load: StepLoad, u: Array) -> dict[str, Array]:
         """Return by contact pair the displacements (dim,) of rigid obstacles, those that forces drive where u has them."""
-        return {**load.obstacles, **self.driven.positions(u)}
+        return {**load.obstacles, **self.force_driven.positions(u)}
 
     def configuration(self, name: str, state: State, load: StepLoad, displacement: Array, u: Array) -> Configuration:
         """Return the configuration of a contact pair.
@@ -156,7 +156,7 @@ class Problem:
         """Return the state before the first load step."""
         # Gaps are differences of coordinates and no more accurate than those.
         round_off = 8 * np.finfo(float).eps * float(np.abs(self.model.mesh.points).max())
-        return State(np.zeros(self.driven.n_dofs), round_off, solver=self.solver.snapshot())
+        return State(np.zeros(self.force_driven.n_dofs), round_off, solver=self.solver.snapshot())
 
 
 @parallel.on_one_blas_thread
@@ -170,7 +170,7 @@ def prepare(
     linear_precision: str | None = None,
 ) -> Problem:
     """Assemble a model that was checked before, and prepare the linear solver; see `run.solve` for the parameters."""
-    mesh, driven = model.mesh, model.driven
+    mesh, driven = model.mesh, model.force_driven
     solver = choice.make(
         linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, tolerance=linear_tolerance, precision=linear_precision,
         columns=not all(pair.eliminable for pair in model.contact),

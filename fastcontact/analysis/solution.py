@@ -1,4 +1,4 @@
-"""Solutions of the inequalities of contact, without friction and with it."""
+"""The inequalities of contact: how accurately they are solved, and their solutions without and with friction."""
 
 from __future__ import annotations
 
@@ -9,6 +9,31 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """Tolerances and limits of one solution of the inequalities of contact.
+
+    Attributes
+    ----------
+    gap : float
+        A gap above minus this counts as open or closed, not as penetration [length].
+    multiplier : float
+        A multiplier above minus this fraction of the largest one counts as compression [-].
+    residual : float, optional
+        Relative residual of iterative linear solvers where less than their own tolerance will do [-].
+    max_iterations : int
+        Linear solutions allowed without friction; the result may then not be settled.
+    max_newton_steps : int, optional
+        Newton steps with friction after which a state that is not settled will do; None where it will not.
+    """
+
+    gap: float
+    multiplier: float = 1e-12
+    residual: float | None = None
+    max_iterations: int = 200
+    max_newton_steps: int | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fastcontact.analysis.accuracy import Accuracy
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.solution import Accuracy
 from fastcontact.linear.protocol import LinearSolver
 
 # Relative residual of the first solution of a step by an iterative solver, and of later ones in units of the relative

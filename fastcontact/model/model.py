@@ -536,7 +536,7 @@ class Model:
         return tuple(float(forces[k]) if k in forces else None for k in range(self.mesh.dim))  # type: ignore[arg-type]
 
     @property
-    def driven(self) -> ForceDrivenObstacles:
+    def force_driven(self) -> ForceDrivenObstacles:
         """The rigid obstacles that forces drive."""
         return ForceDrivenObstacles([pair for pair in self.contact if pair.force], (self.mesh.n_points, self.mesh.dim))
 
@@ -717,7 +717,7 @@ class Model:
         check_overlap(
             self.mesh, self.kinematics, [(p.secondary, p.primary) for p in self.contact if p.obstacle is None]
         )
-        self._check_motions(fixed, list(self.driven.forces(forces).values()))
+        self._check_motions(fixed, list(self.force_driven.forces(forces).values()))
 
     def _check_relations(self, fixed: NDArray[np.bool_], prescribed: Mapping[Table | None, Array], ramp: Ramp) -> None:
         if not self.relations:
@@ -729,7 +729,7 @@ class Model:
 
     def _check_motions(self, fixed: NDArray[np.bool_], forces: Sequence[Array]) -> None:
         """Refuse motions without deformation that no supports, relations, springs or loads against a contact stop."""
-        driven = self.driven
+        driven = self.force_driven
         motions = driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.holding_rows()))
         if not len(motions):
             return

@@ -12,7 +12,7 @@ from scipy.sparse import bsr_array, csr_array
 
 import fastcontact as fc
 from fastcontact.analysis import active_set, geometry_loop
-from fastcontact.analysis.accuracy import Accuracy
+from fastcontact.analysis.solution import Accuracy
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear import choice as linear
@@ -66,7 +66,9 @@ def test_any_problem_from_any_set_ends(n, m, seed, spread, solver, repeated, lim
     if limit == 200 and not repeated:
         assert state.settled
     if state.settled:
-        rounding = max(1e-9, 1e-14 * np.linalg.cond(K))
+        # Equations that repeat each other are solved on their flexibility, column by column to the solver's tolerance.
+        unit = made.tolerance if repeated and solver == "amg" else 1e-14
+        rounding = max(1e-9, unit * np.linalg.cond(K))
         largest = np.abs(state.multiplier).max(initial=0.0)
         assert (state.multiplier >= -1e-9 * largest).all()
         assert (state.gap >= -rounding * max(1.0, np.abs(state.u).max())).all()

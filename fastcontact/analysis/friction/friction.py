@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from scipy.linalg import lstsq
 from scipy.sparse import csr_array, vstack
 
-from fastcontact.analysis.accuracy import Accuracy
 from fastcontact.analysis.friction.slip_directions import aligning, idle, own_compliance
-from fastcontact.analysis.solution import FrictionalEquilibrium
+from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.protocol import Loaded, Oblique
 

@@ -1,6 +1,6 @@
-"""The multiplier field of weighted formulations: point forces, their field, and the compliance between the two.
+"""Pressure fields: point forces, their field, and the compliance between the two.
 
-See the docstring of the continuous formulation for the formulas.
+See `_pressure_field` for the formulas.
 """
 
 from __future__ import annotations

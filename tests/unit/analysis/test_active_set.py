@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.analysis import active_set
-from fastcontact.analysis.accuracy import Accuracy
+from fastcontact.analysis.solution import Accuracy
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear import choice as linear
 
