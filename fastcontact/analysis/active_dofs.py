@@ -1,14 +1,13 @@
 """The displacement components that a pairing solves for: all of them, or those of the contact surfaces alone.
 
 A direct solver condenses the stiffness to the contact surfaces; then all other displacements follow once, when the contact
-forces of the load step are known. Both kinds of active components have the same methods.
+forces of the load step are known.
 """
 
 from __future__ import annotations
 
 import copy
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +22,16 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
-class ActiveDofs(Protocol):
-    """See the module; `u` and `lift` (n,) are of all components, `part` (k,) of the active ones, `v` (l,) unknowns [length].
+class ActiveDofs:
+    """All displacement components.
+
+    Below `u` and `lift` (n,) are of all components, `part` (k,) of the active ones, `v` (l,) the active unknowns [length].
+
+    Parameters
+    ----------
+    system : System
+    contact_dofs : ndarray of int
+        Components that constraints may involve.
 
     Attributes
     ----------
@@ -32,107 +39,47 @@ class ActiveDofs(Protocol):
         Which of the active components contact depends on.
     """
 
-    compared: Indices
+    def __init__(self, system: System, contact_dofs: Indices) -> None:
+        self._system, self.compared = system, contact_dofs
 
     def for_step(self, u: Array, lift: Array) -> ActiveDofs:
         """Return the active components in a load step that begins at `u`, with prescribed displacements `lift`."""
-        ...
-
-    def loaded(self, loaded: Loaded) -> Loaded:
-        """Return the prepared matrix and its right-hand side for the active unknowns."""
-        ...
-
-    def of(self, u: Array) -> Array:
-        """Return the active components of displacements."""
-        ...
-
-    def put(self, u: Array, part: Array) -> Array:
-        """Return all displacements once the active ones are `part`; may write into `u`."""
-        ...
-
-    def rows(self, rows: csr_array, offset: Array, lift: Array) -> tuple[csr_array, Array]:
-        """Return ``rows @ u + offset`` as rows and offset (m,) [length] for the active unknowns."""
-        ...
-
-    def unknowns(self, u: Array, lift: Array) -> Array:
-        """Return the active unknowns of displacements that obey supports and relations."""
-        ...
-
-    def displacement(self, v: Array, lift: Array) -> Array:
-        """Return the active components."""
-        ...
-
-    def size(self, v: Array) -> float:
-        """Return the largest of all unknowns, those that are not active as they were when the step began."""
-        ...
-
-    def scale(self, u: Array, lift: Array) -> float:
-        """Return the sum of the largest displacement and the largest one that supports prescribe."""
-        ...
-
-
-def constraints_on_unknowns(dofs: ActiveDofs, constraints: Constraints, lift: Array, start: Array) -> Constraints:
-    """Return constraints on all displacements as constraints on the active unknowns.
-
-    Parameters
-    ----------
-    dofs : ActiveDofs
-    constraints : Constraints
-    lift : ndarray (n,)
-        Prescribed displacements [length].
-    start : ndarray (n,)
-        Displacements at the beginning of the load step, from where slip is measured [length].
-    """
-    B, gap0 = dofs.rows(constraints.B, constraints.gap0, lift)
-    drift = constraints.drift if constraints.drift is not None else np.zeros((len(constraints.tangents), 1))
-    slips = [own - T @ start for T, own in zip(constraints.tangents, drift, strict=True)]
-    pairs = [dofs.rows(T, slip, lift) for T, slip in zip(constraints.tangents, slips, strict=True)]
-    tangents = tuple(T for T, _ in pairs)
-    return replace(
-        constraints, B=B, gap0=gap0, tangents=tangents, drift=np.stack([s for _, s in pairs]) if pairs else None
-    )
-
-
-class AllDofs:
-    """All displacement components; see `ActiveDofs`.
-
-    Parameters
-    ----------
-    system : System
-    contact_dofs : ndarray of int
-        Components that constraints may involve.
-    """
-
-    def __init__(self, system: System, contact_dofs: Indices) -> None:
-        self.compared = contact_dofs
-        self.rows, self.unknowns, self.displacement = system.rows, system.unknowns, system.displacement
-
-    def for_step(self, u: Array, lift: Array) -> AllDofs:
-        """See `ActiveDofs`."""
         return self
 
     def loaded(self, loaded: Loaded) -> Loaded:
-        """See `ActiveDofs`."""
+        """Return the prepared matrix and its right-hand side for the active unknowns."""
         return loaded
 
     def of(self, u: Array) -> Array:
-        """See `ActiveDofs`."""
+        """Return the active components of displacements."""
         return u
 
     def put(self, u: Array, part: Array) -> Array:
-        """See `ActiveDofs`."""
+        """Return all displacements once the active ones are `part`; may write into `u`."""
         return part
 
+    def rows(self, rows: csr_array, offset: Array, lift: Array) -> tuple[csr_array, Array]:
+        """Return ``rows @ u + offset`` as rows and offset (m,) [length] for the active unknowns."""
+        return self._system.rows(rows, offset, lift)
+
+    def unknowns(self, u: Array, lift: Array) -> Array:
+        """Return the active unknowns of displacements that obey supports and relations."""
+        return self._system.unknowns(u, lift)
+
+    def displacement(self, v: Array, lift: Array) -> Array:
+        """Return the active components."""
+        return self._system.displacement(v, lift)
+
     def size(self, v: Array) -> float:
-        """See `ActiveDofs`."""
+        """Return the largest of all unknowns, those that are not active as they were when the step began."""
         return largest(v)
 
     def scale(self, u: Array, lift: Array) -> float:
-        """See `ActiveDofs`."""
+        """Return the sum of the largest displacement and the largest one that supports prescribe."""
         return largest(lift) + largest(u)
 
 
-class SurfaceDofs:
+class SurfaceDofs(ActiveDofs):
     """The components of the contact surfaces, for solvers that condense the stiffness to them; see `ActiveDofs`.
 
     Parameters
@@ -145,8 +92,8 @@ class SurfaceDofs:
     """
 
     def __init__(self, system: System, contact_dofs: Indices, unknowns: Indices) -> None:
-        self._system, self._dofs, self._unknowns = system, contact_dofs, unknowns
-        self.compared = np.arange(len(contact_dofs))
+        super().__init__(system, np.arange(len(contact_dofs)))
+        self._dofs, self._unknowns = contact_dofs, unknowns
         # Columns of constraints as places among the unknowns, or, where relations stand between, the components.
         columns = unknowns if system.T is None else contact_dofs
         self._place = np.full(len(system.free), -1, np.intp)
@@ -222,3 +169,25 @@ class SurfaceDofs:
     def scale(self, u: Array, lift: Array) -> float:
         """See `ActiveDofs`."""
         return self._prescribed + max(self._beyond, largest(self.of(u)))
+
+
+def constraints_on_unknowns(dofs: ActiveDofs, constraints: Constraints, lift: Array, start: Array) -> Constraints:
+    """Return constraints on all displacements as constraints on the active unknowns.
+
+    Parameters
+    ----------
+    dofs : ActiveDofs
+    constraints : Constraints
+    lift : ndarray (n,)
+        Prescribed displacements [length].
+    start : ndarray (n,)
+        Displacements at the beginning of the load step, from where slip is measured [length].
+    """
+    B, gap0 = dofs.rows(constraints.B, constraints.gap0, lift)
+    drift = constraints.drift if constraints.drift is not None else np.zeros((len(constraints.tangents), 1))
+    slips = [own - T @ start for T, own in zip(constraints.tangents, drift, strict=True)]
+    pairs = [dofs.rows(T, slip, lift) for T, slip in zip(constraints.tangents, slips, strict=True)]
+    tangents = tuple(T for T, _ in pairs)
+    return replace(
+        constraints, B=B, gap0=gap0, tangents=tangents, drift=np.stack([s for _, s in pairs]) if pairs else None
+    )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact._jit import parallel
-from fastcontact.analysis.active_dofs import ActiveDofs, AllDofs, SurfaceDofs
+from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.state import State
 from fastcontact.analysis.unsupported_bodies import UnsupportedBodies
@@ -193,7 +193,7 @@ def prepare(
     return Problem(
         model, ramp, criteria, solver, pairs, moduli, material, system, bodies,
         SurfaceDofs(system, contact_dofs, involved) if pairs and bodies is None and solver.condenses
-        else AllDofs(system, contact_dofs),
+        else ActiveDofs(system, contact_dofs),
         contact_dofs, driven, driven.prescribed(prescribed), driven.forces(model.forces_by_ramp()),
     )  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -137,19 +137,10 @@ def contact_result(
     pressure = np.where(excluded, 0.0, part.pressure(multiplier))
     gap, normal = pair.nodal_gap(at)
     closed = _closed_nodes(pair, part, active, gap, pressure, at) & ~excluded
-    tangential = None
-    shear, sticking, dissipation = np.zeros((len(points), dim)), closed.copy(), 0.0
-    if part.tied is not None:
-        normal = pair.nodal_gap(replace(at, displacement=np.zeros_like(at.displacement)))[
-            1
-        ]  # the bodies at rest are tied
-        shear = _nodal_shear(part, part.tied.directions, part.tied.forces(multiplier)[1], normal)
-    if isinstance(solution, FrictionalEquilibrium) and part.tangents:
-        tangential, slip = solution.tangential[rows], solution.slip[rows]
-        dissipation = float(-(tangential * slip).sum())
-        shear = _nodal_shear(part, part.directions, tangential, normal, part.normal_forces(multiplier))
-        sticking = closed & _mostly_sticking(part, solution.sticking[rows], multiplier, pressure)
-    forces = _nodal_forces(part, multiplier, tangential).reshape(-1, dim)[points]
+    if part.tied is not None:  # as the bodies lay at rest
+        normal = pair.nodal_gap(replace(at, displacement=np.zeros_like(at.displacement)))[1]
+    along = _along_the_surface(part, solution, rows, normal, pressure)
+    forces = _nodal_forces(part, multiplier, along.force).reshape(-1, dim)[points]
     total = forces.sum(axis=0)
     if pair.axisymmetric:
         total[0] = 0.0  # radial forces cancel over the full circle
@@ -168,10 +159,39 @@ def contact_result(
         active=closed,
         force=total,
         radius=_radius(_distance(part.positions, axis), active),
-        shear=np.where(closed[:, None], shear, 0.0),
-        sticking=sticking,
-        dissipation=dissipation,
+        shear=np.where(closed[:, None], along.shear, 0.0),
+        sticking=closed & along.sticking,
+        dissipation=along.dissipation,
         obstacle_displacement=at.obstacle.copy() if isinstance(pair.primary, RigidSide) else None,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _AlongTheSurface:
+    """Nodal traction (n_nodes, dim) [pressure], nodes that stick, dissipation [energy], tangential forces (m, k) [force]."""
+
+    shear: Array
+    sticking: Mask
+    dissipation: float = 0.0
+    force: Array | None = None
+
+
+def _along_the_surface(
+    part: Constraints, solution: Solution, rows: slice, normal: Array, pressure: Array
+) -> _AlongTheSurface:
+    """Return what a pair does along its surface: nothing without friction or tie."""
+    multiplier, everywhere = solution.multiplier[rows], np.ones(len(pressure), bool)
+    if part.tied is not None:
+        _, tangential = part.tied.forces(multiplier)
+        return _AlongTheSurface(_nodal_shear(part, part.tied.directions, tangential, normal), everywhere)
+    if not (isinstance(solution, FrictionalEquilibrium) and part.tangents):
+        return _AlongTheSurface(np.zeros_like(normal), everywhere)
+    tangential, slip = solution.tangential[rows], solution.slip[rows]
+    return _AlongTheSurface(
+        _nodal_shear(part, part.directions, tangential, normal, part.normal_forces(multiplier)),
+        _mostly_sticking(part, solution.sticking[rows], multiplier, pressure),
+        float(-(tangential * slip).sum()),
+        tangential,
     )
 
 

@@ -34,7 +34,6 @@ def solve(
     Parameters
     ----------
     model : Model
-        Checked whole before any numerics.
     ramp : Ramp, optional
         By default 20 equal steps.
     linear_solver : str
@@ -42,38 +41,31 @@ def solve(
     linear_tolerance : float
         Relative residual of iterative linear solvers.
     linear_precision : {"single", "double"}, optional
-        Of the numbers inside the multigrid cycle, single by default; the solution is in double precision always.
+        Of the numbers inside the multigrid cycle, single by default; the solution is always in double precision.
     criteria : Criteria, optional
-        Convergence criteria and the handling of the geometry.
     on_step : callable, optional
-        Called with every new `StepResult` as soon as its step has converged, e.g. ``ResultWriter.write``. To keep only
-        some of the steps in memory, see `solve_steps`.
+        Called with every new `StepResult`, e.g. ``ResultWriter.write``. To keep only some steps, see `solve_steps`.
     resume : sequence of StepResult
-        Steps of the same case to go on after: what `solve` returned, ``open_results(path)`` or ``ResultWriter.done``;
-        none by default. The analysis goes on with the instants of the ramp after the last of them and ends as if it had
-        never stopped. Linear solver, tolerances and limits may be others, and so may the ramp from there on.
+        Steps of the same case to continue: what `solve` returned, ``open_results(path)`` or ``ResultWriter.done``. The
+        analysis ends as if it had never stopped. Linear solver, tolerances, limits and the rest of the ramp may be others.
 
     Returns
     -------
     list of StepResult
-        Those to go on after, and the new ones. Of all these only the last one keeps its `restart`.
+        Those of `resume` and the new ones; only the last one has its `restart`.
 
     Raises
     ------
     MeshError, ModelError, ContactError
-        If the model is wrong, or is another one than that of the steps to go on after.
+        If the model is wrong, or another one than that of `resume`.
     ConvergenceError
-        If a step does not converge, nor in parts (`Criteria.max_halvings`); steps before it have been handed to
-        `on_step`.
+        If a step does not converge, nor in parts (`Criteria.max_halvings`); `on_step` has had the steps before it.
 
     Warns
     -----
     FastcontactWarning
-        At the beginning, if the model is doubtful: units that slipped, poor cells, integrals that are not exact, nodes
-        that coincide. At the end, if bodies interpenetrate where no contact is defined, a contact never closed, was lost
-        or is not resolved by the mesh, a penalty lets it penetrate by more than 1 % of the largest displacement, strains
-        or rotations leave the range of linear kinematics, or a fixed number of geometry updates was too small. The
-        results of the first and of the last step keep the texts.
+        At the beginning about the model (`model.warnings`), at the end about the result (`analysis.result_warnings`): what
+        is doubtful, with its number. The results of the first and of the last step keep the texts.
     """
     steps = list(resume)
     for step in solve_steps(

@@ -20,27 +20,14 @@ def sweep(F, free, mu, y, gaps, tolerance, most):
     free : (p, m)
         Gaps and slips without forces.
     mu : (m,)
-    y : (p, m)
-        Forces, in place.
-    gaps : (p, m)
-        Filled with the gaps and slips of `y`.
+    y, gaps : (p, m)
+        Forces, in place; filled with their gaps and slips.
     tolerance : float
     most : int
-        Sweeps allowed.
-
-    Returns
-    -------
-    int
-        Sweeps made.
+        Sweeps allowed; those made are returned.
     """
     parts, m = free.shape
-    for a in range(parts):
-        for i in range(m):
-            total = free[a, i]
-            for b in range(parts):
-                for j in range(m):
-                    total += F[a * m + i, b * m + j] * y[b, j]
-            gaps[a, i] = total
+    _fill_gaps(F, free, y, gaps)
     change = np.zeros(parts)
     for count in range(most):
         largest_change = largest = 0.0
@@ -77,3 +64,16 @@ def sweep(F, free, mu, y, gaps, tolerance, most):
         if largest_change <= tolerance * largest:
             return count + 1
     return most
+
+
+@kernel
+def _fill_gaps(F, free, y, gaps):
+    """Fill `gaps` (p, m) with the gaps and slips under forces y (p, m)."""
+    parts, m = free.shape
+    for a in range(parts):
+        for i in range(m):
+            total = free[a, i]
+            for b in range(parts):
+                for j in range(m):
+                    total += F[a * m + i, b * m + j] * y[b, j]
+            gaps[a, i] = total

@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis.active_dofs import AllDofs, SurfaceDofs
+from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.contact.configuration import Configuration
 from fastcontact.linear import choice as linear
@@ -39,7 +39,7 @@ def contact_dofs(analysis):
 @pytest.fixture(params=[False, True], ids=["supports", "relations"])
 def both(request):
     analysis = started(request.param)
-    everything = AllDofs(analysis.system, contact_dofs(analysis))
+    everything = ActiveDofs(analysis.system, contact_dofs(analysis))
     surfaces = analysis.dofs
     assert isinstance(surfaces, SurfaceDofs)
     return analysis, everything, surfaces
@@ -85,7 +85,7 @@ def test_displacements_and_sizes_are_those_of_all(both):
 @pytest.mark.parametrize("name", ["direct", "cholmod"])
 def test_steps_end_where_those_of_all_displacements_end(name, friction):
     analysis, other = started(friction=friction, name=name), started(friction=friction, name=name)
-    other.problem = replace(other.problem, dofs=AllDofs(other.system, contact_dofs(other)))
+    other.problem = replace(other.problem, dofs=ActiveDofs(other.system, contact_dofs(other)))
     for index, instant in enumerate(analysis.ramp.instants, start=1):
         result, expected = analysis.step(index, instant), other.step(index, instant)
         scale = np.abs(expected.displacement).max()
@@ -97,7 +97,7 @@ def test_steps_end_where_those_of_all_displacements_end(name, friction):
 
 
 def test_solvers_that_do_not_condense_find_all_displacements():
-    assert isinstance(started(name="amg").dofs, AllDofs)
+    assert not isinstance(started(name="amg").dofs, SurfaceDofs)
 
 
 def test_the_condensed_problem_is_that_of_all_unknowns():
