@@ -29,8 +29,8 @@ from scipy.sparse import csr_array
 
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.field_projection import Projection
 from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.formulations._projection import Projection
 from fastcontact.contact.formulations._supported_nodes import compliant
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.errors import ContactError

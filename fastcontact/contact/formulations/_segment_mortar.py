@@ -21,9 +21,9 @@ from scipy.sparse.linalg import splu
 
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.field_projection import Projection
 from fastcontact.contact.formulations._cut_lines import line_points
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
-from fastcontact.contact.formulations._projection import Projection
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.pair_options import spread
 from fastcontact.contact.pairing import Candidates, Pairing, pair

@@ -15,8 +15,8 @@ from scipy.sparse.linalg import splu
 
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.field_projection import Projection
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
-from fastcontact.contact.formulations._projection import Projection
 from fastcontact.contact.integration import facet_measure, fine_rule, gauss_rule
 from fastcontact.contact.pair_options import spread
 from fastcontact.contact.pairing import Candidates, filled_up, pair

@@ -9,7 +9,7 @@ import fastcontact as fc
 from fastcontact.analysis.friction import cone_newton, coulomb, friction
 from fastcontact.analysis.friction.slip_directions import aligning, idle, own_compliance
 from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.formulations._projection import Projection
+from fastcontact.contact.field_projection import Projection
 from fastcontact.contact.formulations._supported_nodes import compliant
 from fastcontact.contact.pairing import normals, tangents
 
