@@ -57,7 +57,7 @@ _LOADS: dict[str, tuple[dict[str, Any], Callable[..., None], tuple[str, ...]]] =
 # A rigid surface: the facets of a group of a file, or of the mesh of the model.
 _SURFACE = {"file": str, "group": str, "flip": bool, "crease": _NUMBER}
 # What a mesh-convergence study or a sweep of this case needs to know; `fastcontact.convergence` reads it.
-_STUDY = {
+STUDY = {
     "generator": str,
     "triangles": dict,
     "quadrangles": dict,
@@ -71,7 +71,7 @@ _STUDY = {
     "quantities": list,
     "parameters": dict,
 }
-_TOP = {
+TOP = {
     "title": str,
     "kinematics": str,
     "units": dict,
@@ -197,8 +197,8 @@ def build_case(
     FastcontactError
         If the mesh or the model is wrong.
     """
-    _check_keys("", data, _TOP)
-    _check_keys("study", data.get("study", {}), _STUDY)
+    _check_keys("", data, TOP)
+    _check_keys("study", data.get("study", {}), STUDY)
     for key in ("kinematics", "mesh", "material"):
         if key not in data:
             raise CaseError(f"the key '{key}' is missing")

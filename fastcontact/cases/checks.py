@@ -140,7 +140,7 @@ def read_check(
     if check.theory:
         if check.theory not in theories:
             raise CaseError(unknown(f"theory in {where}", check.theory, theories))
-        _check_target(where, check, theories[check.theory]["theory"])
+        check_target(where, check, theories[check.theory]["theory"])
     return check
 
 
@@ -149,7 +149,8 @@ def _whole(what: str, theory: Mapping[str, Any]) -> float:
     return 1.0 / float(theory.get("share", 1.0)) if what == "force" else 1.0
 
 
-def _check_target(where: str, check: Check, theory: Any) -> None:
+def check_target(where: str, check: Check, theory: Any) -> None:
+    """Raise CaseError where a theory has no such number, or one that no deviation can be relative to."""
     try:
         target = check.target(theory)
     except (AttributeError, TypeError):

@@ -59,7 +59,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
         return int(arguments.run(arguments) or 0)
     except ConvergenceError as error:
-        print("\n".join([f"no convergence: {error}", *_history(error.history), *_notes(error)]), file=sys.stderr)
+        print("\n".join([f"no convergence: {error}", *history_lines(error.history), *_notes(error)]), file=sys.stderr)
         return 2
     except FastcontactError as error:
         print(f"error: {error}", file=sys.stderr)
@@ -76,7 +76,7 @@ def _notes(error: BaseException) -> list[str]:
     return [f"  {note}" for note in getattr(error, "__notes__", ())]
 
 
-def _history(history: Sequence[Mapping[str, Any]], shown: int = 10) -> list[str]:
+def history_lines(history: Sequence[Mapping[str, Any]], shown: int = 10) -> list[str]:
     """Return the last iterations of a step that failed as lines: change of the displacement, residual, active set."""
     if not history:
         return []

@@ -44,14 +44,14 @@ def profile_picture(case: Any, step: StepResult, path: str, pair: str | None = N
         contact,
         theory,
         other_theories=others,
-        stress=step.stress[contact.points, 1] if contact.normal.shape[1] == 2 else _normal_stress(contact, step),
+        stress=step.stress[contact.points, 1] if contact.normal.shape[1] == 2 else normal_stress(contact, step),
         title=f"{case.title}\nload factor {step.load_factor:g}",
         units=case.units,
     )
     save(axes, path)
 
 
-def _normal_stress(contact: ContactResult, step: StepResult) -> Any:
+def normal_stress(contact: ContactResult, step: StepResult) -> Any:
     """Return the stress (m,) at the contact nodes along the normals that they face [pressure]."""
     xx, yy, zz, xy, yz, xz = step.stress[contact.points].T
     x, y, z = contact.normal.T

@@ -37,11 +37,11 @@ def substituted(data: Mapping[str, Any], parameter: str, value: Any, linked: Map
         _set(found, parameter, value, [*linked, *found])
         return found
     for path, law in linked[parameter].items():
-        _set(found, path, _by_law(law, value, f"study.parameters.{parameter}.'{path}'"), found)
+        _set(found, path, by_law(law, value, f"study.parameters.{parameter}.'{path}'"), found)
     return found
 
 
-def _by_law(law: Any, value: Any, where: str) -> Any:
+def by_law(law: Any, value: Any, where: str) -> Any:
     """Return ``a value^p``."""
     match = _LAW.match(law) if isinstance(law, str) else None
     if match is None:

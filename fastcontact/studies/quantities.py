@@ -18,40 +18,7 @@ from fastcontact.results.step import ContactResult, StepResult
 
 Array = NDArray[np.float64]
 
-TITLES = {
-    "force": "contact force",
-    "pressure_max": "largest pressure",
-    "pressure_pole": "pressure at the axis",
-    "contact_radius": "contact radius",
-    "von_mises_max": "largest von Mises stress",
-    "von_mises_depth": "depth of the largest von Mises stress",
-    "pressure_error": "pressure against theory at equal approach, relative L2 norm",
-    "pressure_error_equal_force": "pressure against theory at equal force, relative L2 norm",
-}
-UNIT_KINDS = {
-    "force": "force",
-    "pressure_max": "pressure",
-    "pressure_pole": "pressure",
-    "contact_radius": "length",
-    "von_mises_max": "pressure",
-    "von_mises_depth": "length",
-    "pressure_error": "",
-    "pressure_error_equal_force": "",
-}
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
-
-
-def title(quantity: str) -> str:
-    """Return a quantity in words; ``"C1.stress.yy"`` and the like stay as they are."""
-    return TITLES.get(quantity, quantity)
-
-
-def unit(quantity: str, units: dict[str, str]) -> str:
-    """Return the name of a quantity's unit, empty for ratios."""
-    kind = UNIT_KINDS.get(quantity)
-    if kind is None:
-        kind = "length" if ".displacement." in quantity else "pressure"
-    return units[kind] if kind else ""
 
 
 def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
@@ -238,7 +205,7 @@ def mesh_size(case: Case, pair: str | None) -> float:
 
 
 def of_theory(theory: Any) -> dict[str, float]:
-    """Return what a theory says of the quantities of interest, those it knows."""
+    """Return the quantities of interest that a theory gives, in its units."""
     found = {}
     for quantity, attribute in (("force", "force"), ("pressure_max", "pressure_max"), ("contact_radius", "radius")):
         if hasattr(theory, attribute):
@@ -249,3 +216,16 @@ def of_theory(theory: Any) -> dict[str, float]:
         greatest = theory.von_mises_maximum()
         found |= {"von_mises_max": greatest.value, "von_mises_depth": greatest.depth}
     return {quantity: value for quantity, value in found.items() if np.isfinite(value) and value > 0}
+
+
+def of_theories(case: Case, pair: str | None) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the quantities of a pair by its theory at equal approach, and by its mesh-converged solution."""
+    theories = case.theories.get(pair or "", {})
+    theory, reference = (of_theory(theories[key]) if key in theories else {} for key in ("theory", "mesh_converged"))
+    return theory, reference
+
+
+def at_force(case: Case, pair: str | None, force: float) -> dict[str, float]:
+    """Return the quantities of a pair by its theory at a contact force [force]; empty where it has no such method."""
+    theory: Any = case.theories.get(pair or "", {}).get("theory")
+    return of_theory(theory.at_force(force)) if force > 0 and hasattr(theory, "at_force") else {}

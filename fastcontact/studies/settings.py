@@ -83,6 +83,11 @@ class Settings:
     combinations: tuple[Combination, ...] = ()
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
 
+    @property
+    def by_shape(self) -> bool:
+        """Whether ``[study]`` gives the generator's arguments of level 0 by the shape of the cells."""
+        return self.generator is not None and "" not in self.arguments
+
 
 def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
     """Return the settings of a case's studies; `data` stand for the parsed case file with some values changed.

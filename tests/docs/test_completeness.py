@@ -50,7 +50,7 @@ def test_every_command_is_listed():
 
 def test_every_key_of_case_files_is_listed():
     page = text("reference/case-files.md")
-    for key in {**case._TOP, **case._STUDY}:
+    for key in {**case.TOP, **case.STUDY}:
         assert re.search(rf"[`\[]{key}[`\].]", page), key
 
 
