@@ -1,4 +1,4 @@
-"""Checks of a case: one number of its last step held against a theory, or against a documented number."""
+"""Checks of a case: one number of its last step compared with a theory or with a documented number."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact.cases.keys import NUMBER
 from fastcontact.errors import CaseError, unknown
 from fastcontact.results.step import ContactResult, StepResult
 
 STRESS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "yz": 4, "xz": 5}
 _AXES = {"x": 0, "y": 1, "z": 2}
-_NUMBER = (int, float)
-KEYS = {
+# Keys of a check in a case file.
+CHECK = {
     "quantity": str,
     "theory": str,
     "of": str,
-    "value": _NUMBER,
+    "value": NUMBER,
     "source": str,
-    "factor": _NUMBER,
-    "tolerance": _NUMBER,
+    "factor": NUMBER,
+    "tolerance": NUMBER,
     "name": str,
 }
 # What may stand after the name of a contact pair; after that of a probe see `_of_probe`.
@@ -103,10 +104,7 @@ def read_check(
 ) -> Check:
     """Return the check that an entry of a case file describes; its keys and their types are right.
 
-    Raises
-    ------
-    CaseError
-        If the quantity, or what it is compared with, is unknown.
+    Raises CaseError if the quantity, or what it is compared with, is unknown.
     """
     for key in ("quantity", "tolerance"):
         if key not in entry:
@@ -162,7 +160,7 @@ def check_target(where: str, check: Check, theory: Any) -> None:
 
 def _is_number(theory: Any, name: str) -> bool:
     value = getattr(theory, name, None)
-    return isinstance(value, _NUMBER) and not isinstance(value, bool)
+    return isinstance(value, NUMBER) and not isinstance(value, bool)
 
 
 def measured(check: Check, step: StepResult, probes: Mapping[str, int]) -> float:

@@ -18,13 +18,9 @@ def check_outputs(
 ) -> None:
     """Refuse files that could not be written, or would replace the one to `read`; None stands for no file.
 
-    Raises
-    ------
-    FileError
-        If a folder is missing or write-protected, a path is a folder, the file to read or that of another output,
-        or the suffix of a picture is of no known format.
-    FastcontactError
-        If there is no matplotlib for a picture.
+    Raises FileError if a folder is missing or write-protected, a path is a folder, the file to read or that of another
+    output, or the suffix of a picture is of no known format. Raises FastcontactError if there is no matplotlib for a
+    picture.
     """
     from fastcontact.mesh.files.targets import checked_target
 
@@ -57,10 +53,7 @@ def _check_formats(paths: list[str]) -> None:
 def write_text(path: str, content: str) -> None:
     """Write a text file.
 
-    Raises
-    ------
-    FileError
-        If it cannot be written.
+    Raises FileError if it cannot be written.
     """
     try:
         Path(path).write_text(content, encoding="utf-8")

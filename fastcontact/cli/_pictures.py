@@ -14,10 +14,7 @@ from fastcontact.results.step import ContactResult, StepResult
 def save(axes: Any, path: str) -> None:
     """Write the figure of `axes` to `path`.
 
-    Raises
-    ------
-    FileError
-        If the file cannot be written or its format is unknown.
+    Raises FileError if the file cannot be written or its format is unknown.
     """
     try:
         axes.figure.savefig(path)

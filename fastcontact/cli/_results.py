@@ -1,4 +1,4 @@
-"""What commands on result files share: the step, the contact pair, the case kept in the file."""
+"""Parts that the commands on result files share: the step, the contact pair, the case kept in the file."""
 
 from __future__ import annotations
 
@@ -19,10 +19,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def chosen_step(results: Any, number: int) -> Any:
     """Return the step with a number from 1, or the last for -1.
 
-    Raises
-    ------
-    CaseError
-        If there is no such step.
+    Raises CaseError if there is no such step.
     """
     if not len(results):
         raise CaseError(f"'{results.path}' holds no finished step yet")
@@ -36,10 +33,7 @@ def chosen_step(results: Any, number: int) -> Any:
 def chosen_contact(step: Any, name: str | None) -> str:
     """Return the name of a contact pair of a step.
 
-    Raises
-    ------
-    CaseError
-        If there is none, or none of that name.
+    Raises CaseError if there is none, or none of that name.
     """
     if not step.contact:
         raise CaseError("this result holds no contact pair")

@@ -44,10 +44,7 @@ def names(text: str | None) -> list[str] | None:
 def finished(options: argparse.Namespace, study: Callable[..., Any]) -> Any:
     """Return the result of a study, run on the executor of the options with a line of progress.
 
-    Raises
-    ------
-    FastcontactError
-        If it is interrupted from the keyboard; the message says how to go on.
+    Raises FastcontactError if it is interrupted from the keyboard; the message says how to go on.
     """
     progress = Runs(show=sys.stderr.isatty() and not options.quiet)
     try:
@@ -63,10 +60,7 @@ def finished(options: argparse.Namespace, study: Callable[..., Any]) -> Any:
 def executor(where: str) -> Iterator[Any]:
     """Give an executor to run on, None for processes of this machine, and shut it down at the end.
 
-    Raises
-    ------
-    CaseError
-        If the library for it is not installed, nothing answers at the address, or the word is unknown.
+    Raises CaseError if the library for it is not installed, nothing answers at the address, or the word is unknown.
     """
     if where == "processes":
         yield None

@@ -32,10 +32,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def suite(name: str) -> Any:
     """Import a module of ``bench/suite`` in the checkout.
 
-    Raises
-    ------
-    FastcontactError
-        If the package is installed without its checkout.
+    Raises FastcontactError if the package is installed without its checkout.
     """
     folder = Path(__file__).resolve().parents[2] / "bench"
     if not (folder / "suite").is_dir():
@@ -97,10 +94,7 @@ def _stored(path: str) -> Any:
 def draw(path: str, results: dict[str, Any]) -> None:
     """Draw every benchmark of several sizes into a folder.
 
-    Raises
-    ------
-    FileError
-        If a picture cannot be written.
+    Raises FileError if a picture cannot be written.
     """
     pictures = suite("pictures")
     for name, sizes in results.items():

@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     output = Path(options.output or f"{case.name}.vtkhdf")
     check_outputs(options.case, [output, options.json], [options.plot])
     read = time.perf_counter()
-    case.model.check(case.ramp)  # a wrong one must not replace the file of a right one
+    case.model.check(case.ramp)  # a wrong model must not replace the results of a right one
     with shown() as caught:
         done, last, steps = _solved(options, case, output)
     texts = list(dict.fromkeys([*(text for step in done for text in step.warnings), *caught]))

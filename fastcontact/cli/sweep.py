@@ -49,10 +49,7 @@ def run(options: argparse.Namespace) -> int:
 def values(text: str) -> tuple[str, list[Any]]:
     """Return a parameter and its values from ``NAME=VALUES``.
 
-    Raises
-    ------
-    CaseError
-        If the text is of another form.
+    Raises CaseError if the text is of another form.
     """
     name, equals, listed = text.partition("=")
     if not (name and equals and listed):

@@ -46,8 +46,7 @@ def adaptive_study(
     """Refine the mesh of a case where its error is large, until a quantity is accurate enough.
 
     Every round solves the case, estimates the error of each cell (`estimate_error`), weights it with its influence on the
-    quantity, and divides the cells that carry most of it in four (`generate.Forest`), arcs kept round. The error of the
-    quantity is estimated from its last changes.
+    quantity, and divides the cells that carry most of it in four. The error of the quantity is estimated from its changes.
 
     Parameters
     ----------
@@ -56,44 +55,52 @@ def adaptive_study(
     quantity : str
         What must be accurate, e.g. ``"force"``, ``"pressure_max"``, ``"C1.stress.yy"``.
     tolerance : float
-        Relative error wanted.
+        Relative error wanted [-].
     element, formulation : str, optional
         By default the last of ``study.combinations``, or the case's own.
     max_dofs, max_rounds : int
-        Where to stop in any case.
+        Limits at which refinement stops in any case.
     on_round : callable, optional
         Called with every `Round`.
+
+    Returns
+    -------
+    AdaptiveStudy
 
     Raises
     ------
     CaseError, FastcontactError
         If the case, a name or a number is wrong, or a mesh could not be solved.
     """
-    case = case if isinstance(case, Case) else read_case(case)
-    if not 0 < tolerance < 1:
-        raise CaseError(f"the relative tolerance {tolerance:g} must lie between 0 and 1")
-    if case.mesh.dim != 2:
-        raise CaseError("adaptive refinement is for triangles and quadrangles in two dimensions; this case is in 3D")
+    case = _checked(case, tolerance)
     chosen = settings(case)
     member = one_combination(chosen, element, formulation)
     forest, curves = _first_mesh(case, chosen, member)
     rounds: list[Round] = []
     while True:
+        started = time.perf_counter()
         linear, leaf = forest.mesh()
         solved = _case_on(linear, curves, case, chosen, member)
-        last, error, this = _solved(solved, quantity, chosen.pair, rounds)
+        last, error, this = _solved(solved, quantity, chosen.pair, rounds, started)
         rounds.append(this)
         if on_round is not None:
             on_round(this)
         reached = this.estimate <= tolerance
         if reached or len(rounds) == max_rounds or this.n_dofs > 0.6 * max_dofs:
             break
-        marked = np.zeros(forest.n_leaves, bool)
-        marked[leaf[_bulk(_indicator(solved, last, error, quantity, chosen.pair))]] = True
-        forest.refine(marked)
+        forest.refine(_marked(_indicator(solved, last, error, quantity, chosen.pair), leaf, forest.n_leaves))
     return AdaptiveStudy(
         case.name, case.title, case.text, case.units, str(member), quantity, tolerance, reached, rounds, solved, last, error,
     )  # fmt: skip
+
+
+def _checked(case: Case | str | Path, tolerance: float) -> Case:
+    case = case if isinstance(case, Case) else read_case(case)
+    if not 0 < tolerance < 1:
+        raise CaseError(f"the relative tolerance {tolerance:g} must lie between 0 and 1")
+    if case.mesh.dim != 2:
+        raise CaseError("adaptive refinement is for triangles and quadrangles in two dimensions; this case is in 3D")
+    return case
 
 
 def _first_mesh(case: Case, chosen: Settings, member: Combination) -> tuple[Forest, list[Any]]:
@@ -114,10 +121,9 @@ def _case_on(linear: Mesh, curves: Sequence[Any], case: Case, chosen: Settings, 
 
 
 def _solved(
-    case: Case, quantity: str, pair: str | None, before: Sequence[Round]
+    case: Case, quantity: str, pair: str | None, before: Sequence[Round], started: float
 ) -> tuple[StepResult, ErrorEstimate, Round]:
     """Solve a case, estimate its error, measure its quantities; its warnings are given in the first round only."""
-    started = time.perf_counter()
     with warnings.catch_warnings():
         if before:
             warnings.simplefilter("ignore", FastcontactWarning)
@@ -192,8 +198,11 @@ def _place(case: Case, last: StepResult, quantity: str, pair: str | None) -> Arr
     return None
 
 
-def _bulk(indicator: Array) -> NDArray[np.intp]:
-    """Return the numbers of the fewest cells that carry the part `BULK` of the sum of an indicator (n_solids,)."""
+def _marked(indicator: Array, leaf: NDArray[np.intp], n_leaves: int) -> NDArray[np.bool_]:
+    """Return which leaves (n_leaves,) to divide: the fewest cells that carry the part `BULK` of an indicator (n_solids,)."""
     order = np.argsort(-indicator, kind="stable")
     carried = np.cumsum(indicator[order])
-    return order[: int(np.searchsorted(carried, BULK * carried[-1])) + 1]
+    count = int(np.searchsorted(carried, BULK * carried[-1])) + 1
+    marked = np.zeros(n_leaves, bool)
+    marked[leaf[order[:count]]] = True
+    return marked

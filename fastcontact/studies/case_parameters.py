@@ -27,10 +27,7 @@ def substituted(data: Mapping[str, Any], parameter: str, value: Any, linked: Map
     linked : mapping of str to mapping
         Names that stand for several paths, each set to a law ``"a*value^p"`` of the value: ``[study.parameters]``.
 
-    Raises
-    ------
-    CaseError
-        If there is no such place or name, or a law is wrong.
+    Raises CaseError if there is no such place or name, or a law is wrong.
     """
     found: dict[str, Any] = copy.deepcopy(dict(data))
     if parameter not in linked:

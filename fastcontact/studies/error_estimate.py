@@ -1,8 +1,8 @@
 """Estimate of a solution's error, cell by cell: smoothed stress, and balance at the contact surface.
 
-The smoothed stress is closer to the truth than the stress of the solution, so their difference tells the error
-(Zienkiewicz and Zhu, 1987). What it does not see is that the smoothed stress and the contact pressure disagree on the
-contact surface; that residual is added as in residual estimates (e.g. Wriggers and Scherf, 1998).
+The smoothed stress is more exact than the stress of the solution, so that their difference estimates the error
+(Zienkiewicz and Zhu, 1987). It does not contain the difference between smoothed stress and contact pressure on the contact
+surface, which is added as in residual estimates (e.g. Wriggers and Scherf, 1998).
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ class ErrorEstimate:
     Attributes
     ----------
     cells : ndarray (n_solids,)
-        Error of every solid cell, in the order of ``mesh.solids``.
+        Error of every solid cell, in the order of ``mesh.solids`` [(force length)^(1/2)].
     contact : ndarray (n_solids,)
-        The part that stems from the contact surface.
+        The part of the contact surface in it [(force length)^(1/2)].
     energy : float
-        Energy norm of the solution.
+        Energy norm of the solution [(force length)^(1/2)].
     """
 
     cells: Array
@@ -50,7 +50,7 @@ class ErrorEstimate:
 
     @property
     def relative(self) -> float:
-        """Error of the whole solution over its energy norm [1]."""
+        """Error of the whole solution over its energy norm [-]."""
         return self.total / math.hypot(self.energy, self.total) if self.total else 0.0
 
 
@@ -61,6 +61,10 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     ----------
     model : Model
     step : StepResult
+
+    Returns
+    -------
+    ErrorEstimate
 
     Examples
     --------

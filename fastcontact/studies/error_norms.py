@@ -1,7 +1,7 @@
-"""How far a finite-element solution is from a theory: the energy of the error and its mean square, by quadrature.
+"""Norms of the difference between a finite-element solution and a theory, by quadrature: energy and mean square.
 
-For convergence studies against exact solutions such as `analytic.hertz_box`: nodal errors hide what happens between the
-nodes and often converge faster than the solution does.
+For convergence studies against exact solutions such as `analytic.hertz_box`. Errors at the nodes alone often converge faster
+than the solution between them.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ class Theory(Protocol):
     """An exact solution in the whole body."""
 
     def displacement(self, points: Array) -> Array:
-        """Return the displacements (n, dim) at `points` (n, dim) [length]."""
+        """Return the displacements (n, dim) [length] at `points` (n, dim) [length]."""
         ...
 
     def stress(self, points: Array) -> Array:
-        """Return the stresses (n, 4), in three dimensions (n, 6), at `points`, ordered as in results [pressure]."""
+        """Return the stresses (n, 4), in 3D (n, 6) [pressure], at `points` (n, dim) [length], ordered as in results."""
         ...
 
 
@@ -61,12 +61,12 @@ class ErrorNorms:
 
     @property
     def relative_energy(self) -> float:
-        """Energy norm of the error over that of the theory [1]."""
+        """Energy norm of the error over that of the theory [-]."""
         return self.energy / self.energy_of_theory
 
     @property
     def relative_displacement(self) -> float:
-        """L2 norm of the error of displacements over that of the theory [1]."""
+        """L2 norm of the error of displacements over that of the theory [-]."""
         return self.displacement / self.displacement_of_theory
 
 

@@ -143,10 +143,7 @@ def on_processes(count: int, jobs: Sequence[Job], rest: list[int]) -> Iterator[t
 def started_pool(count: int) -> ProcessPoolExecutor:
     """Return a pool of processes of which one has answered.
 
-    Raises
-    ------
-    FastcontactError
-        If none can start.
+    Raises FastcontactError if none can start.
     """
     # Forked children of a process with OpenMP threads die, so workers are spawned.
     pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"))

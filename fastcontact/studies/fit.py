@@ -1,4 +1,4 @@
-r"""Order of convergence and limit of a quantity over a family of meshes, with error bars.
+r"""The fitted limit of a quantity over a family of meshes, and its order of convergence, with error bars.
 
 The values are taken to be
 
@@ -38,7 +38,7 @@ ROUND_OFF = 1e-12
 
 @dataclass(frozen=True)
 class Limit:
-    """What a quantity tends to as the mesh is refined.
+    """The limit of a quantity as the mesh is refined.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Limit:
     order, order_uncertainty : float
         Fitted order of convergence in h, and its standard deviation; NaN if the values do not change.
     n_levels : int
-        Number of meshes it rests on.
+        Number of meshes that were fitted.
     converging : bool
         Whether the last change is smaller than some change before; if not, there may be no limit.
     """
@@ -67,14 +67,18 @@ class Limit:
 
 
 def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
-    """Fit limit and order of convergence; see the module for the model.
+    """Fit limit and order of convergence, by the model in the header of the module.
 
     Parameters
     ----------
     h : array_like (n,)
         Mesh sizes, all different, n >= 3 [length].
     values : array_like (n,)
-        The quantity on each mesh; meshes where it is not finite are left out.
+        The quantity on each mesh, in its own unit; meshes where it is not finite are left out.
+
+    Returns
+    -------
+    Limit
 
     Raises
     ------
@@ -164,7 +168,10 @@ def _quantiles(centre: Array, width: Array, weight: Array, dof: float) -> list[f
 
 
 def step_orders(h: Sequence[float], values: Sequence[float], limit: float) -> list[float]:
-    """Return the order from each mesh to the next (n,), the first NaN; erratic by nature, see the module."""
+    """Return the order from each mesh to the next (n,) [-], the first NaN; see the header: it is erratic.
+
+    `h` (n,) are mesh sizes [length], `values` (n,) and `limit` are in the unit of the quantity.
+    """
     error = np.abs(np.asarray(values, np.float64) - limit)
     with np.errstate(divide="ignore", invalid="ignore"):
         steps = np.log(error[:-1] / error[1:]) / np.log(np.asarray(h[:-1]) / np.asarray(h[1:]))

@@ -1,4 +1,4 @@
-"""Quantities of interest: plain numbers from the last step of a run, and what a theory says of them."""
+"""Quantities of interest: numbers measured on the last step of a run, and the same numbers by a theory."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ``[study]`` table of a case file: where the meshes of a study come from, and what to compare on them."""
+"""Settings of a study, from the table ``[study]`` of its case file: its meshes, elements, formulations, quantities."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.generate import Circle
 
 SHAPES = {"triangles": ("tri3", "tri6"), "quadrangles": ("quad4", "quad8", "quad9")}
-# What "all" stands for.
+# Elements that "all" stands for.
 ALL_ELEMENTS = ("quad4", "quad8", "tri3", "tri6")
 
 
@@ -38,7 +38,7 @@ class Combination:
 
 @dataclass(frozen=True)
 class Settings:
-    """A study's settings, checked.
+    """Settings of a study, checked.
 
     Attributes
     ----------
@@ -65,8 +65,6 @@ class Settings:
         To fit and to show, besides the standard ones.
     combinations : tuple of Combination
         To compare where nothing else is asked.
-    parameters : dict
-        Named sets of linked paths for sweeps.
     """
 
     data: dict[str, Any]
@@ -81,7 +79,6 @@ class Settings:
     options: dict[str, dict[str, Any]] = field(default_factory=dict)
     quantities: tuple[str, ...] = ()
     combinations: tuple[Combination, ...] = ()
-    parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     @property
     def by_shape(self) -> bool:
@@ -92,10 +89,7 @@ class Settings:
 def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
     """Return the settings of a case's studies; `data` stand for the parsed case file with some values changed.
 
-    Raises
-    ------
-    CaseError
-        If a value of ``[study]`` is wrong.
+    Raises CaseError if a value of ``[study]`` is wrong.
     """
     data = tomllib.loads(case.text) if data is None else data
     study = data.get("study", {})
@@ -123,7 +117,6 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
         options=study.get("options", {}),
         quantities=tuple(study.get("quantities", ())),
         combinations=combinations,
-        parameters=study.get("parameters", {}),
     )
 
 
@@ -169,31 +162,25 @@ def combinations(
 ) -> tuple[Combination, ...]:
     """Return the combinations to compare: every element with every formulation, or without both the case's choice.
 
-    Raises
-    ------
-    CaseError
-        If an element or a formulation is unknown, or cannot be made of this case's mesh.
+    Raises CaseError if an element or a formulation is unknown, or cannot be made of this case's mesh.
     """
     if names is None and formulations is None:
         return settings.combinations
     chosen = [settings.own.element] if names is None else list(names)
     if names is not None and list(names) == ["all"]:
         chosen = [name for name in ALL_ELEMENTS if makeable(settings, name)]
-    how = [settings.own.formulation] if formulations is None else [name.replace("-", "_") for name in formulations]
-    if formulations is not None and list(formulations) == ["all"]:
-        how = list(FORMULATIONS)
-    if settings.pair is None and formulations is not None:
+    if formulations is None:
+        return tuple(_checked(element, settings.own.formulation) for element in chosen)
+    if settings.pair is None:
         raise CaseError("this case has no contact pair, so there are no formulations to compare")
-    return tuple(_checked(element, formulation) for element in chosen for formulation in how)
+    every = list(FORMULATIONS) if list(formulations) == ["all"] else [name.replace("-", "_") for name in formulations]
+    return tuple(_checked(element, formulation) for element in chosen for formulation in every)
 
 
 def one_combination(settings: Settings, element: str | None, formulation: str | None) -> Combination:
     """Return the last combination of ``[study]`` with this element and formulation, where given; else make one of them.
 
-    Raises
-    ------
-    CaseError
-        If the element or the formulation is unknown.
+    Raises CaseError if the element or the formulation is unknown.
     """
     formulation = formulation.replace("-", "_") if formulation else None
     for known in reversed(settings.combinations):
@@ -205,13 +192,12 @@ def one_combination(settings: Settings, element: str | None, formulation: str | 
 
 def makeable(settings: Settings, element: str) -> bool:
     """Whether meshes of this element can be made for the case."""
-    if settings.generator is None:
-        own = settings.own.element
-        return own is not None and elements.get(own).linear == elements.get(element).linear
-    if "" in settings.arguments:
-        own = settings.own.element
-        return own is None or elements.get(own).linear == elements.get(element).linear
-    return shape_of(element) in settings.arguments
+    if settings.by_shape:
+        return shape_of(element) in settings.arguments
+    own = settings.own.element
+    if own is None:
+        return settings.generator is not None
+    return elements.get(own).linear == elements.get(element).linear
 
 
 def shape_of(element: str) -> str:

@@ -104,10 +104,7 @@ def marker(number: int) -> str:
 def figure(panels: Sequence[Sequence[Panel]], size: tuple[float, float], title: str = "", **style: Any) -> Figure:
     """Return a figure of rows of panels, of a `size` [inch]; it needs no display. `style` is that of its title.
 
-    Raises
-    ------
-    FastcontactError
-        If matplotlib is not installed.
+    Raises FastcontactError if matplotlib is not installed.
     """
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
