@@ -41,34 +41,18 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
 # A rigid surface: the facets of a group of a file, or of the mesh of the model.
 SURFACE = {"file": str, "group": str, "flip": bool, "crease": NUMBER}
 # Studies of this case; `fastcontact.studies.settings` reads them.
-STUDY = {
+STUDY: dict[str, Any] = {
     "generator": str,
-    "triangles": dict,
-    "quadrangles": dict,
-    "halve": list,
-    "double": list,
-    "curves": list,
-    "load_steps": int,
-    "combinations": list,
-    "options": dict,
     "contact": str,
-    "quantities": list,
-    "parameters": dict,
+    "load_steps": int,
+    **dict.fromkeys(("halve", "double", "curves", "combinations", "quantities"), list),
+    **dict.fromkeys(("triangles", "quadrangles", "options", "parameters"), dict),
 }
-TOP = {
+TOP: dict[str, Any] = {
     "title": str,
     "kinematics": str,
-    "units": dict,
-    "mesh": dict,
-    **dict.fromkeys(LISTS, list),
-    "contact": dict,
-    "obstacle": dict,
-    "ramp": dict,
-    "solve": dict,
-    "probes": dict,
-    "theory": dict,
-    "check": list,
-    "study": dict,
+    **dict.fromkeys(("units", "mesh", "contact", "obstacle", "ramp", "solve", "probes", "theory", "study"), dict),
+    **dict.fromkeys((*LISTS, "check"), list),
 }
 
 

@@ -155,10 +155,11 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
 
 
 def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str]) -> list[str]:
+    inside, outside = contact["radius"]
     found = [
         f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force {contact['force']:.6g} "
         f"{unit['force']}, largest pressure {contact['pressure_max']:.6g} {unit['pressure']}, "
-        + _edge(*contact["radius"], unit["length"])
+        + _edge(inside, outside, unit["length"])
     ]
     if any(contact["obstacle_displacement"] or ()):
         moved = ", ".join(f"{value:.6g}" for value in contact["obstacle_displacement"])

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from fastcontact.cli._results import curve
+from fastcontact.cli._results import at_equal_force, curve
 from fastcontact.errors import FastcontactError, FileError
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -31,16 +29,12 @@ def profile_picture(case: Any, step: StepResult, path: str, pair: str | None = N
     name = pair or next(iter(step.contact))
     contact = step.contact[name]
     theories = case.theories.get(name, {})
-    theory, others = theories.get("theory"), {}
-    if not curve(theory):
-        theory = None
-    force = float(np.linalg.norm(contact.force)) / theories.get("share", 1.0)
-    if hasattr(theory, "at_force") and force > 0:
-        others["Hertz, equal force"] = theory.at_force(force)
+    theory = theories.get("theory") if curve(theories.get("theory")) else None
+    same = at_equal_force(theory, contact, theories.get("share", 1.0))
     axes = plot.pressure_profile(
         contact,
         theory,
-        other_theories=others,
+        other_theories={} if same is None else {"Hertz, equal force": same},
         stress=step.stress[contact.points, 1] if contact.normal.shape[1] == 2 else normal_stress(contact, step),
         title=f"{case.title}\nload factor {step.load_factor:g}",
         units=case.units,

@@ -6,6 +6,8 @@ import argparse
 import tomllib
 from typing import Any
 
+import numpy as np
+
 from fastcontact.errors import CaseError, unknown
 
 
@@ -56,6 +58,12 @@ def case_data(results: Any) -> dict[str, Any]:
 def curve(theory: Any) -> bool:
     """Return whether a theory has a pressure that can be drawn over the contact; that of a punch is infinite."""
     return all(hasattr(theory, name) for name in ("pressure", "pressure_max", "radius"))
+
+
+def at_equal_force(theory: Any, contact: Any, share: float) -> Any:
+    """Return a theory at the force of a contact, of which the model holds a `share` [-]; None where there is none."""
+    force = float(np.linalg.norm(contact.force)) / share
+    return theory.at_force(force) if force > 0 and hasattr(theory, "at_force") else None
 
 
 def law(case: dict[str, Any], pair: str) -> Any:

@@ -12,23 +12,12 @@ from fastcontact.errors import CaseError, unknown
 from fastcontact.studies.convergence_report import Study
 from fastcontact.studies.execute import Progress, Result, raise_first, run_all
 from fastcontact.studies.fit import Limit, fit_limit
-from fastcontact.studies.job import Job, case_data
+from fastcontact.studies.job import Job, case_data, fields_of
+from fastcontact.studies.labels import LABELS
 from fastcontact.studies.levels import recipe
 from fastcontact.studies.quantities import of_theory
 from fastcontact.studies.series import Level, Series
 from fastcontact.studies.settings import Combination, Settings, combinations, settings
-
-# Quantities that are always fitted, where they are known.
-STANDARD = (
-    "force",
-    "pressure_max",
-    "pressure_pole",
-    "contact_radius",
-    "von_mises_max",
-    "von_mises_depth",
-    "pressure_error",
-    "pressure_error_equal_force",
-)
 
 
 def convergence_study(
@@ -125,23 +114,12 @@ def _series(
 ) -> Series:
     """Return one element and formulation with its limits; `checked` are fitted where they are known."""
     solved = [(number, result) for number, result in results if "error" not in result]
-    levels = [
-        Level(
-            number,
-            result["h"],
-            result["n_dofs"],
-            result["values"],
-            result["profile"],
-            result["seconds"],
-            tuple(result["warnings"]),
-        )
-        for number, result in solved
-    ]
+    levels = [Level(number=number, **fields_of(Level, result)) for number, result in solved]
     known = levels[-1].values
     for name in wanted:
         if name not in known:
             raise CaseError(unknown("quantity", name, known))
-    names = tuple(dict.fromkeys(name for name in (*STANDARD, *checked, *wanted) if name in known))
+    names = tuple(dict.fromkeys(name for name in (*LABELS, *checked, *wanted) if name in known))
     limits = {name: limit for name in names if (limit := _limit(levels, name)) is not None}
     failed = {number: str(result["error"]) for number, result in results if "error" in result}
     last = solved[-1][1]

@@ -34,36 +34,16 @@ SCHEMA = 1
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """A case to solve.
+    """All data of one run: a case to solve."""
 
-    Attributes
-    ----------
-    label : str
-        Name of the run, for messages.
-    name : str
-        Name of the case.
-    data : dict
-        Parsed case file with everything set for this run.
-    pair : str or None
-        Contact pair to measure.
-    recipe : dict or None
-        Of the mesh, see `levels.recipe`; None: `base` as it is, or the mesh that the data name.
-    base : Mesh or None
-        The case's mesh, where it was read from a file.
-    marks : dict
-        What distinguishes this run from the others of its study, e.g. its ``level``.
-    size : float
-        Amount of work, in any unit that the runs of a study share.
-    """
-
-    label: str
-    name: str
-    data: dict[str, Any]
-    pair: str | None
-    recipe: Recipe | None
-    base: Mesh | None
-    marks: dict[str, Any]
-    size: float = 0.0
+    label: str  # name of the run, for messages
+    name: str  # of the case
+    data: dict[str, Any]  # the parsed case file with all values of this run
+    pair: str | None  # contact pair to measure
+    recipe: Recipe | None  # of the mesh; None: `base` as it is, or the mesh that the data name
+    base: Mesh | None  # the case's mesh, where it was read from a file
+    marks: dict[str, Any]  # distinguish this run from the others of its study, e.g. its level
+    size: float = 0.0  # amount of work, in any unit that the runs of a study share
 
     @property
     def key(self) -> str:
@@ -127,17 +107,9 @@ def ramp_of(ramp: dict[str, Any], steps: int) -> dict[str, Any]:
 def run(job: Job, threads: int | None = None) -> dict[str, Any]:
     """Solve a case and measure its quantities; an error is not raised but returned under the key ``"error"``.
 
-    Parameters
-    ----------
-    job : Job
-    threads : int, optional
-        Threads of the parallel kernels in this process.
-
-    Returns
-    -------
-    dict
-        ``h`` [length], ``n_dofs``, ``seconds`` [s], ``iterations``, ``warnings``, ``profile``, and by quantity ``values``,
-        ``theory``, ``reference``, ``equal_force``; or ``error`` and ``kind`` (name of the exception).
+    `threads` is the number of threads of the parallel kernels in this process. The result holds ``h`` [length], ``n_dofs``,
+    ``seconds`` [s], ``iterations``, ``warnings``, ``profile``, and by quantity ``values``, ``theory``, ``reference`` and
+    ``equal_force``; or ``error`` and ``kind`` (name of the exception).
     """
     try:
         if threads is not None:
@@ -173,6 +145,12 @@ def measured(job: Job) -> dict[str, Any]:
         "seconds": time.perf_counter() - started,
         "warnings": [str(entry.message) for entry in caught if issubclass(entry.category, FastcontactWarning)],
     }
+
+
+def fields_of(kind: type, result: dict[str, Any]) -> dict[str, Any]:
+    """Return the entries of a result that a dataclass has as fields."""
+    found = {field.name: result[field.name] for field in dataclasses.fields(kind) if field.name in result}
+    return {**found, "warnings": tuple(found["warnings"])}
 
 
 def last_step(case: Case) -> StepResult:

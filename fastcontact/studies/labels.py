@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-# By quantity: its title, and the kind of its unit, empty for ratios.
+# Of the standard quantities, which every study shows where they are known: title, and kind of the unit, empty for ratios.
 LABELS = {
     "force": ("contact force", "force"),
     "pressure_max": ("largest pressure", "pressure"),

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.cases.case import Case
+from fastcontact.cases.checks import STRESS, at_point
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.mesh import elements, quadrature
@@ -18,20 +19,9 @@ from fastcontact.results.step import ContactResult, StepResult
 
 Array = NDArray[np.float64]
 
-COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
-
 
 def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
-    """Return every quantity of interest of a solved case; forces, lengths and stresses in the case's units.
-
-    Parameters
-    ----------
-    case : Case
-    last : StepResult
-        State to measure.
-    pair : str or None
-        Contact pair; None leaves out what belongs to a contact.
-    """
+    """Return every quantity of interest of a solved case, in the case's units; without a `pair` those of no contact."""
     found: dict[str, float] = {}
     if pair is not None:
         found |= _of_contact(case, last.contact[pair], pair)
@@ -106,7 +96,7 @@ def pressure_error(case: Case, side: Surface, contact: ContactResult, theory: An
 
 
 def peak(mesh: Mesh, values: Array, axisymmetric: bool) -> tuple[float, Array]:
-    """Return the largest value of a nodal field and where it is, between the nodes.
+    """Return the largest value of a nodal field (n_points,), and its place (dim,) between the nodes [length].
 
     On the axis, a polynomial is fitted to the nodes along it that reach 97 % of the largest value, where there are
     enough of them. Else a quadratic function is fitted to the nodes around the largest one (on the axis: even in the
@@ -184,14 +174,14 @@ def _depth(case: Case, pair: str, where: Array) -> float:
 
 def _of_probe(name: str, point: int, last: StepResult) -> dict[str, float]:
     found = {f"{name}.von_mises": float(last.von_mises[point])}
-    for component, value in zip(COMPONENTS, last.stress[point], strict=False):
+    for component, value in zip(STRESS, last.stress[point], strict=False):
         found[f"{name}.stress.{component}"] = float(value)
     for axis, value in zip("xyz", last.displacement[point], strict=False):
         found[f"{name}.displacement.{axis}"] = float(value)
-    for contact in last.contact.values():
-        at = np.flatnonzero(contact.points == point)
-        if len(at):
-            found[f"{name}.pressure"] = float(contact.pressure[at[0]])
+    at = at_point(last, point)
+    if at is not None:
+        contact, row = at
+        found[f"{name}.pressure"] = float(contact.pressure[row])
     return found
 
 

@@ -38,47 +38,21 @@ class Combination:
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a study, checked.
+    """Settings of a study, checked."""
 
-    Attributes
-    ----------
-    data : dict
-        The parsed case file.
-    own : Combination
-        Element and formulation of the case itself.
-    pair : str or None
-        The contact pair that is measured.
-    generator : str or None
-        None where a mesh file is refined.
-    arguments : dict
-        Arguments of the generator on level 0, by shape (``"triangles"``, ``"quadrangles"``), or by ``""`` for the
-        case's own, whatever the element.
-    halve, double : tuple of str or None
-        Names of the generator's arguments to halve or double per level; None: the known ones.
-    curves : tuple of Circle or None
-        True shapes of a mesh file's boundary; None: the circles found.
-    load_steps : int or None
-        Load steps of the study; None: the case's.
-    options : dict
-        Options of the formulations, by formulation.
-    quantities : tuple of str
-        To fit and to show, besides the standard ones.
-    combinations : tuple of Combination
-        To compare where nothing else is asked.
-    """
-
-    data: dict[str, Any]
-    own: Combination
-    pair: str | None
-    generator: str | None
+    data: dict[str, Any]  # the parsed case file
+    own: Combination  # element and formulation of the case itself
+    pair: str | None  # the contact pair that is measured
+    generator: str | None  # of the meshes; None where a mesh file is refined
+    # Arguments of the generator on level 0: by shape of the cells (a key of `SHAPES`), or the case's own by "".
     arguments: dict[str, dict[str, Any]]
-    halve: tuple[str, ...] | None = None
-    double: tuple[str, ...] | None = None
-    curves: tuple[Circle, ...] | None = None
-    load_steps: int | None = None
-    options: dict[str, dict[str, Any]] = field(default_factory=dict)
-    quantities: tuple[str, ...] = ()
-    combinations: tuple[Combination, ...] = ()
+    halve: tuple[str, ...] | None = None  # arguments to halve from level to level; None: those of `levels.RULES`
+    double: tuple[str, ...] | None = None  # arguments to double likewise
+    curves: tuple[Circle, ...] | None = None  # true boundaries of a mesh file; None: the circles found
+    load_steps: int | None = None  # of every run; None: the case's
+    options: dict[str, dict[str, Any]] = field(default_factory=dict)  # of the contact pair, by formulation
+    quantities: tuple[str, ...] = ()  # to fit and to show besides the standard ones
+    combinations: tuple[Combination, ...] = ()  # to compare by default
 
     @property
     def by_shape(self) -> bool:

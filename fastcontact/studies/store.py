@@ -12,17 +12,9 @@ from fastcontact.studies.job import Job
 
 
 class Store:
-    """A folder of finished runs, named by the keys of their jobs.
+    """A folder of finished runs, named by the keys of their jobs; made if it is not there.
 
-    Parameters
-    ----------
-    folder : path-like
-        Made if it is not there.
-
-    Raises
-    ------
-    FileError
-        If the folder cannot be made.
+    Raises FileError if it cannot be made.
     """
 
     def __init__(self, folder: str | Path) -> None:

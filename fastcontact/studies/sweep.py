@@ -12,7 +12,7 @@ from fastcontact.cases.case import Case, build_case, read_case
 from fastcontact.errors import CaseError
 from fastcontact.studies.case_parameters import substituted
 from fastcontact.studies.execute import Progress, raise_first, run_all
-from fastcontact.studies.job import Job, case_data
+from fastcontact.studies.job import Job, case_data, fields_of
 from fastcontact.studies.levels import make_mesh, recipe
 from fastcontact.studies.settings import Combination, Settings, one_combination, settings
 from fastcontact.studies.sweep_report import Point, Sweep, Value
@@ -76,7 +76,9 @@ def parameter_sweep(
         units=case.units,
         combination=str(jobs[0].marks["combination"]),
         parameters={name: tuple(values) for name, values in parameters.items()},
-        points=[Point.of(choice, result) for choice, result in runs if "error" not in result],
+        points=[
+            Point(parameters=choice, **fields_of(Point, result)) for choice, result in runs if "error" not in result
+        ],
         failed=[(choice, str(result["error"])) for choice, result in runs if "error" in result],
     )
 

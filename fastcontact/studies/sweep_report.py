@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,12 +56,6 @@ class Point:
     profile: dict[str, list[float]]
     seconds: float
     warnings: tuple[str, ...]
-
-    @classmethod
-    def of(cls, parameters: dict[str, Value], result: Mapping[str, Any]) -> Point:
-        """Return the point of a finished run."""
-        measured = {field.name: result[field.name] for field in dataclasses.fields(cls) if field.name in result}
-        return cls(parameters=parameters, **{**measured, "warnings": tuple(result["warnings"])})
 
     def ratio(self, quantity: str, to: str = "theory") -> float:
         """Return value over ``"theory"``, ``"reference"`` or ``"equal_force"`` [-]; NaN where one is not known."""

@@ -17,32 +17,16 @@ MARKERS = "osD^v<>ph*"
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Points of a panel, joined.
-
-    Attributes
-    ----------
-    x, y : array_like (n,)
-        In the units of the panel's axes.
-    style : str
-        Marker and line, as matplotlib writes them, e.g. ``"o-"``.
-    label : str or None
-        In the legend; None leaves it out.
-    color : matplotlib colour, optional
-        By default the next one of matplotlib's cycle.
-    width, size : float
-        Of line and markers [point].
-    bars : tuple of ndarray (n,), optional
-        Lower and upper ends of the error bars, in the unit of `y`.
-    """
+    """Points of a panel, joined: `x` and `y` (n_points,), in the units of its axes."""
 
     x: Any
     y: Any
-    style: str = "-"
-    label: str | None = None
-    color: Any = None
-    width: float = 1.0
-    size: float = 4
-    bars: tuple[Any, Any] | None = None
+    style: str = "-"  # marker and line, as matplotlib writes them
+    label: str | None = None  # in the legend; None leaves it out
+    color: Any = None  # None: the next one of matplotlib's cycle
+    width: float = 1.0  # of the line [point]
+    size: float = 4  # of the markers [point]
+    bars: tuple[Any, Any] | None = None  # lower and upper ends of error bars, each (n_points,), in the unit of y
 
 
 @dataclass(frozen=True)
@@ -59,41 +43,22 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """What one pair of axes shows.
-
-    Attributes
-    ----------
-    title, x_label, y_label : str
-    curves : sequence of Curve
-    lines : sequence of Line
-    x_scale, y_scale : str
-        ``"linear"`` or ``"log"``, for x also ``"plain log"``: few plain numbers instead of powers of ten.
-    x_end : float or None
-        Where the x axis ends, in its unit; both axes start from zero then.
-    grid, minor_grid : float
-        Opacity of the grid at major and at minor ticks; 0: none.
-    title_size, legend_size : float or None
-        Sizes of the text [point].
-    draw : callable, optional
-        Called with the axes after the curves: draws what is more than curves and lines.
-    instead : str
-        Shown in place of everything else, where there is nothing to draw.
-    """
+    """One pair of axes and what is drawn on it."""
 
     title: str = ""
     x_label: str = ""
     y_label: str = ""
     curves: Sequence[Curve] = ()
     lines: Sequence[Line] = ()
-    x_scale: str = "linear"
-    y_scale: str = "linear"
-    x_end: float | None = None
-    grid: float = 0.4
-    minor_grid: float = 0.0
-    title_size: float | None = None
-    legend_size: float = 8
-    draw: Callable[[Axes], None] | None = None
-    instead: str = ""
+    x_scale: str = "linear"  # or "log", or "plain log": few plain numbers instead of powers of ten
+    y_scale: str = "linear"  # or "log"
+    x_end: float | None = None  # end of the x axis, in its unit; both axes start from zero then
+    grid: float = 0.4  # opacity at major ticks; 0: no grid
+    minor_grid: float = 0.0  # opacity at minor ticks
+    title_size: float | None = None  # [point]
+    legend_size: float = 8  # [point]
+    draw: Callable[[Axes], None] | None = None  # draws on the axes what is more than curves and lines
+    instead: str = ""  # shown in place of everything else, where there is nothing to draw
 
 
 def marker(number: int) -> str:
