@@ -26,8 +26,9 @@ CHECK = {
     "tolerance": NUMBER,
     "name": str,
 }
-# What may stand after the name of a contact pair; after that of a probe see `_of_probe`.
+# Quantities of a contact pair, and of a probe.
 OF_PAIRS = ("force", "pressure_max", "radius", "stick_radius")
+OF_PROBES = ("pressure", "shear", "von_mises", *(f"stress.{c}" for c in STRESS), *(f"displacement.{a}" for a in _AXES))
 
 
 @dataclass(frozen=True)
@@ -114,14 +115,7 @@ def read_check(
     owner, _, what = entry["quantity"].partition(".")
     if owner not in {**probes, **pairs}:
         raise CaseError(unknown(f"contact pair or probe in {where}.quantity", owner, [*probes, *pairs]))
-    of_probes = [
-        "pressure",
-        "shear",
-        "von_mises",
-        *(f"stress.{c}" for c in STRESS),
-        *(f"displacement.{a}" for a in _AXES),
-    ]
-    allowed = of_probes if owner in probes else list(OF_PAIRS)
+    allowed = OF_PROBES if owner in probes else OF_PAIRS
     if what not in allowed:
         raise CaseError(unknown(f"quantity in {where}", what, allowed))
     of = what if what in ("force", "radius", "stick_radius") else "pressure_max"

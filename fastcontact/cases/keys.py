@@ -26,7 +26,7 @@ SOLVE = {
     "max_active_set_iterations": int,
     "max_halvings": int,
 }
-# By kind of table that may stand several times: its keys, and those that it needs.
+# Tables that may occur several times, by kind: the types of their keys, and the keys that are required.
 LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     "material": ({"E": NUMBER, "nu": NUMBER, "groups": (list, str)}, ("E", "nu")),
     "support": ({"group": str, **AXES, "ramp": list}, ("group",)),

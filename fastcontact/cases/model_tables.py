@@ -69,7 +69,7 @@ def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
         raise CaseError(f"{where} needs 'secondary', the name of a group of facets")
     rest = {key: value for key, value in entry.items() if key != "shape"}
     shape = entry.get("shape")
-    if shape == "mesh":  # its few arguments may stand beside it
+    if shape == "mesh":  # its arguments may be keys of the obstacle itself
         shape = {"kind": "mesh", **{key: rest.pop(key) for key in SURFACE if key in rest}}
     obstacle = _obstacle(f"{where}.shape", shape, model.mesh, folder)
     for key in ("motion", "force"):

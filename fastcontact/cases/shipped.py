@@ -7,7 +7,7 @@ from pathlib import Path
 from fastcontact.errors import CaseError, unknown
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-# Where an installed package carries them, and where they stand in a checkout.
+# The folder in an installed package, and the folder in a checkout.
 _FOLDERS = (_PACKAGE / "data" / "cases", _PACKAGE.parent / "data" / "cases")
 
 
@@ -29,7 +29,7 @@ def ready_case(name: str) -> Path:
 
 
 def case_path(given: str | Path) -> Path:
-    """Return the file that `given` stands for: a path, or the name of a ready case where no such file exists.
+    """Return the file of a path, or of the name of a ready case where no such file exists.
 
     Raises CaseError if neither exists; the message offers the nearest ready cases.
     """

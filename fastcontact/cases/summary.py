@@ -19,7 +19,7 @@ COMPARED = ("force", "pressure_max", "radius")
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of fastcontact, Python and the libraries it stands on."""
+    """Return the versions of fastcontact, Python and the libraries it uses."""
     libraries = ("numpy", "scipy", "numba", "pyamg", "meshio", "h5py")
     found = {"fastcontact": __version__, "python": platform.python_version()}
     return {**found, **{name: metadata.version(name) for name in libraries}}

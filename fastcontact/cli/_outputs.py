@@ -16,7 +16,7 @@ def check_outputs(
     files: Iterable[str | os.PathLike[str] | None],
     pictures: Iterable[str | os.PathLike[str] | None] = (),
 ) -> None:
-    """Refuse files that could not be written, or would replace the one to `read`; None stands for no file.
+    """Refuse files that could not be written, or would replace the one to `read`; None means no file.
 
     Raises FileError if a folder is missing or write-protected, a path is a folder, the file to read or that of another
     output, or the suffix of a picture is of no known format. Raises FastcontactError if there is no matplotlib for a

@@ -23,7 +23,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write what was asked for; print the table if nothing was."""
+    """Write the files of the options, or print the table if there are none."""
     from fastcontact.results.reader import open_results
     from fastcontact.results.tables import contact_table, with_theory, write_csv
 

@@ -32,16 +32,16 @@ def convergence_study(
     store: str | Path | None = None,
     on_progress: Callable[[Progress], None] | None = None,
 ) -> Study:
-    """Solve a case on finer and finer meshes; fit order and limit; tell model error from mesh error.
+    """Solve a case on finer and finer meshes; fit order and limit; separate model error from mesh error.
 
     Meshes come from the generator that the case names, its sizes halved on every level, or from uniform refinement of
-    its mesh file, arcs kept round; the table ``[study]`` of the case says more (`fastcontact.studies.settings`).
+    its mesh file, arcs kept round; see the table ``[study]`` of case files.
 
     Parameters
     ----------
     case : Case or path-like
     levels : int
-        Number of meshes; a limit takes three, a trustworthy one five.
+        Number of meshes; a limit needs three, a reliable one five.
     elements, formulations : sequence of str, optional
         Compared in all combinations; ``["all"]`` for all; by default what ``[study]`` names, or the case's own.
     quantities : sequence of str

@@ -9,10 +9,10 @@ contact edge sits at another fraction of an element on every mesh. Steps from on
 orders, and three meshes solved for three unknowns (Richardson 1911; Roache 1998) a limit without an error bar. Here L, C
 and s are integrated out for every order p (Bayesian linear regression with weights :math:`h^{-2p}`; Zellner 1971, chapter
 3), and the orders are averaged with their evidence. The prior of p is log-normal about 1.6, with 95 % between 0.8 and
-3.2; that of s^2 weighs as much as one and a half meshes and stands at s = 0.2, so that few meshes that happen to agree
-are not believed blindly. Meshes too coarse for one power of h are allowed for: the first k meshes may be off by ten
-times s, with a prior probability of 1/2 for each further k, as long as three meshes are left. The error bar is half of
-the 95 % interval of L, the greater half if they differ.
+3.2; that of s^2 weighs as much as one and a half meshes and is centred at s = 0.2, so that a chance agreement of few
+meshes does not make the error bar too small. Meshes too coarse for one power of h are allowed for: the first k meshes
+may be off by ten times s, with a prior probability of 1/2 for each further k, as long as three meshes are left. The
+error bar is half of the 95 % interval of L, the greater half if they differ.
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
         }
     element = element or "tri3"
     shape = shape_of(element)
-    # Where level 0 is given by shape, it is that of quadratic cells; linear ones stand on the same nodes.
+    # Where level 0 is given by shape, it is that of quadratic cells; linear ones have the same nodes.
     finer = level + int(shape in settings.arguments and elements.get(element).order == 1)
     given = settings.arguments.get(shape, settings.arguments.get("", {}))
     # Free triangles of another size lie in another pattern, which changes the largest pressure at random: refine them.

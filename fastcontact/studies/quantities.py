@@ -63,9 +63,9 @@ def contact_radius(contact: ContactResult) -> float:
     """Return the distance from the axis at which the pressure goes to zero [length]; NaN without contact.
 
     Near the edge of a smooth contact the square of the pressure is linear in the square of the distance (Hertz: over
-    the whole contact). A line through the closed nodes beyond 0.4 of the radius, but for the last two, where the edge
-    cuts through a facet, tells where it ends; the bracket of the outermost closed and the first open point bounds it.
-    Where the pressure does not fall towards the edge (a punch), the end of the bracket is the answer.
+    the whole contact). A line is fitted through the closed nodes beyond 0.4 of the radius, without the last two, where the
+    edge cuts through a facet; its zero is the radius, limited to the bracket of the outermost closed and the first open
+    node. Where the pressure does not fall towards the edge (a punch), the radius is the end of the bracket.
     """
     inside, outside = contact.radius
     if not np.isfinite(inside):
@@ -99,8 +99,8 @@ def peak(mesh: Mesh, values: Array, axisymmetric: bool) -> tuple[float, Array]:
     """Return the largest value of a nodal field (n_points,), and its place (dim,) between the nodes [length].
 
     On the axis, a polynomial is fitted to the nodes along it that reach 97 % of the largest value, where there are
-    enough of them. Else a quadratic function is fitted to the nodes around the largest one (on the axis: even in the
-    radius); its vertex counts if it is a maximum within the ring of these nodes, and else the node does.
+    enough of them. Otherwise a quadratic function is fitted to the nodes around the largest one (on the axis: even in the
+    radius); the result is its vertex if that is a maximum within the ring of these nodes, otherwise the node.
     """
     top = int(np.argmax(values))
     on_axis = axisymmetric and abs(mesh.points[top, 0]) <= 1e-9 * np.abs(mesh.points).max()

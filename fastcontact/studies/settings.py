@@ -61,7 +61,7 @@ class Settings:
 
 
 def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
-    """Return the settings of a case's studies; `data` stand for the parsed case file with some values changed.
+    """Return the settings of a case's studies; `data` replaces the parsed case file, e.g. with other values.
 
     Raises CaseError if a value of ``[study]`` is wrong.
     """

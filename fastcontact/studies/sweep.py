@@ -17,7 +17,7 @@ from fastcontact.studies.levels import make_mesh, recipe
 from fastcontact.studies.settings import Combination, Settings, one_combination, settings
 from fastcontact.studies.sweep_report import Point, Sweep, Value
 
-# The level of the study's meshes by default: fine enough to tell a trend from mesh error.
+# The level of the study's meshes by default: fine enough for trends larger than the mesh error.
 LEVEL = 2
 
 
@@ -64,7 +64,7 @@ def parameter_sweep(
         raise CaseError("a sweep needs at least one parameter with at least one value")
     choices = [dict(zip(parameters, values, strict=True)) for values in itertools.product(*parameters.values())]
     jobs = [_job(case, choice, element, formulation, level) for choice in choices]
-    # A key that the case does not know would fail in every run.
+    # An unknown key would make every run fail.
     build_case(jobs[0].data, name=case.name, mesh=case.mesh)
     results = run_all(jobs, executor=executor, workers=workers, store=store, on_progress=on_progress)
     raise_first("no point of the sweep could be solved", jobs, results)
