@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.surface import surface
-from fastcontact.elasticity import element_kernels
-from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
+from fastcontact.elasticity.energy import elastic_energy
 from fastcontact.elasticity.smoothed_stress import smoothed_stress
 from fastcontact.mesh import elements
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.studies.error_norms import stress_in_cells
 
 Array = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     smooth = smoothed_stress(model.mesh, model.kinematics, moduli, material, step.displacement)
     squares, energy = [], 0.0
     for name in model.mesh.solids:
-        own, whole = _differences(model, step, name, smooth[name], moduli, material[name])
+        own, whole = _differences(model, step.displacement, name, smooth[name])
         squares.append(own)
         energy += whole
     contact = np.zeros(sum(map(len, squares)))
@@ -92,21 +92,9 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     return ErrorEstimate(np.sqrt(np.concatenate(squares) + contact), np.sqrt(contact), math.sqrt(energy))
 
 
-def _differences(
-    model: Model, step: StepResult, name: str, smooth: Array, moduli: Array, material: NDArray[np.int32]
-) -> tuple[Array, float]:
+def _differences(model: Model, displacement: Array, name: str, smooth: Array) -> tuple[Array, float]:
     """Return the squared energy norms (n_cells,) of smoothed minus own stress, and that of the own stress in all."""
-    element, mesh = elements.get(name), model.mesh
-    xi, weights = integration_rule(element, element.order + 1)
-    N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
-    cells = mesh.cells[name]
-    stress = np.empty((len(cells), len(weights), moduli.shape[1]))
-    axisymmetric = model.kinematics == "axisymmetric"
-    element_kernels.loops(mesh.dim).stress(
-        mesh.points, cells, N, dN, moduli, material, axisymmetric, step.displacement, stress
-    )
-    volume = cell_volumes(mesh.points[cells], N, dN, axisymmetric) * weights
-    elastic = np.array([(own.E, own.nu) for own, _ in model.materials])[material].T[:, :, None]
+    N, stress, volume, elastic = stress_in_cells(model, name, slice(None), displacement, elements.get(name).order + 1)
     off = np.einsum("qa,cai->cqi", N, smooth) - stress
     squares = (elastic_energy(off, *elastic) * volume).sum(axis=1)
     return squares, float((elastic_energy(stress, *elastic) * volume).sum())
