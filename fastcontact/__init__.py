@@ -59,7 +59,7 @@ _NAMES = {
     "studies.adaptive": ("adaptive_study",),
     "studies.error_estimate": ("ErrorEstimate", "estimate_error"),
     "studies.error_norms": ("ErrorNorms", "error_against"),
-    "studies.study": ("convergence_study",),
+    "studies.convergence": ("convergence_study",),
     "studies.sweep": ("parameter_sweep",),
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}

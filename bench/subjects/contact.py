@@ -12,6 +12,7 @@ import time
 import numpy as np
 from scipy.sparse import bsr_array, csr_array
 from scipy.sparse.linalg import splu
+from suite.timing import peak_bytes
 
 import fastcontact as fc
 from fastcontact._jit import decorators as _jit
@@ -20,7 +21,6 @@ from fastcontact.analysis.load_step import load_step
 from fastcontact.analysis.problem import near_nullspace, prepare
 from fastcontact.errors import FastcontactError, unknown
 from fastcontact.linear import choice as linear
-from fastcontact.studies.benchmark.timing import peak_bytes
 
 SIZES = (1_500, 10_000, 40_000)
 TOLERANCE = 1e-8

@@ -1,4 +1,4 @@
-"""Checks of a case: one number of its last step held against a theory, or against a documented number."""
+"""Checks of a case: one number of its last step compared with a theory or with a documented number."""
 
 from __future__ import annotations
 
@@ -9,24 +9,26 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact.cases.keys import NUMBER
 from fastcontact.errors import CaseError, unknown
 from fastcontact.results.step import ContactResult, StepResult
 
 STRESS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "yz": 4, "xz": 5}
 _AXES = {"x": 0, "y": 1, "z": 2}
-_NUMBER = (int, float)
-KEYS = {
+# Keys of a check in a case file.
+CHECK = {
     "quantity": str,
     "theory": str,
     "of": str,
-    "value": _NUMBER,
+    "value": NUMBER,
     "source": str,
-    "factor": _NUMBER,
-    "tolerance": _NUMBER,
+    "factor": NUMBER,
+    "tolerance": NUMBER,
     "name": str,
 }
-# What may stand after the name of a contact pair; after that of a probe see `_of_probe`.
+# Quantities of a contact pair, and of a probe.
 OF_PAIRS = ("force", "pressure_max", "radius", "stick_radius")
+OF_PROBES = ("pressure", "shear", "von_mises", *(f"stress.{c}" for c in STRESS), *(f"displacement.{a}" for a in _AXES))
 
 
 @dataclass(frozen=True)
@@ -103,10 +105,7 @@ def read_check(
 ) -> Check:
     """Return the check that an entry of a case file describes; its keys and their types are right.
 
-    Raises
-    ------
-    CaseError
-        If the quantity, or what it is compared with, is unknown.
+    Raises CaseError if the quantity, or what it is compared with, is unknown.
     """
     for key in ("quantity", "tolerance"):
         if key not in entry:
@@ -116,14 +115,7 @@ def read_check(
     owner, _, what = entry["quantity"].partition(".")
     if owner not in {**probes, **pairs}:
         raise CaseError(unknown(f"contact pair or probe in {where}.quantity", owner, [*probes, *pairs]))
-    of_probes = [
-        "pressure",
-        "shear",
-        "von_mises",
-        *(f"stress.{c}" for c in STRESS),
-        *(f"displacement.{a}" for a in _AXES),
-    ]
-    allowed = of_probes if owner in probes else list(OF_PAIRS)
+    allowed = OF_PROBES if owner in probes else OF_PAIRS
     if what not in allowed:
         raise CaseError(unknown(f"quantity in {where}", what, allowed))
     of = what if what in ("force", "radius", "stick_radius") else "pressure_max"
@@ -140,7 +132,7 @@ def read_check(
     if check.theory:
         if check.theory not in theories:
             raise CaseError(unknown(f"theory in {where}", check.theory, theories))
-        _check_target(where, check, theories[check.theory]["theory"])
+        check_target(where, check, theories[check.theory]["theory"])
     return check
 
 
@@ -149,7 +141,8 @@ def _whole(what: str, theory: Mapping[str, Any]) -> float:
     return 1.0 / float(theory.get("share", 1.0)) if what == "force" else 1.0
 
 
-def _check_target(where: str, check: Check, theory: Any) -> None:
+def check_target(where: str, check: Check, theory: Any) -> None:
+    """Raise CaseError where a theory has no such number, or one that no deviation can be relative to."""
     try:
         target = check.target(theory)
     except (AttributeError, TypeError):
@@ -161,7 +154,7 @@ def _check_target(where: str, check: Check, theory: Any) -> None:
 
 def _is_number(theory: Any, name: str) -> bool:
     value = getattr(theory, name, None)
-    return isinstance(value, _NUMBER) and not isinstance(value, bool)
+    return isinstance(value, NUMBER) and not isinstance(value, bool)
 
 
 def measured(check: Check, step: StepResult, probes: Mapping[str, int]) -> float:

@@ -1,4 +1,4 @@
-"""Ready cases: the case files that come with fastcontact, found by name."""
+"""Ready cases: the case files that come with the package, found by name."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from fastcontact.errors import CaseError, unknown
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-# Where an installed package carries them, and where they stand in a checkout.
+# The folder in an installed package, and the folder in a checkout.
 _FOLDERS = (_PACKAGE / "data" / "cases", _PACKAGE.parent / "data" / "cases")
 
 
@@ -20,10 +20,7 @@ def ready_cases() -> dict[str, Path]:
 def ready_case(name: str) -> Path:
     """Return the case file of a ready case.
 
-    Raises
-    ------
-    CaseError
-        If there is none of that name; the message offers the nearest ones.
+    Raises CaseError if there is none of that name; the message offers the nearest ones.
     """
     found = ready_cases()
     if name not in found:
@@ -32,12 +29,9 @@ def ready_case(name: str) -> Path:
 
 
 def case_path(given: str | Path) -> Path:
-    """Return the file that `given` stands for: a path, or the name of a ready case where no such file exists.
+    """Return the file of a path, or of the name of a ready case where no such file exists.
 
-    Raises
-    ------
-    CaseError
-        If neither exists; the message offers the nearest ready cases.
+    Raises CaseError if neither exists; the message offers the nearest ready cases.
     """
     path = Path(given)
     try:

@@ -1,4 +1,4 @@
-"""A run in numbers: the dictionary behind ``--json``, and the lines a person reads."""
+"""Summary of a run: the dictionary that ``--json`` writes, and lines for a person."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ COMPARED = ("force", "pressure_max", "radius")
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of fastcontact, Python and the libraries it stands on."""
+    """Return the versions of fastcontact, Python and the libraries it uses."""
     libraries = ("numpy", "scipy", "numba", "pyamg", "meshio", "h5py")
     found = {"fastcontact": __version__, "python": platform.python_version()}
     return {**found, **{name: metadata.version(name) for name in libraries}}
@@ -60,7 +60,7 @@ def summarise(
 
 
 def of_step(step: StepResult) -> dict[str, Any]:
-    """Return what the summary tells of every step: its load factor and how it was solved."""
+    """Return the entry of a step in the summary: its load factor and the counts of its solution."""
     counts = ("geometry_updates", "active_set_iterations", "linear_iterations")
     found = {"load_factor": step.load_factor, **{name: step.iterations[name] for name in counts}}
     if "substeps" in step.iterations:
@@ -102,7 +102,7 @@ def _probe(step: StepResult, point: int) -> dict[str, Any]:
 def _against_theory(
     contact: ContactResult, approach: float | None, theory: Any, mesh_converged: Any = None, share: float = 1.0
 ) -> dict[str, Any]:
-    """Compare a contact, a `share` of the theory's, with it at its own load and at the computed force."""
+    """Compare a contact with its theory at the given approach and at equal force; the model holds a `share` of it."""
     force = float(np.linalg.norm(contact.force)) / share
     computed = {"force": force, "pressure_max": contact.pressure_max, "radius": list(contact.radius)}
     compared = {"equal_approach": {"approach": approach, **_deviations(computed, theory)}}
@@ -114,7 +114,7 @@ def _against_theory(
 
 
 def _deviations(computed: Mapping[str, Any], theory: Any) -> dict[str, Any]:
-    """Return the theory's numbers, and how far the computed ones lie from them, relative to them."""
+    """Return the theory's numbers, and the relative deviations of the computed ones from them."""
     inside, outside = computed["radius"]
     middle = 0.5 * (inside + outside)
     return {
@@ -143,34 +143,37 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
         many = "1 load step" if len(parts) == 1 else f"{len(parts)} load steps"
         found.append(f"  {many} did not converge as a whole and went in {sum(parts)} parts")
     for name, contact in summary["contact"].items():
-        inside, outside = contact["radius"]
-        edge = _edge(inside, outside, unit["length"])
-        found.append(
-            f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force {contact['force']:.6g} "
-            f"{unit['force']}, largest pressure {contact['pressure_max']:.6g} {unit['pressure']}, {edge}"
-        )
-        if any(contact["obstacle_displacement"] or ()):
-            moved = ", ".join(f"{value:.6g}" for value in contact["obstacle_displacement"])
-            found.append(f"  obstacle '{name}' stands ({moved}) {unit['length']} from its place at rest")
-        if contact["penalty"] is not None:
-            found.append(
-                f"  contact '{name}' penetrates by up to {contact['penetration']:.4g} {unit['length']}, with a penalty of "
-                f"{contact['penalty']:.4g} {unit['pressure']}/{unit['length']}"
-            )
+        found += _contact_lines(name, contact, unit)
     top = summary["von_mises_max"]
     where = ", ".join(f"{x:.4g}" for x in top["at"])
     found.append(f"  largest von Mises stress {top['value']:.6g} {unit['pressure']} at ({where}) {unit['length']}")
     if summary["regularised"]:
         found.append(_regularised_line(summary["regularised"], unit))
     for name, theory in summary["theory"].items():
-        found.extend(_theory_lines(name, theory))
-    for check in summary["checks"]:
-        found.append(_check_line(check, unit[check["unit"]]))
+        found += _theory_lines(name, theory)
+    return found + [_check_line(check, unit[check["unit"]]) for check in summary["checks"]]
+
+
+def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str]) -> list[str]:
+    inside, outside = contact["radius"]
+    found = [
+        f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force {contact['force']:.6g} "
+        f"{unit['force']}, largest pressure {contact['pressure_max']:.6g} {unit['pressure']}, "
+        + _edge(inside, outside, unit["length"])
+    ]
+    if any(contact["obstacle_displacement"] or ()):
+        moved = ", ".join(f"{value:.6g}" for value in contact["obstacle_displacement"])
+        found.append(f"  obstacle '{name}' stands ({moved}) {unit['length']} from its place at rest")
+    if contact["penalty"] is not None:
+        found.append(
+            f"  contact '{name}' penetrates by up to {contact['penetration']:.4g} {unit['length']}, with a penalty of "
+            f"{contact['penalty']:.4g} {unit['pressure']}/{unit['length']}"
+        )
     return found
 
 
 def _edge(inside: float | None, outside: float | None, unit: str) -> str:
-    """Return where the contact ends; `outside` is None where it reaches to the end of the surface."""
+    """Return the radius of a contact as text; `outside` is None where it reaches the end of the surface."""
     if inside is None:
         return "open"
     return (

@@ -25,12 +25,12 @@ class Parser(argparse.ArgumentParser):
     """An argument parser whose errors are those of the library: one line, exit code 1."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
-        """Raise instead of exiting with code 2, which stands for no convergence."""
+        """Raise instead of exiting with code 2, which means no convergence."""
         raise FastcontactError(f"{message}; see '{self.prog} --help'")
 
 
 def parser(command: str | None = None) -> argparse.ArgumentParser:
-    """Return the parser with every sub-command of this package, the arguments only of `command` if it is one of them."""
+    """Return the parser with every sub-command of this package, with arguments only for `command` if it is one of them."""
     top = Parser(prog="fastcontact", description="Elastic contact by finite elements, fast.")
     top.add_argument("--version", action="version", version=f"fastcontact {__version__}")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
@@ -38,7 +38,7 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
     for name in names:
         module = importlib.import_module(f"{__package__}.{name}")
         sub = commands.add_parser(name, help=module.HELP, description=module.HELP)
-        if command not in names or command == name:  # some take long to find out what they offer
+        if command not in names or command == name:  # those of some commands take long to collect
             module.arguments(sub)
             sub.set_defaults(run=module.run)
             loudness = sub.add_mutually_exclusive_group()
@@ -59,7 +59,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
         return int(arguments.run(arguments) or 0)
     except ConvergenceError as error:
-        print("\n".join([f"no convergence: {error}", *_history(error.history), *_notes(error)]), file=sys.stderr)
+        print("\n".join([f"no convergence: {error}", *history_lines(error.history), *_notes(error)]), file=sys.stderr)
         return 2
     except FastcontactError as error:
         print(f"error: {error}", file=sys.stderr)
@@ -72,11 +72,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _notes(error: BaseException) -> list[str]:
-    """Return what a command has to say about an error, as lines."""
+    """Return the notes that a command added to an error, as lines."""
     return [f"  {note}" for note in getattr(error, "__notes__", ())]
 
 
-def _history(history: Sequence[Mapping[str, Any]], shown: int = 10) -> list[str]:
+def history_lines(history: Sequence[Mapping[str, Any]], shown: int = 10) -> list[str]:
     """Return the last iterations of a step that failed as lines: change of the displacement, residual, active set."""
     if not history:
         return []

@@ -1,10 +1,12 @@
-"""Files that a command will write when its work is done, checked before it begins."""
+"""Files that a command writes when its work is done: checked before it begins, and written."""
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from fastcontact.errors import FastcontactError, FileError
 
@@ -14,15 +16,11 @@ def check_outputs(
     files: Iterable[str | os.PathLike[str] | None],
     pictures: Iterable[str | os.PathLike[str] | None] = (),
 ) -> None:
-    """Refuse files that could not be written, or would replace the one to `read`; None is a file that nobody asks for.
+    """Refuse files that could not be written, or would replace the one to `read`; None means no file.
 
-    Raises
-    ------
-    FileError
-        If a folder is missing or write-protected, a path is a folder, the file to read or that of another output,
-        or the suffix of a picture is of no known format.
-    FastcontactError
-        If there is no matplotlib for a picture.
+    Raises FileError if a folder is missing or write-protected, a path is a folder, the file to read or that of another
+    output, or the suffix of a picture is of no known format. Raises FastcontactError if there is no matplotlib for a
+    picture.
     """
     from fastcontact.mesh.files.targets import checked_target
 
@@ -50,3 +48,19 @@ def _check_formats(paths: list[str]) -> None:
     for path in paths:
         if Path(path).suffix[1:].lower() not in known:
             raise FileError(f"'{path}' has a suffix that no kind of picture has: use .png, .svg or .pdf")
+
+
+def write_text(path: str, content: str) -> None:
+    """Write a text file.
+
+    Raises FileError if it cannot be written.
+    """
+    try:
+        Path(path).write_text(content, encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"cannot write '{path}': {error.strerror}") from error
+
+
+def write_json(path: str, numbers: Any, indent: int = 2) -> None:
+    """Write a JSON file; raises like `write_text`."""
+    write_text(path, json.dumps(numbers, indent=indent) + "\n")

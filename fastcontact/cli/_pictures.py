@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from fastcontact.cli._results import curve
+from fastcontact.cli._results import at_equal_force, curve
 from fastcontact.errors import FastcontactError, FileError
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -14,10 +12,7 @@ from fastcontact.results.step import ContactResult, StepResult
 def save(axes: Any, path: str) -> None:
     """Write the figure of `axes` to `path`.
 
-    Raises
-    ------
-    FileError
-        If the file cannot be written or its format is unknown.
+    Raises FileError if the file cannot be written or its format is unknown.
     """
     try:
         axes.figure.savefig(path)
@@ -34,24 +29,20 @@ def profile_picture(case: Any, step: StepResult, path: str, pair: str | None = N
     name = pair or next(iter(step.contact))
     contact = step.contact[name]
     theories = case.theories.get(name, {})
-    theory, others = theories.get("theory"), {}
-    if not curve(theory):
-        theory = None
-    force = float(np.linalg.norm(contact.force)) / theories.get("share", 1.0)
-    if hasattr(theory, "at_force") and force > 0:
-        others["Hertz, equal force"] = theory.at_force(force)
+    theory = theories.get("theory") if curve(theories.get("theory")) else None
+    same = at_equal_force(theory, contact, theories.get("share", 1.0))
     axes = plot.pressure_profile(
         contact,
         theory,
-        other_theories=others,
-        stress=step.stress[contact.points, 1] if contact.normal.shape[1] == 2 else _normal_stress(contact, step),
+        other_theories={} if same is None else {"Hertz, equal force": same},
+        stress=step.stress[contact.points, 1] if contact.normal.shape[1] == 2 else normal_stress(contact, step),
         title=f"{case.title}\nload factor {step.load_factor:g}",
         units=case.units,
     )
     save(axes, path)
 
 
-def _normal_stress(contact: ContactResult, step: StepResult) -> Any:
+def normal_stress(contact: ContactResult, step: StepResult) -> Any:
     """Return the stress (m,) at the contact nodes along the normals that they face [pressure]."""
     xx, yy, zz, xy, yz, xz = step.stress[contact.points].T
     x, y, z = contact.normal.T

@@ -1,37 +1,68 @@
-"""A progress bar on a terminal."""
+"""Progress on a terminal: one line, drawn anew after every load step, run or mesh."""
 
 from __future__ import annotations
 
 import sys
 import time
+from typing import Any
 
 from fastcontact.results.step import StepResult
 
 WIDTH = 30
 
 
-class Progress:
-    """Steps done, active nodes, time left; nothing at all unless `show`."""
+class StatusLine:
+    """A line of `width` characters on standard error; nothing at all unless `show`."""
+
+    def __init__(self, width: int, show: bool) -> None:
+        self._width, self._show = width, show
+        self._started = time.perf_counter()
+
+    def draw(self, text: str) -> None:
+        """Replace the line."""
+        if self._show:
+            sys.stderr.write(f"\r{text:<{self._width}}")
+            sys.stderr.flush()
+
+    def close(self) -> None:
+        """Clear the line."""
+        if self._show:
+            sys.stderr.write("\r" + " " * self._width + "\r")
+            sys.stderr.flush()
+
+
+class Progress(StatusLine):
+    """Load steps of a run: steps done, nodes in contact, time left."""
 
     def __init__(self, total: int, show: bool, done: int = 0) -> None:
-        self._total, self._show, self._before = total, show, done
-        self._started = time.perf_counter()
+        super().__init__(WIDTH + 54, show)
+        self._total, self._before = total, done
 
     def step(self, step: StepResult) -> None:
         """Redraw after a step."""
         if not self._show:
             return
-        done = step.index / self._total
         each = (time.perf_counter() - self._started) / max(step.index - self._before, 1)
-        left = each * (self._total - step.index)
-        bar = "#" * round(WIDTH * done)
+        bar = "#" * round(WIDTH * step.index / self._total)
         closed = sum(int(contact.active.sum()) for contact in step.contact.values())
-        text = f"step {step.index}/{self._total}, {closed} nodes in contact, {left:.0f} s left"
-        sys.stderr.write(f"\r[{bar:<{WIDTH}}] {text:<50}")
-        sys.stderr.flush()
+        left = each * (self._total - step.index)
+        self.draw(f"[{bar:<{WIDTH}}] step {step.index}/{self._total}, {closed} nodes in contact, {left:.0f} s left")
 
-    def close(self) -> None:
-        """Clear the line."""
-        if self._show:
-            sys.stderr.write("\r" + " " * (WIDTH + 54) + "\r")
-            sys.stderr.flush()
+
+class Runs(StatusLine):
+    """Runs of a study: the one that has ended, how many are left, and for how long."""
+
+    def __init__(self, show: bool) -> None:
+        super().__init__(100, show)
+        self._stored = 0
+
+    def __call__(self, progress: Any) -> None:
+        """Redraw after a run; `progress` is a `fastcontact.studies.execute.Progress`."""
+        self._stored += progress.stored
+        solved = progress.done - self._stored
+        outcome = "failed" if progress.error else "found in the store" if progress.stored else "done"
+        left = ""
+        if solved and progress.left:
+            seconds = (time.perf_counter() - self._started) / solved * len(progress.left)
+            left = f", {len(progress.left)} left: about {seconds:.0f} s"
+        self.draw(f"{progress.done}/{progress.total} {progress.label} {outcome}{left}")

@@ -1,10 +1,12 @@
-"""What commands on result files share: the step, the contact pair, the case kept in the file."""
+"""Parts that the commands on result files share: the step, the contact pair, the case kept in the file."""
 
 from __future__ import annotations
 
 import argparse
 import tomllib
 from typing import Any
+
+import numpy as np
 
 from fastcontact.errors import CaseError, unknown
 
@@ -19,10 +21,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def chosen_step(results: Any, number: int) -> Any:
     """Return the step with a number from 1, or the last for -1.
 
-    Raises
-    ------
-    CaseError
-        If there is no such step.
+    Raises CaseError if there is no such step.
     """
     if not len(results):
         raise CaseError(f"'{results.path}' holds no finished step yet")
@@ -36,10 +35,7 @@ def chosen_step(results: Any, number: int) -> Any:
 def chosen_contact(step: Any, name: str | None) -> str:
     """Return the name of a contact pair of a step.
 
-    Raises
-    ------
-    CaseError
-        If there is none, or none of that name.
+    Raises CaseError if there is none, or none of that name.
     """
     if not step.contact:
         raise CaseError("this result holds no contact pair")
@@ -62,6 +58,12 @@ def case_data(results: Any) -> dict[str, Any]:
 def curve(theory: Any) -> bool:
     """Return whether a theory has a pressure that can be drawn over the contact; that of a punch is infinite."""
     return all(hasattr(theory, name) for name in ("pressure", "pressure_max", "radius"))
+
+
+def at_equal_force(theory: Any, contact: Any, share: float) -> Any:
+    """Return a theory at the force of a contact, of which the model holds a `share` [-]; None where there is none."""
+    force = float(np.linalg.norm(contact.force)) / share
+    return theory.at_force(force) if force > 0 and hasattr(theory, "at_force") else None
 
 
 def law(case: dict[str, Any], pair: str) -> Any:

@@ -1,18 +1,17 @@
-"""What the commands that make many runs share: their arguments, progress, and files to write."""
+"""Parts that the commands of studies share: arguments, executors, interruption, files to write."""
 
 from __future__ import annotations
 
 import argparse
 import contextlib
-import json
 import sys
-import time
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from fastcontact.cli._outputs import check_outputs
-from fastcontact.errors import CaseError, FileError
+from fastcontact.cli._outputs import check_outputs, write_json, write_text
+from fastcontact.cli._pictures import save
+from fastcontact.cli._progress import Runs
+from fastcontact.errors import CaseError, FastcontactError
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,13 +32,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def check_targets(options: argparse.Namespace) -> None:
-    """Refuse files that cannot be written, before anything runs.
-
-    Raises
-    ------
-    FileError, FastcontactError
-        See `check_outputs`.
-    """
+    """Refuse files that cannot be written, before anything runs; raises like `check_outputs`."""
     check_outputs(options.case, [options.json, options.csv, options.html], [options.png])
 
 
@@ -48,43 +41,26 @@ def names(text: str | None) -> list[str] | None:
     return [name.strip() for name in text.split(",") if name.strip()] if text else None
 
 
-class Lines:
-    """Progress on a terminal: one line that says what has ended, what is left, and for how long."""
+def finished(options: argparse.Namespace, study: Callable[..., Any]) -> Any:
+    """Return the result of a study, run on the executor of the options with a line of progress.
 
-    def __init__(self, show: bool) -> None:
-        self._show = show
-        self._started = time.perf_counter()
-        self._stored = 0
-
-    def __call__(self, progress: Any) -> None:
-        """Redraw after a run."""
-        self._stored += progress.stored
-        fresh = progress.done - self._stored
-        if not self._show:
-            return
-        outcome = "failed" if progress.error else "found in the store" if progress.stored else "done"
-        left = ""
-        if fresh and progress.left:
-            seconds = (time.perf_counter() - self._started) / fresh * len(progress.left)
-            left = f", {len(progress.left)} left: about {seconds:.0f} s"
-        sys.stderr.write(f"\r{f'{progress.done}/{progress.total} {progress.label} {outcome}{left}':<100}")
-        sys.stderr.flush()
-
-    def close(self) -> None:
-        """Clear the line."""
-        if self._show:
-            sys.stderr.write("\r" + " " * 100 + "\r")
-            sys.stderr.flush()
+    Raises FastcontactError if it is interrupted from the keyboard; the message says how to go on.
+    """
+    progress = Runs(show=sys.stderr.isatty() and not options.quiet)
+    try:
+        with executor(options.executor) as where:
+            return study(executor=where, workers=options.workers, store=options.store, on_progress=progress)
+    except KeyboardInterrupt:
+        raise FastcontactError(stopped(options)) from None
+    finally:
+        progress.close()
 
 
 @contextlib.contextmanager
 def executor(where: str) -> Iterator[Any]:
     """Give an executor to run on, None for processes of this machine, and shut it down at the end.
 
-    Raises
-    ------
-    CaseError
-        If the library for it is not installed, nothing answers at the address, or the word is unknown.
+    Raises CaseError if the library for it is not installed, nothing answers at the address, or the word is unknown.
     """
     if where == "processes":
         yield None
@@ -112,16 +88,16 @@ def executor(where: str) -> Iterator[Any]:
 
 
 def stopped(options: argparse.Namespace) -> str:
-    """Return what to say after an interruption."""
+    """Return the message after an interruption."""
     if options.store:
         return f"stopped; the same command goes on where it stopped, with the runs in {options.store}"
     return "stopped; with --store DIR the same command would go on where it stopped"
 
 
-def write(options: argparse.Namespace, result: Any, save: Callable[[Any, str], None]) -> list[str]:
-    """Write what was asked for and return the paths."""
+def write(options: argparse.Namespace, result: Any) -> list[str]:
+    """Write the files of the options and return their paths."""
     if options.json:
-        text(options.json, json.dumps(result.as_dict(), indent=2) + "\n")
+        write_json(options.json, result.as_dict())
     if options.csv:
         from fastcontact.results.tables import write_csv
 
@@ -129,19 +105,14 @@ def write(options: argparse.Namespace, result: Any, save: Callable[[Any, str], N
     if options.png:
         save(result.figure(), options.png)
     if options.html:
-        text(options.html, result.html())
+        write_text(options.html, result.html())
     return [path for path in (options.json, options.csv, options.png, options.html) if path]
 
 
-def text(path: str, content: str) -> None:
-    """Write a text file.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written.
-    """
-    try:
-        Path(path).write_text(content, encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot write '{path}': {error.strerror}") from error
+def show(options: argparse.Namespace, result: Any, written: Sequence[str], hint: str, failures: Sequence[str]) -> None:
+    """Print why runs failed, the lines of the result, and the files written; without any, a hint how to get one."""
+    for text in failures:
+        print(f"warning: {text}", file=sys.stderr)
+    if not options.quiet:
+        print("\n".join(result.lines()))
+        print(f"wrote {', '.join(written)}" if written else f"nothing written: {hint}")

@@ -1,13 +1,15 @@
-"""``fastcontact bench``: the benchmark suite of the checkout."""
+"""``fastcontact bench``: the benchmark suite of the checkout, ``bench/suite``."""
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import sys
 from pathlib import Path
 from typing import Any
 
+from fastcontact.cli._outputs import write_json
 from fastcontact.errors import FastcontactError, FileError
 
 HELP = "run the benchmarks of the checkout"
@@ -27,14 +29,28 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--tolerance", type=float, metavar="T", help="with --problem: of solver and geometry (1e-8)")
 
 
+def suite(name: str) -> Any:
+    """Import a module of ``bench/suite`` in the checkout.
+
+    Raises FastcontactError if the package is installed without its checkout.
+    """
+    folder = Path(__file__).resolve().parents[2] / "bench"
+    if not (folder / "suite").is_dir():
+        raise FastcontactError(
+            f"the benchmarks need the source checkout, and there is no '{folder}': install it with pip install -e"
+        )
+    if str(folder) not in sys.path:
+        sys.path.append(str(folder))
+    return importlib.import_module(f"suite.{name}")
+
+
 def run(options: argparse.Namespace) -> int:
-    """Run the benchmarks, print the table, write what was asked for."""
+    """Run the benchmarks, print the table, write the files of the options."""
     if any(size < 1 for size in [*(options.sizes or ()), *([] if options.dofs is None else [options.dofs])]):
         raise FastcontactError("--sizes and --dofs must be positive: give about how many unknowns the problem has")
     if options.problem or options.dofs:
         return _contact(options)
-    from fastcontact.studies.benchmark import record, subjects, timing
-
+    subjects, timing, table = map(suite, ("subjects", "timing", "table"))
     before = _stored(options.compare) if options.compare else None
     results: dict[str, Any] = {}
     show = sys.stderr.isatty() and not options.quiet
@@ -47,26 +63,24 @@ def run(options: argparse.Namespace) -> int:
             found = timing.measured(subject, size, 1 if options.smallest else 3)
             results.setdefault(name, []).append(found)
     if not options.quiet:
-        print("\n".join(record.lines(results, before)))
+        print("\n".join(table.lines(results, before)))
     if options.json:
-        _write(options.json, {"environment": record.environment(), "results": results})
+        write_json(options.json, {"environment": table.environment(), "results": results}, indent=1)
     if options.png:
-        _draw(options.png, results)
+        draw(options.png, results)
     return 0
 
 
 def _contact(options: argparse.Namespace) -> int:
     if options.names != ["contact"] or not options.problem or not options.dofs:
         raise FastcontactError("--problem and --dofs go together, with the benchmark 'contact' alone")
-    from fastcontact.studies.benchmark import subjects
-
     given = {"solver": options.linear, "tolerance": options.tolerance}
     chosen = {key: value for key, value in given.items() if value is not None}
-    found = subjects.load("contact").detailed(options.problem, options.dofs, **chosen)
+    found = suite("subjects").load("contact").detailed(options.problem, options.dofs, **chosen)
     if not options.quiet:
         print(json.dumps(found, indent=1))
     if options.json:
-        _write(options.json, found)
+        write_json(options.json, found, indent=1)
     return 0
 
 
@@ -77,20 +91,16 @@ def _stored(path: str) -> Any:
         raise FileError(f"'{path}' is no stored run of the benchmarks ({error}): make one with --json") from error
 
 
-def _write(path: str, content: Any) -> None:
-    try:
-        Path(path).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot write '{path}': {error}") from error
+def draw(path: str, results: dict[str, Any]) -> None:
+    """Draw every benchmark of several sizes into a folder.
 
-
-def _draw(path: str, results: dict[str, Any]) -> None:
-    from fastcontact.studies.benchmark.pictures import scaling
-
+    Raises FileError if a picture cannot be written.
+    """
+    pictures = suite("pictures")
     for name, sizes in results.items():
         if len({entry["n_dofs"] for entry in sizes}) > 1:
             try:
                 Path(path).mkdir(parents=True, exist_ok=True)
-                scaling(name, sizes).savefig(Path(path) / f"{name}.png")
+                pictures.scaling(name, sizes).savefig(Path(path) / f"{name}.png")
             except OSError as error:
                 raise FileError(f"cannot write the picture of '{name}' in '{path}': {error}") from error

@@ -28,7 +28,7 @@ def run(options: argparse.Namespace) -> int:
     if options.output and not options.copy:
         raise FastcontactError("-o says where to copy to: give --copy NAME with it")
     if options.copy:
-        written = _copy(ready_case(options.copy), Path(options.output or f"{options.copy}.toml"))
+        written = copied(ready_case(options.copy), Path(options.output or f"{options.copy}.toml"))
         if not options.quiet:
             print(f"wrote {', '.join(map(str, written))}")
     elif options.name:
@@ -54,7 +54,7 @@ def _lines(path: Path) -> list[str]:
     ]
 
 
-def _copy(case: Path, target: Path) -> list[Path]:
+def copied(case: Path, target: Path) -> list[Path]:
     """Copy a case file, and beside it the mesh file it reads, if any; refuse to overwrite."""
     import tomllib
 

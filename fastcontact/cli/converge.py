@@ -5,12 +5,15 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import sys
+from functools import partial
 from typing import Any
 
 from fastcontact.cli import _study
-from fastcontact.errors import CaseError, FastcontactError
+from fastcontact.cli._progress import StatusLine
+from fastcontact.errors import CaseError
 
 HELP = "mesh-convergence study: orders, limits with error bars, model error told from mesh error"
+HINT = "--html FILE makes a report to send on"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,72 +37,50 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the study, write what was asked for, print tables and sentences."""
-    from fastcontact.cli._pictures import save
-    from fastcontact.studies.study import convergence_study
+    """Run the study, write the files of the options, print tables and sentences; 2 if a run failed."""
+    from fastcontact.studies.convergence import convergence_study
 
     _study.check_targets(options)
     if options.adaptive:
         return _adaptive(options)
-    progress = _study.Lines(show=sys.stderr.isatty() and not options.quiet)
-    try:
-        with _study.executor(options.executor) as executor:
-            study = convergence_study(
-                options.case,
-                options.levels,
-                _study.names(options.elements),
-                _study.names(options.formulations),
-                quantities=_study.names(options.quantities) or (),
-                executor=executor,
-                workers=options.workers,
-                store=options.store,
-                on_progress=progress,
-            )
-    except KeyboardInterrupt:
-        raise FastcontactError(_study.stopped(options)) from None
-    finally:
-        progress.close()
-    written = _study.write(options, study, save)
+    elements, formulations, quantities = map(_study.names, (options.elements, options.formulations, options.quantities))
+    study = _study.finished(
+        options,
+        partial(convergence_study, options.case, options.levels, elements, formulations, quantities=quantities or ()),
+    )
+    written = _study.write(options, study)
     failures = [text for series in study.series for text in series.failed.values()] + list(study.failed.values())
-    for text in failures:
-        print(f"warning: {text}", file=sys.stderr)
-    if not options.quiet:
-        print("\n".join(study.lines()))
-        print(f"wrote {', '.join(written)}" if written else "nothing written: --html FILE makes a report to send on")
+    _study.show(options, study, written, HINT, failures)
     return 2 if failures else 0
 
 
 def _adaptive(options: argparse.Namespace) -> int:
-    """Refine until the quantity is accurate, write what was asked for, print the table; 2 if it is not."""
-    from fastcontact.cli._pictures import save
+    """Refine until the quantity is accurate, write the files of the options, print the table; 2 if it is not."""
     from fastcontact.studies.adaptive import adaptive_study
 
-    element, formulation = (
-        _only(text, name) for text, name in ((options.elements, "element"), (options.formulations, "formulation"))
-    )
-    show = sys.stderr.isatty() and not options.quiet
+    line = StatusLine(80, show=sys.stderr.isatty() and not options.quiet)
 
-    def told(found: Any) -> None:
-        if show:
-            sys.stderr.write(f"\r{found.n_dofs} degrees of freedom, estimated error {found.estimate:.1e}".ljust(80))
-            sys.stderr.flush()
+    def on_round(found: Any) -> None:
+        line.draw(f"{found.n_dofs} degrees of freedom, estimated error {found.estimate:.1e}")
 
     study = adaptive_study(
-        options.case, options.adaptive, options.tolerance, element=element, formulation=formulation,
-        max_dofs=options.max_dofs, on_round=told,
-    )  # fmt: skip
-    if show:
-        sys.stderr.write("\r" + " " * 80 + "\r")
-    written = _study.write(options, study, save)
+        options.case,
+        options.adaptive,
+        options.tolerance,
+        element=_only(options.elements, "element"),
+        formulation=_only(options.formulations, "formulation"),
+        max_dofs=options.max_dofs,
+        on_round=on_round,
+    )
+    line.close()
+    written = _study.write(options, study)
     if options.output:
         from fastcontact.results.writer import ResultWriter
 
         with ResultWriter(options.output, study.case.model, case_text=study.text, cell_fields=("error",)) as out:
             out.write(dataclasses.replace(study.last, cell_fields={"error": study.error.cells}))
         written.append(options.output)
-    if not options.quiet:
-        print("\n".join(study.lines()))
-        print(f"wrote {', '.join(written)}" if written else "nothing written: --html FILE makes a report to send on")
+    _study.show(options, study, written, HINT, ())
     return 0 if study.reached else 2
 
 

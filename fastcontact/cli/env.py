@@ -35,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
     if options.warmup:
         started = time.perf_counter()
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FastcontactWarning)  # nobody looks at the results
+            warnings.simplefilter("ignore", FastcontactWarning)  # the results are not used
             _warm_up()
         print(f"{'warm-up':<12} {time.perf_counter() - started:.1f} s")
     return 0

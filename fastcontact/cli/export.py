@@ -17,7 +17,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write what was asked for."""
+    """Write the files of the options."""
     if not (options.med or options.xdmf):
         raise CaseError("nothing to export: give --med FILE or --xdmf FILE")
     if options.med:

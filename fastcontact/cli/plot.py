@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-import numpy as np
-
 from fastcontact.cli import _results
+from fastcontact.cli._pictures import save
 from fastcontact.errors import CaseError
 
 HELP = "plot the deformed mesh with its von Mises stress, or force and radius over the load"
@@ -30,7 +29,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the picture, or show the window."""
-    from fastcontact.cli._pictures import save
     from fastcontact.results import plot
     from fastcontact.results.reader import open_results
 
@@ -76,8 +74,8 @@ def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict
     theory = case["theories"].get(name)
     theory = getattr(theory, "hertz", theory)
     curves = {"theory, equal approach": theory} if hasattr(theory, "stress_on_axis") else {}
-    force = float(np.linalg.norm(step.contact[name].force)) / case["shares"].get(name, 1.0)
-    if curves and hasattr(theory, "at_force") and force > 0:
-        curves["theory, equal force"] = theory.at_force(force)
+    same = _results.at_equal_force(theory, step.contact[name], case["shares"].get(name, 1.0))
+    if curves and same is not None:
+        curves["theory, equal force"] = same
     title = f"{case['title']}\nstresses on the axis, load factor {step.load_factor:g}".strip()
     return plot.axis_stress(results.mesh, step, name, curves, title=title, units=case["units"])

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from fastcontact.cli import _results
+from fastcontact.cli._pictures import save
+from fastcontact.cli._results import at_equal_force
 
 HELP = "pressure along the contact line against theory: CSV, XMGRACE .agr, PNG"
 
@@ -21,7 +23,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write what was asked for; print the table if nothing was."""
+    """Write the files of the options, or print the table if there are none."""
     from fastcontact.results.reader import open_results
     from fastcontact.results.tables import contact_table, with_theory, write_csv
 
@@ -52,11 +54,8 @@ def _theories(case: dict[str, Any], name: str, contact: Any) -> dict[str, Any]:
     theory = case["theories"].get(name)
     if not _results.curve(theory):
         return {}
-    force = float(np.linalg.norm(contact.force)) / case["shares"][name]
-    found = {"Hertz equal approach": theory}
-    if force > 0 and hasattr(theory, "at_force"):
-        found["Hertz equal force"] = theory.at_force(force)
-    return found
+    found = {"Hertz equal approach": theory, "Hertz equal force": at_equal_force(theory, contact, case["shares"][name])}
+    return {label: theory for label, theory in found.items() if theory is not None}
 
 
 def _print(table: Any) -> None:
@@ -86,7 +85,6 @@ def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theorie
 
 
 def _write_png(path: str, case: dict[str, Any], contact: Any, step: Any, theories: dict[str, Any]) -> None:
-    from fastcontact.cli._pictures import save
     from fastcontact.results import plot
 
     named = {label.replace("Hertz ", "Hertz, "): theory for label, theory in theories.items()}

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 import os
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from fastcontact.cli._outputs import check_outputs
+from fastcontact.cli._outputs import check_outputs, write_json
+from fastcontact.cli._pictures import profile_picture
 from fastcontact.cli._progress import Progress
-from fastcontact.cli._warnings import told
-from fastcontact.errors import ConvergenceError, FileError, ModelError
+from fastcontact.cli._warnings import shown
+from fastcontact.errors import CaseError, ConvergenceError, ModelError
+
+if TYPE_CHECKING:
+    from fastcontact.cases.case import Case
 
 HELP = "solve a case file and write the results of all steps"
 # Cell field of the estimated error.
@@ -39,11 +42,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Solve, write, print the summary."""
-    from fastcontact.analysis.restart import remaining
-    from fastcontact.analysis.run import solve_steps
     from fastcontact.cases import summary
     from fastcontact.cases.case import read_case
-    from fastcontact.results.writer import ResultWriter
 
     started = time.perf_counter()
     if options.threads is not None:
@@ -52,45 +52,15 @@ def run(options: argparse.Namespace) -> int:
     output = Path(options.output or f"{case.name}.vtkhdf")
     check_outputs(options.case, [output, options.json], [options.plot])
     read = time.perf_counter()
-    case.model.check(case.ramp)  # a wrong one must not replace the file of a right one
-    with told() as caught:
-        fields = (ERROR,) if options.estimate_error else ()
-        with ResultWriter(output, case.model, case_text=case.text, cell_fields=fields, resume=options.resume) as writer:
-            done = writer.done
-            _check_same(case, done, output)
-            last, steps = done[-1] if done else None, [summary.of_step(step) for step in done]
-            total = len(done) + len(remaining(case.ramp, last))
-            progress = Progress(total, show=sys.stderr.isatty() and not options.quiet, done=len(done))
-            try:
-                for last in solve_steps(
-                    case.model,
-                    case.ramp,
-                    linear_solver=options.linear or case.linear_solver,
-                    linear_tolerance=case.linear_tolerance,
-                    criteria=case.criteria,
-                    resume=done,
-                ):
-                    writer.write(_estimated(case.model, last) if fields else last)
-                    progress.step(last)
-                    steps.append(summary.of_step(last))
-            except (ConvergenceError, KeyboardInterrupt) as error:
-                error.add_note(_kept(output, writer.n_steps))
-                if options.json:  # in place of the summary of an earlier run
-                    reason = str(error) or "interrupted from the keyboard"
-                    _write_json(options.json, {"failed": reason, "complete_steps": writer.n_steps})
-                raise
-            finally:
-                progress.close()
+    case.model.check(case.ramp)  # a wrong model must not replace the results of a right one
+    with shown() as caught:
+        done, last, steps = _solved(options, case, output)
     texts = list(dict.fromkeys([*(text for step in done for text in step.warnings), *caught]))
-    solved = time.perf_counter()
-    assert last is not None  # a ramp without instants is refused
-    timings = {"read": read - started, "solve": solved - read, "cpu": time.process_time()}
+    timings = {"read": read - started, "solve": time.perf_counter() - read, "cpu": time.process_time()}
     numbers = summary.summarise(case, last, steps, timings, texts)
     if options.json:
-        _write_json(options.json, numbers)
+        write_json(options.json, numbers)
     if options.plot:
-        from fastcontact.cli._pictures import profile_picture
-
         profile_picture(case, last, options.plot)
     for text in texts:
         if text not in caught:  # of the steps that were there already
@@ -99,6 +69,43 @@ def run(options: argparse.Namespace) -> int:
         print("\n".join(summary.lines(numbers)))
         print("  " + _written(output, len(done), len(steps), [path for path in (options.json, options.plot) if path]))
     return 0
+
+
+def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[list[Any], Any, list[dict[str, Any]]]:
+    """Write all steps; return those that were there before, the last one, and the summaries of all."""
+    from fastcontact.analysis.restart import remaining
+    from fastcontact.analysis.run import solve_steps
+    from fastcontact.cases.summary import of_step
+    from fastcontact.results.writer import ResultWriter
+
+    fields = (ERROR,) if options.estimate_error else ()
+    with ResultWriter(output, case.model, case_text=case.text, cell_fields=fields, resume=options.resume) as writer:
+        done = writer.done
+        _check_same(case, done, output)
+        last, steps = done[-1] if done else None, [of_step(step) for step in done]
+        total = len(done) + len(remaining(case.ramp, last))
+        progress = Progress(total, show=sys.stderr.isatty() and not options.quiet, done=len(done))
+        try:
+            for last in solve_steps(
+                case.model,
+                case.ramp,
+                linear_solver=options.linear or case.linear_solver,
+                linear_tolerance=case.linear_tolerance,
+                criteria=case.criteria,
+                resume=done,
+            ):
+                writer.write(_estimated(case.model, last) if fields else last)
+                progress.step(last)
+                steps.append(of_step(last))
+        except (ConvergenceError, KeyboardInterrupt) as error:
+            error.add_note(_kept(output, writer.n_steps))
+            if options.json:  # in place of the summary of an earlier run
+                reason = str(error) or "interrupted from the keyboard"
+                write_json(options.json, {"failed": reason, "complete_steps": writer.n_steps})
+            raise
+        finally:
+            progress.close()
+    return done, last, steps
 
 
 def _check_same(case: Any, done: list[Any], output: Path) -> None:
@@ -113,7 +120,7 @@ def _check_same(case: Any, done: list[Any], output: Path) -> None:
 
 
 def _kept(output: Path, steps: int) -> str:
-    """Return what a run that stops leaves."""
+    """Return which steps the result file of a stopped run holds."""
     if not steps:
         return f"'{output}' holds no complete step"
     many = "one complete step" if steps == 1 else f"all {steps} complete steps"
@@ -121,7 +128,7 @@ def _kept(output: Path, steps: int) -> str:
 
 
 def _written(output: Path, done: int, total: int, others: list[str]) -> str:
-    """Return what was written, and how much of it was there before."""
+    """Return the names of the files written, and how many steps were there before."""
     if done == total:
         nothing = f"{output} was complete with {total} steps, nothing was left to solve"
         return "; wrote ".join([nothing, ", ".join(others)] if others else [nothing])
@@ -137,17 +144,8 @@ def _estimated(model: Any, step: Any) -> Any:
 
 def _set_threads(count: int) -> None:
     from fastcontact._jit import decorators as _jit
-    from fastcontact.errors import CaseError
 
     limit = os.cpu_count() or 1
     if not 1 <= count <= limit:
         raise CaseError(f"--threads {count} must lie between 1 and {limit}, the number of processors")
     _jit.set_threads(count)
-
-
-def _write_json(path: str, numbers: dict[str, Any]) -> None:
-    text = json.dumps(numbers, indent=2)
-    try:
-        Path(path).write_text(text + "\n", encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot write '{path}': {error.strerror}") from error

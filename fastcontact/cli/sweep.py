@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import sys
+from functools import partial
 from typing import Any
 
+import numpy as np
+
 from fastcontact.cli import _study
-from fastcontact.errors import CaseError, FastcontactError
+from fastcontact.errors import CaseError
 
 HELP = "solve a case for many values of its parameters, held against theory"
 
@@ -30,52 +32,34 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the sweep, write what was asked for, print the table."""
-    from fastcontact.cli._pictures import save
+    """Run the sweep, write the files of the options, print the table; 2 if a run failed."""
     from fastcontact.studies.sweep import parameter_sweep
 
     _study.check_targets(options)
-    wanted = dict(_values(text) for text in options.set)
-    progress = _study.Lines(show=sys.stderr.isatty() and not options.quiet)
-    try:
-        with _study.executor(options.executor) as executor:
-            sweep = parameter_sweep(
-                options.case,
-                wanted,
-                element=options.element,
-                formulation=options.formulation.replace("-", "_") if options.formulation else None,
-                level=options.level,
-                executor=executor,
-                workers=options.workers,
-                store=options.store,
-                on_progress=progress,
-            )
-    except KeyboardInterrupt:
-        raise FastcontactError(_study.stopped(options)) from None
-    finally:
-        progress.close()
-    written = _study.write(options, sweep, save)
-    for _, text in sweep.failed:
-        print(f"warning: {text}", file=sys.stderr)
-    if not options.quiet:
-        print("\n".join(sweep.lines()))
-        print(f"wrote {', '.join(written)}" if written else "nothing written: --png FILE makes a picture")
-    return 2 if sweep.failed else 0
+    wanted = dict(values(text) for text in options.set)
+    formulation = options.formulation.replace("-", "_") if options.formulation else None
+    given = {"element": options.element, "formulation": formulation, "level": options.level}
+    sweep = _study.finished(options, partial(parameter_sweep, options.case, wanted, **given))
+    written = _study.write(options, sweep)
+    failures = [text for _, text in sweep.failed]
+    _study.show(options, sweep, written, "--png FILE makes a picture", failures)
+    return 2 if failures else 0
 
 
-def _values(text: str) -> tuple[str, list[Any]]:
-    """Return a parameter and its values from ``NAME=VALUES``."""
-    name, equals, values = text.partition("=")
-    if not (name and equals and values):
+def values(text: str) -> tuple[str, list[Any]]:
+    """Return a parameter and its values from ``NAME=VALUES``.
+
+    Raises CaseError if the text is of another form.
+    """
+    name, equals, listed = text.partition("=")
+    if not (name and equals and listed):
         raise CaseError(f"--set '{text}' must be NAME=VALUES, for example approach=0.04,0.4,4")
-    if ":" in values:
-        return name.strip(), _range(text, values.split(":"))
-    return name.strip(), [_value(entry.strip()) for entry in values.split(",") if entry.strip()]
+    if ":" in listed:
+        return name.strip(), _range(text, listed.split(":"))
+    return name.strip(), [_value(entry.strip()) for entry in listed.split(",") if entry.strip()]
 
 
 def _range(text: str, parts: list[str]) -> list[float]:
-    import numpy as np
-
     logarithmic = parts[-1] == "log"
     try:
         first, last, count = float(parts[0]), float(parts[1]), int(parts[2])

@@ -1,1 +1,1 @@
-"""Studies of many runs: mesh convergence with model error told from mesh error, and parameter sweeps."""
+"""Studies: mesh convergence, adaptive meshes, parameter sweeps, and the error of one solution."""

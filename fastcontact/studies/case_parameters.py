@@ -15,33 +15,21 @@ _LAW = re.compile(rf"\s*(?:({_NUMBER})\s*\*\s*)?value(?:\s*\^\s*({_NUMBER}))?\s*
 
 
 def substituted(data: Mapping[str, Any], parameter: str, value: Any, linked: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a copy of the data with a parameter set.
+    """Return a copy of a parsed case file with a parameter set: a path, or a name of `linked`.
 
-    Parameters
-    ----------
-    data : mapping
-        A parsed case file.
-    parameter : str
-        A path, or a name of `linked`.
-    value : float, int, str or bool
-    linked : mapping of str to mapping
-        Names that stand for several paths, each set to a law ``"a*value^p"`` of the value: ``[study.parameters]``.
-
-    Raises
-    ------
-    CaseError
-        If there is no such place or name, or a law is wrong.
+    `linked` is ``[study.parameters]``: names that stand for several paths, each set to a law ``"a*value^p"`` of the value.
+    Raises CaseError if there is no such place or name, or a law is wrong.
     """
     found: dict[str, Any] = copy.deepcopy(dict(data))
     if parameter not in linked:
         _set(found, parameter, value, [*linked, *found])
         return found
     for path, law in linked[parameter].items():
-        _set(found, path, _by_law(law, value, f"study.parameters.{parameter}.'{path}'"), found)
+        _set(found, path, by_law(law, value, f"study.parameters.{parameter}.'{path}'"), found)
     return found
 
 
-def _by_law(law: Any, value: Any, where: str) -> Any:
+def by_law(law: Any, value: Any, where: str) -> Any:
     """Return ``a value^p``."""
     match = _LAW.match(law) if isinstance(law, str) else None
     if match is None:

@@ -1,8 +1,8 @@
 """Estimate of a solution's error, cell by cell: smoothed stress, and balance at the contact surface.
 
-The smoothed stress is closer to the truth than the stress of the solution, so their difference tells the error
-(Zienkiewicz and Zhu, 1987). What it does not see is that the smoothed stress and the contact pressure disagree on the
-contact surface; that residual is added as in residual estimates (e.g. Wriggers and Scherf, 1998).
+The smoothed stress is more exact than the stress of the solution, so that their difference estimates the error
+(Zienkiewicz and Zhu, 1987). It does not contain the difference between smoothed stress and contact pressure on the contact
+surface, which is added as in residual estimates (e.g. Wriggers and Scherf, 1998).
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.surface import surface
-from fastcontact.elasticity import element_kernels
-from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
+from fastcontact.elasticity.energy import elastic_energy
 from fastcontact.elasticity.smoothed_stress import smoothed_stress
 from fastcontact.mesh import elements
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.studies.error_norms import stress_in_cells
 
 Array = NDArray[np.float64]
 
@@ -32,11 +32,11 @@ class ErrorEstimate:
     Attributes
     ----------
     cells : ndarray (n_solids,)
-        Error of every solid cell, in the order of ``mesh.solids``.
+        Error of every solid cell, in the order of ``mesh.solids`` [(force length)^(1/2)].
     contact : ndarray (n_solids,)
-        The part that stems from the contact surface.
+        The part of the contact surface in it [(force length)^(1/2)].
     energy : float
-        Energy norm of the solution.
+        Energy norm of the solution [(force length)^(1/2)].
     """
 
     cells: Array
@@ -50,7 +50,7 @@ class ErrorEstimate:
 
     @property
     def relative(self) -> float:
-        """Error of the whole solution over its energy norm [1]."""
+        """Error of the whole solution over its energy norm [-]."""
         return self.total / math.hypot(self.energy, self.total) if self.total else 0.0
 
 
@@ -61,6 +61,10 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     ----------
     model : Model
     step : StepResult
+
+    Returns
+    -------
+    ErrorEstimate
 
     Examples
     --------
@@ -79,7 +83,7 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     smooth = smoothed_stress(model.mesh, model.kinematics, moduli, material, step.displacement)
     squares, energy = [], 0.0
     for name in model.mesh.solids:
-        own, whole = _differences(model, step, name, smooth[name], moduli, material[name])
+        own, whole = _differences(model, step.displacement, name, smooth[name])
         squares.append(own)
         energy += whole
     contact = np.zeros(sum(map(len, squares)))
@@ -88,21 +92,9 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     return ErrorEstimate(np.sqrt(np.concatenate(squares) + contact), np.sqrt(contact), math.sqrt(energy))
 
 
-def _differences(
-    model: Model, step: StepResult, name: str, smooth: Array, moduli: Array, material: NDArray[np.int32]
-) -> tuple[Array, float]:
+def _differences(model: Model, displacement: Array, name: str, smooth: Array) -> tuple[Array, float]:
     """Return the squared energy norms (n_cells,) of smoothed minus own stress, and that of the own stress in all."""
-    element, mesh = elements.get(name), model.mesh
-    xi, weights = integration_rule(element, element.order + 1)
-    N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
-    cells = mesh.cells[name]
-    stress = np.empty((len(cells), len(weights), moduli.shape[1]))
-    axisymmetric = model.kinematics == "axisymmetric"
-    element_kernels.loops(mesh.dim).stress(
-        mesh.points, cells, N, dN, moduli, material, axisymmetric, step.displacement, stress
-    )
-    volume = cell_volumes(mesh.points[cells], N, dN, axisymmetric) * weights
-    elastic = np.array([(own.E, own.nu) for own, _ in model.materials])[material].T[:, :, None]
+    N, stress, volume, elastic = stress_in_cells(model, name, slice(None), displacement, elements.get(name).order + 1)
     off = np.einsum("qa,cai->cqi", N, smooth) - stress
     squares = (elastic_energy(off, *elastic) * volume).sum(axis=1)
     return squares, float((elastic_energy(stress, *elastic) * volume).sum())

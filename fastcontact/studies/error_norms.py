@@ -1,7 +1,7 @@
-"""How far a finite-element solution is from a theory: the energy of the error and its mean square, by quadrature.
+"""Norms of the difference between a finite-element solution and a theory, by quadrature: energy and mean square.
 
-For convergence studies against exact solutions such as `analytic.hertz_box`: nodal errors hide what happens between the
-nodes and often converge faster than the solution does.
+For convergence studies against exact solutions such as `analytic.hertz_box`. Errors at the nodes alone often converge faster
+than the solution between them.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ class Theory(Protocol):
     """An exact solution in the whole body."""
 
     def displacement(self, points: Array) -> Array:
-        """Return the displacements (n, dim) at `points` (n, dim) [length]."""
+        """Return the displacements (n, dim) [length] at `points` (n, dim) [length]."""
         ...
 
     def stress(self, points: Array) -> Array:
-        """Return the stresses (n, 4), in three dimensions (n, 6), at `points`, ordered as in results [pressure]."""
+        """Return the stresses (n, 4), in 3D (n, 6) [pressure], at `points` (n, dim) [length], ordered as in results."""
         ...
 
 
@@ -61,12 +61,12 @@ class ErrorNorms:
 
     @property
     def relative_energy(self) -> float:
-        """Energy norm of the error over that of the theory [1]."""
+        """Energy norm of the error over that of the theory [-]."""
         return self.energy / self.energy_of_theory
 
     @property
     def relative_displacement(self) -> float:
-        """L2 norm of the error of displacements over that of the theory [1]."""
+        """L2 norm of the error of displacements over that of the theory [-]."""
         return self.displacement / self.displacement_of_theory
 
 
@@ -144,23 +144,33 @@ def _portions(rows: NDArray[np.intp], element: Element, n_points: int | None) ->
     return (rows[first : first + at_once] for first in range(0, len(rows), at_once))
 
 
-def _squares(theory: Theory, model: Model, u: Array, name: str, rows: NDArray[np.intp], n_points: int | None) -> Array:
-    """Return the squares of the four norms over some cells, in the order of `ErrorNorms`."""
-    mesh, element = model.mesh, elements.get(name)
+def stress_in_cells(
+    model: Model, name: str, rows: NDArray[np.intp] | slice, displacement: Array, n_points: int | None
+) -> tuple[Array, Array, Array, Array]:
+    """Return shape functions, stresses, volumes and elastic constants at the quadrature points of some cells of a kind.
+
+    Shape functions (n_q, n_nodes) [-]; stresses (n_cells, n_q, n_components) [pressure]; volumes (n_cells, n_q) [length^dim];
+    moduli and Poisson's ratios (2, n_cells, 1) [pressure], [-]. `displacement` is (n_points, dim) [length].
+    """
+    mesh, element, axisymmetric = model.mesh, elements.get(name), model.kinematics == "axisymmetric"
     xi, weights = integration_rule(element, n_points)
-    N, dN = element.shape(xi), element.gradient(xi)
-    cells = mesh.cells[name][rows]
-    corners = mesh.points[cells]
-    places = np.einsum("qa,cad->cqd", N, corners)
-    volume = cell_volumes(mesh.points[cells], N, dN, model.kinematics == "axisymmetric") * weights
-    exact_u, exact = _exact(theory, places, 4 if mesh.dim == 2 else 6)
-    moduli, material = model.material_numbers()
-    stress = np.empty(exact.shape)
+    N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
+    cells, (moduli, material) = mesh.cells[name][rows], model.material_numbers()
+    numbers = material[name][rows]
+    stress = np.empty((len(cells), len(weights), moduli.shape[1]))
     element_kernels.loops(mesh.dim).stress(
-        mesh.points, cells, np.ascontiguousarray(N), np.ascontiguousarray(dN), moduli, material[name][rows],
-        model.kinematics == "axisymmetric", u, stress,
-    )  # fmt: skip
-    elastic = np.array([(own.E, own.nu) for own, _ in model.materials])[material[name][rows]].T[:, :, None]
+        mesh.points, cells, N, dN, moduli, numbers, axisymmetric, displacement, stress
+    )
+    elastic = np.array([(own.E, own.nu) for own, _ in model.materials])[numbers].T[:, :, None]
+    return N, stress, cell_volumes(mesh.points[cells], N, dN, axisymmetric) * weights, elastic
+
+
+def _squares(theory: Theory, model: Model, u: Array, name: str, rows: NDArray[np.intp], n_points: int | None) -> Array:
+    """Return the squares (4,) of the norms over some cells, in the order of `ErrorNorms`."""
+    N, stress, volume, elastic = stress_in_cells(model, name, rows, u, n_points)
+    cells = model.mesh.cells[name][rows]
+    places = np.einsum("qa,cad->cqd", N, model.mesh.points[cells])
+    exact_u, exact = _exact(theory, places, stress.shape[2])
     error_u = np.einsum("qa,cad->cqd", N, u[cells]) - exact_u
     densities = (
         elastic_energy(stress - exact, *elastic), (error_u**2).sum(axis=-1),

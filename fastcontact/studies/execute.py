@@ -1,4 +1,4 @@
-"""Many independent runs on any executor, results kept as they come."""
+"""How runs are spread over processes: of this machine, or of any executor; finished runs are kept as they come."""
 
 from __future__ import annotations
 
@@ -9,20 +9,22 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+from fastcontact import errors
 from fastcontact.errors import CaseError, FastcontactError
 from fastcontact.studies.job import Job, run
 from fastcontact.studies.store import Store
 
 Result = dict[str, Any]
-# Read when numpy and numba load, so they must stand before a worker does.
+# NumPy and Numba read these when they are imported, so they are set before a worker process starts.
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 @dataclass(frozen=True)
 class Progress:
-    """What `on_progress` is told after every run.
+    """Argument of `on_progress`, which is called after every run.
 
     Attributes
     ----------
@@ -33,7 +35,7 @@ class Progress:
     left : tuple of str
         Labels of the runs still to come.
     seconds : float
-        Time the run took; 0 if it was found in the store.
+        Time the run took [s]; 0 if it was found in the store.
     error : str
         Why it failed; empty if it did not.
     stored : bool
@@ -54,7 +56,7 @@ def run_all(
     *,
     executor: Executor | None = None,
     workers: int | None = None,
-    store: Store | None = None,
+    store: str | Path | None = None,
     on_progress: Callable[[Progress], None] | None = None,
 ) -> list[Result]:
     """Run jobs side by side and return their results in the order of the jobs.
@@ -68,8 +70,8 @@ def run_all(
     workers : int, optional
         Processes where no executor is given, by default as many as there are processors for this process; 1 runs
         everything in this process.
-    store : Store, optional
-        Finished runs found there are not run again; new ones are added.
+    store : path-like, optional
+        Folder of finished runs: those found there are not run again; new ones are added.
     on_progress : callable, optional
         Called with a `Progress` after every run.
 
@@ -80,29 +82,32 @@ def run_all(
     FastcontactError
         If no worker process can start.
     """
-    results: list[Result | None] = [None] * len(jobs)
+    kept = None if store is None else Store(store)
+    results: list[Result | None] = [None if kept is None else kept.get(job) for job in jobs]
+    stored = [index for index, result in enumerate(results) if result is not None]
     waiting = {index: job.label for index, job in enumerate(jobs)}
 
-    def ended(index: int, result: Result, stored: bool = False) -> None:
+    def ended(index: int, result: Result, seconds: float, found: bool) -> None:
         results[index] = result
-        waiting.pop(index)
-        if store is not None and not stored and "error" not in result:
-            store.put(jobs[index], result)
+        label = waiting.pop(index)
         if on_progress is not None:
-            seconds = 0.0 if stored else float(result.get("seconds", 0.0))
-            told = Progress(
-                jobs[index].label, len(jobs) - len(waiting), len(jobs), tuple(waiting.values()), seconds,
-                str(result.get("error", "")), stored,
-            )  # fmt: skip
-            on_progress(told)
+            done, left, error = len(jobs) - len(waiting), tuple(waiting.values()), str(result.get("error", ""))
+            on_progress(Progress(label, done, len(jobs), left, seconds, error, found))
 
-    for index, job in enumerate(jobs):
-        kept = store.get(job) if store is not None else None
-        if kept is not None:
-            ended(index, kept, stored=True)
+    for index in stored:
+        ended(index, results[index] or {}, 0.0, True)
     for index, result in _run_rest(jobs, list(waiting), executor, workers):
-        ended(index, result)
+        if kept is not None and "error" not in result:
+            kept.put(jobs[index], result)
+        ended(index, result, float(result.get("seconds", 0.0)), False)
     return [result for result in results if result is not None]
+
+
+def raise_first(what: str, jobs: Sequence[Job], results: Sequence[Result]) -> None:
+    """Raise the error of the first run if all runs failed; `what` begins the message."""
+    if all("error" in result for result in results):
+        kind = getattr(errors, str(results[0].get("kind")), CaseError)
+        raise kind(f"{what}; {jobs[0].label}: {results[0]['error']}")
 
 
 def _run_rest(
@@ -112,20 +117,20 @@ def _run_rest(
         raise CaseError(f"workers = {workers} must be at least 1, the number of processes")
     count = min(workers or _processors(), len(rest))
     if executor is not None:
-        yield from _on_executor(executor, jobs, rest)
+        yield from on_executor(executor, jobs, rest)
     elif count <= 1:
         for index in rest:
             yield index, run(jobs[index])
     else:
-        yield from _on_processes(count, jobs, rest)
+        yield from on_processes(count, jobs, rest)
 
 
-def _on_processes(count: int, jobs: Sequence[Job], rest: list[int]) -> Iterator[tuple[int, Result]]:
-    """Run on processes of this machine; a run that kills its worker is tried once more alone, then reported."""
+def on_processes(count: int, jobs: Sequence[Job], rest: list[int]) -> Iterator[tuple[int, Result]]:
+    """Run on `count` processes of this machine; a run that kills its worker is tried once more alone, then reported."""
     left = list(rest)
-    pool = _pool(count)
+    pool = started_pool(count)
     try:
-        for index, result in _on_executor(pool, jobs, rest):
+        for index, result in on_executor(pool, jobs, rest):
             left.remove(index)
             yield index, result
     except BrokenProcessPool:
@@ -135,8 +140,11 @@ def _on_processes(count: int, jobs: Sequence[Job], rest: list[int]) -> Iterator[
         pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _pool(count: int) -> ProcessPoolExecutor:
-    """Start workers that are known to live."""
+def started_pool(count: int) -> ProcessPoolExecutor:
+    """Return a pool of processes of which one has answered.
+
+    Raises FastcontactError if none can start.
+    """
     # Forked children of a process with OpenMP threads die, so workers are spawned.
     pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"))
     try:
@@ -151,7 +159,7 @@ def _pool(count: int) -> ProcessPoolExecutor:
 
 
 def _alone(job: Job) -> Result:
-    pool = _pool(1)
+    pool = started_pool(1)
     try:
         return pool.submit(run, job, 1).result()
     except BrokenProcessPool:
@@ -168,7 +176,8 @@ def _processors() -> int:
     return os.cpu_count() or 1
 
 
-def _on_executor(executor: Executor, jobs: Sequence[Job], rest: list[int]) -> Iterator[tuple[int, Result]]:
+def on_executor(executor: Executor, jobs: Sequence[Job], rest: list[int]) -> Iterator[tuple[int, Result]]:
+    """Run on any executor and yield number and result of each job as it ends; cancel the others if one raises."""
     futures: dict[Future[Result], int] = {}
     try:
         with _environment(_ONE_THREAD, "1"):
@@ -185,7 +194,7 @@ def _on_executor(executor: Executor, jobs: Sequence[Job], rest: list[int]) -> It
 
 @contextlib.contextmanager
 def _environment(names: Sequence[str], value: str) -> Iterator[None]:
-    """Set environment variables for processes started meanwhile, and put them back."""
+    """Set environment variables for processes started inside the block, and put them back."""
     before = {name: os.environ.get(name) for name in names}
     os.environ.update(dict.fromkeys(names, value))
     try:

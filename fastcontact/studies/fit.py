@@ -1,4 +1,4 @@
-r"""Order of convergence and limit of a quantity over a family of meshes, with error bars.
+r"""The fitted limit of a quantity over a family of meshes, and its order of convergence, with error bars.
 
 The values are taken to be
 
@@ -9,10 +9,10 @@ contact edge sits at another fraction of an element on every mesh. Steps from on
 orders, and three meshes solved for three unknowns (Richardson 1911; Roache 1998) a limit without an error bar. Here L, C
 and s are integrated out for every order p (Bayesian linear regression with weights :math:`h^{-2p}`; Zellner 1971, chapter
 3), and the orders are averaged with their evidence. The prior of p is log-normal about 1.6, with 95 % between 0.8 and
-3.2; that of s^2 weighs as much as one and a half meshes and stands at s = 0.2, so that few meshes that happen to agree
-are not believed blindly. Meshes too coarse for one power of h are allowed for: the first k meshes may be off by ten
-times s, with a prior probability of 1/2 for each further k, as long as three meshes are left. The error bar is half of
-the 95 % interval of L, the greater half if they differ.
+3.2; that of s^2 weighs as much as one and a half meshes and is centred at s = 0.2, so that a chance agreement of few
+meshes does not make the error bar too small. Meshes too coarse for one power of h are allowed for: the first k meshes
+may be off by ten times s, with a prior probability of 1/2 for each further k, as long as three meshes are left. The
+error bar is half of the 95 % interval of L, the greater half if they differ.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ ROUND_OFF = 1e-12
 
 @dataclass(frozen=True)
 class Limit:
-    """What a quantity tends to as the mesh is refined.
+    """The limit of a quantity as the mesh is refined.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Limit:
     order, order_uncertainty : float
         Fitted order of convergence in h, and its standard deviation; NaN if the values do not change.
     n_levels : int
-        Number of meshes it rests on.
+        Number of meshes that were fitted.
     converging : bool
         Whether the last change is smaller than some change before; if not, there may be no limit.
     """
@@ -67,14 +67,18 @@ class Limit:
 
 
 def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
-    """Fit limit and order of convergence; see the module for the model.
+    """Fit limit and order of convergence, by the model in the header of the module.
 
     Parameters
     ----------
     h : array_like (n,)
         Mesh sizes, all different, n >= 3 [length].
     values : array_like (n,)
-        The quantity on each mesh; meshes where it is not finite are left out.
+        The quantity on each mesh, in its own unit; meshes where it is not finite are left out.
+
+    Returns
+    -------
+    Limit
 
     Raises
     ------
@@ -164,7 +168,10 @@ def _quantiles(centre: Array, width: Array, weight: Array, dof: float) -> list[f
 
 
 def step_orders(h: Sequence[float], values: Sequence[float], limit: float) -> list[float]:
-    """Return the order from each mesh to the next (n,), the first NaN; erratic by nature, see the module."""
+    """Return the order from each mesh to the next (n,) [-], the first NaN; see the header: it is erratic.
+
+    `h` (n,) are mesh sizes [length], `values` (n,) and `limit` are in the unit of the quantity.
+    """
     error = np.abs(np.asarray(values, np.float64) - limit)
     with np.errstate(divide="ignore", invalid="ignore"):
         steps = np.log(error[:-1] / error[1:]) / np.log(np.asarray(h[:-1]) / np.asarray(h[1:]))

@@ -1,4 +1,4 @@
-"""One run of a study or a sweep: plain data in, plain data out, so that any process anywhere can do it."""
+"""One run of a study: plain data in, plain data out, so that any process on any machine can do it."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._jit import decorators as _jit
 from fastcontact._version import __version__
 from fastcontact.analysis.run import solve_steps
 from fastcontact.cases.case import Case, build_case
@@ -22,46 +23,27 @@ from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import FastcontactError, FastcontactWarning
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.pair_options import SHARED_OPTIONS
+from fastcontact.results.step import StepResult
 from fastcontact.studies import quantities
 from fastcontact.studies.levels import Recipe, make_mesh
 from fastcontact.studies.settings import Combination, Settings
 
-# Changes when the measured numbers or the stored form change.
+# Raised when the measured numbers or their form in a store change.
 SCHEMA = 1
 
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """A case to solve.
+    """All data of one run: a case to solve."""
 
-    Attributes
-    ----------
-    label : str
-        For people: what is being run.
-    name : str
-        Name of the case.
-    data : dict
-        Parsed case file with everything set for this run.
-    pair : str or None
-        Contact pair to measure.
-    recipe : dict or None
-        What makes the mesh; None: `base` as it is, or the mesh that the data name.
-    base : Mesh or None
-        The case's mesh, where it was read from a file.
-    marks : dict
-        What tells this run from its fellows, e.g. ``level``; goes into the results.
-    size : float
-        How much work it is, to compare with its fellows.
-    """
-
-    label: str
-    name: str
-    data: dict[str, Any]
-    pair: str | None
-    recipe: Recipe | None
-    base: Mesh | None
-    marks: dict[str, Any]
-    size: float = 0.0
+    label: str  # name of the run, for messages
+    name: str  # of the case
+    data: dict[str, Any]  # the parsed case file with all values of this run
+    pair: str | None  # contact pair to measure
+    recipe: Recipe | None  # of the mesh; None: `base` as it is, or the mesh that the data name
+    base: Mesh | None  # the case's mesh, where it was read from a file
+    marks: dict[str, Any]  # distinguish this run from the others of its study, e.g. its level
+    size: float = 0.0  # amount of work, in any unit that the runs of a study share
 
     @property
     def key(self) -> str:
@@ -110,11 +92,11 @@ def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
                 del entry[key]
         entry.update(settings.options.get(combination.formulation, {}))
     if settings.load_steps is not None:
-        data["ramp"] = _fewer(data.get("ramp", {}), settings.load_steps)
+        data["ramp"] = ramp_of(data.get("ramp", {}), settings.load_steps)
     return data
 
 
-def _fewer(ramp: dict[str, Any], steps: int) -> dict[str, Any]:
+def ramp_of(ramp: dict[str, Any], steps: int) -> dict[str, Any]:
     """Return a ramp of equal steps to the same end."""
     if "instants" not in ramp:
         return {**ramp, "steps": steps}
@@ -123,74 +105,68 @@ def _fewer(ramp: dict[str, Any], steps: int) -> dict[str, Any]:
 
 
 def run(job: Job, threads: int | None = None) -> dict[str, Any]:
-    """Solve and measure; never raises: a failure is a result with the key ``"error"``.
+    """Solve a case and measure its quantities; an error is not raised but returned under the key ``"error"``.
 
-    Parameters
-    ----------
-    job : Job
-    threads : int, optional
-        Threads of the parallel kernels in this process.
-
-    Returns
-    -------
-    dict
-        ``h``, ``n_dofs``, ``values`` (quantity by name), ``theory``, ``reference``, ``profile``, ``seconds``,
-        ``iterations``, ``warnings``; or ``error`` and ``kind`` (name of the exception).
+    `threads` is the number of threads of the parallel kernels in this process. The result holds ``h`` [length], ``n_dofs``,
+    ``seconds`` [s], ``iterations``, ``warnings``, ``profile``, and by quantity ``values``, ``theory``, ``reference`` and
+    ``equal_force``; or ``error`` and ``kind`` (name of the exception).
     """
     try:
         if threads is not None:
-            from fastcontact._jit import decorators as _jit
-
             _jit.set_threads(threads)
-        return _solved(job)
+        return measured(job)
     except FastcontactError as error:
         return {"error": str(error), "kind": type(error).__name__}
     except Exception as error:
-        # One bad run must not end a study of many; what went wrong stays readable.
+        # One failed run must not end a study of many.
         where = traceback.extract_tb(error.__traceback__)[-1]
         return {"error": f"{error} ({where.name}, line {where.lineno})", "kind": type(error).__name__}
 
 
-def _solved(job: Job) -> dict[str, Any]:
+def measured(job: Job) -> dict[str, Any]:
+    """Return the result of `run`; raises where the mesh, the model or the solution fails."""
     started = time.perf_counter()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FastcontactWarning)
         mesh = job.base if job.recipe is None else make_mesh(job.recipe, job.base)
         case = build_case(job.data, name=job.name, mesh=mesh)
-        steps = solve_steps(
-            case.model,
-            case.ramp,
-            linear_solver=case.linear_solver,
-            linear_tolerance=case.linear_tolerance,
-            criteria=case.criteria,
-        )
-        last = deque(steps, maxlen=1).pop()  # none of the others is kept
-    texts = [str(entry.message) for entry in caught if issubclass(entry.category, FastcontactWarning)]
+        last = last_step(case)
     values = quantities.measure(case, last, job.pair)
-    theories = case.theories.get(job.pair or "", {})
+    theory, reference = quantities.of_theories(case, job.pair)
     return {
         "h": quantities.mesh_size(case, job.pair),
         "n_dofs": case.model.n_dofs,
         "values": {name: value for name, value in values.items() if np.isfinite(value)},
-        "theory": quantities.of_theory(theories["theory"]) if "theory" in theories else {},
-        "reference": quantities.of_theory(theories["mesh_converged"]) if "mesh_converged" in theories else {},
-        "equal_force": _equal_force(theories.get("theory"), values.get("force", 0.0)),
+        "theory": theory,
+        "reference": reference,
+        "equal_force": quantities.at_force(case, job.pair, values.get("force", 0.0)),
         "profile": _profile(case, last, job.pair),
         "iterations": {k: int(v) for k, v in last.iterations.items() if isinstance(v, int)},
         "seconds": time.perf_counter() - started,
-        "warnings": texts,
+        "warnings": [str(entry.message) for entry in caught if issubclass(entry.category, FastcontactWarning)],
     }
 
 
-def _equal_force(theory: Any, force: float) -> dict[str, float]:
-    return quantities.of_theory(theory.at_force(force)) if force > 0 and hasattr(theory, "at_force") else {}
+def fields_of(kind: type, result: dict[str, Any]) -> dict[str, Any]:
+    """Return the entries of a result that a dataclass has as fields."""
+    found = {field.name: result[field.name] for field in dataclasses.fields(kind) if field.name in result}
+    return {**found, "warnings": tuple(found["warnings"])}
 
 
-def _profile(case: Case, last: Any, pair: str | None) -> dict[str, list[float]]:
+def last_step(case: Case) -> StepResult:
+    """Solve a case and return its last step; no earlier one is kept in memory."""
+    steps = solve_steps(
+        case.model,
+        case.ramp,
+        linear_solver=case.linear_solver,
+        linear_tolerance=case.linear_tolerance,
+        criteria=case.criteria,
+    )
+    return deque(steps, maxlen=1).pop()
+
+
+def _profile(case: Case, last: StepResult, pair: str | None) -> dict[str, list[float]]:
     if pair is None or case.mesh.dim != 2:
         return {}
     contact = last.contact[pair]
-    return {
-        "r": np.abs(contact.coordinates[:, 0]).tolist(),
-        "pressure": contact.pressure.tolist(),
-    }
+    return {"r": np.abs(contact.coordinates[:, 0]).tolist(), "pressure": contact.pressure.tolist()}

@@ -1,4 +1,4 @@
-"""The family of meshes of a study: what makes the mesh of a level, and the mesh itself."""
+"""Meshes of a study, level by level: a recipe of plain data, and the mesh that is made from it."""
 
 from __future__ import annotations
 
@@ -15,44 +15,35 @@ from fastcontact.studies.settings import Settings, makeable, shape_of
 
 Arguments = dict[str, Any]
 Recipe = dict[str, Any]
+# Of a generator: defaults that depend on other arguments, arguments to halve, arguments to double.
+Rule = tuple[Arguments, tuple[str, ...], tuple[str, ...]]
 
 
-def _spheres(element: str, given: Mapping[str, Any]) -> tuple[Arguments, tuple[str, ...], tuple[str, ...]]:
+def _spheres(element: str, given: Mapping[str, Any]) -> Rule:
     R = float(given.get("R", 50.0))
     if shape_of(element) == "triangles":
         return {"size": R / 25}, ("size", "contact_size"), ()
     return {"arc_sizes": (R / 250, R / 25), "segments": 15}, ("arc_sizes", "radial_sizes"), ("segments",)
 
 
-def _cylinder(element: str, given: Mapping[str, Any]) -> tuple[Arguments, tuple[str, ...], tuple[str, ...]]:
+def _cylinder(element: str, given: Mapping[str, Any]) -> Rule:
     R = float(given.get("R", 50.0))
     far = float(given.get("size", R / 10))
     return {"size": far, "contact_size": min(R / 100, far)}, ("size", "contact_size"), ()
 
 
-def _counts(*names: str) -> Callable[..., tuple[Arguments, tuple[str, ...], tuple[str, ...]]]:
-    def rule(element: str, given: Mapping[str, Any]) -> tuple[Arguments, tuple[str, ...], tuple[str, ...]]:
-        return {}, (), names
-
-    return rule
-
-
-# By generator: defaults that depend on other arguments, arguments to halve, arguments to double.
-RULES = {
+RULES: dict[str, Callable[[str, Mapping[str, Any]], Rule]] = {
     "half-spheres": _spheres,
     "cylinder-on-block": _cylinder,
-    "block-on-block": _counts("divisions_lower", "divisions_upper"),
-    "box": _counts("divisions"),
+    "block-on-block": lambda element, given: ({}, (), ("divisions_lower", "divisions_upper")),
+    "box": lambda element, given: ({}, (), ("divisions",)),
 }
 
 
 def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
-    """Return what makes the mesh of a level: plain data, the same for equal meshes.
+    """Return the recipe of the mesh of a level: plain data, equal for equal meshes.
 
-    Raises
-    ------
-    CaseError
-        If the element cannot be made of the case's mesh, or nothing is known of the generator's arguments.
+    Raises CaseError if the element cannot be made of the case's mesh, or nothing is known of the generator's arguments.
     """
     if element is not None and not makeable(settings, element):
         raise CaseError(_not_makeable(settings, element))
@@ -65,10 +56,10 @@ def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
         }
     element = element or "tri3"
     shape = shape_of(element)
-    # Where level 0 is given by shape, it is that of quadratic cells; linear ones stand on the same nodes.
+    # Where level 0 is given by shape, it is that of quadratic cells; linear ones have the same nodes.
     finer = level + int(shape in settings.arguments and elements.get(element).order == 1)
     given = settings.arguments.get(shape, settings.arguments.get("", {}))
-    # Free triangles of other sizes lie in another pattern, and the largest pressure jumps with it: refined, they do not.
+    # Free triangles of another size lie in another pattern, which changes the largest pressure at random: refine them.
     free = shape == "triangles"
     return {
         "generator": settings.generator,
@@ -79,7 +70,7 @@ def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
 
 def _not_makeable(settings: Settings, element: str) -> str:
     own = settings.own.element or "mixed cells"
-    if settings.generator is not None and "" not in settings.arguments:
+    if settings.by_shape:
         shape = shape_of(element) or "triangles"
         return f"there are no meshes of {element} in this study: give the arguments of level 0 in [study.{shape}]"
     return (
@@ -120,10 +111,7 @@ def _scaled(value: Any, factor: float) -> Any:
 def make_mesh(recipe: Recipe, base: Mesh | None) -> Mesh:
     """Return the mesh of a recipe; `base` is the loaded mesh that is refined where no generator is named.
 
-    Raises
-    ------
-    MeshError
-        If the generator refuses its arguments or a cell cannot be refined.
+    Raises MeshError if the generator refuses its arguments or a cell cannot be refined.
     """
     if "generator" in recipe:
         arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in recipe["arguments"].items()}

@@ -1,4 +1,4 @@
-"""The difference from a theory in two parts: mesh error, which goes to zero, and model error, which stays."""
+"""The difference from a theory in two parts: mesh error, which refinement removes, and model error, which it does not."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ class Split:
     theory : float
         The theory's value, in the unit of the quantity.
     model : float
-        What stays as the mesh is refined: the limit's difference from the theory.
+        Model error: difference of the limit from the theory.
     mesh : float
-        What the finest mesh adds to it.
+        Mesh error: difference of the finest mesh from the limit.
     uncertainty : float
-        Of both, from that of the limit (95 %).
+        Of both, from that of the limit, at 95 %.
     """
 
     theory: float

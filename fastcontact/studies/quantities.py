@@ -1,4 +1,4 @@
-"""Quantities of interest: plain numbers from the last step of a run, and what a theory says of them."""
+"""Quantities of interest: numbers measured on the last step of a run, and the same numbers by a theory."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.cases.case import Case
+from fastcontact.cases.checks import STRESS, at_point
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.mesh import elements, quadrature
@@ -18,53 +19,9 @@ from fastcontact.results.step import ContactResult, StepResult
 
 Array = NDArray[np.float64]
 
-TITLES = {
-    "force": "contact force",
-    "pressure_max": "largest pressure",
-    "pressure_pole": "pressure at the axis",
-    "contact_radius": "contact radius",
-    "von_mises_max": "largest von Mises stress",
-    "von_mises_depth": "depth of the largest von Mises stress",
-    "pressure_error": "pressure against theory at equal approach, relative L2 norm",
-    "pressure_error_equal_force": "pressure against theory at equal force, relative L2 norm",
-}
-UNIT_KINDS = {
-    "force": "force",
-    "pressure_max": "pressure",
-    "pressure_pole": "pressure",
-    "contact_radius": "length",
-    "von_mises_max": "pressure",
-    "von_mises_depth": "length",
-    "pressure_error": "",
-    "pressure_error_equal_force": "",
-}
-COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
-
-
-def title(quantity: str) -> str:
-    """Return a quantity in words; ``"C1.stress.yy"`` and the like stay as they are."""
-    return TITLES.get(quantity, quantity)
-
-
-def unit(quantity: str, units: dict[str, str]) -> str:
-    """Return the name of a quantity's unit, empty for ratios."""
-    kind = UNIT_KINDS.get(quantity)
-    if kind is None:
-        kind = "length" if ".displacement." in quantity else "pressure"
-    return units[kind] if kind else ""
-
 
 def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
-    """Return every quantity of interest of a solved case; forces, lengths and stresses in the case's units.
-
-    Parameters
-    ----------
-    case : Case
-    last : StepResult
-        State to measure.
-    pair : str or None
-        Contact pair; None leaves out what belongs to a contact.
-    """
+    """Return every quantity of interest of a solved case, in the case's units; without a `pair` those of no contact."""
     found: dict[str, float] = {}
     if pair is not None:
         found |= _of_contact(case, last.contact[pair], pair)
@@ -106,9 +63,9 @@ def contact_radius(contact: ContactResult) -> float:
     """Return the distance from the axis at which the pressure goes to zero [length]; NaN without contact.
 
     Near the edge of a smooth contact the square of the pressure is linear in the square of the distance (Hertz: over
-    the whole contact). A line through the closed nodes beyond 0.4 of the radius, but for the last two, where the edge
-    cuts through a facet, tells where it ends; the bracket of the outermost closed and the first open point bounds it.
-    Where the pressure does not fall towards the edge (a punch), the end of the bracket is the answer.
+    the whole contact). A line is fitted through the closed nodes beyond 0.4 of the radius, without the last two, where the
+    edge cuts through a facet; its zero is the radius, limited to the bracket of the outermost closed and the first open
+    node. Where the pressure does not fall towards the edge (a punch), the radius is the end of the bracket.
     """
     inside, outside = contact.radius
     if not np.isfinite(inside):
@@ -139,11 +96,11 @@ def pressure_error(case: Case, side: Surface, contact: ContactResult, theory: An
 
 
 def peak(mesh: Mesh, values: Array, axisymmetric: bool) -> tuple[float, Array]:
-    """Return the largest value of a nodal field and where it is, between the nodes.
+    """Return the largest value of a nodal field (n_points,), and its place (dim,) between the nodes [length].
 
     On the axis, a polynomial is fitted to the nodes along it that reach 97 % of the largest value, where there are
-    enough of them. Else a quadratic function is fitted to the nodes around the largest one (on the axis: even in the
-    radius); its vertex counts if it is a maximum within the ring of these nodes, and else the node does.
+    enough of them. Otherwise a quadratic function is fitted to the nodes around the largest one (on the axis: even in the
+    radius); the result is its vertex if that is a maximum within the ring of these nodes, otherwise the node.
     """
     top = int(np.argmax(values))
     on_axis = axisymmetric and abs(mesh.points[top, 0]) <= 1e-9 * np.abs(mesh.points).max()
@@ -217,14 +174,14 @@ def _depth(case: Case, pair: str, where: Array) -> float:
 
 def _of_probe(name: str, point: int, last: StepResult) -> dict[str, float]:
     found = {f"{name}.von_mises": float(last.von_mises[point])}
-    for component, value in zip(COMPONENTS, last.stress[point], strict=False):
+    for component, value in zip(STRESS, last.stress[point], strict=False):
         found[f"{name}.stress.{component}"] = float(value)
     for axis, value in zip("xyz", last.displacement[point], strict=False):
         found[f"{name}.displacement.{axis}"] = float(value)
-    for contact in last.contact.values():
-        at = np.flatnonzero(contact.points == point)
-        if len(at):
-            found[f"{name}.pressure"] = float(contact.pressure[at[0]])
+    at = at_point(last, point)
+    if at is not None:
+        contact, row = at
+        found[f"{name}.pressure"] = float(contact.pressure[row])
     return found
 
 
@@ -238,7 +195,7 @@ def mesh_size(case: Case, pair: str | None) -> float:
 
 
 def of_theory(theory: Any) -> dict[str, float]:
-    """Return what a theory says of the quantities of interest, those it knows."""
+    """Return the quantities of interest that a theory gives, in its units."""
     found = {}
     for quantity, attribute in (("force", "force"), ("pressure_max", "pressure_max"), ("contact_radius", "radius")):
         if hasattr(theory, attribute):
@@ -249,3 +206,16 @@ def of_theory(theory: Any) -> dict[str, float]:
         greatest = theory.von_mises_maximum()
         found |= {"von_mises_max": greatest.value, "von_mises_depth": greatest.depth}
     return {quantity: value for quantity, value in found.items() if np.isfinite(value) and value > 0}
+
+
+def of_theories(case: Case, pair: str | None) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the quantities of a pair by its theory at equal approach, and by its mesh-converged solution."""
+    theories = case.theories.get(pair or "", {})
+    theory, reference = (of_theory(theories[key]) if key in theories else {} for key in ("theory", "mesh_converged"))
+    return theory, reference
+
+
+def at_force(case: Case, pair: str | None, force: float) -> dict[str, float]:
+    """Return the quantities of a pair by its theory at a contact force [force]; empty where it has no such method."""
+    theory: Any = case.theories.get(pair or "", {}).get("theory")
+    return of_theory(theory.at_force(force)) if force > 0 and hasattr(theory, "at_force") else {}

@@ -1,4 +1,4 @@
-"""The ``[study]`` table of a case file: where the meshes of a study come from, and what to compare on them."""
+"""Settings of a study, from the table ``[study]`` of its case file: its meshes, elements, formulations, quantities."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.generate import Circle
 
 SHAPES = {"triangles": ("tri3", "tri6"), "quadrangles": ("quad4", "quad8", "quad9")}
-# What "all" stands for.
+# Elements that "all" stands for.
 ALL_ELEMENTS = ("quad4", "quad8", "tri3", "tri6")
 
 
@@ -38,59 +38,32 @@ class Combination:
 
 @dataclass(frozen=True)
 class Settings:
-    """A study's settings, checked.
+    """Settings of a study, checked."""
 
-    Attributes
-    ----------
-    data : dict
-        The parsed case file.
-    own : Combination
-        Element and formulation of the case itself.
-    pair : str or None
-        The contact pair that is measured.
-    generator : str or None
-        None where a mesh file is refined.
-    arguments : dict
-        Arguments of the generator on level 0, by shape (``"triangles"``, ``"quadrangles"``), or by ``""`` for the
-        case's own, whatever the element.
-    halve, double : tuple of str or None
-        Names of the generator's arguments to halve or double per level; None: the known ones.
-    curves : tuple of Circle or None
-        True shapes of a mesh file's boundary; None: the circles found.
-    load_steps : int or None
-        Load steps of the study; None: the case's.
-    options : dict
-        Options of the formulations, by formulation.
-    quantities : tuple of str
-        To fit and to show, besides the standard ones.
-    combinations : tuple of Combination
-        To compare where nothing else is asked.
-    parameters : dict
-        Named sets of linked paths for sweeps.
-    """
-
-    data: dict[str, Any]
-    own: Combination
-    pair: str | None
-    generator: str | None
+    data: dict[str, Any]  # the parsed case file
+    own: Combination  # element and formulation of the case itself
+    pair: str | None  # the contact pair that is measured
+    generator: str | None  # of the meshes; None where a mesh file is refined
+    # Arguments of the generator on level 0: by shape of the cells (a key of `SHAPES`), or the case's own by "".
     arguments: dict[str, dict[str, Any]]
-    halve: tuple[str, ...] | None = None
-    double: tuple[str, ...] | None = None
-    curves: tuple[Circle, ...] | None = None
-    load_steps: int | None = None
-    options: dict[str, dict[str, Any]] = field(default_factory=dict)
-    quantities: tuple[str, ...] = ()
-    combinations: tuple[Combination, ...] = ()
-    parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
+    halve: tuple[str, ...] | None = None  # arguments to halve from level to level; None: those of `levels.RULES`
+    double: tuple[str, ...] | None = None  # arguments to double likewise
+    curves: tuple[Circle, ...] | None = None  # true boundaries of a mesh file; None: the circles found
+    load_steps: int | None = None  # of every run; None: the case's
+    options: dict[str, dict[str, Any]] = field(default_factory=dict)  # of the contact pair, by formulation
+    quantities: tuple[str, ...] = ()  # to fit and to show besides the standard ones
+    combinations: tuple[Combination, ...] = ()  # to compare by default
+
+    @property
+    def by_shape(self) -> bool:
+        """Whether ``[study]`` gives the generator's arguments of level 0 by the shape of the cells."""
+        return self.generator is not None and "" not in self.arguments
 
 
 def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
-    """Return the settings of a case's studies; `data` stand for the parsed case file with some values changed.
+    """Return the settings of a case's studies; `data` replaces the parsed case file, e.g. with other values.
 
-    Raises
-    ------
-    CaseError
-        If a value of ``[study]`` is wrong.
+    Raises CaseError if a value of ``[study]`` is wrong.
     """
     data = tomllib.loads(case.text) if data is None else data
     study = data.get("study", {})
@@ -118,7 +91,6 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
         options=study.get("options", {}),
         quantities=tuple(study.get("quantities", ())),
         combinations=combinations,
-        parameters=study.get("parameters", {}),
     )
 
 
@@ -164,31 +136,25 @@ def combinations(
 ) -> tuple[Combination, ...]:
     """Return the combinations to compare: every element with every formulation, or without both the case's choice.
 
-    Raises
-    ------
-    CaseError
-        If an element or a formulation is unknown, or cannot be made of this case's mesh.
+    Raises CaseError if an element or a formulation is unknown, or cannot be made of this case's mesh.
     """
     if names is None and formulations is None:
         return settings.combinations
     chosen = [settings.own.element] if names is None else list(names)
     if names is not None and list(names) == ["all"]:
         chosen = [name for name in ALL_ELEMENTS if makeable(settings, name)]
-    how = [settings.own.formulation] if formulations is None else [name.replace("-", "_") for name in formulations]
-    if formulations is not None and list(formulations) == ["all"]:
-        how = list(FORMULATIONS)
-    if settings.pair is None and formulations is not None:
+    if formulations is None:
+        return tuple(_checked(element, settings.own.formulation) for element in chosen)
+    if settings.pair is None:
         raise CaseError("this case has no contact pair, so there are no formulations to compare")
-    return tuple(_checked(element, formulation) for element in chosen for formulation in how)
+    every = list(FORMULATIONS) if list(formulations) == ["all"] else [name.replace("-", "_") for name in formulations]
+    return tuple(_checked(element, formulation) for element in chosen for formulation in every)
 
 
 def one_combination(settings: Settings, element: str | None, formulation: str | None) -> Combination:
     """Return the last combination of ``[study]`` with this element and formulation, where given; else make one of them.
 
-    Raises
-    ------
-    CaseError
-        If the element or the formulation is unknown.
+    Raises CaseError if the element or the formulation is unknown.
     """
     formulation = formulation.replace("-", "_") if formulation else None
     for known in reversed(settings.combinations):
@@ -200,13 +166,12 @@ def one_combination(settings: Settings, element: str | None, formulation: str | 
 
 def makeable(settings: Settings, element: str) -> bool:
     """Whether meshes of this element can be made for the case."""
-    if settings.generator is None:
-        own = settings.own.element
-        return own is not None and elements.get(own).linear == elements.get(element).linear
-    if "" in settings.arguments:
-        own = settings.own.element
-        return own is None or elements.get(own).linear == elements.get(element).linear
-    return shape_of(element) in settings.arguments
+    if settings.by_shape:
+        return shape_of(element) in settings.arguments
+    own = settings.own.element
+    if own is None:
+        return settings.generator is not None
+    return elements.get(own).linear == elements.get(element).linear
 
 
 def shape_of(element: str) -> str:

@@ -1,4 +1,4 @@
-"""Finished runs in a folder, one JSON file each, so that an interrupted study goes on where it stopped."""
+"""How finished runs are kept: a folder with one JSON file a run, so that an interrupted study goes on where it stopped."""
 
 from __future__ import annotations
 
@@ -12,17 +12,9 @@ from fastcontact.studies.job import Job
 
 
 class Store:
-    """A folder of finished runs.
+    """A folder of finished runs, named by the keys of their jobs; made if it is not there.
 
-    Parameters
-    ----------
-    folder : path-like
-        Made if it is not there.
-
-    Raises
-    ------
-    FileError
-        If the folder cannot be made.
+    Raises FileError if it cannot be made.
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -48,10 +40,7 @@ class Store:
     def put(self, job: Job, result: dict[str, Any]) -> None:
         """Keep the result of a run; the file appears whole or not at all.
 
-        Raises
-        ------
-        FileError
-            If it cannot be written.
+        Raises FileError if it cannot be written.
         """
         text = json.dumps({"label": job.label, "case": job.name, "marks": job.marks, "result": result}, default=str)
         with replacing(self.path(job)) as temporary:

@@ -1,4 +1,4 @@
-"""Parameter sweep: the same case with other numbers in it, held against theory where there is one."""
+"""Parameter sweep: solve the same case with other values of its parameters."""
 
 from __future__ import annotations
 
@@ -6,127 +6,19 @@ import itertools
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from numpy.typing import NDArray
-
-from fastcontact import errors
 from fastcontact.cases.case import Case, build_case, read_case
 from fastcontact.errors import CaseError
 from fastcontact.studies.case_parameters import substituted
-from fastcontact.studies.execute import Progress, run_all
-from fastcontact.studies.job import Job, case_data
+from fastcontact.studies.execute import Progress, raise_first, run_all
+from fastcontact.studies.job import Job, case_data, fields_of
 from fastcontact.studies.levels import make_mesh, recipe
 from fastcontact.studies.settings import Combination, Settings, one_combination, settings
-from fastcontact.studies.store import Store
+from fastcontact.studies.sweep_report import Point, Sweep, Value
 
-Value = float | int | str | bool
-# The level of the study's meshes where nothing is said: fine enough to tell a trend from mesh error.
+# The level of the study's meshes by default: fine enough for trends larger than the mesh error.
 LEVEL = 2
-
-
-@dataclass(frozen=True, eq=False)
-class Point:
-    """What one choice of the parameters gave.
-
-    Attributes
-    ----------
-    parameters : dict of str to value
-    h : float
-        Shortest facet of the secondary surface [length].
-    n_dofs : int
-    values : dict of str to float
-        Quantities of interest.
-    theory, reference, equal_force : dict of str to float
-        What the theory at equal approach, the mesh-converged solution if the case names one, and the theory at equal
-        force say of a quantity.
-    profile : dict
-        ``r`` [length] and ``pressure`` [pressure] of the secondary nodes.
-    seconds : float
-    warnings : tuple of str
-    """
-
-    parameters: dict[str, Value]
-    h: float
-    n_dofs: int
-    values: dict[str, float]
-    theory: dict[str, float]
-    reference: dict[str, float]
-    equal_force: dict[str, float]
-    profile: dict[str, list[float]]
-    seconds: float
-    warnings: tuple[str, ...]
-
-    def ratio(self, quantity: str, to: str = "theory") -> float:
-        """Return value over ``"theory"``, ``"reference"`` or ``"equal_force"``; NaN where one is not known."""
-        other = getattr(self, to).get(quantity)
-        return self.values.get(quantity, float("nan")) / other if other else float("nan")
-
-
-@dataclass(frozen=True, eq=False)
-class Sweep:
-    """A finished sweep.
-
-    Attributes
-    ----------
-    name, title, text : str
-        Of the case.
-    units : dict of str to str
-    combination : str
-        Element and formulation.
-    parameters : dict of str to tuple
-        Values by parameter.
-    points : list of Point
-        Those that could be solved; the last parameter changes fastest.
-    failed : list of (dict, str)
-        Parameters and reason of the others.
-    """
-
-    name: str
-    title: str
-    text: str
-    units: dict[str, str]
-    combination: str
-    parameters: dict[str, tuple[Value, ...]]
-    points: list[Point]
-    failed: list[tuple[dict[str, Value], str]]
-
-    @property
-    def quantities(self) -> list[str]:
-        """Names of all quantities that were measured."""
-        return list(dict.fromkeys(name for point in self.points for name in point.values))
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain numbers, texts, lists and dictionaries, as ``--json`` writes them."""
-        from fastcontact.studies.sweep_output import as_dict
-
-        return as_dict(self)
-
-    def table(self) -> NDArray[Any]:
-        """Return a structured array, one row a point, as ``--csv`` writes it."""
-        from fastcontact.studies.sweep_output import table
-
-        return table(self)
-
-    def lines(self) -> list[str]:
-        """Return a table for a person."""
-        from fastcontact.studies.sweep_output import lines
-
-        return lines(self)
-
-    def figure(self) -> Any:
-        """Return a matplotlib figure: values over the parameter, and their ratio to theory."""
-        from fastcontact.studies.sweep_pictures import overview
-
-        return overview(self)
-
-    def html(self) -> str:
-        """Return the sweep as one self-contained HTML page."""
-        from fastcontact.studies.sweep_output import html_report
-
-        return html_report(self)
 
 
 def parameter_sweep(
@@ -172,18 +64,23 @@ def parameter_sweep(
         raise CaseError("a sweep needs at least one parameter with at least one value")
     choices = [dict(zip(parameters, values, strict=True)) for values in itertools.product(*parameters.values())]
     jobs = [_job(case, choice, element, formulation, level) for choice in choices]
-    # A key that the case does not know would fail in every run.
+    # An unknown key would make every run fail.
     build_case(jobs[0].data, name=case.name, mesh=case.mesh)
-    kept = Store(store) if store is not None else None
-    results = run_all(jobs, executor=executor, workers=workers, store=kept, on_progress=on_progress)
-    points = [_point(c, r) for c, r in zip(choices, results, strict=True) if "error" not in r]
-    failed = [(c, str(r["error"])) for c, r in zip(choices, results, strict=True) if "error" in r]
-    if not points:
-        kind = getattr(errors, str(results[0].get("kind")), CaseError)
-        raise kind(f"no point of the sweep could be solved; {jobs[0].label}: {failed[0][1]}")
-    values = {name: tuple(given) for name, given in parameters.items()}
-    used = str(jobs[0].marks["combination"])
-    return Sweep(case.name, case.title, case.text, case.units, used, values, points, failed)
+    results = run_all(jobs, executor=executor, workers=workers, store=store, on_progress=on_progress)
+    raise_first("no point of the sweep could be solved", jobs, results)
+    runs = list(zip(choices, results, strict=True))
+    return Sweep(
+        name=case.name,
+        title=case.title,
+        text=case.text,
+        units=case.units,
+        combination=str(jobs[0].marks["combination"]),
+        parameters={name: tuple(values) for name, values in parameters.items()},
+        points=[
+            Point(parameters=choice, **fields_of(Point, result)) for choice, result in runs if "error" not in result
+        ],
+        failed=[(choice, str(result["error"])) for choice, result in runs if "error" in result],
+    )
 
 
 def _job(case: Case, choice: dict[str, Value], element: str | None, formulation: str | None, level: int | None) -> Job:
@@ -193,8 +90,7 @@ def _job(case: Case, choice: dict[str, Value], element: str | None, formulation:
         data = substituted(data, parameter, value, linked)
     chosen = settings(case, data)
     member = one_combination(chosen, element, formulation)
-    by_shape = chosen.generator is not None and "" not in chosen.arguments
-    finer = (LEVEL if by_shape else 0) if level is None else level
+    finer = (LEVEL if chosen.by_shape else 0) if level is None else level
     return Job(
         label=", ".join(f"{name} = {value}" for name, value in choice.items()),
         name=case.name,
@@ -202,26 +98,11 @@ def _job(case: Case, choice: dict[str, Value], element: str | None, formulation:
         pair=chosen.pair,
         recipe=recipe(chosen, member.element, finer),
         base=case.mesh if chosen.generator is None else None,
-        size=_points(chosen, member),
+        size=_size(chosen, member),
         marks={**choice, "combination": f"{member}, level {finer}"},
     )
 
 
-def _points(chosen: Settings, member: Combination) -> float:
-    """Return the points of the coarsest mesh, which tell which of the runs is the largest."""
+def _size(chosen: Settings, member: Combination) -> float:
+    """Return the number of points of the coarsest mesh, by which the largest of the runs starts first."""
     return make_mesh(recipe(chosen, member.element, 0), None).n_points if chosen.generator is not None else 0
-
-
-def _point(choice: dict[str, Value], result: dict[str, Any]) -> Point:
-    return Point(
-        choice,
-        result["h"],
-        result["n_dofs"],
-        result["values"],
-        result["theory"],
-        result["reference"],
-        result["equal_force"],
-        result["profile"],
-        result["seconds"],
-        tuple(result["warnings"]),
-    )

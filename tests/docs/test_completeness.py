@@ -8,7 +8,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact import analytic, generate, obstacles, plot
-from fastcontact.cases import case
+from fastcontact.cases import keys
 from fastcontact.cli._main import parser
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.linear import choice as linear
@@ -50,7 +50,7 @@ def test_every_command_is_listed():
 
 def test_every_key_of_case_files_is_listed():
     page = text("reference/case-files.md")
-    for key in {**case._TOP, **case._STUDY}:
+    for key in {**keys.TOP, **keys.STUDY}:
         assert re.search(rf"[`\[]{key}[`\].]", page), key
 
 

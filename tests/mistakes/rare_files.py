@@ -15,8 +15,8 @@ import numpy as np
 
 import fastcontact as fc
 from fastcontact.cases import case as cases
-from fastcontact.cli import _pictures, _results, bench
-from fastcontact.cli.run import _write_json
+from fastcontact.cli import _pictures, _results
+from fastcontact.cli._outputs import write_json
 from fastcontact.mesh.files import _abaqus, hdf5, replacing
 from fastcontact.mesh.files._blocks import build_mesh
 from fastcontact.mesh.generate import block, block_on_block
@@ -179,8 +179,8 @@ CALLS = [
     ("a picture without contact", lambda: _pictures.profile_picture(None, SimpleNamespace(contact={}), "a.png"), fc.errors.FastcontactError, r"there is no contact pair whose pressure could be plotted"),
     ("a step of no steps", no_step_yet, fc.errors.CaseError, r"a\.vtkhdf' holds no finished step yet"),
     ("a pair of a result without contact", lambda: _results.chosen_contact(SimpleNamespace(contact={}), None), fc.errors.CaseError, r"this result holds no contact pair"),
-    ("figures of benchmarks on a full disk", lambda patch: full(patch, bench._write), fc.errors.FileError, r"cannot write 'a\.json': .*No space left on device"),
-    ("a summary on a full disk", lambda patch: full(patch, _write_json), fc.errors.FileError, r"cannot write 'a\.json': No space left on device"),
+    ("figures of benchmarks on a full disk", lambda patch: full(patch, write_json), fc.errors.FileError, r"cannot write 'a\.json': .*No space left on device"),
+    ("a summary on a full disk", lambda patch: full(patch, write_json), fc.errors.FileError, r"cannot write 'a\.json': No space left on device"),
     ("a mesh from a pipe", pipe, fc.errors.FileError, r"pipe\.med' is a device or a pipe: name a plain file"),
     ("a file that was never made", vanished, fc.errors.FileError, r"a\.txt' cannot be written: No such file or directory"),
     ("an Abaqus file that cannot be read", lambda folder: _abaqus.check_readable(folder), fc.errors.FileError, r"cannot read '.*': .*Is a directory"),

@@ -31,11 +31,11 @@ from fastcontact.mesh.files import _meshio, hdf5, med
 from fastcontact.mesh.generate import _triangulate
 from fastcontact.mesh.generate.transform import renamed
 from fastcontact.results import reader
-from fastcontact.studies import pictures, study, sweep
-from fastcontact.studies.benchmark import subjects
+from fastcontact.studies import convergence, sweep
+from fastcontact.studies.convergence import convergence_study
 from fastcontact.studies.levels import recipe
+from fastcontact.studies.render import figure
 from fastcontact.studies.settings import Combination, settings
-from fastcontact.studies.study import convergence_study
 from fastcontact.studies.sweep import parameter_sweep
 
 REPEATED = re.escape(str(elimination.RepeatedError()))
@@ -63,8 +63,8 @@ def not_slack(patch):
 
 
 def no_checkout(patch, folder):
-    patch.setattr(subjects, "__file__", str(folder / "package" / "studies" / "benchmark" / "subjects.py"))
-    subjects.folder()
+    patch.setattr(bench, "__file__", str(folder / "package" / "cli" / "bench.py"))
+    bench.suite("subjects")
 
 
 def no_matplotlib_for_outputs(patch):
@@ -74,7 +74,7 @@ def no_matplotlib_for_outputs(patch):
 
 def no_matplotlib_for_studies(patch):
     patch.setitem(sys.modules, "matplotlib.backends.backend_agg", None)
-    pictures.new_figure(4.0, 3.0)
+    figure.figure([[figure.Panel()]], (4.0, 3.0))
 
 
 def no_scheduler(patch):
@@ -87,14 +87,14 @@ def no_scheduler(patch):
 
 def drawn_on_a_full_disk(patch):
     patch.setattr(Path, "mkdir", refusing(errno.ENOSPC))
-    bench._draw("pictures", {"a": [{"n_dofs": 1}, {"n_dofs": 2}]})
+    bench.draw("pictures", {"a": [{"n_dofs": 1}, {"n_dofs": 2}]})
 
 
 def copied_to_a_full_disk(patch, folder):
     case = folder / "a.toml"
     case.write_text("title = 'a'\n")
     patch.setattr(Path, "write_bytes", refusing(errno.ENOSPC))
-    cases._copy(case, folder / "b.toml")
+    cases.copied(case, folder / "b.toml")
 
 
 def distorted_facets(patch):
@@ -138,7 +138,7 @@ def failing(jobs, **_):
 
 
 def no_level(patch):
-    patch.setattr(study, "run_all", failing)
+    patch.setattr(convergence, "run_all", failing)
     convergence_study("forma04a", 1, ["tri3"], ["node_to_segment"])
 
 

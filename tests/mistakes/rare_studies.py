@@ -10,18 +10,19 @@ import numpy as np
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case, read_case
-from fastcontact.cases.checks import Check, _check_target
+from fastcontact.cases.checks import Check, check_target
 from fastcontact.cli import _study
 from fastcontact.cli._main import parser
+from fastcontact.cli._outputs import write_text
 from fastcontact.mesh.generate import block, box, half_spheres, merge_points
 from fastcontact.mesh.generate.refine import Circle, refined
 from fastcontact.studies import execute, fit
 from fastcontact.studies.adaptive import adaptive_study
-from fastcontact.studies.case_parameters import _by_law
+from fastcontact.studies.case_parameters import by_law
+from fastcontact.studies.convergence import convergence_study
 from fastcontact.studies.levels import make_mesh
 from fastcontact.studies.settings import combinations, settings
 from fastcontact.studies.store import Store
-from fastcontact.studies.study import convergence_study
 
 CASES = [
     ("mesh is a word", '[mesh]\nfile = "forma04a.med"', 'mesh = "forma04a.med"', r"of 'mesh' must be of type dict|'mesh' must be a table"),
@@ -92,7 +93,7 @@ def no_worker_starts(patch):
             raise BrokenProcessPool
 
     patch.setattr(execute, "ProcessPoolExecutor", Pool)
-    execute._pool(1)
+    execute.started_pool(1)
 
 
 def protected_text(patch):
@@ -100,7 +101,7 @@ def protected_text(patch):
         raise OSError(errno.EROFS, "Read-only file system")
 
     patch.setattr(Path, "write_text", refuse)
-    _study.text("a.json", "{}")
+    write_text("a.json", "{}")
 
 
 def file_for_a_store(patch):
@@ -123,7 +124,7 @@ def interrupted(patch, command):
     def stop(*_, **__):
         raise KeyboardInterrupt
 
-    module = {"convergence_study": "study", "parameter_sweep": "sweep"}[command]
+    module = {"convergence_study": "convergence", "parameter_sweep": "sweep"}[command]
     patch.setattr(f"fastcontact.studies.{module}.{command}", stop)
     name = {"convergence_study": ["converge"], "parameter_sweep": ["sweep", "--set", "approach=1"]}[command]
     options = parser(name[0]).parse_args([name[0], "forma04a", *name[1:]])
@@ -133,12 +134,12 @@ def interrupted(patch, command):
 CALLS = [
     ("materials that are no tables", lambda: case_of(material=[1]), fc.errors.CaseError, r"'material' must be a list of tables: write \[\[material\]\] above each"),
     ("a contact without name", lambda: case_of(material=[{"E": 1.0, "nu": 0.3}], contact={"secondary": "CONT1"}), fc.errors.CaseError, r"'contact' needs a name for each pair: write \[contact\.NAME\] above its keys, not 'secondary'"),
-    ("a check of what is zero", lambda: _check_target("check[0]", Check("a", "b.force", 0.1, "hertz", of="zero"), SimpleNamespace(zero=0.0)), fc.errors.CaseError, r"check\[0\]: the theory's zero is 0, so no relative deviation can be told"),
+    ("a check of what is zero", lambda: check_target("check[0]", Check("a", "b.force", 0.1, "hertz", of="zero"), SimpleNamespace(zero=0.0)), fc.errors.CaseError, r"check\[0\]: the theory's zero is 0, so no relative deviation can be told"),
     ("an unknown quantity of a study", unknown_quantity, fc.errors.CaseError, r"unknown quantity 'forse': did you mean 'force'"),
     ("a study that is interrupted", lambda patch: interrupted(patch, "convergence_study"), fc.errors.FastcontactError, r"stopped; with --store DIR the same command would go on where it stopped"),
     ("a sweep that is interrupted", lambda patch: interrupted(patch, "parameter_sweep"), fc.errors.FastcontactError, r"stopped; with --store DIR the same command would go on where it stopped"),
     ("formulations without contact", lambda: combinations(replace(settings(read_case("forma04a")), pair=None), None, ["mortar"]), fc.errors.CaseError, r"this case has no contact pair, so there are no formulations to compare"),
-    ("a law beyond all numbers", lambda: _by_law("value^400", 1e300, "study.parameters.a"), fc.errors.CaseError, r"study\.parameters\.a = 'value\^400' is too large a number for 1e\+300"),
+    ("a law beyond all numbers", lambda: by_law("value^400", 1e300, "study.parameters.a"), fc.errors.CaseError, r"study\.parameters\.a = 'value\^400' is too large a number for 1e\+300"),
     ("adaptive meshes in space", lambda: adaptive_study(solid_case(), 0.1), fc.errors.CaseError, r"adaptive refinement is for triangles and quadrangles in two dimensions; this case is in 3D"),
     ("sizes without values", lambda: fit.fit_limit([1.0, 0.5], [1.0]), fc.errors.CaseError, r"mesh sizes and values must be two lists of one length, not \(2,\) and \(1,\)"),
     ("a limit of two meshes", lambda: fit.fit_limit([1.0, 0.5], [1.0, 2.0]), fc.errors.CaseError, r"a limit needs the values of at least 3 meshes, not 2: compute more levels"),

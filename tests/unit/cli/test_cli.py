@@ -9,7 +9,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.cli import main
-from fastcontact.cli._main import _history
+from fastcontact.cli._main import history_lines
 
 CASE = """
 title = "small spheres"
@@ -318,4 +318,4 @@ def test_import_is_light():
 
 
 def test_a_failure_without_history_shows_none():
-    assert _history([]) == []
+    assert history_lines([]) == []

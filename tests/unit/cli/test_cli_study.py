@@ -5,6 +5,7 @@ import argparse
 import pytest
 
 from fastcontact.cli import _study, sweep
+from fastcontact.cli._progress import Runs
 from fastcontact.studies.execute import Progress
 
 
@@ -17,7 +18,7 @@ from fastcontact.studies.execute import Progress
     ],
 )
 def test_progress_is_one_line_that_is_drawn_anew(left, seconds, error, stored, told, capsys):
-    lines = _study.Lines(show=True)
+    lines = Runs(show=True)
     lines(Progress("level 2", 2, 3, left, seconds, error, stored))
     shown = capsys.readouterr().err
     assert shown.startswith(f"\r{told}")
@@ -28,12 +29,12 @@ def test_progress_is_one_line_that_is_drawn_anew(left, seconds, error, stored, t
 
 
 def test_what_the_store_holds_says_nothing_about_the_time_left(capsys):
-    _study.Lines(show=True)(Progress("level 1", 1, 3, ("level 2", "level 3"), 0.0, "", True))
+    Runs(show=True)(Progress("level 1", 1, 3, ("level 2", "level 3"), 0.0, "", True))
     assert capsys.readouterr().err.rstrip() == "\r1/3 level 1 found in the store"
 
 
 def test_nothing_is_drawn_where_nobody_looks(capsys):
-    lines = _study.Lines(show=False)
+    lines = Runs(show=False)
     lines(Progress("level 1", 1, 3, ("level 2", "level 3"), 1.0, "", False))
     lines.close()
     assert capsys.readouterr().err == ""
@@ -56,6 +57,6 @@ def test_an_interrupted_study_says_how_to_go_on(store, told):
     ],
 )
 def test_values_of_a_parameter(text, values):
-    name, found = sweep._values(text)
+    name, found = sweep.values(text)
     assert name == text.split("=")[0]
     assert found == pytest.approx(values) if isinstance(values[0], float) else found == values

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.cli._pictures import _normal_stress
+from fastcontact.cli._pictures import normal_stress
 from fastcontact.mesh.generate import block, box, union
 from fastcontact.results.step import StepResult
 
@@ -116,4 +116,4 @@ def test_the_stress_along_normals_in_space_is_that_of_the_tensor():
     points = np.array([8, 1, 3, 5, 7, 0])
     stress[points] = tensor[:, [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
     contact, step = SimpleNamespace(points=points, normal=normal), SimpleNamespace(stress=stress)
-    np.testing.assert_allclose(_normal_stress(contact, step), -np.arange(6.0), atol=1e-14)
+    np.testing.assert_allclose(normal_stress(contact, step), -np.arange(6.0), atol=1e-14)

@@ -4,14 +4,14 @@ import json
 
 import pytest
 
-from fastcontact.cli._main import main
-from fastcontact.studies.benchmark import subjects
+from fastcontact.cli import main
+from fastcontact.cli.bench import suite
 
 SUBJECTS = {"assembly", "contact", "io", "linear", "recovery", "search", "startup", "study"}
 
 
 def test_all_subjects_are_there():
-    assert set(subjects.names()) == SUBJECTS
+    assert set(suite("subjects").names()) == SUBJECTS
 
 
 @pytest.mark.parametrize("name", sorted(SUBJECTS))

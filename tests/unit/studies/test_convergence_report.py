@@ -4,9 +4,8 @@ import re
 
 import pytest
 
-from fastcontact.studies.fit import Limit
-from fastcontact.studies.report import with_error_bar
-from fastcontact.studies.study import convergence_study
+from fastcontact.studies.convergence import convergence_study
+from fastcontact.studies.render.table import with_error_bar
 
 
 @pytest.mark.parametrize(("value", "bar", "text"), [
@@ -14,7 +13,7 @@ from fastcontact.studies.study import convergence_study
     (-2910.2335, 6.63, "-2910.2 +- 6.6"), (10.0, 0.0, "10"), (1e-20, 1e-22, "1e-20 +- 1e-22"),
 ])  # fmt: skip
 def test_a_limit_has_no_more_digits_than_its_error_bar(value, bar, text):
-    assert with_error_bar(Limit(value, bar, 2.0, 0.5, 5, True)) == text
+    assert with_error_bar(value, bar) == text
 
 
 def test_the_report_stands_alone_and_says_everything(root):
@@ -25,7 +24,8 @@ def test_the_report_stands_alone_and_says_everything(root):
     assert page.count("<img") == page.count("data:image/png;base64,") == 3
     for series in study.series:
         assert page.count(f">{series.combination}<") == 3  # in two tables and as a heading
-        assert with_error_bar(series.limits["force"]).replace("+-", "&plusmn;") in page
+        limit = series.limits["force"]
+        assert with_error_bar(limit.value, limit.uncertainty).replace("+-", "&plusmn;") in page
     rows = re.findall(r"<tr>(.*?)</tr>", page)
     for table in re.findall(r"<table>.*?</table>", page):
         widths = {len(re.findall(r"<t[hd]>", row)) for row in re.findall(r"<tr>(.*?)</tr>", table)}

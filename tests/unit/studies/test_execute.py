@@ -23,7 +23,7 @@ def jobs(monkeypatch):
 
 
 def test_a_run_that_kills_its_worker_is_reported_and_the_others_end(jobs):
-    found = dict(execute._on_processes(2, jobs, [0, 1, 2]))
+    found = dict(execute.on_processes(2, jobs, [0, 1, 2]))
     assert sorted(found) == [0, 1, 2]
     assert found[0] == {"label": "first", "threads": 1}
     assert found[2] == {"label": "last", "threads": 1}
@@ -44,5 +44,5 @@ def test_what_has_not_begun_is_called_off_where_a_study_stops(jobs):
 
     executor = Slow()
     with pytest.raises(KeyboardInterrupt):
-        list(execute._on_executor(executor, jobs, [0, 1, 2]))
+        list(execute.on_executor(executor, jobs, [0, 1, 2]))
     assert [future.cancelled() for future in executor.futures] == [False, True, True]

@@ -1,4 +1,4 @@
-"""What a benchmark run leaves: the environment, a table, the comparison with a stored run."""
+"""The results of a run as a table, compared with a stored run; versions and machine."""
 
 from __future__ import annotations
 

@@ -9,8 +9,7 @@ import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.cli import main
 from fastcontact.errors import CaseError, ContactError
-from fastcontact.studies import levels
-from fastcontact.studies import study as studies
+from fastcontact.studies import convergence, levels
 from fastcontact.studies.settings import combinations, settings
 
 FORCE, PRESSURE = 600_000.0, 2900.0  # of theory
@@ -40,8 +39,8 @@ def gathered(case, results, elements=("quad8",), wanted=("C1.stress.yy",)):
     """The study of these results, one list of levels an element."""
     chosen = settings(case)
     members = combinations(chosen, elements, ["continuous"])
-    jobs = [studies._job(case, chosen, member, level) for member in members for level in range(len(results[0]))]
-    return studies._gathered(case, chosen, members, jobs, [one for levels in results for one in levels], wanted)
+    jobs = [convergence.level_job(case, chosen, member, k) for member in members for k in range(len(results[0]))]
+    return convergence.gathered(case, jobs, [one for levels in results for one in levels], wanted)
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,8 @@ import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.studies import job
 from fastcontact.studies.fit import fit_limit
-from fastcontact.studies.labels import percent
 from fastcontact.studies.levels import recipe
+from fastcontact.studies.render.table import percent
 from fastcontact.studies.settings import Combination, combinations, settings
 
 
@@ -42,15 +42,15 @@ def test_options_that_another_formulation_does_not_have_are_dropped(chosen):
 
 
 def test_fewer_load_steps_end_where_the_ramp_does():
-    assert job._fewer({"steps": 20}, 2) == {"steps": 2}
-    assert job._fewer({"instants": [0.1, 0.5, 2.0]}, 4)["instants"] == [0.5, 1.0, 1.5, 2.0]
+    assert job.ramp_of({"steps": 20}, 2) == {"steps": 2}
+    assert job.ramp_of({"instants": [0.1, 0.5, 2.0]}, 4)["instants"] == [0.5, 1.0, 1.5, 2.0]
 
 
 def test_a_run_that_goes_wrong_in_any_way_is_a_result(monkeypatch):
     def wrong(_):
         raise ZeroDivisionError("by nothing")
 
-    monkeypatch.setattr(job, "_solved", wrong)
+    monkeypatch.setattr(job, "measured", wrong)
     found = job.run(of())
     assert found["kind"] == "ZeroDivisionError"
     assert found["error"].startswith("by nothing (wrong, line ")

@@ -1,0 +1,114 @@
+"""Keys of case files, the types of their values, and the check of a table against them."""
+
+from __future__ import annotations
+
+import contextlib
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from reprlib import repr
+from typing import Any
+
+from fastcontact.errors import CaseError, FastcontactError, unknown
+
+NUMBER = (int, float)
+AXES = {"x": NUMBER, "y": NUMBER, "z": NUMBER}
+UNITS = {"length": str, "force": str, "pressure": str}
+RAMP = {"steps": int, "end": NUMBER, "instants": list, "table": list}
+SOLVE = {
+    "linear_solver": str,
+    "linear_tolerance": NUMBER,
+    "relative": NUMBER,
+    "absolute": NUMBER,
+    "geometry_updates": int,
+    "geometry": NUMBER,
+    "keep_pairing": bool,
+    "max_geometry_updates": int,
+    "max_active_set_iterations": int,
+    "max_halvings": int,
+}
+# Tables that may occur several times, by kind: the types of their keys, and the keys that are required.
+LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
+    "material": ({"E": NUMBER, "nu": NUMBER, "groups": (list, str)}, ("E", "nu")),
+    "support": ({"group": str, **AXES, "ramp": list}, ("group",)),
+    "pressure": ({"group": str, "value": NUMBER, "ramp": list}, ("group", "value")),
+    "traction": ({"group": str, **AXES, "ramp": list}, ("group",)),
+    "body_force": ({"groups": (list, str), **AXES, "ramp": list}, ()),
+    "force": ({"group": str, **AXES, "distribute": bool, "ramp": list}, ("group",)),
+    "couple": ({"group": str, "component": str}, ("group", "component")),
+    "relation": ({"terms": list, "value": NUMBER, "ramp": list}, ("terms",)),
+    "spring": ({"group": (str, int), "to": (str, int), **AXES, "axial": NUMBER}, ("group",)),
+}
+# A rigid surface: the facets of a group of a file, or of the mesh of the model.
+SURFACE = {"file": str, "group": str, "flip": bool, "crease": NUMBER}
+# Studies of this case; `fastcontact.studies.settings` reads them.
+STUDY: dict[str, Any] = {
+    "generator": str,
+    "contact": str,
+    "load_steps": int,
+    **dict.fromkeys(("halve", "double", "curves", "combinations", "quantities"), list),
+    **dict.fromkeys(("triangles", "quadrangles", "options", "parameters"), dict),
+}
+TOP: dict[str, Any] = {
+    "title": str,
+    "kinematics": str,
+    **dict.fromkeys(("units", "mesh", "contact", "obstacle", "ramp", "solve", "probes", "theory", "study"), dict),
+    **dict.fromkeys((*LISTS, "check"), list),
+}
+
+
+def check_keys(where: str, data: Any, known: Mapping[str, Any]) -> None:
+    """Raise CaseError for a key that is not in `known`, or a value not of the type there (None: any)."""
+    if not isinstance(data, dict):
+        raise CaseError(f"'{where}' must be a table of keys, not {repr(data)}")
+    for key, value in data.items():
+        label = f"{where}.{key}" if where else key
+        if key not in known:
+            raise CaseError(unknown("key", label, [f"{where}.{k}" if where else k for k in known]))
+        kind = known[key]
+        if kind is not None and (not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool)):
+            names = " or ".join(k.__name__ for k in (kind if isinstance(kind, tuple) else (kind,)))
+            raise CaseError(f"the value of '{label}' must be of type {names}, not {repr(value)}")
+
+
+def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) -> Any:
+    """Call `function` with the keys of a table of a case file.
+
+    Raises CaseError if a key is unknown or missing, or a value is of another type than the function takes, or refused
+    by it.
+    """
+    parameters = inspect.signature(function).parameters
+    check_keys(where, arguments, dict.fromkeys(parameters))
+    missing = [key for key, p in parameters.items() if p.default is p.empty and key not in arguments]
+    if missing:
+        raise CaseError(f"'{where}' needs {' and '.join(repr(key) for key in missing)}")
+    for key, value in arguments.items():
+        wanted = str(parameters[key].annotation)
+        if "float" in wanted and isinstance(value, str) and "str" not in wanted:
+            raise CaseError(f"the value of '{where}.{key}' must be a number, not {repr(value)}")
+    try:
+        return function(**arguments)
+    except (TypeError, ValueError) as error:
+        given = ", ".join(f"{key} = {repr(value)}" for key, value in arguments.items())
+        raise CaseError(f"'{where}': {given} are not of the kinds that it takes ({error})") from error
+    except FastcontactError as error:
+        raise CaseError(f"'{where}': {error}") from error
+
+
+@contextlib.contextmanager
+def at(where: str) -> Iterator[None]:
+    """Put the place in the case file before the message of an error from inside the block."""
+    try:
+        yield
+    except CaseError:
+        raise
+    except FastcontactError as error:
+        if where.replace(".", " '", 1) + "'" in str(error):  # it names the place already
+            raise
+        raise type(error)(f"{where}: {error}") from error
+
+
+def tables(where: str, entries: Any) -> list[dict[str, Any]]:
+    """Return the tables of a list of tables, checked to be one."""
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+        raise CaseError(f"'{where}' must be a list of tables: write [[{where}]] above each")
+    return entries

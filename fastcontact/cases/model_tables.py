@@ -1,0 +1,117 @@
+"""The model of a case file: materials, supports, loads, relations, springs, contact pairs and obstacles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from reprlib import repr
+from typing import Any
+
+from fastcontact.cases.keys import AXES, LISTS, NUMBER, SURFACE, at, called, check_keys, tables
+from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
+from fastcontact.elasticity.materials import LinearElastic
+from fastcontact.errors import CaseError, unknown
+from fastcontact.mesh.files.mesh_files import read_mesh
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.model.model import Model
+from fastcontact.model.ramp import Table
+
+
+def _add_material(model: Model, E: float, nu: float, groups: Any = None) -> None:
+    model.add_material(LinearElastic(E=float(E), nu=float(nu)), groups)
+
+
+# By kind of table, in the order in which they are added to the model.
+_ADD: dict[str, Callable[..., None]] = {
+    "material": _add_material,
+    "support": Model.prescribe,
+    "pressure": Model.add_pressure,
+    "traction": Model.add_traction,
+    "body_force": Model.add_body_force,
+    "force": Model.add_force,
+    "couple": Model.couple,
+    "relation": Model.relate,
+    "spring": Model.add_spring,
+}
+
+
+def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
+    """Return the model that the parsed `data` of a case file describe; meshes of obstacles lie relative to `folder`."""
+    model = Model(mesh, data["kinematics"], case_text=text)
+    model.units = dict(data.get("units", {}))
+    for kind, add in _ADD.items():
+        known, needed = LISTS[kind]
+        for i, entry in enumerate(tables(kind, data.get(kind, []))):
+            where = f"{kind}[{i}]"
+            check_keys(where, entry, known)
+            for key in needed:
+                if key not in entry:
+                    raise CaseError(f"{where} needs '{key}'")
+            with at(where):
+                add(model, **_arguments(where, entry))
+    for name, entry in data.get("contact", {}).items():
+        if not isinstance(entry, dict):
+            raise CaseError(f"'contact' needs a name for each pair: write [contact.NAME] above its keys, not '{name}'")
+        for key in ("secondary", "primary"):
+            if not isinstance(entry.get(key), str):
+                raise CaseError(f"contact.{name} needs '{key}', the name of a group of facets")
+        with at(f"contact.{name}"):
+            model.add_contact(name, **entry)
+    for name, entry in data.get("obstacle", {}).items():
+        _add_obstacle(model, name, entry, folder)
+    return model
+
+
+def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
+    """Add a rigid obstacle: its shape by kind and arguments, the other keys as for `Model.add_obstacle`."""
+    where = f"obstacle.{name}"
+    if not isinstance(entry, dict) or not isinstance(entry.get("secondary"), str):
+        raise CaseError(f"{where} needs 'secondary', the name of a group of facets")
+    rest = {key: value for key, value in entry.items() if key != "shape"}
+    shape = entry.get("shape")
+    if shape == "mesh":  # its arguments may be keys of the obstacle itself
+        shape = {"kind": "mesh", **{key: rest.pop(key) for key in SURFACE if key in rest}}
+    obstacle = _obstacle(f"{where}.shape", shape, model.mesh, folder)
+    for key in ("motion", "force"):
+        if key in rest:
+            check_keys(f"{where}.{key}", rest[key], AXES)
+    with at(where):
+        model.add_obstacle(name, obstacle=obstacle, **_arguments(where, rest))
+
+
+def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
+    """Return the rigid shape that a table with its kind and arguments describes; `mesh` is that of the model."""
+    kind = shape.get("kind", "") if isinstance(shape, dict) else shape if isinstance(shape, str) else ""
+    if not isinstance(shape, dict) or kind not in (*SHAPES, "mesh"):
+        raise CaseError(unknown(f"{where}.kind", str(kind), (*SHAPES, "mesh")))
+    arguments: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in shape.items() if k != "kind"}
+    if kind == "mesh":
+        check_keys(where, arguments, SURFACE)
+        if "group" not in arguments:
+            raise CaseError(f"'{where}' needs 'group', the facets of the rigid surface")
+        file = arguments.pop("file", None)
+        return MeshedSurface(mesh if file is None else read_mesh(folder / file), **arguments)
+    obstacle: Obstacle = called(where, SHAPES[kind], arguments)
+    return obstacle
+
+
+def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
+    """Return an entry as arguments of a method of the model, its lists of numbers and terms checked."""
+    arguments = dict(entry)
+    if "ramp" in entry:
+        arguments["ramp"] = points(entry["ramp"], f"{where}.ramp")
+    for term in entry.get("terms", []):
+        kinds: list[Any] = [(str, int), str, NUMBER]
+        if not isinstance(term, list) or len(term) != 3 or not all(isinstance(v, k) for v, k in zip(term, kinds)):
+            raise CaseError(
+                f"'{where}.terms' must be a list of [group or point, component, coefficient], not {repr(term)}"
+            )
+    return arguments
+
+
+def points(table: list[Any], where: str = "ramp.table") -> Table:
+    """Return a ramp as pairs of instant and multiplier of the loads [-]."""
+    pairs = all(isinstance(row, list) and len(row) == 2 and all(isinstance(v, NUMBER) for v in row) for row in table)
+    if not table or not pairs:
+        raise CaseError(f"'{where}' must be a list of pairs [instant, multiplier of the loads]")
+    return tuple((float(t), float(v)) for t, v in table)

@@ -1,0 +1,219 @@
+"""A finished adaptive study and its report: lines, table, dictionary, figure, page."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.cases.case import Case
+from fastcontact.cases.summary import versions
+from fastcontact.mesh import elements
+from fastcontact.results.step import StepResult
+from fastcontact.studies.error_estimate import ErrorEstimate
+from fastcontact.studies.labels import column, title, unit
+from fastcontact.studies.render import page
+from fastcontact.studies.render.figure import Curve, Line, Panel, figure
+from fastcontact.studies.render.table import Rows, aligned, finite, number, structured
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """One mesh of an adaptive study.
+
+    Attributes
+    ----------
+    n_dofs, n_cells : int
+    values, theory, reference : dict of str to float
+        By quantity, in the case's units: its value, the theory at equal approach, the mesh-converged solution.
+    energy_error : float
+        Estimated error of the whole solution in the energy norm, relative [-].
+    estimate : float
+        Estimated error of the wanted quantity, relative [-]; NaN on the first two meshes.
+    seconds : float
+        Time of solution and estimate [s].
+    """
+
+    n_dofs: int
+    n_cells: int
+    values: dict[str, float]
+    theory: dict[str, float]
+    reference: dict[str, float]
+    energy_error: float
+    estimate: float
+    seconds: float
+
+    def true_error(self, quantity: str) -> float:
+        """Return the difference from the case's mesh-converged solution, relative [-]; NaN without one."""
+        exact = self.reference.get(quantity)
+        return abs(self.values[quantity] / exact - 1.0) if exact else math.nan
+
+
+@dataclass(frozen=True, eq=False)
+class AdaptiveStudy:
+    """A finished adaptive study.
+
+    Attributes
+    ----------
+    name, title, text : str
+        Of the case: file name without suffix, title, text of the file.
+    units : dict of str to str
+        Names of the units of length, force and pressure.
+    combination : str
+        Element and formulation.
+    quantity : str
+    tolerance : float
+        Relative error asked for [-].
+    reached : bool
+        Whether the estimate fell below it.
+    rounds : list of Round
+    case : Case
+        That of the last mesh.
+    last : StepResult
+        Its solution.
+    error : ErrorEstimate
+        Its error, cell by cell.
+    """
+
+    name: str
+    title: str
+    text: str
+    units: dict[str, str]
+    combination: str
+    quantity: str
+    tolerance: float
+    reached: bool
+    rounds: list[Round]
+    case: Case
+    last: StepResult
+    error: ErrorEstimate
+
+    def effectivity(self, number: int = -1) -> float:
+        """Return estimated over true error of the quantity in a round [-]; NaN without a reference."""
+        found = self.rounds[number]
+        true = found.true_error(self.quantity)
+        return found.estimate / true if true > 0 else math.nan
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain numbers, texts, lists and dictionaries, as ``--json`` writes them; errors are relative."""
+        errors = self._errors()
+        return {
+            "case": self.name,
+            "title": self.title,
+            "units": dict(self.units),
+            "combination": self.combination,
+            "quantity": self.quantity,
+            "tolerance": self.tolerance,
+            "reached": self.reached,
+            "value": self.rounds[-1].values[self.quantity],
+            "rounds": [
+                {
+                    "n_dofs": found.n_dofs,
+                    "n_cells": found.n_cells,
+                    **found.values,
+                    **{name: finite(values[k]) for name, values in errors.items()},
+                    "seconds": found.seconds,
+                }
+                for k, found in enumerate(self.rounds)
+            ],
+            "versions": versions(),
+        }
+
+    def table(self) -> NDArray[Any]:
+        """Return a structured array (n_rounds,), one row a mesh, as ``--csv`` writes it.
+
+        Fields ``n_dofs``, ``n_cells``, the quantity in its unit, and ``energy_error``, ``estimate``, ``true_error`` (against
+        the case's mesh-converged solution) and ``effectivity`` [-].
+        """
+        counts = {name: [getattr(found, name) for found in self.rounds] for name in ("n_dofs", "n_cells")}
+        values = [found.values[self.quantity] for found in self.rounds]
+        return structured({**counts, self.quantity: values, **self._errors()})
+
+    def lines(self) -> list[str]:
+        """Return a table and a sentence for a person, as ``fastcontact converge --adaptive`` prints them."""
+        return [self.title, "", *aligned(self._rows()), "", self._sentence()]
+
+    def figure(self) -> Any:
+        """Return a matplotlib figure: errors over degrees of freedom, and the last mesh coloured by its error."""
+        heading = f"{self.title}: {self.combination}, refined for the {title(self.quantity)}"
+        return figure([[self._error_panel(), self._mesh_panel()]], (12.0, 5.2), heading)
+
+    def html(self) -> str:
+        """Return the study as one self-contained HTML page."""
+        description = "errors over degrees of freedom, and the last mesh coloured by its error"
+        sentence = page.paragraph(f"{self._sentence()}.")
+        parts = [sentence, page.image(self.figure(), description), page.table(self._rows())]
+        return page.page(f"Adaptive meshes: {self.title}", parts, self.text)
+
+    def _errors(self) -> dict[str, list[float]]:
+        """Return the errors of all rounds by name, each (n_rounds,)."""
+        return {
+            "energy_error": [found.energy_error for found in self.rounds],
+            "estimate": [found.estimate for found in self.rounds],
+            "true_error": [found.true_error(self.quantity) for found in self.rounds],
+            "effectivity": [self.effectivity(k) for k in range(len(self.rounds))],
+        }
+
+    def _rows(self) -> Rows:
+        """Return header and one row a mesh."""
+        q, errors = self.quantity, self._errors()
+        shown = {"estimated error": "estimate", "energy error": "energy_error"}
+        if math.isfinite(errors["true_error"][-1]):
+            shown |= {"true error": "true_error", "effectivity": "effectivity"}
+        rows = [["round", "cells", "DOF", column(q, q, self.units), *shown]]
+        for k, found in enumerate(self.rounds):
+            row = [str(k), str(found.n_cells), str(found.n_dofs), number(found.values[q], 8)]
+            rows.append(row + [number(errors[name][k], 2) for name in shown.values()])
+        return rows
+
+    def _sentence(self) -> str:
+        last, q = self.rounds[-1], self.quantity
+        what = f"{title(q)} {last.values[q]:.8g} {unit(q, self.units)}".rstrip()
+        verdict = "within" if self.reached else "NOT within"
+        text = f"{self.combination}: {what}, estimated error {last.estimate:.1e}, {verdict} the {self.tolerance:g} asked for"
+        if not self.reached:
+            text += ": the limit of meshes or degrees of freedom was reached; allow more (--max-dofs)"
+        true = last.true_error(q)
+        return text + (f"; true error {true:.1e}, effectivity {self.effectivity():.2g}" if math.isfinite(true) else "")
+
+    def _error_panel(self) -> Panel:
+        n_dofs, errors = [found.n_dofs for found in self.rounds], self._errors()
+        shown = {
+            "estimated error": ("o-", "estimate"),
+            "true error": ("s-", "true_error"),
+            "estimated error in the energy norm": ("^-", "energy_error"),
+        }
+        curves = [
+            Curve(n_dofs, errors[name], style, label)
+            for label, (style, name) in shown.items()
+            if np.isfinite(errors[name]).any()
+        ]
+        heading, asked = f"Error of the {title(self.quantity)}", Line(self.tolerance, style="--", label="asked for")
+        return Panel(heading, "degrees of freedom", "relative error", curves, [asked], x_scale="log", y_scale="log")
+
+    def _mesh_panel(self) -> Panel:
+        length = self.units["length"]
+        heading = f"Last mesh: {self.rounds[-1].n_cells} cells, estimated error"
+        return Panel(heading, f"x [{length}]", f"y [{length}]", grid=0.0, draw=self._draw_mesh)
+
+    def _draw_mesh(self, ax: Axes) -> None:
+        from matplotlib.collections import PolyCollection
+        from matplotlib.colors import LogNorm
+
+        mesh, cells = self.case.mesh, self.error.cells
+        shapes = [
+            p for name, block in mesh.solids.items() for p in mesh.points[block[:, : elements.get(name).n_corners]]
+        ]
+        error = np.maximum(cells, 1e-6 * cells.max())
+        drawn = PolyCollection(shapes, array=error, norm=LogNorm(), cmap="viridis", edgecolors="white", linewidths=0.1)
+        ax.add_collection(drawn)
+        ax.autoscale_view()
+        ax.set_aspect("equal")
+        bar = ax.figure.colorbar(drawn, ax=ax)
+        bar.set_label(f"energy norm [({self.units['force']} {self.units['length']})$^{{1/2}}$]")

@@ -1,0 +1,143 @@
+"""Mesh-convergence study: solve a case on finer and finer meshes, fit limits, compare them with theory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import Any
+
+from fastcontact.cases.case import Case, read_case
+from fastcontact.errors import CaseError, unknown
+from fastcontact.studies.convergence_report import Study
+from fastcontact.studies.execute import Progress, Result, raise_first, run_all
+from fastcontact.studies.fit import Limit, fit_limit
+from fastcontact.studies.job import Job, case_data, fields_of
+from fastcontact.studies.labels import LABELS
+from fastcontact.studies.levels import recipe
+from fastcontact.studies.quantities import of_theory
+from fastcontact.studies.series import Level, Series
+from fastcontact.studies.settings import Combination, Settings, combinations, settings
+
+
+def convergence_study(
+    case: Case | str | Path,
+    levels: int = 5,
+    elements: Sequence[str] | None = None,
+    formulations: Sequence[str] | None = None,
+    *,
+    quantities: Sequence[str] = (),
+    executor: Executor | None = None,
+    workers: int | None = None,
+    store: str | Path | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> Study:
+    """Solve a case on finer and finer meshes; fit order and limit; separate model error from mesh error.
+
+    Meshes come from the generator that the case names, its sizes halved on every level, or from uniform refinement of
+    its mesh file, arcs kept round; see the table ``[study]`` of case files.
+
+    Parameters
+    ----------
+    case : Case or path-like
+    levels : int
+        Number of meshes; a limit needs three, a reliable one five.
+    elements, formulations : sequence of str, optional
+        Compared in all combinations; ``["all"]`` for all; by default what ``[study]`` names, or the case's own.
+    quantities : sequence of str
+        Further ones to fit, such as ``"C1.stress.yy"``, ``"C1.displacement.y"``, ``"C1.pressure"``.
+    executor : concurrent.futures.Executor, optional
+        Where to run, see `fastcontact.studies.execute.run_all`; by default processes of this machine.
+    workers : int, optional
+        Number of these processes; 1 runs everything in this one.
+    store : path-like, optional
+        Folder of finished runs: what is there is not run again.
+    on_progress : callable, optional
+        Called with a `Progress` after every run.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    CaseError, FastcontactError
+        If the case, a name or a number is wrong, or no level of any combination could be solved.
+    """
+    case = case if isinstance(case, Case) else read_case(case)
+    if levels < 1:
+        raise CaseError(f"levels = {levels} must be at least 1; a limit takes 3")
+    chosen = settings(case)
+    members = combinations(chosen, elements, formulations)
+    jobs = [level_job(case, chosen, member, level) for level in range(levels) for member in members]
+    results = run_all(jobs, executor=executor, workers=workers, store=store, on_progress=on_progress)
+    return gathered(case, jobs, results, [*chosen.quantities, *quantities])
+
+
+def level_job(case: Case, chosen: Settings, combination: Combination, level: int) -> Job:
+    """Return the run of one element and formulation on one mesh."""
+    return Job(
+        label=f"{combination} level {level}",
+        name=case.name,
+        data=case_data(chosen, combination),
+        pair=chosen.pair,
+        recipe=recipe(chosen, combination.element, level),
+        base=case.mesh if chosen.generator is None else None,
+        size=level,
+        marks={"level": level, "element": combination.element, "formulation": combination.formulation},
+    )
+
+
+def gathered(case: Case, jobs: Sequence[Job], results: Sequence[Result], wanted: Sequence[str]) -> Study:
+    """Return the study of finished runs; `wanted` are the quantities to fit besides the standard ones.
+
+    Raises CaseError or FastcontactError if a quantity is unknown, or no run succeeded.
+    """
+    raise_first("no level could be solved", jobs, results)
+    by_combination: dict[Combination, list[tuple[int, Result]]] = {}
+    for job, result in zip(jobs, results, strict=True):
+        member = Combination(job.marks["element"], job.marks["formulation"])
+        by_combination.setdefault(member, []).append((job.marks["level"], result))
+    checked = [check.quantity for check in case.checks]
+    theory = case.theories.get(settings(case).pair or "", {}).get("theory")
+    series, failed = [], {}
+    for member, own in by_combination.items():
+        if all("error" in result for _, result in own):
+            failed[str(member)] = str(own[0][1]["error"])
+        else:
+            series.append(_series(member, own, wanted, checked, theory))
+    return Study(case.name, case.title, case.text, case.units, series, failed, theory)
+
+
+def _series(
+    member: Combination, results: list[tuple[int, Result]], wanted: Sequence[str], checked: Sequence[str], theory: Any
+) -> Series:
+    """Return one element and formulation with its limits; `checked` are fitted where they are known."""
+    solved = [(number, result) for number, result in results if "error" not in result]
+    levels = [Level(number=number, **fields_of(Level, result)) for number, result in solved]
+    known = levels[-1].values
+    for name in wanted:
+        if name not in known:
+            raise CaseError(unknown("quantity", name, known))
+    names = tuple(dict.fromkeys(name for name in (*LABELS, *checked, *wanted) if name in known))
+    limits = {name: limit for name in names if (limit := _limit(levels, name)) is not None}
+    failed = {number: str(result["error"]) for number, result in results if "error" in result}
+    last = solved[-1][1]
+    at_force, spread = _at_force(theory, limits.get("force"))
+    return Series(member, levels, failed, last["theory"], last["reference"], at_force, spread, names, limits)
+
+
+def _at_force(theory: Any, force: Limit | None) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the theory's values at the limit of the force, and how much they change over its error bar."""
+    if force is None or not force.value > force.uncertainty or not hasattr(theory, "at_force"):
+        return {}, {}
+    middle = of_theory(theory.at_force(force.value))
+    upper = of_theory(theory.at_force(force.value + force.uncertainty))
+    return middle, {name: abs(upper[name] - value) for name, value in middle.items()}
+
+
+def _limit(levels: Sequence[Level], quantity: str) -> Limit | None:
+    known = [level for level in levels if quantity in level.values]
+    if len({level.h for level in known}) < max(3, len(known)):
+        return None
+    return fit_limit([level.h for level in known], [level.values[quantity] for level in known])

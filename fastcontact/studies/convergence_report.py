@@ -1,0 +1,159 @@
+"""A finished mesh-convergence study and its report: lines, table, dictionary, figure, page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import NDArray
+
+from fastcontact.cases.summary import versions
+from fastcontact.studies import convergence_tables as tables
+from fastcontact.studies.convergence_figures import error_panel, pressure_panel, theory_panel
+from fastcontact.studies.fit import CONFIDENCE
+from fastcontact.studies.render import page
+from fastcontact.studies.render.figure import Panel, figure
+from fastcontact.studies.render.table import aligned, structured
+from fastcontact.studies.sentences import MAIN, sentences
+from fastcontact.studies.series import Series
+
+# In figures, and in the table of all combinations.
+COMPARED = ("force", "pressure_max")
+EXPLANATIONS = (
+    "The <em>limit</em> is what the values tend to on ever finer meshes, from a fit of value = limit + C "
+    f"h<sup>order</sup>; it lies within the error bar with a probability of {CONFIDENCE:.0%}. Orders from one level "
+    "to the next are erratic, because the edge of the contact cuts another facet each time: judge by the fitted order.",
+    "The <em>mesh error</em> is the finest mesh's difference from the limit; a finer mesh makes it smaller. The "
+    "<em>model error</em> is the limit's difference from theory; it stays on every mesh, because theory and model "
+    "are about different bodies. Both are relative to the theory and sum up to the whole difference.",
+    "<em>Equal approach</em> compares at the same displacement, <em>equal force</em> at the same contact force.",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """A finished mesh-convergence study.
+
+    Attributes
+    ----------
+    name, title, text : str
+        Of the case: file name without suffix, title, text of the file.
+    units : dict of str to str
+        Names of the units of length, force and pressure.
+    series : list of Series
+        One for each combination of element and formulation that could be solved.
+    failed : dict of str to str
+        Why a whole combination failed, by its name.
+    theory : object or None
+        The theory at equal approach, of `fastcontact.analytic`.
+    """
+
+    name: str
+    title: str
+    text: str
+    units: dict[str, str]
+    series: list[Series]
+    failed: dict[str, str]
+    theory: Any
+
+    @property
+    def best(self) -> Series:
+        """The combination that is usually the most accurate: quadratic quadrangles with a pressure field."""
+        complete = max(len(series.levels) for series in self.series)
+        candidates = [series for series in self.series if len(series.levels) == complete]
+        return max(candidates, key=lambda series: series.combination.rank)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain numbers, texts, lists and dictionaries, as ``--json`` writes them.
+
+        The top level holds the best combination (`best`), ``combinations`` all of them. Errors are relative to the theory,
+        or without one to the limit; ``mesh_error`` is that of the finest mesh, and ``model_error + mesh_error`` its
+        difference from theory. ``uncertainty`` is in the unit of the quantity, at a confidence of 95 %.
+        """
+        return {
+            "case": self.name,
+            "title": self.title,
+            "units": dict(self.units),
+            "confidence": CONFIDENCE,
+            **tables.series_dict(self.best),
+            "combinations": [tables.series_dict(series) for series in self.series],
+            "failed_combinations": dict(self.failed),
+            "versions": versions(),
+        }
+
+    def table(self) -> NDArray[Any]:
+        """Return a structured array (n_rows,), one row a level of a combination, as ``--csv`` writes it.
+
+        Fields ``element``, ``formulation``, ``level``, ``h`` [length], ``n_dofs``, ``seconds`` [s], and for every quantity
+        its value in its unit, ``..._error`` [-] (relative to its limit), ``..._order`` [-] (from the level before) and, where
+        there is a theory of it, ``..._from_theory`` [-] (relative to the theory).
+        """
+        return structured(tables.csv_columns(self.series))
+
+    def lines(self) -> list[str]:
+        """Return tables and sentences for a person, as ``fastcontact converge`` prints them."""
+        found = [self.title]
+        for series in self.series:
+            limits = tables.limit_rows(series, self.units)
+            none = [f"  no limits: {len(series.levels)} levels were solved, and a limit takes three"]
+            found += ["", f"{series.combination}", *aligned(tables.level_rows(series, self.units)), ""]
+            found += aligned(limits) if len(limits) > 1 else none
+            found += [f"  level {number} failed: {text}" for number, text in series.failed.items()]
+        found += [f"  {name} failed: {text}" for name, text in self.failed.items()]
+        if len(self.series) > 1:
+            names = [name for name in COMPARED if name in self.best.quantities]
+            found += ["", "all combinations: limits and model errors at equal approach"]
+            found += aligned(tables.comparison_rows(self.series, names, self.units))
+        return [*found, "", *sentences(self.best)]
+
+    def figure(self) -> Any:
+        """Return a matplotlib figure: errors, pressure over the radius, differences from theory."""
+        pressure = pressure_panel(self.best, self.theory, self.units)
+        difference = theory_panel(self.series, self.best, "pressure_max", self.units)
+        errors = [error_panel(self.series, name, self.units) for name in COMPARED]
+        return figure([errors, [pressure, difference]], (12.0, 9.2), self.title)
+
+    def html(self) -> str:
+        """Return the study as one self-contained HTML page."""
+        parts = [page.paragraph(text) for text in sentences(self.best)]
+        if len(self.series) > 1:
+            parts += [page.section("All combinations"), page.paragraph("Limits with error bars, held against theory.")]
+            for name in (name for name in MAIN if name in self.best.quantities):
+                rows = tables.page_comparison_rows(self.series, name)
+                parts.append(page.table(rows, tables.caption(name, self.units)))
+        parts += [page.section("Pictures"), *self._pictures()]
+        for series in self.series:
+            parts += self._series_parts(series)
+        parts += [page.failure(f"{name} failed: {text}") for name, text in self.failed.items()]
+        parts += [page.section("How to read this"), *(f"<p class='say'>{text}</p>" for text in EXPLANATIONS)]
+        return page.page(f"Mesh convergence: {self.title}", parts, self.text)
+
+    def _pictures(self) -> list[str]:
+        limits = [name for name in COMPARED if any(name in series.limits for series in self.series)]
+        errors = [error_panel(self.series, name, self.units) for name in limits] or [Panel(grid=0.0)]
+        found = [
+            page.image(
+                figure([errors], (5.6 * len(errors), 4.8), self.title),
+                "mesh errors over the mesh size, doubly logarithmic",
+            )
+        ]
+        theories = [name for name in COMPARED if any(series.split(name) for series in self.series)]
+        if theories:
+            panels = [theory_panel(self.series, self.best, name, self.units) for name in theories]
+            drawn = figure([panels], (5.6 * len(panels), 4.8), self.title)
+            found.append(page.image(drawn, "difference from theory over the mesh size: model and mesh error"))
+        if self.best.finest.profile:
+            drawn = figure([[pressure_panel(self.best, self.theory, self.units)]], (7.4, 5.0))
+            found.append(page.image(drawn, "contact pressure of all levels over theory"))
+        return found
+
+    def _series_parts(self, series: Series) -> list[str]:
+        parts = [page.section(str(series.combination))]
+        names = [name for name in tables.IN_TABLES if name in series.quantities]
+        for first in range(0, len(names), 2):
+            parts.append(page.table(tables.level_rows(series, self.units, names[first : first + 2])))
+        if series.limits:
+            parts.append(page.table(tables.page_limit_rows(series, self.units)))
+        parts += [page.failure(f"level {number} failed: {text}") for number, text in series.failed.items()]
+        warnings = sorted({text for level in series.levels for text in level.warnings})
+        return parts + [page.paragraph(f"Warning: {text}") for text in warnings]

@@ -1,0 +1,130 @@
+"""Figures: panels of curves and horizontal lines, drawn with matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from fastcontact.errors import FastcontactError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MARKERS = "osD^v<>ph*"
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Points of a panel, joined: `x` and `y` (n_points,), in the units of its axes."""
+
+    x: Any
+    y: Any
+    style: str = "-"  # marker and line, as matplotlib writes them
+    label: str | None = None  # in the legend; None leaves it out
+    color: Any = None  # None: the next one of matplotlib's cycle
+    width: float = 1.0  # of the line [point]
+    size: float = 4  # of the markers [point]
+    bars: tuple[Any, Any] | None = None  # lower and upper ends of error bars, each (n_points,), in the unit of y
+
+
+@dataclass(frozen=True)
+class Line:
+    """A horizontal line at `value`, with a band of `half_width` on both sides; both in the unit of the y axis."""
+
+    value: float
+    color: str = "black"
+    style: str = "-"
+    width: float = 1.0
+    label: str | None = None
+    half_width: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One pair of axes and what is drawn on it."""
+
+    title: str = ""
+    x_label: str = ""
+    y_label: str = ""
+    curves: Sequence[Curve] = ()
+    lines: Sequence[Line] = ()
+    x_scale: str = "linear"  # or "log", or "plain log": few plain numbers instead of powers of ten
+    y_scale: str = "linear"  # or "log"
+    x_end: float | None = None  # end of the x axis, in its unit; both axes start from zero then
+    grid: float = 0.4  # opacity at major ticks; 0: no grid
+    minor_grid: float = 0.0  # opacity at minor ticks
+    title_size: float | None = None  # [point]
+    legend_size: float = 8  # [point]
+    draw: Callable[[Axes], None] | None = None  # draws on the axes what is more than curves and lines
+    instead: str = ""  # shown in place of everything else, where there is nothing to draw
+
+
+def marker(number: int) -> str:
+    """Return the marker of a curve, counted from 0."""
+    return MARKERS[number % len(MARKERS)]
+
+
+def figure(panels: Sequence[Sequence[Panel]], size: tuple[float, float], title: str = "", **style: Any) -> Figure:
+    """Return a figure of rows of panels, of a `size` [inch]; it needs no display. `style` is that of its title.
+
+    Raises FastcontactError if matplotlib is not installed.
+    """
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise FastcontactError("pictures need matplotlib: pip install 'fastcontact[plot]'") from error
+    made = Figure(figsize=size, layout="constrained", dpi=130)
+    FigureCanvasAgg(made)
+    axes = made.subplots(len(panels), max(map(len, panels)), squeeze=False)
+    for ax, panel in zip(axes.flat, (panel for row in panels for panel in row), strict=True):
+        _draw(panel, ax)
+    if title:
+        made.suptitle(title, **style)
+    return made
+
+
+def _draw(panel: Panel, ax: Axes) -> None:
+    if panel.instead:
+        ax.set_axis_off()
+        ax.text(0.5, 0.5, panel.instead, ha="center", va="center", transform=ax.transAxes, wrap=True)
+        return
+    for curve in panel.curves:
+        color = {} if curve.color is None else {"color": curve.color}
+        (drawn,) = ax.plot(curve.x, curve.y, curve.style, ms=curve.size, lw=curve.width, label=curve.label, **color)
+        if curve.bars is not None:
+            ax.vlines(curve.x, *curve.bars, colors=drawn.get_color(), lw=0.7)
+    for line in panel.lines:
+        ax.axhline(line.value, color=line.color, ls=line.style, lw=line.width, label=line.label)
+        if line.half_width:
+            ax.axhspan(line.value - line.half_width, line.value + line.half_width, color=line.color, alpha=0.15, lw=0)
+    _scale(panel, ax)
+    if panel.draw is not None:
+        panel.draw(ax)
+    ax.set_xlabel(panel.x_label)
+    ax.set_ylabel(panel.y_label)
+    ax.set_title(panel.title, fontsize=panel.title_size or "large")
+    if panel.x_end is not None:
+        ax.set_xlim(0.0, panel.x_end or None)
+        ax.set_ylim(bottom=0.0)
+    if panel.grid:
+        ax.grid(which="major", alpha=panel.grid)
+    if panel.minor_grid:
+        ax.grid(which="minor", alpha=panel.minor_grid)
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(fontsize=panel.legend_size)
+
+
+def _scale(panel: Panel, ax: Axes) -> None:
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    if panel.x_scale != "linear":
+        ax.set_xscale("log")
+    if panel.x_scale == "plain log":
+        ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        ax.xaxis.set_minor_formatter(NullFormatter())
+    if panel.y_scale != "linear":
+        ax.set_yscale(panel.y_scale)

@@ -1,0 +1,80 @@
+"""Pages: one self-contained HTML file of paragraphs, tables and pictures, which loads nothing from elsewhere."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from collections.abc import Sequence
+from typing import Any
+
+from fastcontact.cases.summary import versions
+
+STYLE = """
+body { font-family: system-ui, sans-serif; line-height: 1.45; color: #1b1b1b; background: #fff;
+  max-width: 72rem; margin: 2rem auto; padding: 0 1rem; }
+h1 { font-size: 1.6rem; } h2 { font-size: 1.25rem; margin-top: 2.2rem; border-bottom: 1px solid #ccc; }
+table { border-collapse: collapse; margin: 0.8rem 0; font-variant-numeric: tabular-nums; font-size: 0.9rem; }
+th, td { padding: 0.25rem 0.6rem; text-align: right; border-bottom: 1px solid #ddd; white-space: nowrap; }
+th { background: #f3f3f3; white-space: normal; vertical-align: bottom; }
+th:first-child, td:first-child { text-align: left; white-space: normal; }
+caption { text-align: left; font-weight: 600; padding: 0.4rem 0; }
+.wide { overflow-x: auto; } img { max-width: 100%; height: auto; } p.say { max-width: 50rem; }
+pre { background: #f6f6f6; padding: 0.8rem; overflow-x: auto; font-size: 0.85rem; }
+.failed { color: #a00; } footer { margin-top: 2.5rem; color: #555; font-size: 0.85rem; }
+"""
+
+
+def page(heading: str, parts: Sequence[str], case_text: str) -> str:
+    """Return a page: its heading, its parts (HTML already), the case file, and the versions that made it."""
+    parts = list(parts)
+    if case_text:
+        parts += [section("The case"), f"<pre>{html.escape(case_text)}</pre>"]
+    made = ", ".join(f"{name} {version}" for name, version in versions().items())
+    parts.append(f"<footer>Made with {html.escape(made)}.</footer>")
+    return (
+        "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'>"
+        "<meta name='viewport' content='width=device-width, initial-scale=1'>"
+        f"<title>{html.escape(heading)}</title><style>{STYLE}</style></head>\n<body>\n<h1>{html.escape(heading)}</h1>\n"
+        + "\n".join(parts)
+        + "\n</body></html>\n"
+    )
+
+
+def section(heading: str) -> str:
+    """Return the heading of a section."""
+    return f"<h2>{html.escape(heading)}</h2>"
+
+
+def paragraph(text: str) -> str:
+    """Return a text as a paragraph."""
+    return f"<p class='say'>{_text(text)}</p>"
+
+
+def failure(text: str) -> str:
+    """Return why something failed as a paragraph."""
+    return f"<p class='failed'>{html.escape(text)}</p>"
+
+
+def table(rows: Sequence[Sequence[str]], caption: str = "") -> str:
+    """Return rows of texts as a table, the first row a header."""
+
+    def row(cells: Sequence[str], tag: str) -> str:
+        inside = "".join(f"<{tag}>{_text(cell)}</{tag}>" for cell in cells)
+        return f"<tr>{inside}</tr>"
+
+    body = "".join(row(cells, "td") for cells in rows[1:])
+    above = f"<caption>{_text(caption)}</caption>" if caption else ""
+    return f"<div class='wide'><table>{above}<thead>{row(rows[0], 'th')}</thead><tbody>{body}</tbody></table></div>"
+
+
+def image(figure: Any, description: str) -> str:
+    """Return a matplotlib figure as an image element that holds the picture."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png")
+    data = base64.b64encode(buffer.getvalue()).decode("ascii")
+    return f"<p><img alt='{html.escape(description, quote=True)}' src='data:image/png;base64,{data}'></p>"
+
+
+def _text(text: str) -> str:
+    return html.escape(text).replace("+-", "&plusmn;")

@@ -1,0 +1,70 @@
+"""Tables: rows of texts aligned for a terminal, columns of numbers for CSV, numbers written as text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Rows = list[list[str]]
+
+
+def number(value: float, digits: int = 6) -> str:
+    """Return a number, or a dash for NaN and infinity."""
+    return f"{value:.{digits}g}" if math.isfinite(value) else "-"
+
+
+def percent(value: float | None, uncertainty: float | None = None) -> str:
+    """Return a relative difference in percent with its sign, or a dash for None and NaN.
+
+    There are three decimals, and four where the `uncertainty`, relative like the value, is below 1e-5.
+
+    Examples
+    --------
+    >>> percent(0.04005, 0.00003), percent(0.5)
+    ('+4.005 %', '+50.000 %')
+    """
+    if value is None or not math.isfinite(value):
+        return "-"
+    return f"{100 * value:+.{4 if uncertainty is not None and 0 < uncertainty < 1e-5 else 3}f} %"
+
+
+def with_error_bar(value: float, bar: float) -> str:
+    """Return a value with its error bar, both rounded to the two leading digits of the latter.
+
+    Examples
+    --------
+    >>> with_error_bar(2908.1012, 28.7)
+    '2908 +- 29'
+    """
+    if not (math.isfinite(bar) and bar > 0):
+        return number(value, 8)
+    digits = 1 - math.floor(math.log10(bar))
+    if abs(digits) > 12:
+        return f"{number(value, 8)} +- {number(bar, 2)}"
+    places = max(digits, 0)
+    return f"{round(value, digits):.{places}f} +- {round(bar, digits):.{places}f}"
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return rows of texts as lines, columns right-aligned, the first row a header."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  " + "  ".join(text.rjust(width) for text, width in zip(row, widths, strict=True)) for row in rows]
+
+
+def structured(columns: Mapping[str, Sequence[Any]]) -> NDArray[Any]:
+    """Return columns of equal length (n_rows,) as a structured array (n_rows,) with a field each, in their units."""
+    arrays = {name: np.array(values) for name, values in columns.items()}
+    length = len(next(iter(arrays.values())))
+    result = np.empty(length, dtype=[(name, column.dtype) for name, column in arrays.items()])
+    for name, column in arrays.items():
+        result[name] = column
+    return result
+
+
+def finite(value: Any) -> Any:
+    """Return a number that JSON can hold: None for NaN and infinity."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,83 @@
+"""Sentences about a mesh-convergence study: model error, mesh error, and what they do not prove."""
+
+from __future__ import annotations
+
+from fastcontact.studies.fit import CONFIDENCE
+from fastcontact.studies.labels import title
+from fastcontact.studies.model_error import cancelling
+from fastcontact.studies.render.table import percent
+from fastcontact.studies.series import Series
+
+# The quantities that sentences are about, in this order.
+MAIN = ("pressure_max", "force")
+
+
+def sentences(series: Series) -> list[str]:
+    """Return sentences about the difference of one element and formulation from theory."""
+    if not series.limits:
+        return [f"{series.combination}: {len(series.levels)} levels were solved, and a limit takes three."]
+    about = [text for quantity in MAIN if quantity in series.limits for text in _about_quantity(series, quantity)]
+    return about + _about_equal_force(series)
+
+
+def _about_quantity(series: Series, quantity: str) -> list[str]:
+    found, name = series.split(quantity), title(quantity)
+    if found is None:
+        off = percent(series.errors(quantity)[-1])
+        return [f"{series.combination}: the mesh error of the {name} is {off} on the finest mesh."]
+    start = f"{series.combination}: at equal approach the {name}"
+    finest = f"({series.finest.n_dofs} degrees of freedom)"
+    bar = f"{100 * found.uncertainty:.2g} %"
+    if found.resolved:
+        texts = [
+            f"{start} differs from theory by {percent(found.total)}. Of that, "
+            f"{percent(found.model, found.uncertainty)} (+- {bar}) is model error, which no mesh removes, and "
+            f"{percent(found.mesh)} is mesh error on the finest mesh {finest}, which goes to zero."
+        ]
+    else:
+        texts = [
+            f"{start} agrees with theory within the error bar of its limit, {percent(found.model)} +- {bar}; "
+            f"{percent(found.mesh)} is mesh error on the finest mesh {finest}."
+        ]
+    if not series.limits[quantity].converging:
+        texts.append(f"The {name} does not settle: its last change is the largest, so finer meshes are needed.")
+    return texts + _about_cancelling(series, quantity, found.model) + _about_reference(series, quantity)
+
+
+def _about_cancelling(series: Series, quantity: str, model_error: float) -> list[str]:
+    """Name the mesh whose mesh error cancels the model error: it looks better than it is."""
+    best = cancelling(series.values(quantity), series.limits[quantity], series.theory[quantity])
+    if best is None:
+        return []
+    level, off = series.levels[best], series.from_theory(quantity)[best]
+    return [
+        f"Level {level.number} ({level.n_dofs} degrees of freedom) lies only {percent(off)} from theory because its mesh "
+        f"error of {percent(off - model_error)} cancels model error: that it agrees is no proof of a good mesh."
+    ]
+
+
+def _about_reference(series: Series, quantity: str) -> list[str]:
+    reference, limit = series.reference.get(quantity), series.limits[quantity]
+    if reference is None:
+        return []
+    where = "inside" if limit.contains(reference) else "OUTSIDE"
+    return [
+        f"The case's mesh-converged solution lies {where} the error bar of the limit ({CONFIDENCE:.0%}), "
+        f"{percent(limit.value / reference - 1.0)} from the limit."
+    ]
+
+
+def _about_equal_force(series: Series) -> list[str]:
+    same, equal = series.split_equal_force("pressure_max"), series.split("pressure_max")
+    if same is None or equal is None:
+        return []
+    text = (
+        f"{series.combination}: at equal force the model error of the largest pressure is {percent(same.model)} (+- "
+        f"{100 * same.uncertainty:.2g} %)"
+    )
+    radius = series.split_equal_force("contact_radius")
+    if radius is not None:
+        text += f", that of the contact radius {percent(radius.model)} (+- {100 * radius.uncertainty:.2g} %)"
+    if abs(same.model) < 0.3 * abs(equal.model) and equal.resolved:
+        text += ": what differs at equal approach is mostly the force that it takes, not how the force is spread"
+    return [text + "."]

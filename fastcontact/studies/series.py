@@ -1,0 +1,120 @@
+"""One element and formulation on all meshes of a convergence study: values, limits, errors."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+from fastcontact.studies.fit import Limit, step_orders
+from fastcontact.studies.model_error import Split, split
+from fastcontact.studies.settings import Combination
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """Results of one mesh.
+
+    Attributes
+    ----------
+    number : int
+        0 is the coarsest.
+    h : float
+        Shortest facet of the secondary surface; without contact the shortest edge [length].
+    n_dofs : int
+    values : dict of str to float
+        Quantities of interest, in the case's units.
+    profile : dict
+        ``r`` [length] and ``pressure`` [pressure], lists (n_nodes,) over the secondary nodes.
+    seconds : float
+        Time of the run [s].
+    warnings : tuple of str
+    """
+
+    number: int
+    h: float
+    n_dofs: int
+    values: dict[str, float]
+    profile: dict[str, list[float]]
+    seconds: float
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """One element and formulation on all levels.
+
+    Attributes
+    ----------
+    combination : Combination
+    levels : list of Level
+        Those that could be solved, coarsest first.
+    failed : dict of int to str
+        Why a level failed, by its number.
+    theory, reference : dict of str to float
+        By quantity: the theory at equal approach, and the mesh-converged solution if the case names one.
+    equal_force, equal_force_spread : dict of str to float
+        By quantity: the theory at the limit of the force, and its change over the error bar of the force.
+    quantities : tuple of str
+        Those that were fitted, or would have been with more levels.
+    limits : dict of str to Limit
+        By quantity; empty with fewer than three levels.
+    """
+
+    combination: Combination
+    levels: list[Level]
+    failed: dict[int, str]
+    theory: dict[str, float]
+    reference: dict[str, float]
+    equal_force: dict[str, float]
+    equal_force_spread: dict[str, float]
+    quantities: tuple[str, ...]
+    limits: dict[str, Limit]
+
+    @property
+    def finest(self) -> Level:
+        """The last level that could be solved."""
+        return self.levels[-1]
+
+    @property
+    def h(self) -> list[float]:
+        """Mesh size of every level (n_levels,) [length]."""
+        return [level.h for level in self.levels]
+
+    def values(self, quantity: str) -> list[float]:
+        """Return a quantity on every level (n_levels,), in its unit; NaN where it is not known."""
+        return [level.values.get(quantity, math.nan) for level in self.levels]
+
+    def errors(self, quantity: str) -> list[float]:
+        """Return (value - limit) / limit on every level (n_levels,) [-]; NaN without a limit."""
+        limit = self.limits.get(quantity)
+        return [value / limit.value - 1.0 if limit and limit.value else math.nan for value in self.values(quantity)]
+
+    def orders(self, quantity: str) -> list[float]:
+        """Return the order from level to level (n_levels,) [-], the first NaN."""
+        limit = self.limits.get(quantity)
+        return step_orders(self.h, self.values(quantity), limit.value) if limit else [math.nan] * len(self.levels)
+
+    def from_theory(self, quantity: str) -> list[float]:
+        """Return value / theory - 1 at equal approach on every level (n_levels,) [-]; NaN without a theory."""
+        theory = self.theory.get(quantity)
+        return [value / theory - 1.0 if theory else math.nan for value in self.values(quantity)]
+
+    def split(self, quantity: str) -> Split | None:
+        """Return model and mesh error at equal approach, where there are a limit and a theory."""
+        limit, theory = self.limits.get(quantity), self.theory.get(quantity)
+        return split(self.values(quantity)[-1], limit, theory) if limit and theory else None
+
+    def split_equal_force(self, quantity: str) -> Split | None:
+        """Return model and mesh error against the theory at the limit of the force."""
+        limit, theory = self.limits.get(quantity), self.equal_force.get(quantity)
+        if not (limit and theory):
+            return None
+        # The theory's value is as uncertain as the force at which it is taken.
+        error_bar = math.hypot(limit.uncertainty, self.equal_force_spread.get(quantity, 0.0))
+        return split(self.values(quantity)[-1], dataclasses.replace(limit, uncertainty=error_bar), theory)
+
+    def mesh_error(self, quantity: str) -> float:
+        """Return the error of the finest mesh [-], relative to the theory, or without one to the limit."""
+        found = self.split(quantity)
+        return found.mesh if found else self.errors(quantity)[-1]
