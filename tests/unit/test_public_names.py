@@ -38,6 +38,3 @@ def test_an_unknown_name_is_no_attribute():
     with pytest.raises(AttributeError, match="no attribute 'solver'"):
         fc.solver  # noqa: B018
 
-
-def test_dir_lists_the_public_names():
-    assert set(fc.__all__) <= set(dir(fc))
