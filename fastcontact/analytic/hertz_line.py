@@ -74,7 +74,7 @@ class HertzLine:
         return self.stress(np.zeros_like(np.asarray(depth, dtype=np.float64)), np.negative(depth), nu)
 
     def surface_stress(self, x: ArrayLike, nu: float | None = None) -> Array:
-        """Return the stresses (..., 4) [pressure] of the surface at `x` (...) [length]; xx = yy = -pressure (Johnson, 4.2)."""
+        """Return the stresses (..., 4) [pressure] of the surface at `x` (...) [length]: xx = yy = -pressure."""
         return self.stress(x, np.zeros_like(np.asarray(x, dtype=np.float64)), nu)
 
     def von_mises(self, x: ArrayLike, y: ArrayLike, nu: float | None = None) -> Array:

@@ -4,7 +4,8 @@ What counts are parameters, results, properties and attributes whose annotation,
 function of positions. A shape is a parenthesis such as ``(n_points, dim)``, ``(...)`` standing for any shape; a unit is a
 bracket such as ``[length]``, ``[force / length^2]`` or ``[-]``. Indices, numbers of things and booleans have no unit.
 An entry of a numpydoc section holds both in its type or its text. Outside of sections an argument is written as
-```x` (n,) [length]``, and a result as the first shape and unit of the text that belong to no argument.
+```x` (n,) [length]``, and a result as a shape and a unit that belong to no argument. ``as for `other``` and ``see `other```
+refer to the docstring of another function or class, and the name of a type that the docstring of the module explains to that.
 
 ``python tests/docs/arrays.py [PATH ...]`` prints the figures of the public names, or those of all functions and classes of
 the modules under these paths of the package, and what is missing.
@@ -26,11 +27,12 @@ import fastcontact as fc
 
 PACKAGE = Path(fc.__file__).parent
 NAMESPACES = [fc.analytic, fc.generate, fc.obstacles, fc.plot, fc.recovery, fc.topology]
-SHAPE = re.compile(r"\((?:\.\.\.|[\w.]+(?: [+*-] [\w.]+)*(?:, (?:\.\.\.|[\w.]+(?: [+*-] [\w.]+)*))*),?\)")
-WORD = r"(?:length|force|pressure|energy|mass|time|radian|degrees|1|-|unit of [^\]]+|units? [^\]]+)"
-UNIT = re.compile(rf"\[{WORD}[^\]]*\]")
+SIZE = r"(?:\.\.\.|(?:[a-z]\w*|[1-9]\d?)(?: [+*-] (?:[a-z]\w*|[1-9]\d?))*)"
+SHAPE = re.compile(rf"\(\.\.\.\)|\({SIZE},\)|\({SIZE}(?:, {SIZE})+\)")
+UNIT = re.compile(r"\[(?:-|(?:length|force|pressure|energy|radian|degrees|1 /|units? of)[^\]]*)\]")
 TYPED = re.compile(r"ndarray|array_like|csr_array|bsr_array")
-WHOLE = re.compile(r"of (?:int|bool)|bool_|np\.u?int|Indices|Numbers|Mask|intp|integer")
+AFTER = r"((?: \([^)]*\))?(?: of int| of bool|(?: \[[^\]]*\])?))"  # the name of an argument: its shape, its unit
+WHOLE = re.compile(r"of (?:int|bool)|bool_|np\.u?int|NDArray\[Any\]|Indices|Numbers|Mask|intp|integer")
 
 
 @dataclass(frozen=True)
@@ -76,17 +78,50 @@ class Docstring:
 
     def argument(self, name: str) -> str:
         """What is said of an argument: its entry, or the shape and unit that follow its name in the text."""
-        if name in self.entries:
-            return self.entries[name]
-        match = re.search(rf"`{name}`((?: \([^)]*\))?(?: \[[^\]]*\])?)", self.sections[""])
-        return match[1] if match else ""
+        match = re.search(rf"`{name}`{AFTER}", self.sections[""])
+        return self.entries.get(name) or (match[1] if match else "")
 
     @property
     def result(self) -> str:
         """What is said of the result."""
-        if "Returns" in self.sections:
-            return self.sections["Returns"]
-        return re.sub(r"`\w+`(?: \([^)]*\))?(?: \[[^\]]*\])?", "", self.sections[""])
+        return self.sections.get("Returns") or re.sub(rf"`\w+`{AFTER}", "", self.sections[""])
+
+    @property
+    def references(self) -> list[str]:
+        """The functions and classes that the docstring refers to for what it leaves out."""
+        return re.findall(r"(?:as for|[Ss]ee) `(\w+)`", self.text)
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a docstring stands: what it says itself, and then what it refers to."""
+
+    function: Callable[..., Any]
+    doc: Docstring
+
+    @cached_property
+    def others(self) -> list[Docstring]:
+        """The docstrings that it refers to: of functions, or of the method of the same name of another class."""
+        known = vars(sys.modules[self.function.__module__])
+        values = [known[name] for name in self.doc.references if name in known]
+        values = [getattr(v, self.function.__name__, v) if inspect.isclass(v) else v for v in values]
+        return [Docstring(value.__doc__ or "") for value in values]
+
+    def argument(self, name: str, note: str) -> str:
+        """What is said of an argument: here, where the docstring refers to, or of its type."""
+        return self._first([*(doc.argument(name) for doc in (self.doc, *self.others)), *self._types(note)])
+
+    def result(self, note: str) -> str:
+        """What is said of the result: here, where the docstring refers to, or of its type."""
+        return self._first([*(doc.result for doc in (self.doc, *self.others)), *self._types(note)])
+
+    def _first(self, texts: list[str]) -> str:
+        return next((text for text in texts if SHAPE.search(text)), texts[0])
+
+    def _types(self, note: str) -> list[str]:
+        """The paragraphs of the module's docstring that explain a type of an annotation."""
+        paragraphs = inspect.cleandoc(sys.modules[self.function.__module__].__doc__ or "").split("\n\n")
+        return [text for text in paragraphs if any(f"`{word}`" in text for word in re.findall(r"\w+", note))]
 
 
 def _items(section: str) -> Iterator[tuple[str, str, str]]:
@@ -111,15 +146,17 @@ def is_array(annotation: Any, module: Any) -> bool:
 
 def of_function(function: Callable[..., Any], where: str, inherited: Docstring | None = None) -> Iterator[Entry]:
     """The entries of a function or method; those of a constructor stand in the docstring of its class."""
-    module, doc = sys.modules[function.__module__], inherited or Docstring(function.__doc__ or "")
+    module = sys.modules[function.__module__]
+    source = Source(function, inherited or Docstring(function.__doc__ or ""))
     for name, parameter in inspect.signature(function).parameters.items():
         note = "" if parameter.annotation is parameter.empty else str(parameter.annotation)
-        said = doc.argument(name)
+        said = source.argument(name, note)
         if is_array(note, module) or TYPED.search(said.partition("\n")[0]):
             yield Entry(where, name, said, bool(WHOLE.search(note) or WHOLE.search(said)))
     note = str(inspect.signature(function).return_annotation)
     if is_array(note, module) and inherited is None:
-        yield Entry(where, "return", doc.result, bool(WHOLE.search(note) or WHOLE.search(doc.result)))
+        said = source.result(note)
+        yield Entry(where, "return", said, bool(WHOLE.search(note) or WHOLE.search(said)))
 
 
 def of_class(kind: type, where: str) -> Iterator[Entry]:

@@ -16,7 +16,7 @@ SIDES = ("BOTTOM", "RIGHT", "TOP", "LEFT")
 
 
 def rectangular(x: Array, y: Array) -> Array:
-    """Grid (n + 1, m + 1, 2) of the coordinates x (n + 1,) and y (m + 1,) [length]."""
+    """Return the grid (n + 1, m + 1, 2) [length] of the coordinates `x` (n + 1,) [length] and `y` (m + 1,) [length]."""
     affordable(len(x) * len(y))
     return np.stack(np.meshgrid(x, y, indexing="ij"), axis=2)
 
@@ -33,12 +33,12 @@ def transfinite(bottom: Array, right: Array, top: Array, left: Array, u: Array, 
     right, left : ndarray (m + 1, 2)
         Nodes in the direction of v [length].
     u, v : ndarray (n + 1,), (m + 1,)
-        Relative abscissae of the nodes of opposite sides, 0 to 1.
+        Relative abscissae of the nodes of opposite sides, 0 to 1 [-].
 
     Returns
     -------
     ndarray (n + 1, m + 1, 2)
-        The sides are met exactly.
+        Its sides are exactly the given ones [length].
     """
     affordable(len(u) * len(v))
     U, V = u[:, None, None], v[None, :, None]

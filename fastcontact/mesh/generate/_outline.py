@@ -38,11 +38,11 @@ def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> 
 
 
 def straight(start: Sequence[float], end: Sequence[float], relative: Array) -> Array:
-    """Points (n, 2) of a straight side at the relative abscissae (n,), its ends exact [length]."""
+    """Return points (n, 2) [length] of a straight side at the abscissae `relative` (n,) [-], its ends exact."""
     a, b, s = np.asarray(start, float), np.asarray(end, float), relative[:, None]
     return np.where(s < 1.0, a + s * (b - a), b)
 
 
 def arc(centre: Sequence[float], radius: float, angles: Array) -> Array:
-    """Points (n, 2) of a circle at `angles` (n,) from its topmost point, clockwise [radian]."""
+    """Return points (n, 2) [length] of a circle at `angles` (n,) [radian] from its topmost point, clockwise."""
     return np.asarray(centre, float) + radius * np.column_stack([np.sin(angles), np.cos(angles)])

@@ -1,4 +1,4 @@
-"""Spread points evenly: they repel each other along the edges of their triangulation."""
+"""Spread points evenly, by repulsive forces along the edges of their triangulation."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _KEPT = 4  # steps with one triangulation
 
 
 def relax(points: Array, movable: Mask, size: Size, steps: int) -> Array:
-    """Spread the movable points by repulsive bars along the edges.
+    """Return points (n, 2) [length], the movable ones spread by repulsive bars along the edges.
 
     The bars of a truss push its nodes apart until the lengths follow the size function (P.-O. Persson and
     G. Strang, A simple mesh generator in MATLAB, SIAM Review 46, 2004, section 2).
@@ -35,10 +35,6 @@ def relax(points: Array, movable: Mask, size: Size, steps: int) -> Array:
         ``size(points)`` is the wanted edge length (n,) [length].
     steps : int
         Number of moves.
-
-    Returns
-    -------
-    ndarray (n, 2)
     """
     points = points.copy()
     if not movable.any():
