@@ -132,7 +132,7 @@ def _marched(
     touched: dict[str, bool],
 ) -> Iterator[StepResult]:  # fmt: skip
     """Yield the steps at `instants`, the first of them after `last`; `touched` are the pairs that closed before."""
-    doubtful = warnings.doubts(model)
+    doubtful = warnings.model_warnings(model)
     for text in doubtful if last is None else ():
         warn(text)
     analysis = prepare()

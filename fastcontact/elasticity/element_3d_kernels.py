@@ -1,10 +1,10 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Element loops of 3D solids: stiffness, stress at quadrature points, internal forces.
+"""Element loops of three-dimensional solids: stiffness, stresses, rotations, internal forces.
 
-Shared arguments, as in `solid2d`: ``points`` (n_points, 3); ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes),
-``dN`` (n_q, n_nodes, 3), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 6, 6), symmetric, for
-strains (xx, yy, zz, 2xy, 2yz, 2xz); ``material`` (n_cells,). `N` and `axisymmetric` mean nothing here; they are taken
-so that the loops of both dimensions are called alike.
+Shared arguments: ``points`` (n_points, 3) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes), ``dN`` (n_q,
+n_nodes, 3), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 6, 6) [pressure], symmetric, for strains
+(xx, yy, zz, 2xy, 2yz, 2xz); ``material`` (n_cells,). `N` and `axisymmetric` have no effect here: the loops of both dimensions
+have the same arguments. What they share is written in both files, since Numba's cache does not see changes in other files.
 """
 
 import numpy as np

@@ -1,8 +1,11 @@
-"""Loads: what they act on and the nodal forces they amount to, in the reference configuration.
+"""Loads and their nodal forces, in the reference configuration.
 
 Each kind is a class with ``check`` and ``vector``; a new class here, with an ``add_...`` of the model, is a new load.
 Nodal forces are the work-equivalent ones, the integrals of the load times the shape functions. In axisymmetry every
 force is that over the full circle.
+
+A `Value` is a number, or a function from positions (n, dim) [length] in the reference configuration to numbers (n,) [unit of
+the load]; `Components` are values by the number of their axis.
 """
 
 from __future__ import annotations
@@ -24,9 +27,7 @@ from fastcontact.mesh.topology import outer_facets
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 Table = tuple[tuple[float, float], ...]
-# A number, or a function from positions (n, dim) in the reference configuration to numbers (n,).
 Value = float | Callable[[Array], Array]
-# Components by the number of their axis.
 Components = Mapping[int, Value]
 
 # By the linear element on the same corners. Of degree 7 at least (products: in each direction): enough for a constant
@@ -47,7 +48,7 @@ class Load(Protocol):
 
     @property
     def name(self) -> str:
-        """What the load is and where it acts, for messages."""
+        """Kind of the load and where it acts, for messages."""
         ...
 
     @property
@@ -153,7 +154,7 @@ class BodyForce:
         return forces
 
     def cells(self, mesh: Mesh) -> Iterator[tuple[str, Indices]]:
-        """Give the solid cells that the load acts on, by element."""
+        """Yield each element and the solid cells (n_cells, n_nodes) on which the load acts."""
         if self.groups is None:
             yield from mesh.solids.items()
             return
@@ -230,7 +231,7 @@ class TotalForce:
 
 
 def facets_of(mesh: Mesh, group: str) -> dict[str, Indices]:
-    """Return the facets of a group by element.
+    """Return the facets (n, n_nodes) of a group by element.
 
     Raises
     ------
@@ -248,7 +249,7 @@ def facets_of(mesh: Mesh, group: str) -> dict[str, Indices]:
 
 
 def outward(mesh: Mesh, group: str, element: str, block: Indices) -> Indices:
-    """Return the facets `block` (n, n_nodes) turned so that their normals point out of the solid.
+    """Return facets (n, n_nodes), those of `block` (n, n_nodes), turned so that their normals point out of the solid.
 
     Raises
     ------
@@ -270,7 +271,7 @@ def outward(mesh: Mesh, group: str, element: str, block: Indices) -> Indices:
 
 
 def evaluated(value: Value, points: Array, name: str) -> Array:
-    """Return `value` at `points` (..., dim), shape (...).
+    """Return the value (...) [unit of the load] at `points` (..., dim) [length].
 
     Raises
     ------

@@ -1,7 +1,7 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Sparsity of a stiffness matrix by node blocks: neighbours of each node, slot of each node pair of each cell.
+"""Sparsity of a stiffness matrix by node blocks: neighbours of each node, place of each node pair of each cell.
 
-Cells of all elements come as one ragged list: cell ``c`` owns ``nodes[start[c]:start[c + 1]]``.
+Cells of all elements stand in one list: the nodes of cell ``c`` are ``nodes[start[c]:start[c + 1]]``.
 """
 
 import numpy as np

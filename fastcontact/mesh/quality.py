@@ -1,4 +1,4 @@
-"""How good a mesh is: angles, lengths, and cells that are flat or inside out."""
+"""Quality of a mesh: angles, lengths, and cells that are flat or inside out."""
 
 from __future__ import annotations
 
@@ -106,9 +106,8 @@ def check_cells(mesh: Mesh) -> None:
     Raises
     ------
     MeshError
-        If a cell is degenerate (its area or volume is nothing but rounding) or inverted (clockwise, or folded so
-        that the Jacobian is negative at a quadrature point), or stands there twice; the message names the first one
-        and says where.
+        If a cell is degenerate (its area or volume is zero to rounding) or inverted (clockwise, or folded so that the
+        Jacobian is negative at a quadrature point), or is in the mesh twice; the message names the first one and its place.
     """
     for name in mesh.solids:
         _check_twice(mesh, name)

@@ -89,7 +89,7 @@ class Docstring:
     @property
     def references(self) -> list[str]:
         """The functions and classes that the docstring refers to for what it leaves out."""
-        return re.findall(r"(?:as for|[Ss]ee) `(\w+)`", self.text)
+        return re.findall(r"(?:as for|[Ss]ee) `(\w[\w.]*)`", self.text)
 
 
 @dataclass(frozen=True)
@@ -102,10 +102,14 @@ class Source:
     @cached_property
     def others(self) -> list[Docstring]:
         """The docstrings that it refers to: of functions, or of the method of the same name of another class."""
-        known = vars(sys.modules[self.function.__module__])
-        values = [known[name] for name in self.doc.references if name in known]
-        values = [getattr(v, self.function.__name__, v) if inspect.isclass(v) else v for v in values]
-        return [Docstring(value.__doc__ or "") for value in values]
+        found = []
+        for name in self.doc.references:
+            value: Any = sys.modules[self.function.__module__]
+            for part in name.split("."):
+                value = getattr(value, part, None)
+            value = getattr(value, self.function.__name__, value) if inspect.isclass(value) else value
+            found.append(Docstring(getattr(value, "__doc__", None) or ""))
+        return found
 
     def argument(self, name: str, note: str) -> str:
         """What is said of an argument: here, where the docstring refers to, or of its type."""
@@ -164,7 +168,8 @@ def of_class(kind: type, where: str) -> Iterator[Entry]:
     doc = Docstring(kind.__doc__ or "")
     module, fields = sys.modules[kind.__module__], inspect.get_annotations(kind)
     for name in dict.fromkeys([*fields, *doc.entries]):
-        note, said = str(fields.get(name, "")), doc.argument(name)
+        note = str(fields.get(name, ""))
+        said = Source(kind, doc).argument(name, note)
         if not name.startswith("_") and (is_array(note, module) or TYPED.search(said.partition("\n")[0])):
             yield Entry(where, name, said, bool(WHOLE.search(note) or WHOLE.search(said)))
     if "__init__" in vars(kind) and inspect.isfunction(kind.__init__) and kind.__init__.__module__ == kind.__module__:

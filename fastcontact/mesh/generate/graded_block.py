@@ -70,8 +70,7 @@ def graded_block(
     >>> mesh.dim, mesh.point("POLE") in mesh.points_of("CONTACT")
     (3, True)
     """
-    one_of("element", element, (*FACES, *SOLIDS))
-    dim = elements.get(element).dim
+    dim = elements.get(one_of("element", element, (*FACES, *SOLIDS))).dim
     width = positive("width", width)
     depth = width if depth is None else positive("depth", depth)
     radius = width / 10 if contact_radius is None else positive("contact_radius", contact_radius, width, "width")
