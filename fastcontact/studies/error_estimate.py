@@ -32,9 +32,9 @@ class ErrorEstimate:
     Attributes
     ----------
     cells : ndarray (n_solids,)
-        Error of every solid cell, in the order of ``mesh.solids``.
+        Error of every solid cell, in the order of ``mesh.solids`` [energy^(1/2)].
     contact : ndarray (n_solids,)
-        The part that stems from the contact surface.
+        The part that stems from the contact surface [energy^(1/2)].
     energy : float
         Energy norm of the solution.
     """

@@ -5,7 +5,7 @@ function of positions. A shape is a parenthesis such as ``(n_points, dim)``, ``(
 bracket such as ``[length]``, ``[force / length^2]`` or ``[-]``. Indices, numbers of things and booleans have no unit.
 An entry of a numpydoc section holds both in its type or its text. Outside of sections an argument is written as
 ```x` (n,) [length]``, and a result as a shape and a unit that belong to no argument. ``as for `other``` and ``see `other```
-refer to the docstring of another function or class, and the name of a type that the docstring of the module explains to that.
+refer to the docstring of another function or class, the name of a type to the docstring of the module that explains it.
 
 ``python tests/docs/arrays.py [PATH ...]`` prints the figures of the public names, or those of all functions and classes of
 the modules under these paths of the package, and what is missing.
@@ -32,7 +32,8 @@ SHAPE = re.compile(rf"\(\.\.\.\)|\({SIZE},\)|\({SIZE}(?:, {SIZE})+\)")
 UNIT = re.compile(r"\[(?:-|(?:length|force|pressure|energy|radian|degrees|1 /|units? of)[^\]]*)\]")
 TYPED = re.compile(r"ndarray|array_like|csr_array|bsr_array")
 AFTER = r"((?: \([^)]*\))?(?: of int| of bool|(?: \[[^\]]*\])?))"  # the name of an argument: its shape, its unit
-WHOLE = re.compile(r"of (?:int|bool)|bool_|np\.u?int|NDArray\[Any\]|Indices|Numbers|Mask|intp|integer")
+ROWS = re.compile(r"structured array, one row")  # the units of its columns are another matter
+WHOLE = re.compile(r"structured|of (?:int|bool)|bool_|np\.u?int|NDArray\[Any\]|Indices|Numbers|Mask|intp|integer")
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class Entry:
     @property
     def shape(self) -> bool:
         """Whether the shape is given."""
-        return SHAPE.search(self.text) is not None
+        return (SHAPE.search(self.text) or ROWS.search(self.text)) is not None
 
     @property
     def unit(self) -> bool:
@@ -89,7 +90,7 @@ class Docstring:
     @property
     def references(self) -> list[str]:
         """The functions and classes that the docstring refers to for what it leaves out."""
-        return re.findall(r"(?:as for|[Ss]ee) `(\w[\w.]*)`", self.text)
+        return re.findall(r"(?:as (?:for|in)|[Ss]ee) `(\w[\w.]*)`", self.text)
 
 
 @dataclass(frozen=True)
@@ -104,8 +105,12 @@ class Source:
         """The docstrings that it refers to: of functions, or of the method of the same name of another class."""
         found = []
         for name in self.doc.references:
-            value: Any = sys.modules[self.function.__module__]
-            for part in name.split("."):
+            home = self.function.__module__
+            first, *rest = name.split(".")
+            value = next(
+                (v for m in (home, home.rpartition(".")[0]) if (v := getattr(sys.modules[m], first, None))), None
+            )
+            for part in rest:
                 value = getattr(value, part, None)
             value = getattr(value, self.function.__name__, value) if inspect.isclass(value) else value
             found.append(Docstring(getattr(value, "__doc__", None) or ""))
