@@ -79,8 +79,8 @@ class Docstring:
 
     def argument(self, name: str) -> str:
         """What is said of an argument: its entry, or the shape and unit that follow its name in the text."""
-        match = re.search(rf"`{name}`{AFTER}", self.sections[""])
-        return self.entries.get(name) or (match[1] if match else "")
+        found = [match[1] for match in re.finditer(rf"`{name}`{AFTER}", self.sections[""])]
+        return self.entries.get(name) or max(found, key=len, default="")
 
     @property
     def result(self) -> str:

@@ -15,16 +15,10 @@ Array = NDArray[np.float64]
 
 
 def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> Mesh:
-    """Return a triangle mesh of a convex body.
+    """Return a triangle mesh of a convex body, its cells in the group `solid`.
 
-    Parameters
-    ----------
-    solid : str
-        Name of the group of all triangles.
-    sides : sequence of (str, ndarray (n, 2))
-        Name and nodes of each side, counter-clockwise, each starting where the one before ends [length].
-    spacing : Spacing
-        Longest inner edges.
+    The names and the nodes of its `sides` (n, 2) [length] run counter-clockwise, each from the end of the one before.
+    `spacing` gives the longest inner edges.
     """
     outline = np.vstack([nodes[:-1] for _, nodes in sides])
     points, triangles = triangulated(outline, spacing)

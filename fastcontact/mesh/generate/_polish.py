@@ -27,18 +27,8 @@ def polish(points: Array, movable: Mask, limit: Size, sweeps: int) -> Array:
 
     A trial move is kept when it raises the smallest angle of the star, edges longer than `limit` counting against
     it (smart smoothing after L. Freitag and C. Ollivier-Gooch, Int. J. Numer. Meth. Engng 40, 1997). Points moved
-    at the same time share no edge.
-
-    Parameters
-    ----------
-    points : ndarray (n, 2)
-        [length].
-    movable : ndarray of bool (n,)
-        Points that may move.
-    limit : callable
-        ``limit(points)`` is the longest edge allowed at points (n,) [length].
-    sweeps : int
-        Number of passes over the bad points, at most.
+    at the same time share no edge. Of the `points` (n, 2) [length] only those `movable` (n,) of bool move, in at most so many
+    `sweeps`; ``limit(points)``, `limit` (n,) [length], is the longest edge allowed there.
     """
     points = points.copy()
     radius, moved = 0.1, True

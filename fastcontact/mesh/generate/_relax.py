@@ -23,18 +23,8 @@ def relax(points: Array, movable: Mask, size: Size, steps: int) -> Array:
     """Return points (n, 2) [length], the movable ones spread by repulsive bars along the edges.
 
     The bars of a truss push its nodes apart until the lengths follow the size function (P.-O. Persson and
-    G. Strang, A simple mesh generator in MATLAB, SIAM Review 46, 2004, section 2).
-
-    Parameters
-    ----------
-    points : ndarray (n, 2)
-        [length].
-    movable : ndarray of bool (n,)
-        Points that may move.
-    size : callable
-        ``size(points)`` is the wanted edge length (n,) [length].
-    steps : int
-        Number of moves.
+    G. Strang, A simple mesh generator in MATLAB, SIAM Review 46, 2004, section 2). Of the `points` (n, 2) [length] those
+    `movable` (n,) of bool move, in so many `steps`; ``size(points)``, `size` (n,) [length], is the wanted length of edges.
     """
     points = points.copy()
     if not movable.any():

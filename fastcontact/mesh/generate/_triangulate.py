@@ -23,22 +23,10 @@ _AROUND = 3.0  # edge lengths from an added point within which points move
 
 
 def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Numbers]:
-    """Fill a convex polygon with triangles.
+    """Return points (n_points, 2) [length] and triangles (n_triangles, 3), counter-clockwise, that fill a convex polygon.
 
-    Parameters
-    ----------
-    outline : ndarray (n, 2)
-        Corners of the polygon, counter-clockwise. They become the first n points, and no other point lies on the
-        outline [length].
-    spacing : Spacing
-        Longest edge allowed, at the middle of each inner edge [length].
-
-    Returns
-    -------
-    points : ndarray (n_points, 2)
-        [length].
-    triangles : ndarray of int (n_triangles, 3)
-        Counter-clockwise.
+    The corners of the `outline` (n, 2) [length], counter-clockwise, become the first n points, and no other point lies on it.
+    `spacing` gives the longest edge allowed, at the middle of each inner edge.
 
     Raises
     ------

@@ -41,18 +41,10 @@ _TURN = np.pi / 5
 
 @dataclass(frozen=True, eq=False)
 class _Pattern:
-    """How cells of one element are divided.
+    """How cells of one element are divided: the points of the children, the parent's own nodes first.
 
-    Attributes
-    ----------
-    shape : ndarray (m, n_nodes)
-        Shape functions of the parent at all points of its children; the parent's own nodes come first.
-    children : ndarray of int (n_children, n_nodes)
-        Children by those points.
-    on_edge : ndarray of int (m,)
-        Edge on which a new point lies; -1 for the parent's nodes and for points inside.
-    along : ndarray of int (m,)
-        Position of a new point along its edge, in quarters from the edge's first corner.
+    `shape` (m, n_nodes) has the shape functions of the parent at these points, `children` (n_children, n_nodes) their
+    numbers. A new point lies on the edge `on_edge` (m,) of the parent, -1 for others, `along` (m,) quarters from its begin.
     """
 
     shape: Array
