@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Element loops of three-dimensional solids: stiffness, stresses, rotations, internal forces.
+"""Element loops of three-dimensional solids: stiffness, stresses, rotations.
 
 Shared arguments: ``points`` (n_points, 3) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes), ``dN`` (n_q,
 n_nodes, 3), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 6, 6) [pressure], symmetric, for strains
@@ -135,7 +135,7 @@ def _owned(cells, c, owner, part, mine):
 
 @kernel
 def _add_block(flat, at_upper, at_lower, upper, lower, k00, k01, k02, k10, k11, k12, k20, k21, k22):
-    """Add a block of a node pair, and its transpose on the other side of the diagonal, where asked for."""
+    """Add the block of a node pair if `at_upper`, and its transpose on the other side of the diagonal if `at_lower`."""
     u, v = 9 * upper, 9 * lower
     if at_upper:
         flat[u] += k00
@@ -163,7 +163,7 @@ def _add_block(flat, at_upper, at_lower, upper, lower, k00, k01, k02, k10, k11, 
 def _add_isotropic_block(flat, pair, at_upper, at_lower, upper, lower, coupling, shear, g):
     """Add the block of two nodes for Lame's constants: K_ij = lambda g_ij + mu g_ji + mu g_kk delta_ij.
 
-    `pair` says whether the nodes differ; g comes as xx, yy, zz, xy, xz, yz, yx, zx, zy.
+    `pair` is whether the nodes differ; the order of g is xx, yy, zz, xy, xz, yz, yx, zx, zy.
     """
     xx, yy, zz, xy, xz, yz, yx, zx, zy = g
     trace, both = shear * (xx + yy + zz), coupling + shear
@@ -215,8 +215,8 @@ def _add_general(g, tensors, m, products, block, slots, c, mine, flat):
 def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, gradient, flat):
     """Add the blocks of a linear tetrahedron for Lame's constants: its gradients (4, 3) are constant.
 
-    `volume` is that of the reference cell. Returns whether the Jacobian is positive. Loops over four nodes, known to the
-    compiler, take half the time of `_integrate_products` and `_add_isotropic`.
+    `volume` is that of the reference cell. Returns whether the Jacobian is positive. Loops over exactly four nodes
+    take half the time of `_integrate_products` and `_add_isotropic`.
     """
     first = cells[c, 0]
     x0, y0, z0 = points[first, 0], points[first, 1], points[first, 2]
@@ -360,23 +360,3 @@ def largest_rotation(points, cells, N, dN, displacement):
         if square > largest:
             largest, number = square, c
     return largest, number
-
-
-@kernel
-def add_internal_force(points, cells, N, dN, weights, axisymmetric, stresses, force):
-    """Add the nodal forces of `stresses` (n_cells, n_q, 6) to `force` (n_points, 3), in place."""
-    n_cells, n_nodes = cells.shape
-    slopes = _transposed(dN)
-    x, gradient = np.empty((3, n_nodes)), np.empty((3, n_nodes))
-    for c in range(n_cells):
-        _gather(points, cells, c, x)
-        for q in range(weights.shape[0]):
-            weight = weights[q] * _map(x, slopes, q, gradient)
-            xx, yy, zz = weight * stresses[c, q, 0], weight * stresses[c, q, 1], weight * stresses[c, q, 2]
-            xy, yz, xz = weight * stresses[c, q, 3], weight * stresses[c, q, 4], weight * stresses[c, q, 5]
-            for a in range(n_nodes):
-                p = cells[c, a]
-                gx, gy, gz = gradient[0, a], gradient[1, a], gradient[2, a]
-                force[p, 0] += xx * gx + xy * gy + xz * gz
-                force[p, 1] += xy * gx + yy * gy + yz * gz
-                force[p, 2] += xz * gx + yz * gy + zz * gz

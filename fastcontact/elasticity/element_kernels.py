@@ -7,5 +7,5 @@ from fastcontact.elasticity import element_2d_kernels, element_3d_kernels
 
 
 def loops(dim: int) -> ModuleType:
-    """Return the module with `add_stiffness`, `stress`, `largest_rotation` and `add_internal_force` for `dim` coordinates."""
+    """Return the module with `add_stiffness`, `stress` and `largest_rotation` for `dim` coordinates."""
     return {2: element_2d_kernels, 3: element_3d_kernels}[dim]

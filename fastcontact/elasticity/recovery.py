@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from fastcontact._jit import parallel
 from fastcontact.elasticity import element_2d_kernels, element_kernels
+from fastcontact.elasticity.energy import cell_volumes
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
@@ -14,6 +15,8 @@ Array = NDArray[np.float64]
 Materials = dict[str, NDArray[np.int32]]
 # Memory for stresses at points while nodal ones are formed [bytes].
 BATCH = 16_000_000
+# Number of the component xx, yy, zz, xy, yz or xz at each place of a tensor.
+TENSOR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 
 
 def stress_at_points(
@@ -133,11 +136,18 @@ def internal_force(mesh: Mesh, kinematics: str, at_points: dict[str, Array]) -> 
 
     These are `at_points` (n_cells, n_q, n_components) [pressure], by solid element.
     """
-    loops, force = element_kernels.loops(mesh.dim), np.zeros((mesh.n_points, mesh.dim))
+    force, axisymmetric = np.zeros((mesh.n_points, mesh.dim)), kinematics == "axisymmetric"
     for name, values in at_points.items():
         N, dN, weights = elements.get(name).tables
-        axisymmetric = kinematics == "axisymmetric"
-        loops.add_internal_force(mesh.points, mesh.cells[name], N, dN, weights, axisymmetric, values, force)
+        corners = mesh.points[mesh.cells[name]]
+        volume = cell_volumes(corners, N, dN, axisymmetric) * weights
+        gradients = np.linalg.solve(np.einsum("qak,cai->cqki", dN, corners), dN.transpose(0, 2, 1))
+        tensor = values[..., TENSOR[: mesh.dim, : mesh.dim]]
+        nodal = np.einsum("cq,cqij,cqja->cai", volume, tensor, gradients, optimize=True)
+        if axisymmetric:
+            radius = np.einsum("qa,ca->cq", N, corners[:, :, 0])
+            nodal[:, :, 0] += (volume * values[..., 2] / radius) @ N
+        np.add.at(force, mesh.cells[name], nodal)
     return force
 
 

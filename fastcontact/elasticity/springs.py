@@ -57,11 +57,7 @@ def between(
     """Return springs between two of the `points` (n_points, dim) [length].
 
     Along every axis of `stiffness` [force / length], and along their line with the stiffness `axial` [force / length].
-
-    Raises
-    ------
-    ModelError
-        If the nodes are one, or have no line between them.
+    ModelError if the two are one, or are at one place and have no line between them.
     """
     if first == second:
         raise ModelError(f"{name}: both ends are point {first}; without a second node a spring hangs on the ground")

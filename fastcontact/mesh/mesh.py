@@ -39,7 +39,7 @@ def _numbers(what: str, values: ArrayLike) -> NDArray[Any]:
 class Mesh:
     """Points, cells and named groups.
 
-    Cells of every dimension stand together: solids, and the facets (lines in 2D) that carry group names. Cells are
+    A mesh has cells of several dimensions: solids, and the facets (lines in 2D) that carry group names. Cells are
     numbered through all elements in the order of `cells`; a cell group is a sorted array of those numbers.
 
     Parameters

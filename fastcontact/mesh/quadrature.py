@@ -23,11 +23,6 @@ def simpson_line() -> Rule:
     return np.array([[-1.0], [1.0], [0.0]]), np.array([1.0, 1.0, 4.0]) / 3.0
 
 
-def trapezium_line() -> Rule:
-    """Trapezium rule on [-1, 1], exact to degree 1."""
-    return np.array([[-1.0], [1.0]]), np.array([1.0, 1.0])
-
-
 def gauss_square(n: int) -> Rule:
     """Tensor Gauss rule with n x n points on [-1, 1]^2."""
     return square(gauss_line(n))

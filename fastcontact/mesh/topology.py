@@ -95,10 +95,10 @@ def _check_folds(mesh: Mesh) -> None:
 
 
 def _direction(facets: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return three nodes (n, 3) that tell facets, and the way round them, apart: the lowest, the next, the last."""
+    """Return three nodes (n, 3) by which facets and their orientation differ: the lowest, the next, the last."""
     first = facets.argmin(axis=1)
     rows, count = np.arange(len(facets)), facets.shape[1]
-    # The two ends of a line are told apart by their order alone.
+    # The orientation of a line is the order of its two ends.
     ahead, behind = (facets[rows, (first + k) % count] for k in (1, -1))
     return np.column_stack([facets[rows, first], ahead, behind if count > 2 else first])
 

@@ -24,18 +24,9 @@ LENGTH = 16
 
 
 def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[str, str]:
-    """Return the digest of each part of a model, and of the options that change its answer.
+    """Return the digest of each part of a model, and of the options (plain values by name) that change its results.
 
-    Parameters
-    ----------
-    model : Model
-    options : mapping, optional
-        Plain values by name.
-
-    Returns
-    -------
-    dict of str to str
-        By the name of the part in messages: "the mesh", "the materials", "contact 'hertz'", ...
+    By the name of the part in messages: "the mesh", "the materials", "contact 'hertz'", ...
     """
     mesh = model.mesh
     parts: dict[str, Any] = {

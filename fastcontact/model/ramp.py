@@ -16,12 +16,9 @@ MOST_STEPS = 1_000_000
 
 
 def checked_table(rows: Iterable[Iterable[float]], what: str = "the ramp") -> Table:
-    """Return the points (instant, multiplier) of a piecewise linear function of time.
+    """Return the points (instant, multiplier) of a piecewise linear function of time; messages call it `what`.
 
-    Raises
-    ------
-    ModelError
-        If there are fewer than two, their instants do not ascend, or a number is not finite; `what` names the culprit.
+    ModelError if there are fewer than two, their instants do not ascend, or a number is not finite.
     """
     try:
         table = tuple((float(time), float(value)) for time, value in rows)

@@ -12,8 +12,8 @@ from fastcontact.errors import MeshError, unknown
 TRIANGLES = ("tri3", "tri6")
 QUADRANGLES = ("quad4", "quad8", "quad9")
 FACES = TRIANGLES + QUADRANGLES
-# Numbers whose squares and cubes are still numbers. What is made at most: beyond that a unit or a decimal point has
-# slipped, and the machine would be short of memory.
+# Largest size of a number, whose cubes can still be represented. Largest numbers of segments and of cells: more are probably
+# mistakes in units or decimal points, and would not fit into memory.
 LARGEST = 1e100
 MOST_ALONG = 1_000_000
 MOST_CELLS = 5_000_000

@@ -30,7 +30,7 @@ def inner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
 
 
 def _apart(seeds: Array, outline: Array, spacing: Spacing, density: float) -> Array:
-    """The seeds (m, 2) that stand off the outline and off the seeds before them, where a body is a few edges wide."""
+    """Return the seeds (m, 2) far enough from the outline and from the seeds before them, where a body is narrow."""
     kept: list[Array] = []
     for seed, depth, size in zip(seeds, _depth(outline, seeds), density * spacing(seeds), strict=True):
         if depth > 0.4 * size and all(np.hypot(*(seed - other)) > 0.7 * size for other in kept):

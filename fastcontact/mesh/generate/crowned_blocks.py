@@ -27,8 +27,8 @@ def crowned_blocks(
 ) -> Mesh:
     """Two blocks above each other whose facing sides are parabolas of radius R that touch at the origin.
 
-    Both stand for half planes. They are whole, x < 0 as well, so that they can be drawn along, and mirror each other, so
-    that nodes match and like materials do not couple pressure and shear. Groups of cells: LOWER, UPPER, CONT_LOWER,
+    Both represent half planes. They are whole, x < 0 as well, for tangential loads, and mirror each other, so that nodes
+    match and equal materials do not couple pressure and shear. Groups of cells: LOWER, UPPER, CONT_LOWER,
     CONT_UPPER (their facing sides around the origin), FAR_LOWER, FAR_UPPER (the flat sides far from it). Groups of
     points: POLE_LOWER, POLE_UPPER (two points at the origin).
 

@@ -1,4 +1,4 @@
-"""A block that is finest around one corner of its top, where an indenter stands: two symmetric halves or quarters of it."""
+"""Half or quarter of a block under an indenter, finest around one corner of its top."""
 
 from __future__ import annotations
 
@@ -17,11 +17,7 @@ from fastcontact.mesh.mesh import Mesh
 Array = NDArray[np.float64]
 
 _NAMES_2D = {"LEFT": "SYMMETRY_X", "RIGHT": "SIDE", "TOP": "TOP", "BOTTOM": "BOTTOM"}
-_NAMES_3D = {
-    "XMIN": "SYMMETRY_X",
-    "YMIN": "SYMMETRY_Y",
-    "XMAX": "SIDE",
-    "YMAX": "SIDE",
+_NAMES_3D = {"XMIN": "SYMMETRY_X", "YMIN": "SYMMETRY_Y", "XMAX": "SIDE", "YMAX": "SIDE"} | {
     "ZMAX": "TOP",
     "ZMIN": "BOTTOM",
 }

@@ -151,10 +151,7 @@ def _ends(keys: Indices, n_points: int) -> Indices:
 def edges_on(mesh: Mesh, curve: Curve) -> Indices:
     """Return the edges (n,) of the curve's facets that have both ends on it, each as ``least end << 32 | greatest end``.
 
-    Raises
-    ------
-    MeshError
-        If there is none.
+    MeshError if there is none.
     """
     ends = _ends(_edges(facets_of(mesh, curve), mesh.n_points), mesh.n_points)
     on = all_on(mesh, curve, ends)
