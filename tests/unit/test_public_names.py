@@ -37,4 +37,3 @@ def test_the_package_declares_its_types():
 def test_an_unknown_name_is_no_attribute():
     with pytest.raises(AttributeError, match="no attribute 'solver'"):
         fc.solver  # noqa: B018
-
