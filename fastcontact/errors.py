@@ -58,7 +58,7 @@ class ConvergenceError(FastcontactError):
 
 
 class FastcontactWarning(UserWarning):
-    """Something a user should know, with the number that says how much."""
+    """Something doubtful about a model or its result, with its number."""
 
 
 def warn(text: str) -> None:
@@ -70,12 +70,12 @@ def warn(text: str) -> None:
     warnings.warn(text, FastcontactWarning, stacklevel=level)
 
 
-# What is shown of a name that nobody can have meant.
+# Number of characters that a message shows of an unknown name.
 LONGEST_NAME = 120
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
-    """Return the message for an unknown name: the culprit, the nearest known names, all of them if few."""
+    """Return the message for an unknown name: the name, and the nearest known names or, if none is near, the first ones."""
     names = sorted(known)
     name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     if not names:

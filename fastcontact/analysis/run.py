@@ -12,9 +12,9 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.problem import Problem, prepare
 from fastcontact.analysis.result_warnings import result_warnings
 from fastcontact.errors import warn
-from fastcontact.model import warnings as model_warnings
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, linear_ramp
+from fastcontact.model.warnings import model_warnings
 from fastcontact.results.step import StepResult
 
 
@@ -128,7 +128,7 @@ def _marched(
     last: StepResult | None, touched: frozenset[str],
 ) -> Iterator[StepResult]:  # fmt: skip
     """Yield the steps at `instants`, the first of them after `last`; `touched` are the pairs that closed before."""
-    doubtful = model_warnings.doubts(model)
+    doubtful = model_warnings(model)
     for text in doubtful if last is None else ():
         warn(text)
     problem = prepared(model)

@@ -1,9 +1,11 @@
-"""Formulas of contact mechanics: what numerical results are held against.
+"""Formulas of contact mechanics: numerical results are compared with them.
 
-Each file holds one theory: a frozen result with its numbers and methods, and a factory that makes it.
-`THEORIES` names the factories for case files. Normal contacts share `radius` (half-width in the plane),
-`force`, `pressure_max` and `pressure(distance)`. Units are the caller's own; forces of plane problems are per
-unit length.
+Each file holds one theory: a frozen result with its numbers and methods, and a factory that makes it. `THEORIES` names the
+factories for case files. Normal contacts share `radius` (half-width in the plane), `force`, `pressure_max` and
+`pressure(distance)`. Units are the caller's own; forces of plane problems are per unit length.
+
+Positions are numbers, or arrays of any shape (...), which results then have. A number out of range, and two loads where one
+is needed, raise ModelError.
 """
 
 from __future__ import annotations
@@ -44,67 +46,18 @@ from fastcontact.analytic.receding import RecedingLayer, receding_layer
 THEORIES: dict[str, Callable[..., Any]] = {
     factory.__name__: factory
     for factory in (
-        block_sliding,
-        cattaneo_mindlin_line,
-        cattaneo_mindlin_sphere,
-        cone_punch,
-        finite_half_spheres,
-        flat_punch,
-        flat_punch_2d,
-        hertz_box,
-        hertz_elliptical,
-        hertz_line,
-        hertz_point,
-        paraboloid_punch,
-        persson_pin,
-        power_law_punch,
-        press_fit_cylinders,
-        press_fit_spheres,
-        receding_layer,
-        thick_cylinder,
-        thick_sphere,
+        block_sliding, cattaneo_mindlin_line, cattaneo_mindlin_sphere, cone_punch, finite_half_spheres, flat_punch,
+        flat_punch_2d, hertz_box, hertz_elliptical, hertz_line, hertz_point, paraboloid_punch, persson_pin,
+        power_law_punch, press_fit_cylinders, press_fit_spheres, receding_layer, thick_cylinder, thick_sphere,
     )
-}
+}  # fmt: skip
 
 __all__ = [
-    "THEORIES",
-    "BlockSliding",
-    "Bodies",
-    "CattaneoMindlinLine",
-    "CattaneoMindlinSphere",
-    "FiniteHalfSpheres",
-    "FlatPunch",
-    "FlatPunch2D",
-    "HertzBox",
-    "HertzElliptical",
-    "HertzLine",
-    "HertzPoint",
-    "LameShell",
-    "PerssonPin",
-    "PowerLawPunch",
-    "PressFit",
-    "RecedingLayer",
-    "VonMisesMaximum",
-    "block_sliding",
-    "bonded_stiffness_ratio",
-    "cattaneo_mindlin_line",
-    "cattaneo_mindlin_sphere",
-    "cone_punch",
-    "finite_half_spheres",
-    "flat_punch",
-    "flat_punch_2d",
-    "hertz_box",
-    "hertz_elliptical",
-    "hertz_line",
-    "hertz_point",
-    "paraboloid_punch",
-    "persson_limit_angle",
-    "persson_pin",
-    "power_law_punch",
-    "press_fit_cylinders",
-    "press_fit_spheres",
-    "receding_layer",
-    "spence_stick_ratio",
-    "thick_cylinder",
-    "thick_sphere",
-]
+    "THEORIES", "BlockSliding", "Bodies", "CattaneoMindlinLine", "CattaneoMindlinSphere", "FiniteHalfSpheres",
+    "FlatPunch", "FlatPunch2D", "HertzBox", "HertzElliptical", "HertzLine", "HertzPoint", "LameShell", "PerssonPin",
+    "PowerLawPunch", "PressFit", "RecedingLayer", "VonMisesMaximum", "block_sliding", "bonded_stiffness_ratio",
+    "cattaneo_mindlin_line", "cattaneo_mindlin_sphere", "cone_punch", "finite_half_spheres", "flat_punch",
+    "flat_punch_2d", "hertz_box", "hertz_elliptical", "hertz_line", "hertz_point", "paraboloid_punch",
+    "persson_limit_angle", "persson_pin", "power_law_punch", "press_fit_cylinders", "press_fit_spheres",
+    "receding_layer", "spence_stick_ratio", "thick_cylinder", "thick_sphere",
+]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Two elastic bodies as a contact formula sees them: one modulus, one curvature."""
+"""Elastic constants and curvature of two bodies in contact."""
 
 from __future__ import annotations
 
@@ -82,5 +82,5 @@ def effective_radius(R1: float, R2: float, names: tuple[str, str] = ("R1", "R2")
 
 
 def plane_kinematics(kinematics: str) -> str:
-    """Return the word if it is "plane_strain" or "plane_stress"."""
+    """Return `kinematics` if it is "plane_strain" or "plane_stress"."""
     return one_of("kinematics", kinematics, PLANE)

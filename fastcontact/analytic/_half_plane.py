@@ -19,12 +19,12 @@ ComplexArray = NDArray[np.complex128]
 
 
 def plane_nu(nu: float, kinematics: str) -> float:
-    """Return the Poisson ratio that plane-strain formulas take for `kinematics`."""
+    """Return the Poisson ratio for which plane-strain formulas hold in `kinematics`."""
     return nu if kinematics == "plane_strain" else nu / (1.0 + nu)
 
 
 def _roots(x: ArrayLike, y: ArrayLike, b: float) -> tuple[Array, ComplexArray, ComplexArray, ComplexArray]:
-    """Return depth, k, w and w - k, all in units of b."""
+    """Return depth, k, w and w - k (...) [-], all over b."""
     across, depth = np.broadcast_arrays(np.asarray(x, dtype=np.float64) / b, below_surface(y, b) / b)
     k = depth + 1j * across
     square = np.empty(k.shape, dtype=np.complex128)
@@ -32,16 +32,11 @@ def _roots(x: ArrayLike, y: ArrayLike, b: float) -> tuple[Array, ComplexArray, C
     square.imag = 2.0 * across * depth
     w = np.sqrt(square)
     w = w.real + 1j * np.copysign(w.imag, across)  # outside the contact, on the surface, the sign is that of x
-    return (
-        depth,
-        k,
-        w,
-        1.0 / (w + k),
-    )  # (w - k)(w + k) = b^2; the difference itself would lose digits far away
+    return depth, k, w, 1.0 / (w + k)  # (w - k)(w + k) = b^2; the difference itself would lose digits far away
 
 
 def stress(x: ArrayLike, y: ArrayLike, b: float, p0: float, nu: float, kinematics: str) -> Array:
-    """Return stresses (..., 4) xx, yy, zz, xy [pressure] (McEwen 1949)."""
+    """Return stresses (..., 4) xx, yy, zz, xy [pressure] at `x` (...) [length], `y` (...) [length] (McEwen 1949)."""
     depth, _, w, q = _roots(x, y, b)
     inside = depth > 0.0
     gradient = depth * q / np.where(inside, w, 1.0)  # the depth times -dq/dk; w vanishes only on the surface
@@ -51,7 +46,7 @@ def stress(x: ArrayLike, y: ArrayLike, b: float, p0: float, nu: float, kinematic
 
 
 def displacement(x: ArrayLike, y: ArrayLike, b: float, p0: float, E: float, nu: float, kinematics: str) -> Array:
-    """Return displacements (..., 2) along x, y [length], measured from the point (0, 0).
+    """Return displacements (..., 2) along x, y [length] at `x` (...) [length], `y` (...) [length] from the point (0, 0).
 
     With H the integral of w - k over k, 2 G u_x = (p0/b) [y Im(w - k) - (1 - 2 nu) Im H] and
     2 G u_y = (p0/b) [y Re(w - k) + 2 (1 - nu) Re H].

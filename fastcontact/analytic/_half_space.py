@@ -20,7 +20,7 @@ _FAR = 4.0
 
 
 def below_surface(z: ArrayLike, a: float) -> Array:
-    """Return the depth -z, forgiving the rounding of mesh coordinates on the surface."""
+    """Return the depth -z (...) [length] of `z` (...) [length]; rounded coordinates above the surface count as on it."""
     depth = -np.asarray(z, dtype=np.float64)
     if depth.size and depth.min() < -1e-9 * a:
         raise ModelError(f"a point lies {-depth.min():g} above the surface: the body is z <= 0 (y <= 0 in the plane)")
@@ -53,7 +53,7 @@ def _legendre(s: Array) -> tuple[Array, Array, Array]:
 
 
 def stress(r: ArrayLike, z: ArrayLike, a: float, p0: float, nu: float) -> Array:
-    """Return stresses (..., 4) rr, zz, hoop, rz [pressure] (Huber 1904, in spheroidal coordinates)."""
+    """Return stresses (..., 4) rr, zz, hoop, rz [pressure] at `r` (...) [length], `z` (...) [length] (Huber 1904)."""
     s, t = _spheroidal(r, z, a)
     _, q1, _ = _legendre(s)
     sum_of_squares = s**2 + t**2
@@ -69,10 +69,10 @@ def stress(r: ArrayLike, z: ArrayLike, a: float, p0: float, nu: float) -> Array:
 
 
 def displacement(r: ArrayLike, z: ArrayLike, a: float, p0: float, E: float, nu: float) -> Array:
-    """Return displacements (..., 2) radial, axial [length], zero at infinity; z points out of the body.
+    """Return displacements (..., 2) radial, axial [length] at `r` (...) [length], `z` (...) [length], zero at infinity.
 
-    The radial one is r times the hoop strain; the axial one is (z P - 2 (1 - nu) V)/(2 G) with the potential
-    V of the pressure and P = -dV/d|z| (Johnson 1985, eq. 3.2-3.6 without shear tractions).
+    z points out of the body. The radial one is r times the hoop strain; the axial one is (z P - 2 (1 - nu) V)/(2 G) with the
+    potential V of the pressure and P = -dV/d|z| (Johnson 1985, eq. 3.2-3.6 without shear tractions).
     """
     radial, height = np.broadcast_arrays(np.asarray(r, dtype=np.float64), -below_surface(z, a))
     s, t = _spheroidal(r, z, a)

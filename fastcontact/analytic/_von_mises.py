@@ -26,6 +26,6 @@ class VonMisesMaximum(NamedTuple):
 
 
 def von_mises(stress: Array) -> Array:
-    """Return the equivalent stress of (..., 4) components xx, yy, zz, xy (von Mises 1913) [pressure]."""
+    """Return the equivalent stress (...) [pressure] of `stress` (..., 4) [pressure], xx, yy, zz, xy (von Mises 1913)."""
     xx, yy, zz, xy = np.moveaxis(stress, -1, 0)
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * xy**2)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,42 +22,71 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class _PartialSlip:
-    """A tangential load up to a peak, then perhaps back: what the line and the sphere share.
+    """A tangential load up to a peak, then perhaps back: the common part of the line and the sphere.
 
-    After Mindlin and Deresiewicz (1953). The traction of a first load T is f times the pressure less that of
-    a smaller contact, the stick zone. Coming back from a peak T* to T subtracts twice the traction of a first
-    load (T* - T)/2.
+    After Mindlin and Deresiewicz (1953). The traction of a first load T is f times the pressure less that of a smaller
+    contact, the stick zone, of the size a (1 - T/(f F))^p with p = `_POWER`. Coming back from a peak T* to T subtracts twice
+    the traction of a first load (T* - T)/2.
     """
 
     friction: float
     tangential_force: float
     tangential_force_peak: float
+    normal: HertzLine | HertzPoint
+
+    _POWER: ClassVar[float]
 
     @property
-    def _reversal(self) -> float:
-        """First load that, taken twice, leads from the peak back to the present force."""
-        return 0.5 * (self.tangential_force_peak - self.tangential_force)
+    def stick_radius(self) -> float:
+        """Radius or half-width of the zone that sticks [length].
 
-    def _checked(self, tangential_force: float) -> float:
+        While loading a (1 - T/(f F))^p with p = 1/2 for the line (Cattaneo 1938), 1/3 for the sphere (Mindlin 1949).
+        """
+        return self._zone(self._reversal if self._reversal > 0.0 else self.tangential_force)
+
+    def unloaded_to(self, tangential_force: float) -> Self:
+        """Return the contact after the tangential force went down to a value not below the opposite peak.
+
+        Raises
+        ------
+        ModelError
+            If the force would rise, or pass the opposite peak.
+        """
         force = number("tangential_force", tangential_force)
         if not -self.tangential_force_peak <= force <= self.tangential_force:
             raise ModelError(
                 f"tangential_force is {force:g}: unloading runs from {self.tangential_force:g} "
                 f"down to the opposite peak {-self.tangential_force_peak:g}"
             )
-        return force
+        return replace(self, tangential_force=force)
 
+    @property
+    def _reversal(self) -> float:
+        """First load that, taken twice, leads from the peak back to the present force."""
+        return 0.5 * (self.tangential_force_peak - self.tangential_force)
 
-def _stick(radius: float, load: float, limit: float, power: float) -> float:
-    """Return the size of the stick zone, a (1 - T/(f F))^power, for a first load T."""
-    return radius * max(1.0 - load / limit, 0.0) ** power
+    @property
+    def _limit(self) -> float:
+        """Force at which the bodies slide."""
+        return self.friction * self.normal.force
 
+    def _zone(self, load: float) -> float:
+        """Return the size of the stick zone for a first load."""
+        return self.normal.radius * max(1.0 - load / self._limit, 0.0) ** self._POWER
 
-def _traction(normal: HertzLine | HertzPoint, friction: float, stick: float, position: ArrayLike) -> Array:
-    """Return f p0 [sqrt(1 - x^2/a^2) - (c/a) sqrt(1 - x^2/c^2)], each root where it is real."""
-    x2, a = np.asarray(position, dtype=np.float64) ** 2, normal.radius
-    roots = np.sqrt(np.maximum(a**2 - x2, 0.0)) - np.sqrt(np.maximum(stick**2 - x2, 0.0))
-    return friction * normal.pressure_max / a * roots
+    def _present(self, of_first_load: Callable[[float], Any]) -> Any:
+        """Return a quantity of the present force from the function that gives it for a first load."""
+        return of_first_load(self.tangential_force_peak) - 2.0 * of_first_load(self._reversal)
+
+    def _traction(self, position: ArrayLike) -> Array:
+        """Return f p0 [sqrt(1 - x^2/a^2) - (c/a) sqrt(1 - x^2/c^2)] of the present force, each root where it is real."""
+        x2, a = np.asarray(position, dtype=np.float64) ** 2, self.normal.radius
+
+        def of_first_load(load: float) -> Array:
+            roots = np.sqrt(np.maximum(a**2 - x2, 0.0)) - np.sqrt(np.maximum(self._zone(load) ** 2 - x2, 0.0))
+            return self.friction * self.normal.pressure_max / a * roots
+
+        return np.asarray(self._present(of_first_load))
 
 
 @dataclass(frozen=True)
@@ -78,54 +109,34 @@ class CattaneoMindlinLine(_PartialSlip):
 
     normal: HertzLine
 
-    @property
-    def stick_radius(self) -> float:
-        """Half-width of the zone that sticks; a sqrt(1 - Q/(f P)) while loading (Cattaneo 1938) [length]."""
-        return self._zone(self._reversal if self._reversal > 0.0 else self.tangential_force)
+    _POWER = 0.5
 
     def traction(self, x: ArrayLike) -> Array:
-        """Return the shear traction along the force (Cattaneo 1938; Johnson 1985, section 7.2a) [pressure]."""
-        first, back = self._zone(self.tangential_force_peak), self._zone(self._reversal)
-        return _traction(self.normal, self.friction, first, x) - 2.0 * _traction(self.normal, self.friction, back, x)
+        """Return the shear traction (...) [pressure] along the force at `x` (...) [length] (Johnson 1985, section 7.2a)."""
+        return self._traction(x)
 
     def slip(self, x: ArrayLike) -> Array:
-        """Return how far the surfaces have slipped on each other, in the direction of the force [length].
+        """Return the slip (...) [length] of the surfaces on each other at `x` (...) [length], in the direction of the force.
 
-        The integral of f p0/a (2/E*) sqrt(x^2 - c^2) from the edge c of the stick zone outward, for ``c <= |x|
-        <= a``; zero within the stick zone and outside the contact (from Johnson 1985, eq. 2.25 and section
-        7.2a).
+        The integral of f p0/a (2/E*) sqrt(x^2 - c^2) from the edge c of the stick zone outward, for ``c <= |x| <= a``; zero
+        within the stick zone and outside the contact (from Johnson 1985, eq. 2.25 and section 7.2a).
         """
-        return self._slip(self._zone(self.tangential_force_peak), x) - 2.0 * self._slip(self._zone(self._reversal), x)
+        return np.asarray(self._present(lambda load: self._slip(self._zone(load), x)))
 
     @property
     def slip_displacement(self) -> float:
         """Tangential displacement of distant points beyond that of a contact that sticks throughout [length].
 
-        While loading, f F/(pi E*) [(1 - t) ln(1 - t) + t] with t = T/(f F): the compliance of a strip that sticks
-        over ``|x| < c`` is -2/(pi E*) ln c and a constant of the far bodies (from Johnson 1985, eq. 2.25), integrated
-        over the force with c = a sqrt(1 - t). The elastic part, proportional to the force, depends on how the far
-        bodies are held, as ever in the plane.
+        While loading, f F/(pi E*) [(1 - t) ln(1 - t) + t] with t = T/(f F): the compliance of a strip that sticks over
+        ``|x| < c`` is -2/(pi E*) ln c and a constant of the far bodies (from Johnson 1985, eq. 2.25), integrated over the
+        force with c = a sqrt(1 - t). The elastic part, proportional to the force, depends on the supports of the far bodies.
         """
-        return self._beyond(self.tangential_force_peak) - 2.0 * self._beyond(self._reversal)
-
-    def unloaded_to(self, tangential_force: float) -> CattaneoMindlinLine:
-        """Return the contact after the tangential force went down to a value not below the opposite peak.
-
-        Raises
-        ------
-        ModelError
-            If the force would rise, or pass the opposite peak.
-        """
-        return replace(self, tangential_force=self._checked(tangential_force))
-
-    def _zone(self, load: float) -> float:
-        return _stick(self.normal.radius, load, self.friction * self.normal.force, 0.5)
+        return float(self._present(self._beyond))
 
     def _beyond(self, load: float) -> float:
-        limit = self.friction * self.normal.force
-        rest = max(1.0 - load / limit, 0.0)
+        rest = max(1.0 - load / self._limit, 0.0)
         logarithm = rest * math.log(rest) if rest > 0.0 else 0.0
-        return limit / (math.pi * self.normal.E_star) * (logarithm + 1.0 - rest)
+        return self._limit / (math.pi * self.normal.E_star) * (logarithm + 1.0 - rest)
 
     def _slip(self, c: float, x: ArrayLike) -> Array:
         a = self.normal.radius
@@ -141,8 +152,8 @@ class CattaneoMindlinLine(_PartialSlip):
 class CattaneoMindlinSphere(_PartialSlip):
     """Two spheres under a normal and a tangential force (Cattaneo 1938; Mindlin 1949).
 
-    Formulas as in Johnson (1985), section 7.2(b) and 7.4(b). The direction of slip is taken along the force,
-    which is exact for nu = 0 and leaves an error of the order nu/(4 - 2 nu) otherwise.
+    Formulas as in Johnson (1985), section 7.2(b) and 7.4(b). The direction of slip is taken along the force, which is exact
+    for nu = 0 and leaves an error of the order nu/(4 - 2 nu) otherwise.
 
     Attributes
     ----------
@@ -158,15 +169,12 @@ class CattaneoMindlinSphere(_PartialSlip):
 
     normal: HertzPoint
 
+    _POWER = 1.0 / 3.0
+
     @property
     def G_star(self) -> float:
         """Tangential modulus, 1/G* = (2 - nu1)/G1 + (2 - nu2)/G2 [pressure]."""
         return self.normal.bodies.G_star
-
-    @property
-    def stick_radius(self) -> float:
-        """Radius of the zone that sticks; a (1 - T/(f F))^(1/3) while loading (Mindlin 1949) [length]."""
-        return self._zone(self._reversal if self._reversal > 0.0 else self.tangential_force)
 
     @property
     def tangential_displacement(self) -> float:
@@ -174,38 +182,23 @@ class CattaneoMindlinSphere(_PartialSlip):
 
         While loading, 3 f F/(16 a G*) [1 - (1 - T/(f F))^(2/3)].
         """
-        return self._shift(self.tangential_force_peak) - 2.0 * self._shift(self._reversal)
+        return float(self._present(self._shift))
 
     @property
     def dissipation_per_cycle(self) -> float:
         """Work lost in a cycle between +peak and -peak (Mindlin and Deresiewicz 1953) [force length]."""
-        limit = self.friction * self.normal.force
-        load = self.tangential_force_peak / limit
+        load = self.tangential_force_peak / self._limit
         rest = max(1.0 - load, 0.0)
         bracket = 1.0 - rest ** (5.0 / 3.0) - 5.0 * load / 6.0 * (1.0 + rest ** (2.0 / 3.0))
-        return 9.0 * limit**2 / (10.0 * self.normal.radius) * bracket / self.G_star
+        return 9.0 * self._limit**2 / (10.0 * self.normal.radius) * bracket / self.G_star
 
     def traction(self, r: ArrayLike) -> Array:
-        """Return the shear traction along the force (Mindlin 1949; Johnson 1985, section 7.2b) [pressure]."""
-        first, back = self._zone(self.tangential_force_peak), self._zone(self._reversal)
-        return _traction(self.normal, self.friction, first, r) - 2.0 * _traction(self.normal, self.friction, back, r)
-
-    def unloaded_to(self, tangential_force: float) -> CattaneoMindlinSphere:
-        """Return the contact after the tangential force went down to a value not below the opposite peak.
-
-        Raises
-        ------
-        ModelError
-            If the force would rise, or pass the opposite peak.
-        """
-        return replace(self, tangential_force=self._checked(tangential_force))
-
-    def _zone(self, load: float) -> float:
-        return _stick(self.normal.radius, load, self.friction * self.normal.force, 1.0 / 3.0)
+        """Return the shear traction (...) [pressure] along the force at `r` (...) [length] (Johnson 1985, section 7.2b)."""
+        return self._traction(r)
 
     def _shift(self, load: float) -> float:
-        limit, a = self.friction * self.normal.force, self.normal.radius
-        return 3.0 * limit / (16.0 * a * self.G_star) * (1.0 - (self._zone(load) / a) ** 2)
+        a = self.normal.radius
+        return 3.0 * self._limit / (16.0 * a * self.G_star) * (1.0 - (self._zone(load) / a) ** 2)
 
 
 def _friction_limit(friction: float, normal_force: float, tangential_force: float) -> tuple[float, float]:
@@ -244,7 +237,8 @@ def cattaneo_mindlin_line(
 ) -> CattaneoMindlinLine:
     """Return the partial slip of two parallel cylinders in plane strain (Cattaneo 1938; Mindlin 1949).
 
-    The normal force stays constant; the tangential force grows from zero.
+    The normal force stays constant; the tangential force grows from zero. Different materials, for which the theory is
+    approximate, give a FastcontactWarning.
 
     Parameters
     ----------
@@ -253,17 +247,7 @@ def cattaneo_mindlin_line(
     friction : float
         Coulomb's coefficient f > 0.
     tangential_force : float
-        Per unit length, between 0 and f times the normal force [force/length].
-
-    Raises
-    ------
-    ModelError
-        If a number is out of range, or the bodies would slide.
-
-    Warns
-    -----
-    FastcontactWarning
-        If the materials differ, so that the theory is approximate.
+        Per unit length, between 0 and f times the normal force, beyond which the bodies slide [force/length].
     """
     normal = hertz_line(
         E1=E1, nu1=nu1, R1=R1, E2=E2, nu2=nu2, R2=R2, force=force, radius=radius, pressure_max=pressure_max
@@ -288,9 +272,7 @@ def cattaneo_mindlin_sphere(
     radius: float | None = None,
     pressure_max: float | None = None,
 ) -> CattaneoMindlinSphere:
-    """Return the partial slip of two spheres (Cattaneo 1938; Mindlin 1949).
-
-    The normal force stays constant; the tangential force grows from zero.
+    """Return the partial slip of two spheres (Cattaneo 1938; Mindlin 1949), as `cattaneo_mindlin_line`.
 
     Parameters
     ----------
@@ -299,17 +281,7 @@ def cattaneo_mindlin_sphere(
     friction : float
         Coulomb's coefficient f > 0.
     tangential_force : float
-        Between 0 and f times the normal force [force].
-
-    Raises
-    ------
-    ModelError
-        If a number is out of range, or the bodies would slide.
-
-    Warns
-    -----
-    FastcontactWarning
-        If the materials differ, so that the theory is approximate.
+        Between 0 and f times the normal force, beyond which the bodies slide [force].
     """
     normal = hertz_point(
         E1=E1, nu1=nu1, R1=R1, E2=E2, nu2=nu2, R2=R2,
@@ -361,11 +333,6 @@ def block_sliding(
         Coulomb's coefficient f >= 0.
     displacement : float
         Sideways displacement of the top, >= 0 [length].
-
-    Raises
-    ------
-    ModelError
-        If a number is out of range.
     """
     G = positive("E", E) / (2.0 * (1.0 + poisson("nu", nu)))
     H, shift = positive("height", height), not_negative("displacement", displacement)

@@ -108,12 +108,7 @@ def finite_half_spheres(approach: float, *, R: float = 50.0, E: float = 20_000.0
     R, E : float
         Radius [length] and Young's modulus [pressure]; by default those of FORMA04 in mm and MPa.
     nu : float
-        Poisson ratio: 0.3, the only one the table holds.
-
-    Raises
-    ------
-    ModelError
-        If `nu` is not 0.3, or the approach lies outside the table.
+        Poisson ratio: 0.3, the only one of the table.
 
     Examples
     --------

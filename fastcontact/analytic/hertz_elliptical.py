@@ -62,13 +62,12 @@ class HertzElliptical:
         return _solve(self.bodies, self.R_x, self.R_y, *exactly_one(approach=approach))
 
     def pressure(self, x: ArrayLike, y: ArrayLike = 0.0) -> Array:
-        """Return the contact pressure at points, zero outside (Johnson 1985, eq. 3.58) [pressure]."""
-        inside = (
-            1.0
-            - (np.asarray(x, dtype=np.float64) / self.radius_x) ** 2
-            - (np.asarray(y, dtype=np.float64) / self.radius_y) ** 2
-        )
-        return self.pressure_max * np.sqrt(np.maximum(inside, 0.0))
+        """Return the contact pressure (...) [pressure] at `x` (...) [length], `y` (...) [length], zero outside.
+
+        Johnson (1985), eq. 3.58.
+        """
+        x, y = np.asarray(x, dtype=np.float64) / self.radius_x, np.asarray(y, dtype=np.float64) / self.radius_y
+        return self.pressure_max * np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))
 
 
 def _ratio_of_radii(ratio: float) -> float:
@@ -137,20 +136,17 @@ def hertz_elliptical(
 
     Parameters
     ----------
-    E1, E2 : float
-        Young's moduli; `E2` None makes the second body rigid [pressure].
-    nu1, nu2 : float
-        Poisson ratios in (-1, 0.5].
+    E1, nu1, E2, nu2 : float
+        As for `hertz_point`.
     R1x, R1y, R2x, R2y : float
         Principal radii of bodies 1 and 2 in the planes through x and y; infinity is straight [length].
     force, approach, pressure_max : float
-        Exactly one of them.
+        Exactly one of them: force [force], approach [length] or largest pressure [pressure].
 
     Raises
     ------
     ModelError
-        If a number is out of range, the bodies are straight in one direction (a line contact), or not exactly
-        one load quantity is given.
+        Also if the bodies are straight in one direction: a line contact.
 
     Examples
     --------

@@ -20,9 +20,10 @@ Array = NDArray[np.float64]
 class HertzLine:
     """Frictionless contact of two parallel cylinders, formulas as in Johnson (1985), section 4.2(c).
 
-    Positions are x across the contact and y along the outward normal of the body asked for: each body is the
-    half plane y <= 0. Stresses come in the order xx, yy, zz, xy, tension positive. There is no `approach`: in
-    the plane it depends on the far shape of the bodies and how they are held.
+    Positions are x across the contact and y along the outward normal of the body: each body is the half plane y <= 0, and a
+    point above it raises ModelError. Stresses come in the order xx, yy, zz, xy, tension positive; zz depends on the Poisson
+    ratio, that of the first body unless `nu` is given. There is no `approach`: in the plane it depends on the shape of the
+    bodies far away and on their supports.
 
     Attributes
     ----------
@@ -60,62 +61,44 @@ class HertzLine:
         return _solve(self.bodies, self.kinematics, self.R_effective, *exactly_one(force=force))
 
     def pressure(self, x: ArrayLike) -> Array:
-        """Return the contact pressure at positions `x`, zero outside (Johnson 1985, eq. 4.44) [pressure]."""
+        """Return the contact pressure (...) [pressure] at `x` (...) [length], zero outside (Johnson 1985, eq. 4.44)."""
         inside = 1.0 - (np.asarray(x, dtype=np.float64) / self.radius) ** 2
         return self.pressure_max * np.sqrt(np.maximum(inside, 0.0))
 
     def stress(self, x: ArrayLike, y: ArrayLike, nu: float | None = None) -> Array:
-        """Return the stresses (..., 4) at points of a body (McEwen 1949; Johnson 1985, eq. 4.49) [pressure].
-
-        Parameters
-        ----------
-        x, y : array_like
-            Position, y <= 0 in the body [length].
-        nu : float, optional
-            Poisson ratio; by default that of the first body. It matters for the component zz only.
-
-        Raises
-        ------
-        ModelError
-            If a point lies above the surface or `nu` is no Poisson ratio.
-        """
+        """Return the stresses (..., 4) [pressure] at points `x` (...) [length], `y` (...) [length] (Johnson, eq. 4.49)."""
         return _half_plane.stress(x, y, self.radius, self.pressure_max, self._nu(nu), self.kinematics)
 
     def stress_on_axis(self, depth: ArrayLike, nu: float | None = None) -> Array:
-        """Return the stresses (..., 4) at depths >= 0 on the axis (Johnson 1985, eqs 4.46) [pressure]."""
+        """Return the stresses (..., 4) [pressure] on the axis at `depth` (...) [length], >= 0 (Johnson 1985, eqs 4.46)."""
         return self.stress(np.zeros_like(np.asarray(depth, dtype=np.float64)), np.negative(depth), nu)
 
     def surface_stress(self, x: ArrayLike, nu: float | None = None) -> Array:
-        """Return the stresses (..., 4) of the surface, xx = yy = -pressure (Johnson, 4.2c) [pressure]."""
+        """Return the stresses (..., 4) [pressure] of the surface at `x` (...) [length]: xx = yy = -pressure."""
         return self.stress(x, np.zeros_like(np.asarray(x, dtype=np.float64)), nu)
 
     def von_mises(self, x: ArrayLike, y: ArrayLike, nu: float | None = None) -> Array:
-        """Return the equivalent stress at points of a body [pressure]."""
+        """Return the equivalent stress (...) [pressure] at points `x` (...) [length], `y` (...) [length]."""
         return von_mises(self.stress(x, y, nu))
 
     def displacement(self, x: ArrayLike, y: ArrayLike, *, body: int = 1) -> Array:
-        """Return the displacements (..., 2) of body 1 or 2, measured from the point (0, 0) [length].
+        """Return the displacements (..., 2) [length] of body 1 or 2 at points `x` (...) [length], `y` (...) [length].
 
-        The integral of McEwen's (1949) field; the displacement of a half plane has no value at infinity.
-
-        Raises
-        ------
-        ModelError
-            If the body is rigid or a point lies above the surface.
+        They are measured from the point (0, 0), since the displacement of a half plane has no value at infinity: the integral
+        of McEwen's (1949) field. A rigid body raises ModelError.
         """
         E, nu = self.bodies.constants(body)
         return _half_plane.displacement(x, y, self.radius, self.pressure_max, E, nu, self.kinematics)
 
     def surface_displacement(self, x: ArrayLike, *, body: int = 1) -> Array:
-        """Return the displacements (..., 2) of the surface, measured from the point (0, 0) [length]."""
+        """Return the displacements (..., 2) [length] of the surface at `x` (...) [length], measured from the point (0, 0)."""
         return self.displacement(x, np.zeros_like(np.asarray(x, dtype=np.float64)), body=body)
 
     def von_mises_maximum(self, nu: float | None = None) -> VonMisesMaximum:
         """Return the largest equivalent stress on the axis and its depth.
 
-        On the axis at depth s b, with w = sqrt(1 + s^2) and e = 1 - 2 nu (e = 1 in plane stress), Johnson
-        (1985), eqs 4.46 give von Mises = p0 (w - s) sqrt(3 s^2/w^2 + e^2): either at the surface, or where 3
-        s = 3 s^2 w + e^2 w^3.
+        On the axis at depth s b, with w = sqrt(1 + s^2) and e = 1 - 2 nu (e = 1 in plane stress), Johnson, eqs 4.46 give
+        von Mises = p0 (w - s) sqrt(3 s^2/w^2 + e^2): either at the surface, or where 3 s = 3 s^2 w + e^2 w^3.
         """
         from scipy.optimize import brentq
 
@@ -169,21 +152,12 @@ def hertz_line(
 
     Parameters
     ----------
-    E1, E2 : float
-        Young's moduli; `E2` None makes the second body rigid [pressure].
-    nu1, nu2 : float
-        Poisson ratios in (-1, 0.5].
-    R1, R2 : float
-        Radii; infinity is a plane [length].
+    E1, nu1, R1, E2, nu2, R2 : float
+        As for `hertz_point`.
     force, radius, pressure_max : float
-        Exactly one of them; the force is per unit length, the radius is the half-width of the contact.
+        Exactly one of them: force per unit length [force/length], half-width [length] or largest pressure [pressure].
     kinematics : str
         "plane_strain" or "plane_stress" (thin discs).
-
-    Raises
-    ------
-    ModelError
-        If a number is out of range, both radii are infinite, or not exactly one load quantity is given.
 
     Examples
     --------

@@ -20,8 +20,9 @@ Array = NDArray[np.float64]
 class HertzPoint:
     """Frictionless contact of two spheres after Hertz (1881), see Johnson (1985), sections 3.4 and 4.2.
 
-    Positions are the distance r from the axis and the height z along the outward normal of the body asked
-    for: each body is the half space z <= 0. Stresses come in the order rr, zz, hoop, rz, tension positive.
+    Positions are the distance r from the axis and the height z along the outward normal of the body: each body is the half
+    space z <= 0, and a point above it raises ModelError. Stresses come in the order rr, zz, hoop, rz, tension positive; their
+    Poisson ratio is that of the first body unless `nu` is given.
 
     Attributes
     ----------
@@ -58,61 +59,43 @@ class HertzPoint:
         return _solve(self.bodies, self.R_effective, *exactly_one(approach=approach))
 
     def pressure(self, r: ArrayLike) -> Array:
-        """Return the contact pressure at distances `r`, zero outside (Johnson 1985, eq. 3.39) [pressure]."""
+        """Return the contact pressure (...) [pressure] at `r` (...) [length], zero outside (Johnson 1985, eq. 3.39)."""
         inside = 1.0 - (np.asarray(r, dtype=np.float64) / self.radius) ** 2
         return self.pressure_max * np.sqrt(np.maximum(inside, 0.0))
 
     def stress(self, r: ArrayLike, z: ArrayLike, nu: float | None = None) -> Array:
-        """Return the stresses (..., 4) at points of a body (Huber 1904) [pressure].
-
-        Parameters
-        ----------
-        r, z : array_like
-            Distance from the axis and height, z <= 0 in the body [length].
-        nu : float, optional
-            Poisson ratio; by default that of the first body.
-
-        Raises
-        ------
-        ModelError
-            If a point lies above the surface or `nu` is no Poisson ratio.
-        """
+        """Return the stresses (..., 4) [pressure] at points `r` (...) [length], `z` (...) [length] (Huber 1904)."""
         return _half_space.stress(r, z, self.radius, self.pressure_max, self._nu(nu))
 
     def stress_on_axis(self, depth: ArrayLike, nu: float | None = None) -> Array:
-        """Return the stresses (..., 4) at depths >= 0 on the axis (Johnson 1985, eq. 3.45) [pressure]."""
+        """Return the stresses (..., 4) [pressure] on the axis at `depth` (...) [length], >= 0 (Johnson 1985, eq. 3.45)."""
         return self.stress(np.zeros_like(np.asarray(depth, dtype=np.float64)), np.negative(depth), nu)
 
     def surface_stress(self, r: ArrayLike, nu: float | None = None) -> Array:
-        """Return the stresses (..., 4) of the surface (Johnson 1985, eqs 3.43 and 3.44) [pressure]."""
+        """Return the stresses (..., 4) [pressure] of the surface at `r` (...) [length] (Johnson 1985, eqs 3.43 and 3.44)."""
         return self.stress(r, np.zeros_like(np.asarray(r, dtype=np.float64)), nu)
 
     def von_mises(self, r: ArrayLike, z: ArrayLike, nu: float | None = None) -> Array:
-        """Return the equivalent stress at points of a body [pressure]."""
+        """Return the equivalent stress (...) [pressure] at points `r` (...) [length], `z` (...) [length]."""
         return von_mises(self.stress(r, z, nu))
 
     def displacement(self, r: ArrayLike, z: ArrayLike, *, body: int = 1) -> Array:
-        """Return the displacements (..., 2) radial and along z of body 1 or 2, zero at infinity [length].
+        """Return the displacements (..., 2) [length] of body 1 or 2, radial and along z, zero at infinity.
 
-        Boussinesq's potentials of the pressure, see Johnson (1985), eqs 3.2 to 3.6.
-
-        Raises
-        ------
-        ModelError
-            If the body is rigid or a point lies above the surface.
+        At points `r` (...) [length], `z` (...) [length], from Boussinesq's potentials of the pressure (Johnson 1985, eqs 3.2
+        to 3.6). A rigid body raises ModelError.
         """
         return _half_space.displacement(r, z, self.radius, self.pressure_max, *self.bodies.constants(body))
 
     def surface_displacement(self, r: ArrayLike, *, body: int = 1) -> Array:
-        """Return the displacements (..., 2) of the surface (Johnson 1985, eqs 3.41 and 3.42) [length]."""
+        """Return the displacements (..., 2) [length] of the surface at `r` (...) [length] (Johnson 1985, eqs 3.41, 3.42)."""
         return self.displacement(r, np.zeros_like(np.asarray(r, dtype=np.float64)), body=body)
 
     def von_mises_maximum(self, nu: float | None = None) -> VonMisesMaximum:
         """Return the largest equivalent stress on the axis and its depth.
 
-        The stationary point of ``|rr - zz|`` of Johnson (1985), eq. 3.45, found to rounding. For nu >= -0.3 it is
-        the largest anywhere in the body; with a Poisson ratio below that the edge of the contact is stressed
-        more.
+        The stationary point of ``|rr - zz|`` of Johnson (1985), eq. 3.45, found to rounding. For nu >= -0.3 it is the largest
+        anywhere in the body; with a Poisson ratio below that the stress at the edge of the contact is larger.
         """
         from scipy.optimize import brentq
 
@@ -168,14 +151,9 @@ def hertz_point(
     nu1, nu2 : float
         Poisson ratios in (-1, 0.5].
     R1, R2 : float
-        Radii; infinity is a plane [length].
+        Radii, not both infinite; infinity is a plane [length].
     force, approach, radius, pressure_max : float
-        Exactly one of them.
-
-    Raises
-    ------
-    ModelError
-        If a number is out of range, both radii are infinite, or not exactly one load quantity is given.
+        Exactly one of them: force [force], approach [length], contact radius [length] or largest pressure [pressure].
 
     Examples
     --------

@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 class LameShell:
     """A thick cylinder or a hollow sphere under pressure on its bore and its rim.
 
-    With m = 2 (cylinder) or 3 (sphere) the stresses are C - (m - 1) D/r^m radial and C + D/r^m hoop (Lame
-    1852; Timoshenko and Goodier 1970, articles 28 and 136).
+    With m = 2 (cylinder) or 3 (sphere) the stresses are C - (m - 1) D/r^m radial and C + D/r^m hoop (Lame 1852; Timoshenko
+    and Goodier 1970, articles 28 and 136). Radii outside the body raise ModelError.
 
     Attributes
     ----------
@@ -56,13 +56,7 @@ class LameShell:
             raise ModelError("inner_pressure must be 0 for a solid body (inner_radius 0): there is no bore to press on")
 
     def displacement(self, r: ArrayLike) -> Array:
-        """Return the radial displacement at radii `r`: r times the hoop strain [length].
-
-        Raises
-        ------
-        ModelError
-            If a radius lies outside the body.
-        """
+        """Return the radial displacement (...) [length] at radii `r` (...) [length]: r times the hoop strain."""
         radii, _, uniform, varying = self._fields(r)
         bulk = {
             "plane_strain": (1.0 + self.nu) * (1.0 - 2.0 * self.nu),
@@ -72,22 +66,19 @@ class LameShell:
         return radii * (bulk * uniform + (1.0 + self.nu) * varying) / self.E
 
     def radial_stress(self, r: ArrayLike) -> Array:
-        """Return the radial stress at radii `r` [pressure]; errors as for `displacement`."""
+        """Return the radial stress (...) [pressure] at radii `r` (...) [length]."""
         _, m, uniform, varying = self._fields(r)
         return uniform - (m - 1) * varying
 
     def hoop_stress(self, r: ArrayLike) -> Array:
-        """Return the hoop stress at radii `r` [pressure]; errors as for `displacement`."""
+        """Return the hoop stress (...) [pressure] at radii `r` (...) [length]."""
         _, _, uniform, varying = self._fields(r)
         return uniform + varying
 
     def axial_stress(self, r: ArrayLike) -> Array:
-        """Return the stress along the axis of a cylinder at radii `r` [pressure].
+        """Return the stress (...) [pressure] along the axis of a cylinder at radii `r` (...) [length].
 
-        Raises
-        ------
-        ModelError
-            For a sphere, which has no axis, or if a radius lies outside the body.
+        A sphere has no axis and raises ModelError.
         """
         if self.kinematics == "sphere":
             raise ModelError("a sphere has no axial stress: ask for radial_stress or hoop_stress")
@@ -136,11 +127,6 @@ def thick_cylinder(
         Pressures on the bore and the rim [pressure].
     kinematics : str
         "plane_strain" or "plane_stress".
-
-    Raises
-    ------
-    ModelError
-        If a number is out of range.
     """
     plane_kinematics(kinematics)
     return LameShell(inner_radius, outer_radius, inner_pressure, outer_pressure, E, nu, kinematics)
@@ -155,5 +141,5 @@ def thick_sphere(
     inner_pressure: float = 0.0,
     outer_pressure: float = 0.0,
 ) -> LameShell:
-    """Return a hollow sphere under pressure (Lame 1852); parameters and errors as for `thick_cylinder`."""
+    """Return a hollow sphere under pressure (Lame 1852); parameters as for `thick_cylinder`."""
     return LameShell(inner_radius, outer_radius, inner_pressure, outer_pressure, E, nu, "sphere")

@@ -31,7 +31,7 @@ class HertzBox:
     prescribed on both sides). In three dimensions z stands for y, and y is a second coordinate like x, up to the
     same width. The box is the rigid obstacle over its own top, too (see `distance`), for a model with
     ``Criteria(geometry_updates=0)``. Choose a contact radius that no mesh node hits, or results superconverge by
-    chance.
+    chance. Points above the top raise ModelError.
 
     Attributes
     ----------
@@ -81,48 +81,36 @@ class HertzBox:
         return 3 if self.kinematics == "3d" else 2
 
     def obstacle(self, x: ArrayLike, y: ArrayLike = 0.0) -> Array:
-        """Return the height (x^2 + y^2)/(2 R) of the rigid parabola over the top (n,) [length].
+        """Return the height (...) [length] of the rigid parabola at `x` (...) [length], in 3D also `y` (...) [length].
 
-        `y` only in three dimensions.
+        It is (x^2 + y^2)/(2 R) over the top.
         """
         return (np.asarray(x, dtype=np.float64) ** 2 + np.asarray(y, dtype=np.float64) ** 2) / (2.0 * self.R)
 
     def distance(self, points: Array) -> tuple[Array, Array]:
-        """Return the vertical gap (n,) under the parabola and its downward normals (n, dim): a rigid obstacle.
+        """Return the gap (n,) [length] under the parabola and its downward normals (n, dim) [-], as rigid obstacles do.
 
-        The problem is linear, so the gap is measured along the axis, not at right angles to the parabola.
+        At `points` (n, dim) [length]. The problem is linear: the gap is vertical, not at right angles to the parabola.
         """
         normal = np.zeros_like(points)
         normal[:, -1] = -1.0
         return self.obstacle(*points[:, :-1].T) - points[:, -1], normal
 
     def pressure(self, x: ArrayLike, y: ArrayLike = 0.0) -> Array:
-        """Return the exact contact pressure at positions of the top, `y` only in three dimensions [pressure]."""
+        """Return the exact contact pressure (...) [pressure] at `x` (...) [length], in 3D also `y` (...) [length]."""
         return self.hertz.pressure(np.hypot(x, y))
 
     def displacement(self, points: ArrayLike) -> Array:
-        """Return the exact displacements (..., dim) at `points` (..., dim), zero at the origin [length].
-
-        Raises
-        ------
-        ModelError
-            If the points are not of shape (..., dim) or one lies above the top.
-        """
+        """Return the exact displacements (..., dim) [length] at `points` (..., dim) [length], zero at the origin."""
         place, direction = self._in_plane(points)
         u = self.hertz.displacement(*place) - self.hertz.displacement(0.0, 0.0)
         along = np.where(place[0] == 0.0, 0.0, u[..., 0])  # the symmetry is exact
         return np.stack([*(along * cosine for cosine in direction), u[..., 1]], axis=-1)
 
     def stress(self, points: ArrayLike) -> Array:
-        """Return the exact stresses (..., 4) at `points` (..., 2) [pressure].
+        """Return the exact stresses (..., 4), in 3D (..., 6) [pressure] at `points` (..., dim) [length].
 
-        The order is xx, yy, zz, xy; in axisymmetry rr, yy, hoop, ry; in three dimensions (..., 6) at `points` (..., 3),
-        xx, yy, zz, xy, yz, xz.
-
-        Raises
-        ------
-        ModelError
-            If the points are not of shape (..., dim) or one lies above the top.
+        The order is xx, yy, zz, xy; in axisymmetry rr, yy, hoop, ry; in three dimensions xx, yy, zz, xy, yz, xz.
         """
         place, direction = self._in_plane(points)
         stress = self.hertz.stress(*place)
@@ -174,11 +162,6 @@ def hertz_box(
         Pressure at the centre [pressure].
     width, height : float
         Size of the box [length].
-
-    Raises
-    ------
-    ModelError
-        If a number is out of range or the contact is wider than the box.
 
     Examples
     --------

@@ -47,7 +47,7 @@ class PerssonPin:
         return float(self.pressure(0.0))
 
     def pressure(self, angle: ArrayLike) -> Array:
-        """Return the contact pressure at angles from the middle in degrees, zero outside [pressure].
+        """Return the contact pressure (...) [pressure] at `angle` (...) [degrees] from the middle, zero outside.
 
         Persson (1964); Ciavarella and Decuzzi (2001), for like materials.
         """

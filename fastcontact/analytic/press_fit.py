@@ -36,13 +36,6 @@ class PressFit:
         return self.inner.outer_radius
 
 
-def _fit(interference: float, inner: LameShell, outer: LameShell) -> PressFit:
-    """Return the fit of two bodies given under a unit pressure on their interface."""
-    b, d = inner.outer_radius, positive("interference", interference)
-    pressure = d / float(outer.displacement(b) - inner.displacement(b))
-    return PressFit(d, pressure, replace(inner, outer_pressure=pressure), replace(outer, inner_pressure=pressure))
-
-
 def press_fit_cylinders(
     *,
     E_inner: float,
@@ -68,11 +61,6 @@ def press_fit_cylinders(
     kinematics : str
         "plane_strain" or "plane_stress"; the latter also holds for long cylinders with free ends.
 
-    Raises
-    ------
-    ModelError
-        If a number is out of range.
-
     Examples
     --------
     >>> steel = dict(E_inner=210e3, nu_inner=0.3, E_outer=210e3, nu_outer=0.3)
@@ -81,13 +69,8 @@ def press_fit_cylinders(
     86.5385
     """
     plane_kinematics(kinematics)
-    return _pair(
-        (E_inner, nu_inner),
-        (E_outer, nu_outer),
-        (inner_radius, interface_radius, outer_radius),
-        interference,
-        kinematics,
-    )
+    radii = inner_radius, interface_radius, outer_radius
+    return _pair((E_inner, nu_inner), (E_outer, nu_outer), radii, interference, kinematics)
 
 
 def press_fit_spheres(
@@ -101,33 +84,23 @@ def press_fit_spheres(
     interference: float,
     inner_radius: float = 0.0,
 ) -> PressFit:
-    """Return the press fit of two concentric hollow spheres (Lame 1852).
-
-    Parameters and errors as for `press_fit_cylinders`.
-    """
-    return _pair(
-        (E_inner, nu_inner),
-        (E_outer, nu_outer),
-        (inner_radius, interface_radius, outer_radius),
-        interference,
-        "sphere",
-    )
+    """Return the press fit of two concentric hollow spheres (Lame 1852); parameters as for `press_fit_cylinders`."""
+    radii = inner_radius, interface_radius, outer_radius
+    return _pair((E_inner, nu_inner), (E_outer, nu_outer), radii, interference, "sphere")
 
 
 def _pair(
-    inner: tuple[float, float],
-    outer: tuple[float, float],
-    radii: tuple[float, float, float],
-    interference: float,
+    inner: tuple[float, float], outer: tuple[float, float], radii: tuple[float, float, float], interference: float,
     kinematics: str,
-) -> PressFit:
+) -> PressFit:  # fmt: skip
+    """Return the fit of an inner and an outer body, each with its E and nu."""
     for side, (E, nu) in (("inner", inner), ("outer", outer)):
         positive(f"E_{side}", E)
         poisson(f"nu_{side}", nu)
     a, b, c = radii
     positive("interface_radius", b)
-    return _fit(
-        interference,
-        LameShell(a, b, 0.0, 1.0, *inner, kinematics),
-        LameShell(b, c, 1.0, 0.0, *outer, kinematics),
-    )
+    # Under a unit pressure on the interface first.
+    shaft, hub = LameShell(a, b, 0.0, 1.0, *inner, kinematics), LameShell(b, c, 1.0, 0.0, *outer, kinematics)
+    d = positive("interference", interference)
+    pressure = d / float(hub.displacement(b) - shaft.displacement(b))
+    return PressFit(d, pressure, replace(shaft, outer_pressure=pressure), replace(hub, inner_pressure=pressure))

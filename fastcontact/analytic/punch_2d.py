@@ -40,15 +40,15 @@ class FlatPunch2D:
         return self.half_width
 
     def pressure(self, x: ArrayLike) -> Array:
-        """Return the pressure, infinite at the edges, 0 outside (Johnson 1985, eqs 2.64, 2.69) [pressure].
+        """Return the pressure (...) [pressure] at `x` (...) [length], infinite at the edges, zero outside.
 
-        Bonded, it changes sign ever faster towards the edge: the field oscillates there.
+        Johnson (1985), eqs 2.64 and 2.69. Bonded, it changes sign ever faster towards the edge: the field oscillates there.
         """
         amplitude, phase = self._polar(x)
         return amplitude * np.cos(phase)
 
     def shear(self, x: ArrayLike) -> Array:
-        """Return the shear traction on the half plane along x (Johnson 1985, eq. 2.69) [pressure].
+        """Return the shear traction (...) [pressure] along x on the half plane at `x` (...) [length] (Johnson, eq. 2.69).
 
         It pulls the surface outward; without bond it is zero.
         """
@@ -71,7 +71,7 @@ class FlatPunch2D:
 def flat_punch_2d(*, nu: float, half_width: float, force: float, bonded: bool = False) -> FlatPunch2D:
     """Return the tractions under a flat rigid punch on a half plane in plane strain.
 
-    There is no indentation: in a half plane it depends on how the far body is held.
+    There is no indentation: in a half plane it depends on the supports far away.
 
     Parameters
     ----------
@@ -83,11 +83,6 @@ def flat_punch_2d(*, nu: float, half_width: float, force: float, bonded: bool = 
         Force per unit length [force/length].
     bonded : bool
         The punch sticks to the half plane; otherwise there is no friction.
-
-    Raises
-    ------
-    ModelError
-        If a number is out of range.
     """
     return FlatPunch2D(poisson("nu", nu), positive("half_width", half_width), positive("force", force), bool(bonded))
 
@@ -107,11 +102,6 @@ def spence_stick_ratio(*, nu: float, friction: float) -> float:
         Poisson ratio of the half plane.
     friction : float
         Coulomb's coefficient f > 0.
-
-    Raises
-    ------
-    ModelError
-        If a number is out of range.
     """
     from scipy.optimize import brentq
     from scipy.special import ellipk, ellipkm1
@@ -120,8 +110,7 @@ def spence_stick_ratio(*, nu: float, friction: float) -> float:
     if goal == 0.0:
         return 1.0
 
-    # The unknown is ln(k/k'), which spreads both ends of (0, 1); the two integrals swap when its sign
-    # changes.
+    # The unknown is ln(k/k'), which spreads both ends of (0, 1); the two integrals swap when its sign changes.
     def residual(x: float) -> float:
         m = 1.0 / (1.0 + math.exp(-2.0 * x))
         m1 = 1.0 / (1.0 + math.exp(2.0 * x))

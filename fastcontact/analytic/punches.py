@@ -44,12 +44,9 @@ class FlatPunch:
         return self.force / self.approach
 
     def pressure(self, r: ArrayLike) -> Array:
-        """Return F/(2 pi a sqrt(a^2 - r^2)), infinite at the edge, 0 outside (Johnson 1985, 3.34) [pressure].
+        """Return the pressure (...) [pressure] at `r` (...) [length], infinite at the edge, zero outside.
 
-        Raises
-        ------
-        ModelError
-            If the punch is bonded: its pressure has no such form.
+        F/(2 pi a sqrt(a^2 - r^2)) (Johnson 1985, eq. 3.34); a bonded punch has no such form and raises ModelError.
         """
         self._frictionless("pressure")
         inside = self.radius**2 - np.asarray(r, dtype=np.float64) ** 2
@@ -58,12 +55,9 @@ class FlatPunch:
         return np.where(inside < 0.0, 0.0, value)
 
     def normal_displacement(self, r: ArrayLike) -> Array:
-        """Return the displacement of the surface along its normal, <= 0 (Johnson 1985, eq. 3.38) [length].
+        """Return the displacement (...) [length] of the surface along its normal at `r` (...) [length], <= 0.
 
-        Raises
-        ------
-        ModelError
-            If the punch is bonded.
+        Johnson (1985), eq. 3.38; a bonded punch has no such form and raises ModelError.
         """
         self._frictionless("normal displacement")
         ratio = self.radius / np.maximum(np.abs(np.asarray(r, dtype=np.float64)), self.radius)
@@ -117,7 +111,7 @@ class PowerLawPunch:
         return _solve(self.E_star, self.coefficient, self.exponent, *exactly_one(approach=approach))
 
     def pressure(self, r: ArrayLike) -> Array:
-        """Return the contact pressure at distances `r`, zero outside [pressure].
+        """Return the contact pressure (...) [pressure] at distances `r` (...) [length], zero outside.
 
         With k = delta/(A a^n), the integral E*/pi int_r^a k n A x^(n-1)/sqrt(x^2 - r^2) dx (Sneddon 1965, eq.
         4.8) is E* k n A a^(n-2) sqrt(a^2 - r^2)/pi 2F1(1 - n/2, 1; 3/2; 1 - r^2/a^2).
@@ -131,7 +125,7 @@ class PowerLawPunch:
         return scale * np.where((inside == 1.0) & (n <= 1.0), math.inf, shape)
 
     def normal_displacement(self, r: ArrayLike) -> Array:
-        """Return the displacement of the surface along its normal, <= 0 (Sneddon 1965) [length]."""
+        """Return the displacement (...) [length] of the surface along its normal at `r` (...) [length], <= 0 (Sneddon)."""
         from scipy.special import hyp2f1
 
         n, a = self.exponent, self.radius
@@ -169,11 +163,6 @@ def bonded_stiffness_ratio(nu: float) -> float:
     """Return stiffness bonded over frictionless of a flat punch, (1 - nu) ln(3 - 4 nu)/(1 - 2 nu).
 
     Mossakovskii (1954); Spence (1968). The ratio is 1 for nu = 0.5.
-
-    Raises
-    ------
-    ModelError
-        If `nu` is no Poisson ratio.
     """
     compressibility = 1.0 - 2.0 * poisson("nu", nu)
     if compressibility == 0.0:
@@ -199,14 +188,9 @@ def flat_punch(
     radius : float
         Radius of the punch [length].
     force, approach : float
-        Exactly one of them.
+        Exactly one of them: force [force] or indentation [length].
     bonded : bool
         The punch sticks; the force is larger by `bonded_stiffness_ratio`.
-
-    Raises
-    ------
-    ModelError
-        If a number is out of range or not exactly one load quantity is given.
     """
     name, value = exactly_one(force=force, approach=approach)
     E_star, a = _modulus(E, nu), positive("radius", radius)
@@ -235,12 +219,7 @@ def power_law_punch(
     coefficient, exponent : float
         A > 0 [length^(1 - n)] and n > 0.
     force, approach, radius : float
-        Exactly one of them.
-
-    Raises
-    ------
-    ModelError
-        If a number is out of range or not exactly one load quantity is given.
+        Exactly one of them: force [force], indentation [length] or contact radius [length].
     """
     given = exactly_one(force=force, approach=approach, radius=radius)
     return _solve(_modulus(E, nu), positive("coefficient", coefficient), positive("exponent", exponent), *given)
@@ -259,18 +238,10 @@ def cone_punch(
 
     Parameters
     ----------
-    E, nu : float
-        Half space [pressure], [-].
+    E, nu, force, approach, radius : float
+        As for `power_law_punch`.
     slope_angle : float
-        Angle between the cone's side and the surface, in (0, 90) degrees; the formula is linear, so it should
-        be small.
-    force, approach, radius : float
-        Exactly one of them.
-
-    Raises
-    ------
-    ModelError
-        If a number is out of range or not exactly one load quantity is given.
+        Angle between the cone's side and the surface, above 0 and below 90 [degrees]; the formula is linear: choose it small.
     """
     angle = number("slope_angle", slope_angle)
     if not 0.0 < angle < 90.0:
@@ -292,17 +263,10 @@ def paraboloid_punch(
 
     Parameters
     ----------
-    E, nu : float
-        Half space [pressure], [-].
+    E, nu, force, approach, radius : float
+        As for `power_law_punch`.
     R : float
         Radius of curvature [length].
-    force, approach, radius : float
-        Exactly one of them.
-
-    Raises
-    ------
-    ModelError
-        If a number is out of range or not exactly one load quantity is given.
     """
     given = exactly_one(force=force, approach=approach, radius=radius)
     return _solve(_modulus(E, nu), 0.5 / positive("R", R), 2.0, *given)

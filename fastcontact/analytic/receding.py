@@ -55,7 +55,7 @@ class RecedingLayer:
         return float(self.pressure(0.0))
 
     def pressure(self, x: ArrayLike) -> Array:
-        """Return the contact pressure at positions `x`, zero outside [pressure]."""
+        """Return the contact pressure (...) [pressure] at positions `x` (...) [length], zero outside."""
         position = np.abs(np.asarray(x, dtype=np.float64)) / self.radius
         theta = np.arccos(np.minimum(position, 1.0))
         # The coefficients sum to zero: with cos(2 k theta) - 1 in its place there is no 0/0 at the edge.
@@ -147,11 +147,6 @@ def receding_layer(
         [length].
     kinematics : str
         "plane_strain" or "plane_stress".
-
-    Raises
-    ------
-    ModelError
-        If a number is out of range.
     """
     bodies = Bodies(E1, nu1, E2, nu2)
     plane_kinematics(kinematics)

@@ -1,9 +1,9 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Element loops of 2D and axisymmetric solids: stiffness, stress at quadrature points, nodal averages.
+"""Element loops of plane and axisymmetric solids: stiffness, stresses, rotations, nodal sums.
 
 Shared arguments: ``points`` (n_points, 2); ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes),
-``dN`` (n_q, n_nodes, 2), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 4, 4) for strains
-(xx, yy, zz, 2xy); ``material`` (n_cells,). Axisymmetric integrals run over the full circle: weight 2 pi r det J w.
+``dN`` (n_q, n_nodes, 2), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 4, 4) [pressure] for
+strains (xx, yy, zz, 2xy); ``material`` (n_cells,). Axisymmetric integrals run over the full circle: weight 2 pi r det J w.
 """
 
 import numpy as np

@@ -1,10 +1,10 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Element loops of 3D solids: stiffness, stress at quadrature points, internal forces.
+"""Element loops of three-dimensional solids: stiffness, stresses, rotations.
 
-Shared arguments, as in `solid2d`: ``points`` (n_points, 3); ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes),
-``dN`` (n_q, n_nodes, 3), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 6, 6), symmetric, for
-strains (xx, yy, zz, 2xy, 2yz, 2xz); ``material`` (n_cells,). `N` and `axisymmetric` mean nothing here; they are taken
-so that the loops of both dimensions are called alike.
+Shared arguments: ``points`` (n_points, 3) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes), ``dN`` (n_q,
+n_nodes, 3), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 6, 6) [pressure], symmetric, for strains
+(xx, yy, zz, 2xy, 2yz, 2xz); ``material`` (n_cells,). `N` and `axisymmetric` have no effect here: the loops of both dimensions
+have the same arguments. What they share is written in both files, since Numba's cache does not see changes in other files.
 """
 
 import numpy as np
@@ -135,7 +135,7 @@ def _owned(cells, c, owner, part, mine):
 
 @kernel
 def _add_block(flat, at_upper, at_lower, upper, lower, k00, k01, k02, k10, k11, k12, k20, k21, k22):
-    """Add a block of a node pair, and its transpose on the other side of the diagonal, where asked for."""
+    """Add the block of a node pair if `at_upper`, and its transpose on the other side of the diagonal if `at_lower`."""
     u, v = 9 * upper, 9 * lower
     if at_upper:
         flat[u] += k00
@@ -163,7 +163,7 @@ def _add_block(flat, at_upper, at_lower, upper, lower, k00, k01, k02, k10, k11, 
 def _add_isotropic_block(flat, pair, at_upper, at_lower, upper, lower, coupling, shear, g):
     """Add the block of two nodes for Lame's constants: K_ij = lambda g_ij + mu g_ji + mu g_kk delta_ij.
 
-    `pair` says whether the nodes differ; g comes as xx, yy, zz, xy, xz, yz, yx, zx, zy.
+    `pair` is whether the nodes differ; the order of g is xx, yy, zz, xy, xz, yz, yx, zx, zy.
     """
     xx, yy, zz, xy, xz, yz, yx, zx, zy = g
     trace, both = shear * (xx + yy + zz), coupling + shear
@@ -215,8 +215,8 @@ def _add_general(g, tensors, m, products, block, slots, c, mine, flat):
 def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, gradient, flat):
     """Add the blocks of a linear tetrahedron for Lame's constants: its gradients (4, 3) are constant.
 
-    `volume` is that of the reference cell. Returns whether the Jacobian is positive. Loops over four nodes, known to the
-    compiler, take half the time of `_integrate_products` and `_add_isotropic`.
+    `volume` is that of the reference cell. Returns whether the Jacobian is positive. Loops over exactly four nodes
+    take half the time of `_integrate_products` and `_add_isotropic`.
     """
     first = cells[c, 0]
     x0, y0, z0 = points[first, 0], points[first, 1], points[first, 2]

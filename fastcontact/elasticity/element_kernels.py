@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""The element loops for the dimension of a mesh: the one place that chooses between two and three dimensions."""
+"""The choice of the compiled element loops: those of two or those of three dimensions."""
 
 from types import ModuleType
 

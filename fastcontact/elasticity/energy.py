@@ -1,4 +1,4 @@
-"""Elastic energy of stresses, and rules to integrate it over cells more exactly than the stiffness needs."""
+"""Elastic energy of stresses, and quadrature rules to integrate it over cells more exactly than the stiffness."""
 
 from __future__ import annotations
 
@@ -12,16 +12,20 @@ Array = NDArray[np.float64]
 
 
 def elastic_energy(stress: Array, E: Array, nu: Array) -> Array:
-    """Return stress : strain of an isotropic material (Timoshenko and Goodier, 1970, eq. 86, twice)."""
+    """Return stress : strain (...) [pressure] of an isotropic material (Timoshenko and Goodier, 1970, eq. 86, twice).
+
+    From `stress` (..., n_components) [pressure], `E` (...) [pressure] and `nu` (...) [-].
+    """
     trace = stress[..., :3].sum(axis=-1)
     square = (stress[..., :3] ** 2).sum(axis=-1) + 2.0 * (stress[..., 3:] ** 2).sum(axis=-1)
     return np.asarray(((1.0 + nu) * square - nu * trace**2) / E)
 
 
 def cell_volumes(corners: Array, N: Array, dN: Array, axisymmetric: bool) -> Array:
-    """Return the volume per unit of the reference cell, (n_cells, n_q), of cells with nodes (n_cells, n_nodes, dim).
+    """Return the volume (n_cells, n_q) [length^dim] per unit of the reference cell; in axisymmetry of the full circle.
 
-    In axisymmetry over the full circle.
+    From the nodes of the cells, `corners` (n_cells, n_nodes, dim) [length], shape functions `N` (n_q, n_nodes) [-] and their
+    derivatives `dN` (n_q, n_nodes, dim) [-].
     """
     volume = np.linalg.det(np.einsum("qaj,cad->cqdj", dN, corners))
     if axisymmetric:

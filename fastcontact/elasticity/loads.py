@@ -1,8 +1,11 @@
-"""Loads: what they act on and the nodal forces they amount to, in the reference configuration.
+"""Loads and their nodal forces, in the reference configuration.
 
 Each kind is a class with ``check`` and ``vector``; a new class here, with an ``add_...`` of the model, is a new load.
 Nodal forces are the work-equivalent ones, the integrals of the load times the shape functions. In axisymmetry every
 force is that over the full circle.
+
+A `Value` is a number, or a function from positions (n, dim) [length] in the reference configuration to numbers (n,) [unit of
+the load]; `Components` are values by the number of their axis.
 """
 
 from __future__ import annotations
@@ -24,9 +27,7 @@ from fastcontact.mesh.topology import outer_facets
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 Table = tuple[tuple[float, float], ...]
-# A number, or a function from positions (n, dim) in the reference configuration to numbers (n,).
 Value = float | Callable[[Array], Array]
-# Components by the number of their axis.
 Components = Mapping[int, Value]
 
 # By the linear element on the same corners. Of degree 7 at least (products: in each direction): enough for a constant
@@ -47,7 +48,7 @@ class Load(Protocol):
 
     @property
     def name(self) -> str:
-        """What the load is and where it acts, for messages."""
+        """Kind of the load and where it acts, for messages."""
         ...
 
     @property
@@ -109,8 +110,7 @@ class Traction:
     def check(self, mesh: Mesh, kinematics: str) -> None:
         """See `Load`."""
         facets_of(mesh, self.group)
-        for value in self.components.values():
-            check_value(self.name, value)
+        _check_each(self, check_value)
 
     def vector(self, mesh: Mesh, kinematics: str) -> Array:
         """See `Load`."""
@@ -140,8 +140,7 @@ class BodyForce:
         for group in self.groups or ():
             if not mesh.cells_of(group, dim=mesh.dim):
                 raise ModelError(f"group '{group}' holds no solid cells: no body force can act on it")
-        for value in self.components.values():
-            check_value(self.name, value)
+        _check_each(self, check_value)
 
     def vector(self, mesh: Mesh, kinematics: str) -> Array:
         """See `Load`."""
@@ -153,7 +152,7 @@ class BodyForce:
         return forces
 
     def cells(self, mesh: Mesh) -> Iterator[tuple[str, Indices]]:
-        """Give the solid cells that the load acts on, by element."""
+        """Yield each element and the solid cells (n_cells, n_nodes) on which the load acts."""
         if self.groups is None:
             yield from mesh.solids.items()
             return
@@ -180,8 +179,7 @@ class NodalForce:
         """See `Load`."""
         if not len(mesh.points_of(self.group)):
             raise ModelError(f"group '{self.group}' is empty: no force can act on it")
-        for value in self.components.values():
-            check_number(self.name, value)
+        _check_each(self, check_number)
 
     def vector(self, mesh: Mesh, kinematics: str) -> Array:
         """See `Load`."""
@@ -212,8 +210,7 @@ class TotalForce:
                 f"{self.name} has a radial component x, but radial forces cancel over the full circle: "
                 "use add_pressure or add_traction for a radial load"
             )
-        for value in self.components.values():
-            check_number(self.name, value)
+        _check_each(self, check_number)
 
     def vector(self, mesh: Mesh, kinematics: str) -> Array:
         """See `Load`."""
@@ -230,14 +227,9 @@ class TotalForce:
 
 
 def facets_of(mesh: Mesh, group: str) -> dict[str, Indices]:
-    """Return the facets of a group by element.
+    """Return the facets (n, n_nodes) of a group by element.
 
-    Raises
-    ------
-    MeshError
-        If there is no such group of cells.
-    ModelError
-        If it holds no facets.
+    MeshError if there is no such group of cells, ModelError if it has no facets.
     """
     if group in mesh.point_groups and group not in mesh.cell_groups:
         raise ModelError(f"group '{group}' holds points only: this load needs a group of facets")
@@ -248,12 +240,9 @@ def facets_of(mesh: Mesh, group: str) -> dict[str, Indices]:
 
 
 def outward(mesh: Mesh, group: str, element: str, block: Indices) -> Indices:
-    """Return the facets `block` (n, n_nodes) turned so that their normals point out of the solid.
+    """Return facets (n, n_nodes), those of `block` (n, n_nodes), turned so that their normals point out of the solid.
 
-    Raises
-    ------
-    ModelError
-        If a facet does not lie on the outside of a solid.
+    ModelError if a facet does not lie on the outside of a solid.
     """
     outer = outer_facets(mesh).get(element, np.empty((0, block.shape[1]), np.int32))
     keys = np.sort(np.vstack([outer, block]), axis=1)
@@ -270,12 +259,9 @@ def outward(mesh: Mesh, group: str, element: str, block: Indices) -> Indices:
 
 
 def evaluated(value: Value, points: Array, name: str) -> Array:
-    """Return `value` at `points` (..., dim), shape (...).
+    """Return the value (...) [unit of the load] at `points` (..., dim) [length].
 
-    Raises
-    ------
-    ModelError
-        If it is a function that fails or returns another shape, or a result is not finite.
+    ModelError if it is a function that returns another shape, or a result is not finite.
     """
     if not callable(value):
         return np.full(points.shape[:-1], float(value))
@@ -304,13 +290,16 @@ def check_value(name: str, value: Any) -> None:
         check_number(name, value)
 
 
+def _check_each(load: Traction | BodyForce | NodalForce | TotalForce, check: Callable[[str, Any], None]) -> None:
+    """Apply a check to every component of a load."""
+    for value in load.components.values():
+        check(load.name, value)
+
+
 def axes_of(what: str, components: Mapping[str, Any], dim: int) -> dict[int, Any]:
     """Return components given by the names of their axes, those that are not None, by number.
 
-    Raises
-    ------
-    ModelError
-        If there is none, or an axis is not one of the space.
+    ModelError if there is none, or an axis is not one of the space.
     """
     given = {name: value for name, value in components.items() if value is not None}
     if not given:

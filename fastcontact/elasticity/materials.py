@@ -48,10 +48,9 @@ class LinearElastic:
         return self.E / (2 * (1 + self.nu))
 
     def moduli(self, kinematics: str) -> NDArray[np.float64]:
-        """Return the matrix from strains (xx, yy, zz, 2xy[, 2yz, 2xz]) to stresses [pressure].
+        """Return the matrix (4, 4), in 3D (6, 6) [pressure] from strains (xx, yy, zz, 2xy, in 3D 2yz, 2xz) to stresses.
 
-        Shape (4, 4) in two dimensions, (6, 6) in three. Plane stress has no stress zz (Timoshenko and Goodier, 1970,
-        section 16).
+        Plane stress has no stress zz (Timoshenko and Goodier, 1970, section 16).
         """
         E, nu, G = self.E, self.nu, self.shear_modulus
         if kinematics not in KINEMATICS:

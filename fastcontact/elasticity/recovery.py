@@ -12,19 +12,31 @@ from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
 Materials = dict[str, NDArray[np.int32]]
-# Stresses at the points of so many cells are there at a time while nodal ones are formed [bytes].
+# Memory for stresses at points while nodal ones are formed [bytes].
 BATCH = 16_000_000
+# Number of the component xx, yy, zz, xy, yz or xz at each place of a tensor.
 
 
 def stress_at_points(
     mesh: Mesh, kinematics: str, moduli: Array, material: Materials, displacement: Array
 ) -> dict[str, Array]:
-    """Return the stress (n_cells, n_q, 4), in 3D (n_cells, n_q, 6), at the default quadrature points [pressure].
+    """Return by solid element the stress (n_cells, n_q, n_components) [pressure] at the default quadrature points.
 
-    By solid element. Components xx, yy, zz, xy (then yz, xz in 3D); axisymmetric: rr, yy, hoop, ry. Arguments as in
-    `assembly.stiffness`, with the displacement (n_points, dim) [length].
+    Components xx, yy, zz, xy, in 3D also yz, xz; axisymmetric: rr, yy, hoop, ry.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    kinematics : str
+        ``"axisymmetric"``, ``"plane_strain"``, ``"plane_stress"`` or ``"3d"``.
+    moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
+        From `LinearElastic.moduli` [pressure].
+    material : dict of str to ndarray of int (n_cells,)
+        By solid element: material number of each cell.
+    displacement : ndarray (n_points, dim)
+        Of all points [length].
     """
-    loops, values = _Loops(mesh, kinematics, moduli, material, displacement), {}
+    loops, values = _CellStresses(mesh, kinematics, moduli, material, displacement), {}
     for name, block in mesh.solids.items():
         values[name] = loops.room(name, len(block))
         loops.fill(name, 0, values[name])
@@ -32,20 +44,26 @@ def stress_at_points(
 
 
 def nodal_stress(mesh: Mesh, kinematics: str, moduli: Array, material: Materials, displacement: Array) -> Array:
-    """Return the stress (n_points, n_components) at the nodes, `nodal_average` of `stress_at_points`, in little memory."""
-    loops, average = _Loops(mesh, kinematics, moduli, material, displacement), _Average(mesh, moduli.shape[1])
+    """Return the stress (n_points, n_components) [pressure] at the nodes: `nodal_average` of `stress_at_points`.
+
+    The stresses at points are formed for few cells at a time, which takes less memory. Arguments as for `stress_at_points`.
+    """
+    loops, average = (
+        _CellStresses(mesh, kinematics, moduli, material, displacement),
+        NodalAverage(mesh, moduli.shape[1]),
+    )
     for name, block in mesh.solids.items():
         room = loops.room(name, 1)
         room = loops.room(name, min(len(block), BATCH // room.nbytes + 1))
         for first in range(0, len(block), len(room)):
             values = room[: len(block) - first]
             loops.fill(name, first, values)
-            average.add(name, first, values)
+            average.add(block[first : first + len(values)], elements.get(name).extrapolation, values)
     return average.result()
 
 
-class _Loops:
-    """Stresses at the points of some cells: parameters of `stress_at_points`."""
+class _CellStresses:
+    """Stresses at the points of some of the cells; arguments as for `stress_at_points`."""
 
     def __init__(self, mesh: Mesh, kinematics: str, moduli: Array, material: Materials, displacement: Array) -> None:
         self._mesh, self._axisymmetric = mesh, kinematics == "axisymmetric"
@@ -70,28 +88,30 @@ class _Loops:
         parallel.shared(part, parallel.portions(len(out), cells.shape[1]))
 
 
-class _Average:
-    """The plain average, at each node, of the stresses that its cells have there."""
+class NodalAverage:
+    """The plain average, at each node, of the stresses of its cells there."""
 
     def __init__(self, mesh: Mesh, components: int) -> None:
-        self._mesh, self._total, self._count = mesh, np.zeros((mesh.n_points, components)), np.zeros(mesh.n_points)
+        self._total, self._count = np.zeros((mesh.n_points, components)), np.zeros(mesh.n_points)
 
-    def add(self, name: str, first: int, values: Array) -> None:
-        """Add those of the cells from `first` on, given at points (n_cells, n_q, n_components)."""
-        cells = self._mesh.cells[name][first : first + len(values)]
-        # Good for any dimension and number of components.
-        element_2d_kernels.add_nodal(cells, elements.get(name).extrapolation, values, self._total, self._count)
+    def add(self, cells: NDArray[np.int32], extrapolation: Array, values: Array) -> None:
+        """Add the stresses of `cells` (n_cells, n_nodes), `values` (n_cells, n_q, n_components) [pressure] at points.
+
+        The matrix `extrapolation` (n_nodes, n_q) [-] leads from values at the points to values at the nodes.
+        """
+        # For any dimension and number of components.
+        element_2d_kernels.add_nodal(cells, extrapolation, values, self._total, self._count)
 
     def result(self) -> Array:
-        """Return it (n_points, n_components), once; zero where there is no cell."""
+        """Return the average (n_points, n_components) [pressure], once; zero where there is no cell."""
         self._total /= np.maximum(self._count, 1.0)[:, None]
         return self._total
 
 
 def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:
-    """Extrapolate stresses at quadrature points to the nodes of each cell (n_cells, n_nodes, n_components).
+    """Return by solid element the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each cell.
 
-    By solid element, as SIEF_ELNO of code_aster: see `Element.extrapolation`.
+    By `Element.extrapolation` from `at_points` (n_cells, n_q, n_components) [pressure], as SIEF_ELNO of code_aster.
     """
     return {
         name: np.einsum("aq,cqi->cai", elements.get(name).extrapolation, values) for name, values in at_points.items()
@@ -99,18 +119,21 @@ def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:
 
 
 def nodal_average(mesh: Mesh, at_points: dict[str, Array]) -> Array:
-    """Return nodal stresses (n_points, n_components): the plain average over the cells at each node.
+    """Return the stress (n_points, n_components) [pressure] at the nodes: the plain average over the cells at each node.
 
-    As SIEF_NOEU of code_aster. Points without a solid cell get zero.
+    From `at_points` (n_cells, n_q, n_components) [pressure], as SIEF_NOEU of code_aster; zero at points without solid cell.
     """
-    average = _Average(mesh, next(iter(at_points.values())).shape[2])
+    average = NodalAverage(mesh, next(iter(at_points.values())).shape[2])
     for name, values in at_points.items():
-        average.add(name, 0, values)
+        average.add(mesh.cells[name], elements.get(name).extrapolation, values)
     return average.result()
 
 
 def internal_force(mesh: Mesh, kinematics: str, at_points: dict[str, Array]) -> Array:
-    """Return the nodal forces (n_points, dim) that balance the stresses at the quadrature points [force]."""
+    """Return the nodal forces (n_points, dim) [force] that balance the stresses at the quadrature points.
+
+    These are `at_points` (n_cells, n_q, n_components) [pressure], by solid element.
+    """
     loops, force = element_kernels.loops(mesh.dim), np.zeros((mesh.n_points, mesh.dim))
     for name, values in at_points.items():
         N, dN, weights = elements.get(name).tables
@@ -120,13 +143,19 @@ def internal_force(mesh: Mesh, kinematics: str, at_points: dict[str, Array]) -> 
 
 
 def von_mises(stress: Array) -> Array:
-    """Return the von Mises stress of components xx, yy, zz, xy[, yz, xz] in the last axis (von Mises, 1913)."""
+    """Return the equivalent stress (...) [pressure] of `stress` (..., n_components) [pressure] (von Mises, 1913).
+
+    Components xx, yy, zz, xy, in 3D also yz, xz.
+    """
     xx, yy, zz = stress[..., 0], stress[..., 1], stress[..., 2]
     shear = (stress[..., 3:] ** 2).sum(axis=-1)
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * shear)
 
 
 def von_mises_signed(stress: Array, equivalent: Array | None = None) -> Array:
-    """Return the von Mises stress (`equivalent`, where it is known) with the sign of the trace, as VMIS_SG of code_aster."""
+    """Return the von Mises stress (...) [pressure] with the sign of the trace, as VMIS_SG of code_aster.
+
+    Of `stress` (..., n_components) [pressure]; `equivalent` (...) [pressure] is its von Mises stress, where known already.
+    """
     trace = stress[..., 0] + stress[..., 1] + stress[..., 2]
     return np.where(trace < 0, -1.0, 1.0) * (von_mises(stress) if equivalent is None else equivalent)

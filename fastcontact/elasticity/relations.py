@@ -24,8 +24,9 @@ class Relation:
     Parameters
     ----------
     name : str
-        What the user asked for, for messages.
+        For messages.
     rows : csr_array (m, n_dofs)
+        Coefficients [unit of the caller].
     value : float
         At multiplier 1 of the ramp [length times the unit of the coefficients].
     ramp : tuple of (float, float), optional
@@ -44,14 +45,15 @@ class Elimination:
 
     Attributes
     ----------
-    pivots : ndarray of int
+    pivots : ndarray of int (n_pivots,)
         The displacement components expressed by the others.
     T : csr_array (n, n)
-        Identity but for the rows of the pivots; the columns of the pivots are empty.
+        Identity but for the rows of the pivots; the columns of the pivots are empty [-].
     S : csr_array (n, m)
-        How the pivots depend on the right-hand sides.
+        Derivatives of the pivots by the right-hand sides [length / unit of r].
     conditions : csr_array (k, n + m)
-        Rows that bind only known components and right-hand sides: ``conditions @ (w, r) = 0`` or there is no solution.
+        Rows of known components and right-hand sides only: ``conditions @ (w, r) = 0``, or there is no solution
+        [unit of R], [-].
     origin : ndarray of int (k,)
         The row of R that each condition comes from.
     """
@@ -64,7 +66,7 @@ class Elimination:
 
 
 def stacked_rows(relations: Sequence[Relation], n_dofs: int) -> csr_array:
-    """Return the rows of all relations as one matrix R (m, n_dofs)."""
+    """Return the rows of all relations as one matrix R (m, n_dofs) [unit of the rows]."""
     if not relations:
         return csr_array((0, n_dofs))
     return csr_array(vstack([relation.rows for relation in relations], format="csr"))
@@ -76,7 +78,7 @@ def eliminate(R: csr_array, known: Mask) -> Elimination:
     Parameters
     ----------
     R : csr_array (m, n)
-        May repeat itself.
+        Rows may depend on each other [unit of the caller].
     known : ndarray of bool (n,)
         Components that are prescribed and never become pivots.
     """
@@ -96,7 +98,7 @@ def eliminate(R: csr_array, known: Mask) -> Elimination:
             conditions.append(row)
             origin.append(k)
             continue
-        # The component in the fewest relations: a master that others follow stays.
+        # The component in the fewest relations: one on which many others depend stays.
         pivot = min(unknown, key=lambda key: (uses[key], -abs(row[key]), key))
         coefficient = row.pop(pivot)
         _express(pivot, {key: -c / coefficient for key, c in row.items()}, expressed, users)
@@ -107,7 +109,7 @@ def eliminate(R: csr_array, known: Mask) -> Elimination:
 
 
 def _substituted(R: csr_array, k: int, expressed: dict[int, Row]) -> Row:
-    """Return row `k` of R with pivots replaced by what they are expressed by."""
+    """Return row `k` of R with pivots replaced by their expressions."""
     row: Row = {}
     size = 0.0
     for place in range(R.indptr[k], R.indptr[k + 1]):
@@ -119,7 +121,7 @@ def _substituted(R: csr_array, k: int, expressed: dict[int, Row]) -> Row:
 
 
 def _express(pivot: int, by: Row, expressed: dict[int, Row], users: dict[int, set[int]]) -> None:
-    """Enter a new pivot, and replace it where earlier ones are expressed by it."""
+    """Add a new pivot, and replace it in the expressions of earlier ones."""
     expressed[pivot] = by
     for key in by:
         users.setdefault(key, set()).add(pivot)

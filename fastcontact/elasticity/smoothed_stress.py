@@ -1,9 +1,9 @@
-"""Nodal stresses smoother and closer to the truth than those of the solution, for estimates of its error.
+"""Nodal stresses that are smoother and more accurate than those of the solution, to estimate its error.
 
 At the centres of linear cells, and at the reduced Gauss points of quadratic ones, stresses are more accurate than elsewhere
 (Barlow, 1976). They are extrapolated from there to the nodes and averaged over the cells of one material at each node.
 Polynomials fitted to patches of cells (Zienkiewicz and Zhu, 1992) are worse near the edge of a contact, where the pressure
-falls like a square root: they smear it over two cells, and the error of quadratic cells is overestimated two to four times.
+falls like a square root: they spread it over two cells, and the error of quadratic cells is overestimated two to four times.
 """
 
 from __future__ import annotations
@@ -13,26 +13,25 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.elasticity import element_2d_kernels, element_kernels
+from fastcontact.elasticity import element_kernels, recovery
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
-Materials = dict[str, NDArray[np.int32]]
 # Position of the sampling points of quadratic triangles and tetrahedra between centre and corners.
 SIMPLEX = {3: 0.5, 4: 1.0 / math.sqrt(5.0)}
 
 
 def smoothed_stress(
-    mesh: Mesh, kinematics: str, moduli: Array, material: Materials, displacement: Array
+    mesh: Mesh, kinematics: str, moduli: Array, material: recovery.Materials, displacement: Array
 ) -> dict[str, Array]:
-    """Return stresses (n_cells, n_nodes, n_components) at the nodes of each cell [pressure].
+    """Return by solid element the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each cell.
 
-    By solid element; equal at a node for all cells of one material. Arguments as in `recovery.stress_at_points`.
+    It is the same at a node for all cells of one material. Arguments as for `recovery.stress_at_points`.
     """
     found = {name: np.empty((*block.shape, moduli.shape[1])) for name, block in mesh.solids.items()}
     for number in range(len(moduli)):
-        total, count = np.zeros((mesh.n_points, moduli.shape[1])), np.zeros(mesh.n_points)
+        average = recovery.NodalAverage(mesh, moduli.shape[1])
         rows = {name: np.flatnonzero(material[name] == number) for name in found}
         for name, chosen in rows.items():
             xi, outward = sampling(name)
@@ -43,15 +42,15 @@ def smoothed_stress(
                 mesh.points, cells, N, dN, moduli, material[name][chosen], kinematics == "axisymmetric", displacement,
                 stress,
             )  # fmt: skip
-            element_2d_kernels.add_nodal(cells, outward, stress, total, count)
-        nodal = total / np.maximum(count, 1.0)[:, None]
+            average.add(cells, outward, stress)
+        nodal = average.result()
         for name, chosen in rows.items():
             found[name][chosen] = nodal[mesh.cells[name][chosen]]
     return found
 
 
 def sampling(name: str) -> tuple[Array, Array]:
-    """Return the points (n_q, dim) of an element where stresses are best, and the extrapolation (n_nodes, n_q)."""
+    """Return the points (n_q, dim) [-] of an element where stresses are best, and the extrapolation (n_nodes, n_q)."""
     element = elements.get(name)
     corners = element.nodes[: element.n_corners]
     centre = corners.mean(axis=0)

@@ -19,18 +19,18 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Springs:
-    """Springs that a user asked for at once.
+    """Springs defined together.
 
     Attributes
     ----------
     name : str
         For messages.
     rows : csr_array (m, n_dofs)
-        Elongation of each spring from the displacements [1].
+        Elongation of each spring from the displacements [-].
     stiffness : ndarray (m,)
         [force / length]; in axisymmetry over the full circle.
     grounded : bool
-        Whether they hang on the ground rather than between two nodes.
+        Whether they connect nodes to the ground rather than two nodes.
     """
 
     name: str
@@ -39,12 +39,12 @@ class Springs:
     grounded: bool
 
     def tension(self, displacement: Array) -> Array:
-        """Return the force (m,) in each spring, positive where it is stretched, for displacements of all points."""
+        """Return the force (m,) [force] in each spring, positive in tension, for `displacement` (n_points, dim) [length]."""
         return self.stiffness * (self.rows @ displacement.ravel())
 
 
 def grounded(name: str, nodes: NDArray[np.integer], stiffness: Mapping[int, float], n_dofs: int, dim: int) -> Springs:
-    """Return a spring from each of the nodes to the ground along every axis of `stiffness` [force / length]."""
+    """Return a spring from each of the `nodes` (n,) to the ground along every axis of `stiffness` [force / length]."""
     dofs = np.concatenate([nodes.astype(np.intp) * dim + axis for axis in stiffness])
     values = np.repeat(np.array(list(stiffness.values()), float), len(nodes))
     rows = csr_array((np.ones(len(dofs)), dofs, np.arange(len(dofs) + 1)), shape=(len(dofs), n_dofs))
@@ -54,12 +54,10 @@ def grounded(name: str, nodes: NDArray[np.integer], stiffness: Mapping[int, floa
 def between(
     name: str, points: Array, first: int, second: int, stiffness: Mapping[int, float], axial: float | None
 ) -> Springs:
-    """Return springs between two nodes: along every axis of `stiffness`, and along their line [force / length].
+    """Return springs between two of the `points` (n_points, dim) [length].
 
-    Raises
-    ------
-    ModelError
-        If the nodes are one, or have no line between them.
+    Along every axis of `stiffness` [force / length], and along their line with the stiffness `axial` [force / length].
+    ModelError if the two are one, or are at one place and have no line between them.
     """
     if first == second:
         raise ModelError(f"{name}: both ends are point {first}; without a second node a spring hangs on the ground")
@@ -94,13 +92,13 @@ def check_stiffness(name: str, values: Sequence[float]) -> None:
 
 
 def stacked(springs: Sequence[Springs], n_dofs: int) -> csr_array:
-    """Return the rows of all springs as one matrix (m, n_dofs)."""
+    """Return the rows of all springs as one matrix (m, n_dofs) [-]."""
     empty = csr_array((0, n_dofs))
     return csr_array(vstack([empty, *(spring.rows for spring in springs)], format="csr"))
 
 
 def stiffened(K: bsr_array, springs: Sequence[Springs]) -> bsr_array:
-    """Return K (n, n) with the springs."""
+    """Return the stiffness matrix `K` (n, n) [force / length] with the springs added, (n, n) [force / length]."""
     if not springs:
         return K
     R = stacked(springs, K.shape[0])
@@ -111,7 +109,7 @@ def stiffened(K: bsr_array, springs: Sequence[Springs]) -> bsr_array:
 
 
 def ground_force(springs: Sequence[Springs], u: Array) -> Array:
-    """Return the forces (n_dofs,) of the ground on the nodes through grounded springs, for displacements u (n_dofs,)."""
+    """Return the forces (n_dofs,) [force] of the ground on the nodes through springs, for `u` (n_dofs,) [length]."""
     total = np.zeros(len(u))
     for spring in springs:
         if spring.grounded:

@@ -1,4 +1,4 @@
-"""Stiffness matrix: its sparsity once, its values as often as needed."""
+"""Stiffness matrix of a mesh: its sparsity, computed once, and its values; rigid-body modes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,15 @@ Indices = NDArray[np.int64]
 
 
 class Owners(NamedTuple):
-    """Parts that points (n_points,) belong to, and for each part the range of the cells that it works on."""
+    """How threads share the assembly.
+
+    Attributes
+    ----------
+    owner : ndarray of int (n_points,)
+        The part that each point belongs to.
+    cells : list of (int, int)
+        The range of cells that each part computes.
+    """
 
     owner: NDArray[np.uint8]
     cells: list[tuple[int, int]]
@@ -29,11 +37,11 @@ class Owners(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Sparsity:
-    """Which node pairs share a cell.
+    """Node pairs with a common cell.
 
     Attributes
     ----------
-    indptr, indices : ndarray of int32
+    indptr, indices : ndarray of int (n_points + 1,), (n_blocks,)
         Node-block rows and columns, sorted.
     slots : dict of str to ndarray (n_cells, n_nodes, n_nodes)
         By solid element: position in `indices` of every node pair of every cell.
@@ -45,7 +53,7 @@ class Sparsity:
     _owners: dict[tuple[str, int], Owners] = field(default_factory=dict, init=False, repr=False)
 
     def owners(self, mesh: Mesh, name: str) -> Owners:
-        """Return how threads share the assembly of an element, found once for every number of them."""
+        """Return how threads share the assembly of an element, computed once for every number of them."""
         key = name, len(parallel.portions(*mesh.cells[name].shape))
         if key not in self._owners:
             self._owners[key] = owners(mesh.cells[name], mesh.n_points)
@@ -126,10 +134,10 @@ def stiffness(
 
 
 def owners(cells: NDArray[np.int32], n_points: int) -> Owners:
-    """Return which part each point belongs to, and the cells that each part works on.
+    """Return the part of each point, and the cells that each part computes, of `cells` (n_cells, n_nodes).
 
-    A point belongs to the first portion of the cells that has it, so that a part's rows are those of its own cells but for
-    a seam. Portions are chosen so that parts work on the same number of cells, those at their seams included.
+    A point belongs to the first portion of the cells that has it, so that a part has the rows of its own cells and of few
+    others. Portions are chosen so that parts compute the same number of cells, those others included.
     """
     portions = parallel.portions(*cells.shape)
     if len(portions) == 1:
@@ -142,7 +150,7 @@ def owners(cells: NDArray[np.int32], n_points: int) -> Owners:
 
 
 def _owners(cells: NDArray[np.int32], n_points: int, ends: Indices) -> tuple[Owners, Indices]:
-    """Return what belongs to the portions of the cells that begin and end at `ends`, and how many cells each works on."""
+    """Return the owners for portions of the cells that begin and end at `ends`, and how many cells each computes."""
     owner = np.full(n_points, parallel.MOST, np.uint8)
     last, work = np.zeros((2, len(ends) - 1), np.int64)
     pattern_kernels.first_parts(cells, ends, parallel.MOST, owner, last, work)
@@ -150,10 +158,10 @@ def _owners(cells: NDArray[np.int32], n_points: int, ends: Indices) -> tuple[Own
 
 
 def rigid_modes(points: Array, kinematics: str) -> Array:
-    """Return the rigid-body modes (n_points * dim, n_modes) as displacements of all points.
+    """Return the rigid-body modes (n_points * dim, n_modes) [-], displacements of `points` (n_points, dim) [length].
 
-    Columns: axisymmetric, the translation along the axis; plane, two translations and the rotation; 3D, three
-    translations and three rotations. Rotations turn about the mean point.
+    Columns: axisymmetric, the translation along the axis; plane, two translations and the rotation; 3D, three translations
+    and three rotations [length]. Rotations turn about the mean point.
     """
     n, dim = points.shape
     if kinematics == "axisymmetric":

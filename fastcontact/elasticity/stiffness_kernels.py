@@ -1,7 +1,7 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Sparsity of a stiffness matrix by node blocks: neighbours of each node, slot of each node pair of each cell.
+"""Sparsity of a stiffness matrix by node blocks: neighbours of each node, place of each node pair of each cell.
 
-Cells of all elements come as one ragged list: cell ``c`` owns ``nodes[start[c]:start[c + 1]]``.
+Cells of all elements stand in one list: the nodes of cell ``c`` are ``nodes[start[c]:start[c + 1]]``.
 """
 
 import numpy as np
@@ -78,8 +78,8 @@ def slots_of(cells, indptr, indices):
 
 
 @kernel
-def first_parts(cells, ends, nobody, owner, last, work):
-    """Fill `owner` (n_points,), given as `nobody`, with the first of the parts of the cells that has each point.
+def first_parts(cells, ends, unowned, owner, last, work):
+    """Fill `owner` (n_points,), given as `unowned`, with the first of the parts of the cells that has each point.
 
     Part p consists of the cells ``ends[p]`` to ``ends[p + 1] - 1``; ``work[p]`` cells have a point that it owns, none of
     them from ``last[p]`` on. Both (n_parts,) are given as zeros.
@@ -87,7 +87,7 @@ def first_parts(cells, ends, nobody, owner, last, work):
     for part in range(len(ends) - 1):
         for c in range(ends[part], ends[part + 1]):
             for a in range(cells.shape[1]):
-                if owner[cells[c, a]] == nobody:
+                if owner[cells[c, a]] == unowned:
                     owner[cells[c, a]] = part
                 first = owner[cells[c, a]]
                 if last[first] <= c:

@@ -39,7 +39,7 @@ def _numbers(what: str, values: ArrayLike) -> NDArray[Any]:
 class Mesh:
     """Points, cells and named groups.
 
-    Cells of every dimension stand together: solids, and the facets (lines in 2D) that carry group names. Cells are
+    A mesh has cells of several dimensions: solids, and the facets (lines in 2D) that carry group names. Cells are
     numbered through all elements in the order of `cells`; a cell group is a sorted array of those numbers.
 
     Parameters
@@ -144,12 +144,12 @@ class Mesh:
 
     @property
     def solids(self) -> dict[str, Indices]:
-        """Connectivity of the cells that have the dimension of the space, by element."""
+        """Connectivity (n_cells, n_nodes) of the cells that have the dimension of the space, by element."""
         return {name: block for name, block in self.cells.items() if elements.get(name).dim == self.dim}
 
     @property
     def facets(self) -> dict[str, Indices]:
-        """Connectivity of the cells one dimension below the space, by element."""
+        """Connectivity (n_cells, n_nodes) of the cells one dimension below the space, by element."""
         return {name: block for name, block in self.cells.items() if elements.get(name).dim == self.dim - 1}
 
     @property
@@ -158,7 +158,7 @@ class Mesh:
         return list(self.cell_groups) + [name for name in self.point_groups if name not in self.cell_groups]
 
     def split(self, numbers: NDArray[Any]) -> dict[str, NDArray[np.intp]]:
-        """Return, by element, the rows of its block that the cell `numbers` name; elements without any are absent."""
+        """Return by element the rows (m,) of its cells among the cell `numbers` (n,); elements without any are absent."""
         rows = {}
         for name, start in self.offsets.items():
             inside = (numbers >= start) & (numbers < start + len(self.cells[name]))
@@ -167,7 +167,7 @@ class Mesh:
         return rows
 
     def cells_of(self, group: str, dim: int | None = None) -> dict[str, Indices]:
-        """Return the connectivity of a cell group by element, those of dimension `dim` only if it is given.
+        """Return the connectivity (n_cells, n_nodes) of a cell group by element, only that of dimension `dim` if given.
 
         Raises
         ------
@@ -180,7 +180,7 @@ class Mesh:
         return {name: self.cells[name][r] for name, r in rows.items() if dim is None or elements.get(name).dim == dim}
 
     def points_of(self, group: str) -> Indices:
-        """Return the sorted point numbers of a group: a point group, or else all nodes of a cell group.
+        """Return the sorted point numbers (n,) of a group: a point group, or else all nodes of a cell group.
 
         Raises
         ------
@@ -220,7 +220,7 @@ class Mesh:
     def with_groups(
         self, cells: Mapping[str, ArrayLike] | None = None, points: Mapping[str, ArrayLike] | None = None
     ) -> Mesh:
-        """Return the mesh with further (or redefined) groups of cells and points."""
+        """Return the mesh with further (or redefined) groups, by name: `cells` (n,) of int, `points` (n,) of int."""
         return self.replace(
             cell_groups={**self.cell_groups, **(cells or {})},
             point_groups={**self.point_groups, **(points or {})},

@@ -1,4 +1,7 @@
-"""Quadrature rules on reference lines, triangles, squares and solids."""
+"""Quadrature rules on reference lines, triangles, squares and solids.
+
+A `Rule` consists of points (n_q, dim) and weights (n_q,), both without dimension [-].
+"""
 
 from __future__ import annotations
 
@@ -18,11 +21,6 @@ def gauss_line(n: int) -> Rule:
 def simpson_line() -> Rule:
     """Simpson's rule on [-1, 1], exact to degree 3."""
     return np.array([[-1.0], [1.0], [0.0]]), np.array([1.0, 1.0, 4.0]) / 3.0
-
-
-def trapezium_line() -> Rule:
-    """Trapezium rule on [-1, 1], exact to degree 1."""
-    return np.array([[-1.0], [1.0]]), np.array([1.0, 1.0])
 
 
 def gauss_square(n: int) -> Rule:
@@ -126,6 +124,7 @@ def square(rule: Rule) -> Rule:
 
 
 def _merged(points: Array, weights: Array) -> Rule:
+    """Return a rule whose points that coincide are one."""
     unique, place = np.unique(np.round(points, 14), axis=0, return_inverse=True)
     merged = np.zeros(len(unique))
     np.add.at(merged, place.ravel(), weights)
@@ -162,7 +161,7 @@ def pyramid_5() -> Rule:
     """Five points on the pyramid with the base [-1, 1]^2 at z = 0 and the apex (0, 0, 1), exact to degree 2.
 
     Four points over the half diagonals of the base and one on the axis, equal weights; the two heights h, k solve
-    4 h + k = 5/4 and 4 h^2 + k^2 = 1/2, which makes 1, z and z^2 exact. It is the rule of code_aster's PYRAM5.
+    4 h + k = 5/4 and 4 h^2 + k^2 = 1/2, which makes 1, z and z^2 exact. code_aster has the same rule in PYRAM5.
     """
     h, k = (10.0 - np.sqrt(15.0)) / 40.0, 0.25 + np.sqrt(15.0) / 10.0
     points = [[0.5, 0.5, h], [-0.5, 0.5, h], [-0.5, -0.5, h], [0.5, -0.5, h], [0.0, 0.0, k]]
@@ -200,11 +199,7 @@ def subdivided(rule: Rule, parts: int) -> Rule:
     points, weights = rule
     left = -1.0 + 2.0 * np.arange(parts) / parts
     all_points = (left[:, None] + (points[:, 0] + 1.0) / parts).ravel()
-    all_weights = np.tile(weights / parts, parts)
-    unique, place = np.unique(np.round(all_points, 14), return_inverse=True)
-    merged = np.zeros(len(unique))
-    np.add.at(merged, place, all_weights)
-    return unique[:, None], merged
+    return _merged(all_points[:, None], np.tile(weights / parts, parts))
 
 
 def collapsed_triangle(n: int) -> Rule:

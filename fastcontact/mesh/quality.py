@@ -1,8 +1,7 @@
-"""How good a mesh is: angles, lengths, and cells that are flat or inside out."""
+"""Quality of a mesh: angles, lengths, and cells that are flat or inside out."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +12,7 @@ from fastcontact.mesh import elements, quality_kernels
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 # A Jacobian below this fraction of the squared (cubed) longest edge is rounding, not area.
 _FLAT = 1e-12
@@ -79,23 +79,23 @@ def quality(mesh: Mesh) -> MeshQuality:
     >>> round(quality(mesh).smallest_angle, 9), quality(mesh).measure
     (45.0, 0.5)
     """
-    angles = [_angles(mesh.points[block[:, : _corners(name)]]).ravel() for name, block in _surfaces(mesh)]
+    angles = [_angles(_corners(mesh, name)).ravel() for name in mesh.cells if elements.get(name).dim == 2]
     angle = np.concatenate(angles) if angles else np.array([np.nan])
     lengths = [_edge_lengths(mesh, name) for name in mesh.solids]
     length = np.concatenate([block.ravel() for block in lengths]) if lengths else np.array([np.nan])
     with np.errstate(divide="ignore", invalid="ignore"):
         aspects = [(block.max(axis=1) / block.min(axis=1)).max() for block in lengths]
-    verdicts = [_verdict(mesh, name) for name in mesh.solids]
+    found = [_bad_cells(mesh, name) for name in mesh.solids]
     return MeshQuality(
         smallest_angle=float(np.degrees(angle.min())),
         largest_angle=float(np.degrees(angle.max())),
         shortest_edge=float(length.min()),
         longest_edge=float(length.max()),
         worst_aspect=float(max(aspects, default=np.nan)),
-        measure=float(sum(verdict.measure.sum() for verdict in verdicts)),
+        measure=float(sum(measure.sum() for measure, _, _ in found)),
         n_points=mesh.n_points,
         n_cells={name: len(block) for name, block in mesh.cells.items()},
-        n_bad=sum(int((verdict.flat | verdict.inverted).sum()) for verdict in verdicts),
+        n_bad=sum(int((flat | inverted).sum()) for _, flat, inverted in found),
         dim=mesh.dim,
     )
 
@@ -106,20 +106,19 @@ def check_cells(mesh: Mesh) -> None:
     Raises
     ------
     MeshError
-        If a cell is degenerate (its area or volume is nothing but rounding) or inverted (clockwise, or folded so
-        that the Jacobian is negative at a quadrature point), or stands there twice; the message names the first one
-        and says where.
+        If a cell is degenerate (its area or volume is zero to rounding) or inverted (clockwise, or folded so that the
+        Jacobian is negative at a quadrature point), or is in the mesh twice; the message names the first one and its place.
     """
     for name in mesh.solids:
         _check_twice(mesh, name)
-        verdict = _verdict(mesh, name)
+        measure, flat, inverted = _bad_cells(mesh, name)
         for bad, what, remedy in (
-            (verdict.flat, "degenerate", "remove it or merge its points differently"),
-            (verdict.inverted, "inverted", "turn it with fastcontact.topology.oriented, or refine if it is curved"),
+            (flat, "degenerate", "remove it or merge its points differently"),
+            (inverted, "inverted", "turn it with fastcontact.topology.oriented, or refine if it is curved"),
         ):
             if bad.any():
                 row = int(np.flatnonzero(bad)[0])
-                cell = _described(mesh, name, row, verdict.measure[row])
+                cell = _described(mesh, name, row, measure[row])
                 raise MeshError(f"{cell} is {what}, one of {int(bad.sum())} such cells: {remedy}")
 
 
@@ -137,7 +136,7 @@ def poorest_cell(mesh: Mesh) -> str:
             cell = _described(mesh, name, row, measure[row])
             return f"{cell} is poor: its smallest Jacobian is {ratio[row]:.2g} of its largest; move its nodes or remesh"
         if mesh.dim == 2:
-            angle = np.degrees(_angles(mesh.points[mesh.cells[name][:, : _corners(name)]]).max(axis=1))
+            angle = np.degrees(_angles(_corners(mesh, name)).max(axis=1))
             row = int(np.argmax(angle))
             if angle[row] > WIDE:
                 cell = _described(mesh, name, row, measure[row])
@@ -170,19 +169,15 @@ def _check_twice(mesh: Mesh, name: str) -> None:
 
 
 def _described(mesh: Mesh, name: str, row: int, measure: float) -> str:
-    """Number, element, place and size of a cell, in words."""
-    centre = mesh.points[mesh.cells[name][row, : _corners(name)]].mean(axis=0)
-    place = ", ".join(f"{x:.6g}" for x in centre)
+    """Return the number, element, place and size of a cell for messages."""
+    place = ", ".join(f"{x:.6g}" for x in _corners(mesh, name)[row].mean(axis=0))
     kind = "area" if mesh.dim == 2 else "volume"
     return f"cell {mesh.offsets[name] + row} ({name} at ({place}), {kind} {measure:.3g})"
 
 
-def _corners(name: str) -> int:
-    return elements.get(name).n_corners
-
-
-def _surfaces(mesh: Mesh) -> Iterator[tuple[str, NDArray[np.int32]]]:
-    return ((name, block) for name, block in mesh.cells.items() if elements.get(name).dim == 2)
+def _corners(mesh: Mesh, name: str) -> Array:
+    """Return the coordinates (n_cells, n_corners, dim) of the corners of the cells of an element [length]."""
+    return np.asarray(mesh.points[mesh.cells[name][:, : elements.get(name).n_corners]])
 
 
 def _angles(corners: Array) -> Array:
@@ -204,21 +199,12 @@ def _edge_lengths(mesh: Mesh, name: str) -> Array:
     return np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
 
 
-@dataclass(frozen=True, eq=False)
-class _Verdict:
-    """Of each cell (n_cells,): area or volume, whether that is rounding only, whether a Jacobian is not positive."""
-
-    measure: Array
-    flat: NDArray[np.bool_]
-    inverted: NDArray[np.bool_]
-
-
-def _verdict(mesh: Mesh, name: str) -> _Verdict:
-    """Judge the cells of a solid element by their Jacobians at the default quadrature points."""
+def _bad_cells(mesh: Mesh, name: str) -> tuple[Array, Mask, Mask]:
+    """Return of each cell (n_cells,) area or volume, whether that is only rounding, whether a Jacobian is not positive."""
     measure, low, high, longest = _extremes(mesh, name)
     rounding = _FLAT * longest**mesh.dim
     flat = np.maximum(np.abs(low), np.abs(high)) <= rounding
-    return _Verdict(measure, flat, (low <= rounding) & ~flat)
+    return measure, flat, (low <= rounding) & ~flat
 
 
 def _extremes(mesh: Mesh, name: str) -> tuple[Array, Array, Array, Array]:

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Jacobians of solid cells at the points of a quadrature, and their longest edges: what tells bad cells from good."""
+"""Jacobians of solid cells at the points of a quadrature, and their longest edges, by which bad cells are found."""
 
 import numpy as np
 

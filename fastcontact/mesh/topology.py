@@ -1,4 +1,4 @@
-"""Questions to the connectivity: outer facets, bodies, orientation, nodes in order along a line."""
+"""Connectivity of a mesh: outer facets, bodies, orientation, nodes in order along a line."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ Found = TypeVar("Found")
 
 
 def corner_areas(mesh: Mesh, name: str) -> Array:
-    """Return the signed area (n_cells,) of the corner polygons of the 2D cells of element `name` [length^2]."""
+    """Return the signed area (n_cells,) [length^2] of the corner polygons of the 2D cells of element `name`."""
     corners = mesh.points[mesh.cells[name][:, : elements.get(name).n_corners]]
     x, y = corners[..., 0], corners[..., 1]
     return 0.5 * (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
 
 
 def corner_volumes(mesh: Mesh, name: str) -> Array:
-    """Return the signed volume (n_cells,) of the 3D cells of element `name` on their corners alone [length^3].
+    """Return the signed volume (n_cells,) [length^3] of the 3D cells of element `name` on their corners alone.
 
     Faces of four corners are bilinear. The sum is that of the linear element's quadrature, which is exact.
     """
@@ -47,9 +47,9 @@ def corner_volumes(mesh: Mesh, name: str) -> Array:
 
 
 def oriented(mesh: Mesh) -> tuple[Mesh, int]:
-    """Return the mesh with every solid cell the right way round, and how many cells were turned.
+    """Return the mesh with every solid cell oriented as it should be, and how many cells were turned.
 
-    Two-dimensional cells run counter-clockwise; in three dimensions the outer facets of `elements` look outward.
+    Two-dimensional cells run counter-clockwise; in three dimensions the normals of facets point outward.
 
     Raises
     ------
@@ -95,30 +95,33 @@ def _check_folds(mesh: Mesh) -> None:
 
 
 def _direction(facets: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return three nodes (n, 3) that tell facets, and the way round them, apart: the lowest, the next, the last."""
+    """Return three nodes (n, 3) by which facets and their orientation differ: the lowest, the next, the last."""
     first = facets.argmin(axis=1)
     rows, count = np.arange(len(facets)), facets.shape[1]
-    # The two ends of a line are told apart by their order alone.
+    # The orientation of a line is the order of its two ends.
     ahead, behind = (facets[rows, (first + k) % count] for k in (1, -1))
     return np.column_stack([facets[rows, first], ahead, behind if count > 2 else first])
 
 
 def _remembered(function: Callable[[Mesh], Found]) -> Callable[[Mesh], Found]:
-    """Ask `function` once for every mesh: meshes do not change, and many parts of an analysis want the same of one."""
+    """Return `function`, computed once for every mesh: meshes do not change, and many parts of an analysis need it."""
     known: WeakKeyDictionary[Mesh, Found] = WeakKeyDictionary()
 
     @wraps(function)
-    def asked(mesh: Mesh) -> Found:
+    def remembered(mesh: Mesh) -> Found:
         if mesh not in known:
             known[mesh] = function(mesh)
         return known[mesh]
 
-    return asked
+    return remembered
 
 
 @_remembered
 def bodies(mesh: Mesh) -> tuple[int, NDArray[np.int32]]:
-    """Return the number of bodies (sets of solid cells connected by nodes) and the body of each point, -1 for none."""
+    """Return the number of bodies (sets of solid cells connected by nodes) and the body (n_points,) of each point.
+
+    It is -1 for points without a solid cell.
+    """
     rows, columns, used = [], [], np.zeros(mesh.n_points, bool)
     for block in mesh.solids.values():
         rows.append(np.repeat(block[:, 0], block.shape[1]))
@@ -138,7 +141,7 @@ def bodies(mesh: Mesh) -> tuple[int, NDArray[np.int32]]:
 
 @_remembered
 def outer_facets(mesh: Mesh) -> Mapping[str, Indices]:
-    """Return the facets that belong to exactly one solid cell, by facet element, normals pointing outward."""
+    """Return by facet element the facets (n_facets, n_nodes) of exactly one solid cell, normals pointing outward."""
     found: dict[str, list[Indices]] = {}
     for name, block in mesh.solids.items():
         element = elements.get(name)

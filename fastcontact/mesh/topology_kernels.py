@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Facets that belong to one cell only."""
+"""Facets of exactly one cell, found by sorting the facets by their nodes."""
 
 import numpy as np
 
@@ -23,6 +23,7 @@ def _sorted_nodes(facets):
 
 @kernel
 def _same(keys, f, g):
+    """Return whether facets f and g have the same nodes."""
     for a in range(keys.shape[0]):
         if keys[a, f] != keys[a, g]:
             return False
@@ -33,8 +34,8 @@ def _same(keys, f, g):
 def alone(facets, n_points, found):
     """Fill `found` (n_facets,) with whether no other one of the facets (n_facets, n_nodes) has the same nodes.
 
-    The facets are counted and put in their places by one node after the other, the lowest last: alike ones then follow each
-    other, in a time that does not depend on how many meet at a node.
+    The facets are sorted by counting, by one node after the other, the lowest last. Facets with the same nodes then follow
+    each other, in a time that does not depend on how many meet at a node.
     """
     keys, n = _sorted_nodes(facets), facets.shape[0]
     order, other = np.empty(n, np.int32), np.empty(n, np.int32)

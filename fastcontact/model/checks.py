@@ -1,4 +1,4 @@
-"""Checks of a model before any numerics: supports, loads, overlapping bodies."""
+"""Checks of a model before it is solved: supports, loads, overlapping bodies."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ def check_ramps(ramped: Iterable[tuple[str, Table | None]], instants: Iterable[f
 
 
 def check_forces(mesh: Mesh, forces: Array, related: NDArray[np.bool_], name: str) -> None:
-    """Raise ModelError if forces (n_points, dim) act on points that no solid cell or relation (n_points,) holds."""
-    carried = related.copy()
-    for block in mesh.solids.values():
-        carried[block] = True
-    lost = np.flatnonzero(forces.any(axis=1) & ~carried)
+    """Raise ModelError if `forces` (n_points, dim) [force] act on points without solid cell.
+
+    Points with relations, `related` (n_points,) of bool, are left out.
+    """
+    lost = np.flatnonzero(forces.any(axis=1) & ~_carried(mesh, related))
     if len(lost):
         raise ModelError(
             f"{name} acts on {len(lost)} points that belong to no solid cell (first: point {lost[0]}): "
@@ -59,11 +59,20 @@ def check_forces(mesh: Mesh, forces: Array, related: NDArray[np.bool_], name: st
         )
 
 
-def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: NDArray[np.bool_]) -> None:
-    """Raise ModelError if a support (name, group) holds only points that no solid cell or relation (n_points,) has."""
+def _carried(mesh: Mesh, related: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return whether each point (n_points,) has a solid cell or a relation."""
     carried = related.copy()
     for block in mesh.solids.values():
         carried[block] = True
+    return carried
+
+
+def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: NDArray[np.bool_]) -> None:
+    """Raise ModelError if all points of a support (name, group) are without solid cell.
+
+    Points with relations, `related` (n_points,) of bool, are left out.
+    """
+    carried = _carried(mesh, related)
     for name, group in supports:
         points = mesh.points_of(group)
         if not carried[points].any():
@@ -76,7 +85,7 @@ def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: NDA
 def check_penetration(name: str, pair: Formulation) -> None:
     """Raise ContactError if the sides of contact pair `name` lie inside each other by more than an element before any load.
 
-    An interference that is meant is smaller, or a clearance.
+    An intended interference is smaller, or given as a clearance.
     """
     if pair.options.tied:
         return

@@ -1,8 +1,8 @@
-"""What makes a case the case it is, as short digests part by part: two models with equal ones have equal answers.
+"""Fingerprints of models: short digests of each part. Models with equal fingerprints have equal results.
 
 Numbers count bit for bit, functions by their values at the points that they act on. Names of groups count, the order in
-which loads and supports were added does not. Left out is what may change when an analysis goes on: titles, the linear
-solver, tolerances and limits.
+which loads and supports were added does not, and neither does what may change when an analysis is resumed: titles, the
+linear solver, tolerances and limits.
 """
 
 from __future__ import annotations
@@ -24,18 +24,9 @@ LENGTH = 16
 
 
 def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[str, str]:
-    """Return the digest of each part of a model, and of the options that change its answer.
+    """Return the digest of each part of a model, and of the options (plain values by name) that change its results.
 
-    Parameters
-    ----------
-    model : Model
-    options : mapping, optional
-        Plain values by name.
-
-    Returns
-    -------
-    dict of str to str
-        By what the part is called in messages: "the mesh", "the materials", "contact 'hertz'", ...
+    By the name of the part in messages: "the mesh", "the materials", "contact 'hertz'", ...
     """
     mesh = model.mesh
     parts: dict[str, Any] = {
@@ -54,7 +45,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
 
 
 def different(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
-    """Return the parts that two fingerprints do not share."""
+    """Return the names of the parts in which two fingerprints differ."""
     return [name for name in {**one, **other} if one.get(name) != other.get(name)]
 
 
@@ -112,7 +103,7 @@ def _called(function: Callable[[Array], Any], points: Array) -> Any:
     """Return the values (n,) of a function of position; its name where it has none at these points."""
     try:
         return np.asarray(function(points), float)
-    except Exception:  # whatever is wrong with a user's function, the check of the model says it better
+    except Exception:  # the check of the model reports what is wrong with a user's function
         return getattr(function, "__qualname__", "function")
 
 

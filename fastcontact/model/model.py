@@ -1,4 +1,7 @@
-"""Model: a mesh with kinematics, materials, supports, loads and contact pairs; checked whole before any numerics."""
+"""Model: a mesh with kinematics, materials, supports, loads and contact pairs; checked whole before any numerics.
+
+A `Value` is a number, or a function from reference positions (n, dim) [length] to numbers (n,) [unit of the quantity].
+"""
 
 from __future__ import annotations
 
@@ -200,7 +203,7 @@ class Model:
     def prescribe(self, group: str, *, ramp: History = None, **components: Value) -> None:
         """Prescribe displacement components of all nodes of a group, e.g. ``y=-2.0`` [length], times the ramp.
 
-        A component is a number, or a function from reference positions (n, dim) to displacements (n,). `ramp` is a
+        A component is a number, or a function from reference positions (n, dim) [length] to displacements (n,). `ramp` is a
         history of its own: pairs (instant, multiplier), or a `Ramp`, of which the table counts.
 
         Raises
@@ -225,8 +228,8 @@ class Model:
         ----------
         group : str
         value : float or callable
-            Positive in compression; a number, or a function from positions (n, dim) to pressures (n,). Positions,
-            normals and areas are those of the reference configuration.
+            Positive in compression; a number, or a function from positions (n, dim) [length] to pressures (n,) [pressure].
+            Positions, normals and areas are those of the reference configuration.
         ramp : Ramp or iterable of (float, float), optional
             A history of its own, as pairs (instant, multiplier); by default that of the analysis.
 
@@ -408,7 +411,7 @@ class Model:
         self.springs.append(between(name, self.mesh.points, int(ends[0]), int(ends[1]), axes, axial))
 
     def holding_rows(self) -> csr_array:
-        """Return rows (m, n_dofs) that relations and springs want to vanish: motions in which they do are not held."""
+        """Return the rows (m, n_dofs) [unit of the caller] of relations and springs; their product with free motions is 0."""
         relations = stacked_rows(self.relations, self.n_dofs)
         return csr_array(vstack([relations, stacked(self.springs, self.n_dofs)], format="csr"))
 

@@ -1,4 +1,4 @@
-"""The load ramp: at which instants to solve, and how large the loads are there."""
+"""The load ramp: the instants to solve at, and the multiplier of the loads there."""
 
 from __future__ import annotations
 
@@ -11,17 +11,14 @@ from fastcontact.errors import ModelError
 
 # Points (instant, multiplier of the loads) of a piecewise linear function.
 Table = tuple[tuple[float, float], ...]
-# Equal steps that a ramp may be made of: beyond that a digit has slipped.
+# Largest number of equal steps; more are probably a typing error.
 MOST_STEPS = 1_000_000
 
 
 def checked_table(rows: Iterable[Iterable[float]], what: str = "the ramp") -> Table:
-    """Return the points (instant, multiplier) of a piecewise linear function of time.
+    """Return the points (instant, multiplier) of a piecewise linear function of time; messages call it `what`.
 
-    Raises
-    ------
-    ModelError
-        If there are fewer than two, their instants do not ascend, or a number is not finite; `what` names the culprit.
+    ModelError if there are fewer than two, their instants do not ascend, or a number is not finite.
     """
     try:
         table = tuple((float(time), float(value)) for time, value in rows)

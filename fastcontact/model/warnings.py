@@ -1,6 +1,6 @@
-"""What is doubtful about a model before it is solved: units that slipped, poor cells, integrals that are not exact.
+"""Warnings about a model before it is solved, each with its number: units, poor cells, integrals that are not exact.
 
-Each doubt is a sentence with its number, for a warning and the result file. A model that has them may be meant so.
+They are sentences for the screen and the result file. The model may be right all the same, so they do not stop an analysis.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.elements import Element
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import poorest_cell
-from fastcontact.model.small_inverses import inverses
 
 if TYPE_CHECKING:
     from fastcontact.model.model import Model
@@ -26,42 +25,36 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 # Young's moduli that differ by more: steel against soft rubber is 200 000, MPa against Pa a million.
 MODULI = 3e5
-# A displacement of so many times the size of the model, a strain by the loads larger than that or smaller than this,
-# are more likely a slip than meant.
+# A prescribed displacement of more than so many times the size of the model, and strains by the loads above and below these
+# bounds, are probably mistakes.
 DISPLACED, STRAINED, UNSTRAINED = 1.0, 1.0, 1e-12
-# Solids: aerogel to diamond [Pa]. Only here do units of the user matter, and only where a case names them.
+# Solids: aerogel to diamond [Pa]. Only here units of the user matter, and only where a case names them.
 SOLIDS = (1e2, 2e12)
 PASCALS = {
-    "Pa": 1.0,
-    "kPa": 1e3,
-    "MPa": 1e6,
-    "GPa": 1e9,
-    "N/mm2": 1e6,
-    "N/mm^2": 1e6,
-    "psi": 6894.757,
-    "ksi": 6894757.0,
-}
+    "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm2": 1e6, "N/mm^2": 1e6, "psi": 6894.757, "ksi": 6894757.0,
+}  # fmt: skip
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
 NEWTONS = {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "lbf": 4.448222}
-# So many cells are looked at to judge integrals.
+# Number of cells by which integrals are judged.
 SOME = 1000
-# Relative error of the integral of a load, and of the stiffness (1.6 % on the best of pyramids), that is worth a warning.
+# Relative error of the integral of a load, and of the stiffness (1.6 % on regular pyramids), above which there is a warning.
 INTEGRAL, STIFFNESS = 1e-3, 5e-2
 # Nodes closer than this part of the size of the model are at one place.
 COINCIDENT = 1e-9
-# Large odd factors that make one number of three.
+# Large odd factors by which three integers are combined into one.
 MIXED = np.array([0x1E3779B97F4A7C15, 0x3F58476D1CE4E5B9, 0x14D049BB133111EB], np.int64)
 
 
 @on_one_blas_thread
-def doubts(model: Model) -> list[str]:
-    """Return what is doubtful about a model that `Model.check` has found complete."""
+def model_warnings(model: Model) -> list[str]:
+    """Return the warnings about a model that `Model.check` has found complete."""
     found = _moduli(model) + _named_units(model) + _proportions(model)
     found += [text for text in (poorest_cell(model.mesh), _coincident(model)) if text]
     return found + _stiffness(model.mesh) + [text for load in model.loads for text in _load_integral(model, load)]
 
 
 def _moduli(model: Model) -> list[str]:
+    """Compare the moduli with each other."""
     values = [material.E for material, _ in model.materials]
     ratio = max(values) / min(values)
     if ratio <= MODULI:
@@ -73,7 +66,7 @@ def _moduli(model: Model) -> list[str]:
 
 
 def _named_units(model: Model) -> list[str]:
-    """Hold moduli against what solids have, and the names of units against each other, where they are known."""
+    """Compare moduli with those of solids, and the units with each other, where their names are known."""
     units, texts = model.units, []
     pascal = PASCALS.get(units.get("pressure", ""))
     if pascal is not None:
@@ -100,7 +93,7 @@ def _named(groups: tuple[str, ...] | None) -> str:
 
 
 def _proportions(model: Model) -> list[str]:
-    """Hold prescribed displacements against the size of the model, and loads against its stiffness."""
+    """Compare prescribed displacements with the size of the model, and loads with its stiffness."""
     size = float(np.ptp(model.mesh.points, axis=0).max())
     _, prescribed = model.prescribed_by_ramp()
     moved = max((float(np.abs(values).max(initial=0.0)) for values in prescribed.values()), default=0.0)
@@ -123,7 +116,7 @@ def _proportions(model: Model) -> list[str]:
 
 
 def _coincident(model: Model) -> str:
-    """Return a doubt where nodes of solid cells share a place and neither contact nor relations join them."""
+    """Return a warning if nodes of solid cells are at one place and neither contact nor relations join them."""
     mesh = model.mesh
     lone = np.zeros(mesh.n_points, bool)
     for block in mesh.solids.values():
@@ -134,14 +127,14 @@ def _coincident(model: Model) -> str:
     lone[model.holding_rows().indices // mesh.dim] = False
     numbers = np.flatnonzero(lone)
     low = mesh.points.min(axis=0)
-    # Counted from an odd place, so that round numbers do not lie on the borders of the grid.
+    # The grid begins at an odd place, so that round numbers do not lie on its lines.
     grid = np.floor((mesh.points[numbers] - low) / (COINCIDENT * np.ptp(mesh.points, axis=0).max()) + 0.3183)
-    # Nodes at one place have the same sum, and hardly any others.
+    # Nodes at one place have the same sum, and others very rarely.
     if len(np.unique((grid.astype(np.int64) * MIXED[: mesh.dim]).sum(axis=1))) == len(grid):
         return ""
     order = np.lexsort(grid.T)
     same = np.flatnonzero((grid[order[1:]] == grid[order[:-1]]).all(axis=1))
-    if len(same) < mesh.dim:  # bodies that touch at a corner are no unmerged facet
+    if len(same) < mesh.dim:  # bodies that touch at a corner only
         return ""
     first = sorted((int(numbers[order[same[0]]]), int(numbers[order[same[0] + 1]])))
     place = ", ".join(f"{x:.6g}" for x in mesh.points[first[0]])
@@ -152,7 +145,7 @@ def _coincident(model: Model) -> str:
 
 
 def _stiffness(mesh: Mesh) -> list[str]:
-    """Return a doubt where the quadrature of the stiffness misses much of it, on cells that are curved or distorted.
+    """Return a warning if the quadrature of the stiffness is inexact, on cells that are curved or distorted.
 
     Judged by the trace of the stiffness of a scalar field, the integral of all squared gradients of shape functions.
     """
@@ -164,7 +157,7 @@ def _stiffness(mesh: Mesh) -> list[str]:
         corners = mesh.points[_some(block)]
         coarse, fine = (_traces(corners, element, *rule) for rule in (element.quadrature, integration_rule(element)))
         off, total = off + float(np.abs(coarse - fine).sum()), total + float(fine.sum())
-    if not off > STIFFNESS * total:  # no number where a Jacobian is zero: other checks speak of such cells
+    if not off > STIFFNESS * total:  # NaN where a Jacobian is zero: other checks find such cells
         return []
     return [
         f"the quadrature of the stiffness is not exact on curved or distorted cells: it is off by {off / total:.2%} of the "
@@ -175,21 +168,20 @@ def _stiffness(mesh: Mesh) -> list[str]:
 def _traces(corners: Array, element: Element, xi: Array, weights: Array) -> Array:
     """Return the integral (n_cells,) of the squared gradients of all shape functions of cells (n_cells, n_nodes, dim)."""
     dN = element.gradient(xi)
-    J = np.einsum("qnk,cnd->qkdc", dN, corners, optimize=True)
-    inverse, determinant = inverses(np.moveaxis(J, 3, 1))
-    # Their sum over the nodes is that of the slopes' products with those of r, s and t: no gradient is formed.
-    metric = inverse.transpose(0, 1, 3, 2) @ inverse
-    squares = np.einsum("qnk,qnl->qkl", dN, dN)
+    J = np.einsum("qnk,cnd->qckd", dN, corners, optimize=True)
+    determinant = np.linalg.det(J)
+    inverse = np.linalg.inv(np.where(determinant[..., None, None] == 0.0, np.nan, J))
+    metric, squares = inverse.transpose(0, 1, 3, 2) @ inverse, np.einsum("qnk,qnl->qkl", dN, dN)
     return np.asarray((np.einsum("qckl,qkl->qc", metric, squares) * np.abs(determinant)).T @ weights)
 
 
 def _some(cells: NDArray[Any]) -> NDArray[Any]:
-    """Return at most about `SOME` of the cells: enough to judge them by."""
+    """Return about `SOME` of the cells, or all if they are fewer."""
     return cells[:: max(1, len(cells) // SOME)]
 
 
 def _load_integral(model: Model, load: Load) -> list[str]:
-    """Return a doubt where a load that is a function varies too much within a cell for the quadrature of loads."""
+    """Return a warning if a load that is a function varies too much within a cell for the quadrature of loads."""
     off = total = 0.0
     for value in _functions(load):
         for element, cells in _loaded(model, load):

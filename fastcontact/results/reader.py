@@ -69,7 +69,7 @@ class Results(Sequence[StepResult]):
     versions : dict of str to str
         Versions of the packages that computed the results.
     load_factors : ndarray (n_steps,)
-        Pseudo-time of each step.
+        Pseudo-time of each step [-].
     warnings : tuple of str
         Every warning of the run and its steps, once.
     log : object

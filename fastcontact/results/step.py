@@ -38,7 +38,7 @@ class ContactResult:
     force_vectors : ndarray (m, dim)
         Contact force on each secondary node; axisymmetric: over the full circle [force].
     normal : ndarray (m, dim)
-        Unit outward normal of the primary facet faced.
+        Unit outward normal of the primary facet faced [-].
     active : ndarray of bool (m,)
         Closed constraints.
     force : ndarray (dim,)
@@ -133,7 +133,7 @@ class StepResult:
     warnings : tuple of str
         What the step warned of.
     cell_fields : dict of str to ndarray (n_solids,)
-        Further numbers of every solid cell, in the order of ``mesh.solids``, e.g. an estimated error.
+        Further numbers of every solid cell, in the order of ``mesh.solids``, e.g. an estimated error [unit of the field].
     restart : dict, optional
         What the next step owes to this one and those before it, see `restart`: plain numbers, strings and arrays. Result
         files keep that of their last step.

@@ -27,16 +27,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ErrorEstimate:
-    """Estimated errors in the energy norm, see `error_norms.ErrorNorms` [(force length)^(1/2)].
+    """Estimated errors in the energy norm, see `error_norms.ErrorNorms` [energy^(1/2)].
 
     Attributes
     ----------
     cells : ndarray (n_solids,)
-        Error of every solid cell, in the order of ``mesh.solids`` [(force length)^(1/2)].
+        Error of every solid cell, in the order of ``mesh.solids`` [energy^(1/2)].
     contact : ndarray (n_solids,)
-        The part of the contact surface in it [(force length)^(1/2)].
+        The part that stems from the contact surface [energy^(1/2)].
     energy : float
-        Energy norm of the solution [(force length)^(1/2)].
+        Energy norm of the solution [energy^(1/2)].
     """
 
     cells: Array

@@ -42,6 +42,15 @@ def test_every_public_name_is_in_the_reference():
         assert f"automodule:: {module.__name__}\n" in reference
 
 
+def test_every_word_of_the_glossary_is_in_the_code_and_has_one_meaning():
+    rows = re.findall(r"^\| (?!word|---)(.+?) \|", text("words.md"), re.MULTILINE)
+    words = [word for row in rows for word in re.findall(r"`(\w+)`", row)]
+    paths = list((pages.ROOT / "fastcontact").rglob("*.py"))
+    code = "\n".join([path.stem for path in paths] + [path.read_text(encoding="utf-8") for path in paths])
+    assert [word for word in words if not re.search(rf"\b{word}\b", code)] == []
+    assert len(words) == len(set(words)) > 20
+
+
 def test_every_command_is_listed():
     commands = next(action.choices for action in parser()._actions if action.dest == "command")
     for name in commands:

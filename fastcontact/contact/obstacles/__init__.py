@@ -27,7 +27,7 @@ class Obstacle(Protocol):
     """A rigid shape."""
 
     def distance(self, points: Array) -> tuple[Array, Array]:
-        """Return the signed distance (n,) of `points` (n, dim) and the unit outward normals (n, dim) there [length].
+        """Return the signed distance (n,) [length] of `points` (n, dim) [length], and the unit outward normals (n, dim) [-].
 
         The distance is infinite where there is nothing of the obstacle for a point to touch.
         """

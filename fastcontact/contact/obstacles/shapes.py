@@ -152,7 +152,7 @@ class Height:
         return sign * (points[:, -1] - height) / length, sign * normal / length[:, None]
 
 
-def paraboloid(R: float, tip: ArrayLike = 0.0, side: str = "above") -> Height:
+def paraboloid(R: float, tip: float = 0.0, side: str = "above") -> Height:
     """Return a paraboloid of revolution (a parabola in two dimensions) of radius `R` [length] at its tip.
 
     `tip` is the height of its tip over the origin [length]; the obstacle lies `side` ("above" or "below") the body.

@@ -1,4 +1,4 @@
-"""What a reference element is: data, two functions and its default quadrature."""
+"""A reference element: data, two functions and its default quadrature. Its coordinates have no dimension."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Function = Callable[[Array], Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +27,8 @@ class Element:
     order : int
         1 for linear, 2 for quadratic.
     nodes : ndarray (n_nodes, dim)
-        Reference coordinates, in the order of VTK; corners first, then mid nodes in the order of `edges`, then centre
-        nodes of faces and of the cell.
+        Reference coordinates [-], in the order of VTK; corners first, then mid nodes in the order of `edges`, then
+        centre nodes of faces and of the cell.
     edges : tuple of (int, int)
         Corner pairs, one per edge; in 2D counter-clockwise.
     facets : tuple of tuple of int
@@ -34,11 +36,11 @@ class Element:
     facet_elements : tuple of str
         Name of each facet's element; empty for lines.
     shape : callable
-        ``shape(xi)`` maps (m, dim) to values (m, n_nodes).
+        ``shape(xi)`` maps (m, dim) to values (m, n_nodes) [-].
     gradient : callable
-        ``gradient(xi)`` maps (m, dim) to derivatives (m, n_nodes, dim).
+        ``gradient(xi)`` maps (m, dim) to derivatives (m, n_nodes, dim) [-].
     quadrature : (ndarray (n_q, dim), ndarray (n_q,))
-        Default points and weights for the stiffness: those of code_aster's element of the same shape.
+        Default points and weights [-] for the stiffness: those of code_aster's element of the same shape.
     meshio, med : str
         The name in meshio and the three-letter MED code.
     vtk : int
@@ -46,7 +48,7 @@ class Element:
     linear, quadratic : str
         Name of the element on the same corners without, or with, mid nodes.
     corner_shape : callable
-        Shape functions of the linear element on the same corners.
+        Shape functions (m, n_corners) [-] of the linear element on the same corners.
     """
 
     name: str
@@ -56,15 +58,15 @@ class Element:
     edges: tuple[tuple[int, int], ...]
     facets: tuple[tuple[int, ...], ...]
     facet_elements: tuple[str, ...]
-    shape: Callable[[Array], Array]
-    gradient: Callable[[Array], Array]
+    shape: Function
+    gradient: Function
     quadrature: tuple[Array, Array]
     meshio: str
     med: str
     vtk: int
     linear: str
     quadratic: str
-    corner_shape: Callable[[Array], Array]
+    corner_shape: Function
 
     @property
     def n_nodes(self) -> int:
@@ -88,7 +90,7 @@ class Element:
 
     @cached_property
     def tables(self) -> tuple[Array, Array, Array]:
-        """Shape values (n_q, n_nodes), derivatives (n_q, n_nodes, dim) and weights (n_q,) at the default points."""
+        """Shape values (n_q, n_nodes), derivatives (n_q, n_nodes, dim), weights (n_q,), at the default points [-]."""
         points, weights = self.quadrature
         return (
             np.ascontiguousarray(self.shape(points)),
@@ -98,7 +100,7 @@ class Element:
 
     @cached_property
     def extrapolation(self) -> Array:
-        """Matrix (n_nodes, n_q) from values at the default quadrature points to values at the nodes.
+        """Matrix (n_nodes, n_q) [-] from values at the default quadrature points to values at the nodes.
 
         The corner polynomial is fitted to the point values by least squares (exact when there are as many points
         as corners) and evaluated at all nodes; with fewer points than corners, the mean is taken. This is what

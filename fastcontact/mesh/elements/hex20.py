@@ -19,13 +19,13 @@ def _middle_factors(xi: Array) -> tuple[Array, Array]:
 
 
 def shape(xi: Array) -> Array:
-    """Shape functions, (m, 3) to (m, 20)."""
+    """Shape functions (m, 20) [-] at `xi` (m, 3) [-]."""
     corner = hex8.shape(xi) * (xi @ hex8.NODES.T - 2)
     return np.column_stack([corner, _product.values(_middle_factors(xi)[0])])
 
 
 def gradient(xi: Array) -> Array:
-    """Derivatives, (m, 3) to (m, 20, 3)."""
+    """Derivatives (m, 20, 3) [-] at `xi` (m, 3) [-]."""
     factor = (xi @ hex8.NODES.T - 2)[:, :, None]
     corner = hex8.gradient(xi) * factor + hex8.shape(xi)[:, :, None] * hex8.NODES
     return np.concatenate([corner, _product.gradients(*_middle_factors(xi))], axis=1)

@@ -13,12 +13,12 @@ LINE = np.select([NODES < 0, NODES > 0], [0, 1], 2)
 
 
 def shape(xi: Array) -> Array:
-    """Shape functions, (m, 3) to (m, 27)."""
+    """Shape functions (m, 27) [-] at `xi` (m, 3) [-]."""
     return _product.values(np.stack([line3.shape(xi[:, [k]])[:, LINE[:, k]] for k in range(3)], axis=2))
 
 
 def gradient(xi: Array) -> Array:
-    """Derivatives, (m, 3) to (m, 27, 3)."""
+    """Derivatives (m, 27, 3) [-] at `xi` (m, 3) [-]."""
     factors = np.stack([line3.shape(xi[:, [k]])[:, LINE[:, k]] for k in range(3)], axis=2)
     slopes = np.stack([line3.gradient(xi[:, [k]])[:, LINE[:, k], 0] for k in range(3)], axis=2)
     return _product.gradients(factors, slopes)

@@ -11,12 +11,12 @@ EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4),
 
 
 def shape(xi: Array) -> Array:
-    """Shape functions, (m, 3) to (m, 8)."""
+    """Shape functions (m, 8) [-] at `xi` (m, 3) [-]."""
     return _product.values((1 + xi[:, None] * NODES) / 2)
 
 
 def gradient(xi: Array) -> Array:
-    """Derivatives, (m, 3) to (m, 8, 3)."""
+    """Derivatives (m, 8, 3) [-] at `xi` (m, 3) [-]."""
     factors = (1 + xi[:, None] * NODES) / 2
     return _product.gradients(factors, np.broadcast_to(NODES / 2, factors.shape))
 

@@ -7,13 +7,13 @@ from fastcontact.mesh.quadrature import gauss_line
 
 
 def shape(xi: Array) -> Array:
-    """Shape functions, (m, 1) to (m, 2)."""
+    """Shape functions (m, 2) [-] at `xi` (m, 1) [-]."""
     s = xi[:, 0]
     return np.stack([(1 - s) / 2, (1 + s) / 2], axis=1)
 
 
 def gradient(xi: Array) -> Array:
-    """Derivatives, (m, 1) to (m, 2, 1)."""
+    """Derivatives (m, 2, 1) [-] at `xi` (m, 1) [-]."""
     return np.broadcast_to(np.array([[-0.5], [0.5]]), (len(xi), 2, 1)).copy()
 
 

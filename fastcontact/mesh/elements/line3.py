@@ -8,13 +8,13 @@ from fastcontact.mesh.quadrature import gauss_line
 
 
 def shape(xi: Array) -> Array:
-    """Shape functions, (m, 1) to (m, 3)."""
+    """Shape functions (m, 3) [-] at `xi` (m, 1) [-]."""
     s = xi[:, 0]
     return np.stack([s * (s - 1) / 2, s * (s + 1) / 2, 1 - s * s], axis=1)
 
 
 def gradient(xi: Array) -> Array:
-    """Derivatives, (m, 1) to (m, 3, 1)."""
+    """Derivatives (m, 3, 1) [-] at `xi` (m, 1) [-]."""
     s = xi[:, 0]
     return np.stack([s - 0.5, s + 0.5, -2 * s], axis=1)[:, :, None]
 

@@ -19,7 +19,7 @@ ALONG_X = np.array([True, False, True, False])
 
 
 def shape(xi: Array) -> Array:
-    """Shape functions, (m, 3) to (m, 13)."""
+    """Shape functions (m, 13) [-] at `xi` (m, 3) [-]."""
     (a, b, t), z = collapsed(xi), xi[:, 2:3]
     corner = pyramid5.shape(xi)[:, :4] * (xi[:, 0:1] * X + xi[:, 1:2] * Y - 1)
     base = t * t / 2 * np.where(ALONG_X, (1 - a * a) * (1 + SIDES * b), (1 - b * b) * (1 + SIDES * a))
@@ -27,7 +27,7 @@ def shape(xi: Array) -> Array:
 
 
 def gradient(xi: Array) -> Array:
-    """Derivatives, (m, 3) to (m, 13, 3)."""
+    """Derivatives (m, 13, 3) [-] at `xi` (m, 3) [-]."""
     (a, b, t), z = collapsed(xi), xi[:, 2:3]
     N, dN = pyramid5.shape(xi)[:, :4, None], pyramid5.gradient(xi)[:, :4]
     outward = (xi[:, 0:1] * X + xi[:, 1:2] * Y - 1)[:, :, None]

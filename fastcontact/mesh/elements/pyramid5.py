@@ -16,7 +16,7 @@ X, Y = quad4.NODES.T
 
 
 def collapsed(xi: Array) -> tuple[Array, Array, Array]:
-    """Return a = x / (1 - z), b = y / (1 - z) and 1 - z, each (m, 1); a = b = 0 at the apex."""
+    """Return a = x / (1 - z), b = y / (1 - z) and 1 - z, each (m, 1) [-], at `xi` (m, 3) [-]; a = b = 0 at the apex."""
     x, y, t = xi[:, 0:1], xi[:, 1:2], 1 - xi[:, 2:3]
     apex = np.abs(t) < 1e-14
     below = np.where(apex, 1.0, t)
@@ -24,13 +24,13 @@ def collapsed(xi: Array) -> tuple[Array, Array, Array]:
 
 
 def shape(xi: Array) -> Array:
-    """Shape functions, (m, 3) to (m, 5)."""
+    """Shape functions (m, 5) [-] at `xi` (m, 3) [-]."""
     a, b, t = collapsed(xi)
     return np.column_stack([t * (1 + X * a) * (1 + Y * b) / 4, xi[:, 2]])
 
 
 def gradient(xi: Array) -> Array:
-    """Derivatives, (m, 3) to (m, 5, 3)."""
+    """Derivatives (m, 5, 3) [-] at `xi` (m, 3) [-]."""
     a, b, _ = collapsed(xi)
     base = np.stack([X * (1 + Y * b), Y * (1 + X * a), X * Y * a * b - 1], axis=2) / 4
     apex = np.tile([0.0, 0.0, 1.0], (len(xi), 1, 1))

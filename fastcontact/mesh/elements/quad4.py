@@ -9,13 +9,13 @@ NODES = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
 def shape(xi: Array) -> Array:
-    """Shape functions, (m, 2) to (m, 4)."""
+    """Shape functions (m, 4) [-] at `xi` (m, 2) [-]."""
     s, t = xi[:, 0:1], xi[:, 1:2]
     return (1 + s * NODES[:, 0]) * (1 + t * NODES[:, 1]) / 4
 
 
 def gradient(xi: Array) -> Array:
-    """Derivatives, (m, 2) to (m, 4, 2)."""
+    """Derivatives (m, 4, 2) [-] at `xi` (m, 2) [-]."""
     s, t = xi[:, 0:1], xi[:, 1:2]
     return np.stack([NODES[:, 0] * (1 + t * NODES[:, 1]), NODES[:, 1] * (1 + s * NODES[:, 0])], axis=2) / 4
 

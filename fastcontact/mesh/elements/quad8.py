@@ -10,7 +10,7 @@ NODES = np.vstack([quad4.NODES, [[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0
 
 
 def shape(xi: Array) -> Array:
-    """Shape functions, (m, 2) to (m, 8)."""
+    """Shape functions (m, 8) [-] at `xi` (m, 2) [-]."""
     s, t = xi[:, 0:1], xi[:, 1:2]
     S, T = NODES[:, 0], NODES[:, 1]
     corner = (1 + s * S[:4]) * (1 + t * T[:4]) * (s * S[:4] + t * T[:4] - 1) / 4
@@ -20,7 +20,7 @@ def shape(xi: Array) -> Array:
 
 
 def gradient(xi: Array) -> Array:
-    """Derivatives, (m, 2) to (m, 8, 2)."""
+    """Derivatives (m, 8, 2) [-] at `xi` (m, 2) [-]."""
     s, t = xi[:, 0:1], xi[:, 1:2]
     S, T = NODES[:, 0], NODES[:, 1]
     corner_s = S[:4] * (1 + t * T[:4]) * (2 * s * S[:4] + t * T[:4]) / 4

@@ -11,13 +11,13 @@ NODES = np.vstack([tet4.NODES, (tet4.NODES[FIRST] + tet4.NODES[SECOND]) / 2])
 
 
 def shape(xi: Array) -> Array:
-    """Shape functions, (m, 3) to (m, 10)."""
+    """Shape functions (m, 10) [-] at `xi` (m, 3) [-]."""
     L = tet4.shape(xi)
     return np.column_stack([L * (2 * L - 1), 4 * L[:, FIRST] * L[:, SECOND]])
 
 
 def gradient(xi: Array) -> Array:
-    """Derivatives, (m, 3) to (m, 10, 3)."""
+    """Derivatives (m, 10, 3) [-] at `xi` (m, 3) [-]."""
     L, dL = tet4.shape(xi)[:, :, None], tet4.SLOPES
     return np.concatenate([(4 * L - 1) * dL, 4 * (L[:, FIRST] * dL[SECOND] + L[:, SECOND] * dL[FIRST])], axis=1)
 

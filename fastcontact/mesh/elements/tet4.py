@@ -12,12 +12,12 @@ SLOPES = np.vstack([-np.ones(3), np.eye(3)])
 
 
 def shape(xi: Array) -> Array:
-    """Shape functions, the barycentric coordinates, (m, 3) to (m, 4)."""
+    """Shape functions (m, 4) [-] at `xi` (m, 3) [-]: the barycentric coordinates."""
     return np.column_stack([1 - xi.sum(axis=1), xi])
 
 
 def gradient(xi: Array) -> Array:
-    """Derivatives, (m, 3) to (m, 4, 3)."""
+    """Derivatives (m, 4, 3) [-] at `xi` (m, 3) [-]."""
     return np.tile(SLOPES, (len(xi), 1, 1))
 
 

@@ -7,12 +7,12 @@ from fastcontact.mesh.quadrature import triangle_1
 
 
 def shape(xi: Array) -> Array:
-    """Shape functions, (m, 2) to (m, 3)."""
+    """Shape functions (m, 3) [-] at `xi` (m, 2) [-]."""
     return np.stack([1 - xi[:, 0] - xi[:, 1], xi[:, 0], xi[:, 1]], axis=1)
 
 
 def gradient(xi: Array) -> Array:
-    """Derivatives, (m, 2) to (m, 3, 2)."""
+    """Derivatives (m, 3, 2) [-] at `xi` (m, 2) [-]."""
     return np.broadcast_to(np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]), (len(xi), 3, 2)).copy()
 
 

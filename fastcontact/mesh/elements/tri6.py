@@ -8,14 +8,14 @@ from fastcontact.mesh.quadrature import triangle_6
 
 
 def shape(xi: Array) -> Array:
-    """Shape functions, (m, 2) to (m, 6)."""
+    """Shape functions (m, 6) [-] at `xi` (m, 2) [-]."""
     b, c = xi[:, 0], xi[:, 1]
     a = 1 - b - c
     return np.stack([a * (2 * a - 1), b * (2 * b - 1), c * (2 * c - 1), 4 * a * b, 4 * b * c, 4 * c * a], axis=1)
 
 
 def gradient(xi: Array) -> Array:
-    """Derivatives, (m, 2) to (m, 6, 2)."""
+    """Derivatives (m, 6, 2) [-] at `xi` (m, 2) [-]."""
     b, c = xi[:, 0], xi[:, 1]
     a = 1 - b - c
     zero = np.zeros_like(a)

@@ -13,7 +13,7 @@ A, B, SIDE = FIRST[:6], SECOND[:6], wedge6.NODES[FIRST[:6], 2]
 
 
 def shape(xi: Array) -> Array:
-    """Shape functions, (m, 3) to (m, 15)."""
+    """Shape functions (m, 15) [-] at `xi` (m, 3) [-]."""
     L, z = tri3.shape(xi[:, :2])[:, wedge6.I], xi[:, 2:]
     corner = wedge6.shape(xi) * (2 * L - 2 + z * wedge6.NODES[:, 2])
     flat = 2 * L[:, A] * L[:, B] * (1 + z * SIDE)
@@ -21,7 +21,7 @@ def shape(xi: Array) -> Array:
 
 
 def gradient(xi: Array) -> Array:
-    """Derivatives, (m, 3) to (m, 15, 3)."""
+    """Derivatives (m, 15, 3) [-] at `xi` (m, 3) [-]."""
     L, z = tri3.shape(xi[:, :2])[:, wedge6.I], xi[:, 2:]
     dL, Z = tri3.gradient(xi[:, :2])[:, wedge6.I], wedge6.NODES[:, 2]
     slope = np.concatenate([2 * dL, np.broadcast_to(Z[:, None], (*L.shape, 1))], axis=2)

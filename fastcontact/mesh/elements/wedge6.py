@@ -5,8 +5,8 @@ The order is that of Gmsh, Abaqus and VTK 9.7; documents of older VTK count the 
 
 import numpy as np
 
-from fastcontact.mesh.elements import line2, tri3
-from fastcontact.mesh.elements._element import Array, Element
+from fastcontact.mesh.elements import _product, line2, tri3
+from fastcontact.mesh.elements._element import Element
 from fastcontact.mesh.quadrature import gauss_line, prism, triangle_3_sides
 
 NODES = np.column_stack([np.tile(tri3.ELEMENT.nodes, (2, 1)), np.repeat([-1.0, 1.0], 3)])
@@ -14,18 +14,7 @@ EDGES = ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5))
 # Node i is the product of the tri3 function I[i] in x, y and the line2 function J[i] in z.
 I = np.array([0, 1, 2, 0, 1, 2])  # noqa: E741
 J = np.array([0, 0, 0, 1, 1, 1])
-
-
-def shape(xi: Array) -> Array:
-    """Shape functions, (m, 3) to (m, 6)."""
-    return tri3.shape(xi[:, :2])[:, I] * line2.shape(xi[:, 2:])[:, J]
-
-
-def gradient(xi: Array) -> Array:
-    """Derivatives, (m, 3) to (m, 6, 3)."""
-    across = tri3.gradient(xi[:, :2])[:, I] * line2.shape(xi[:, 2:])[:, J, None]
-    along = tri3.shape(xi[:, :2])[:, I, None] * line2.gradient(xi[:, 2:])[:, J]
-    return np.concatenate([across, along], axis=2)
+shape, gradient = _product.of_two(tri3, line2, I, J)
 
 
 ELEMENT = Element(

@@ -374,7 +374,7 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
     times : ndarray (n_instants,)
         In the order of the file's step numbers.
     values : ndarray (n_instants, n_points, n_components)
-        NaN at points where the file gives no value.
+        NaN at points without a value; in the unit of the field, e.g. [length] for ``"DEPL"``.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Mesh makers with named groups, and operations on meshes.
 
 A maker is a function of plain numbers, strings and tuples that returns a `Mesh`; one listed in ``GENERATORS`` can be
-named in case files and on the command line.
+named in case files and on the command line. An argument out of range raises MeshError.
 """
 
 from __future__ import annotations
@@ -37,28 +37,8 @@ GENERATORS: dict[str, Callable[..., Mesh]] = {
 }
 
 __all__ = [
-    "GENERATORS",
-    "Circle",
-    "Forest",
-    "block",
-    "block_on_block",
-    "box",
-    "circles",
-    "crowned_blocks",
-    "cylinder_on_block",
-    "graded_block",
-    "half_spheres",
-    "linearised",
-    "merge_points",
-    "mirrored",
-    "punched_block",
-    "quarter_disc",
-    "refined",
-    "renamed",
-    "rings",
-    "sphere_octant",
-    "sphere_on_block",
-    "to_quadratic",
-    "transformed",
+    "GENERATORS", "Circle", "Forest", "block", "block_on_block", "box", "circles", "crowned_blocks",
+    "cylinder_on_block", "graded_block", "half_spheres", "linearised", "merge_points", "mirrored", "punched_block",
+    "quarter_disc", "refined", "renamed", "rings", "sphere_octant", "sphere_on_block", "to_quadratic", "transformed",
     "union",
-]
+]  # fmt: skip

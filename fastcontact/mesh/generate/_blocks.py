@@ -16,29 +16,17 @@ SIDES = ("BOTTOM", "RIGHT", "TOP", "LEFT")
 
 
 def rectangular(x: Array, y: Array) -> Array:
-    """Grid (n + 1, m + 1, 2) of the coordinates x (n + 1,) and y (m + 1,) [length]."""
+    """Return the grid (n + 1, m + 1, 2) [length] of the coordinates `x` (n + 1,) [length] and `y` (m + 1,) [length]."""
     affordable(len(x) * len(y))
     return np.stack(np.meshgrid(x, y, indexing="ij"), axis=2)
 
 
 def transfinite(bottom: Array, right: Array, top: Array, left: Array, u: Array, v: Array) -> Array:
-    """Grid between four sides by bilinear blending.
+    """Return the grid (n + 1, m + 1, 2) [length] between four sides by bilinear blending; it has exactly their nodes.
 
-    Bilinearly blended Coons patch (W. J. Gordon and C. A. Hall, Int. J. Numer. Meth. Engng 7, 1973, eq. 6).
-
-    Parameters
-    ----------
-    bottom, top : ndarray (n + 1, 2)
-        Nodes in the direction of u [length].
-    right, left : ndarray (m + 1, 2)
-        Nodes in the direction of v [length].
-    u, v : ndarray (n + 1,), (m + 1,)
-        Relative abscissae of the nodes of opposite sides, 0 to 1.
-
-    Returns
-    -------
-    ndarray (n + 1, m + 1, 2)
-        The sides are met exactly.
+    Bilinearly blended Coons patch (W. J. Gordon and C. A. Hall, Int. J. Numer. Meth. Engng 7, 1973, eq. 6). The sides are
+    `bottom` (n + 1, 2) [length] and `top` (n + 1, 2) [length], whose nodes have the relative abscissae `u` (n + 1,) [-] from
+    0 to 1, and `right` (m + 1, 2) [length] and `left` (m + 1, 2) [length] with `v` (m + 1,) [-].
     """
     affordable(len(u) * len(v))
     U, V = u[:, None, None], v[None, :, None]
@@ -51,18 +39,11 @@ def transfinite(bottom: Array, right: Array, top: Array, left: Array, u: Array, 
 
 
 def structured(grid: Array, solid: str, sides: Mapping[str, str], triangles: bool = False) -> Mesh:
-    """Return the linear mesh of a grid.
+    """Return the linear mesh of a grid, its cells in the group `solid`.
 
-    Parameters
-    ----------
-    grid : ndarray (n + 1, m + 1, 2)
-        Nodes, counter-clockwise: the first index to the right, the second up [length].
-    solid : str
-        Name of the group of all cells.
-    sides : mapping of str to str
-        Name of the group of lines on each of BOTTOM, RIGHT, TOP, LEFT that gets one.
-    triangles : bool
-        Whether each quadrangle is cut in two, along diagonals that alternate.
+    The nodes of the `grid` (n + 1, m + 1, 2) [length] stand counter-clockwise: the first index to the right, the second up.
+    `sides` names the groups of lines of those of BOTTOM, RIGHT, TOP, LEFT that get one; with `triangles`, each quadrangle is
+    cut in two, along diagonals that alternate.
     """
     n, m = grid.shape[0] - 1, grid.shape[1] - 1
     numbers = np.arange((n + 1) * (m + 1)).reshape(n + 1, m + 1)

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from reprlib import repr
-from typing import Any
+from typing import Any, TypeVar
 
 from fastcontact.errors import MeshError, unknown
 
 TRIANGLES = ("tri3", "tri6")
 QUADRANGLES = ("quad4", "quad8", "quad9")
 FACES = TRIANGLES + QUADRANGLES
-# Numbers whose squares and cubes are still numbers. What is made at most: beyond that a unit or a decimal point has
-# slipped, and the machine would be short of memory.
+# Largest size of a number, whose cubes can still be represented. Largest numbers of segments and of cells: more are probably
+# mistakes in units or decimal points, and would not fit into memory.
 LARGEST = 1e100
 MOST_ALONG = 1_000_000
 MOST_CELLS = 5_000_000
+
+Number = TypeVar("Number", int, float)
 
 
 def number(name: str, value: Any) -> float:
@@ -40,6 +42,19 @@ def positive(name: str, value: Any, at_most: float = math.inf, limit: str = "") 
     if not 0.0 < result <= at_most * (1 + 1e-12):
         upper = "" if at_most == math.inf else f" and at most {limit + ' = ' if limit else ''}{at_most:g}"
         raise MeshError(f"{name} = {result:g} is out of range: it must be greater than 0{upper}")
+    return result
+
+
+def at_most(limit: float) -> Callable[[str, Any], float]:
+    """Return the check of a positive number up to `limit`."""
+    return lambda name, value: positive(name, value, limit)
+
+
+def growth_of(name: str, value: Any) -> float:
+    """Return the ratio of neighbouring edges as a float; MeshError unless it is more than 1."""
+    result = positive(name, value)
+    if not result > 1.0:
+        raise MeshError(f"{name} = {result:g} is out of range: it must be more than 1")
     return result
 
 
@@ -72,7 +87,7 @@ def segments(wanted: float) -> int:
 
 
 def affordable(n_cells: float) -> None:
-    """Raise MeshError if a mesh of about `n_cells` cells is more than anyone can mean."""
+    """Raise MeshError if a mesh has more than about MOST_CELLS cells."""
     if not n_cells <= MOST_CELLS:
         raise MeshError(
             f"the mesh would have about {n_cells:.3g} cells, more than {MOST_CELLS}: check the units of the element sizes, "
@@ -80,11 +95,11 @@ def affordable(n_cells: float) -> None:
         )
 
 
-def pair(name: str, value: Any) -> tuple[Any, Any]:
-    """Return `value` as a tuple of two; MeshError if it is anything else."""
-    if isinstance(value, str) or not hasattr(value, "__len__") or len(value) != 2:
-        raise MeshError(f"{name} must be two numbers, not {repr(value)}")
-    return value[0], value[1]
+def each(check: Callable[[str, Any], Number], name: str, value: Any, count: int = 2) -> list[Number]:
+    """Return the two (or three) members of `value`, checked one by one; MeshError if there are not so many."""
+    if isinstance(value, str) or not hasattr(value, "__len__") or len(value) != count:
+        raise MeshError(f"{name} must be {'two' if count == 2 else 'three'} numbers, not {repr(value)}")
+    return [check(f"{name}[{i}]", member) for i, member in enumerate(value)]
 
 
 def one_of(name: str, value: Any, known: Sequence[str]) -> str:
@@ -95,7 +110,7 @@ def one_of(name: str, value: Any, known: Sequence[str]) -> str:
 
 
 def unused(element: str, **arguments: Any) -> None:
-    """Raise MeshError if an argument that means nothing to `element` was given (is not None)."""
+    """Raise MeshError if an argument that has no effect with `element` was given (is not None)."""
     for name, value in arguments.items():
         if value is not None:
             raise MeshError(f"{name} = {repr(value)} means nothing to {element} meshes: leave it out")

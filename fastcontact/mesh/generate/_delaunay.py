@@ -10,7 +10,7 @@ Numbers = NDArray[np.intp]
 
 
 def delaunay(points: Array) -> Numbers:
-    """Counter-clockwise triangles (n_triangles, 3) of the convex hull of `points`, flat ones left out.
+    """Return counter-clockwise triangles (n_triangles, 3) of the convex hull of `points` (n, 2) [length], without flat ones.
 
     Nodes in line on the hull give triangles of zero area by rounding; they are dropped.
     """
@@ -27,7 +27,7 @@ def delaunay(points: Array) -> Numbers:
 
 
 def edges_of(triangles: Numbers) -> Numbers:
-    """Edges (n_edges, 2) of `triangles`, each once, smaller point number first."""
+    """Return the edges (n_edges, 2) of `triangles` (n_triangles, 3), each once, smaller point number first."""
     ends = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     ends.sort(axis=1)
     n = int(ends.max()) + 1
@@ -36,7 +36,7 @@ def edges_of(triangles: Numbers) -> Numbers:
 
 
 def stars_of(triangles: Numbers, n_points: int) -> Numbers:
-    """Opposite edges (n_points, degree, 2) of the triangles around each point, padded with -1."""
+    """Return the edges (n_points, degree, 2) of `triangles` (n_triangles, 3) opposite to each point, padded with -1."""
     centre = triangles.ravel()
     opposite = np.stack([np.roll(triangles, -1, axis=1), np.roll(triangles, -2, axis=1)], axis=2).reshape(-1, 2)
     order = np.argsort(centre, kind="stable")

@@ -15,16 +15,10 @@ Array = NDArray[np.float64]
 
 
 def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> Mesh:
-    """Return a triangle mesh of a convex body.
+    """Return a triangle mesh of a convex body, its cells in the group `solid`.
 
-    Parameters
-    ----------
-    solid : str
-        Name of the group of all triangles.
-    sides : sequence of (str, ndarray (n, 2))
-        Name and nodes of each side, counter-clockwise, each starting where the one before ends [length].
-    spacing : Spacing
-        Longest inner edges.
+    The names and the nodes of its `sides` (n, 2) [length] run counter-clockwise, each from the end of the one before.
+    `spacing` gives the longest inner edges.
     """
     outline = np.vstack([nodes[:-1] for _, nodes in sides])
     points, triangles = triangulated(outline, spacing)
@@ -38,11 +32,11 @@ def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> 
 
 
 def straight(start: Sequence[float], end: Sequence[float], relative: Array) -> Array:
-    """Points (n, 2) of a straight side at the relative abscissae (n,), its ends exact [length]."""
+    """Return points (n, 2) [length] of a straight side at the abscissae `relative` (n,) [-], its ends exact."""
     a, b, s = np.asarray(start, float), np.asarray(end, float), relative[:, None]
     return np.where(s < 1.0, a + s * (b - a), b)
 
 
 def arc(centre: Sequence[float], radius: float, angles: Array) -> Array:
-    """Points (n, 2) of a circle at `angles` (n,) from its topmost point, clockwise [radian]."""
+    """Return points (n, 2) [length] of a circle at `angles` (n,) [radian] from its topmost point, clockwise."""
     return np.asarray(centre, float) + radius * np.column_stack([np.sin(angles), np.cos(angles)])

@@ -1,4 +1,4 @@
-"""Move single points of a triangulation until the worst triangle around each is as good as it gets."""
+"""Improve a triangulation: single points are moved so that the worst triangle around each becomes better."""
 
 from __future__ import annotations
 
@@ -18,31 +18,17 @@ _KEPT = 4  # sweeps with one triangulation
 _DIRECTIONS = np.linspace(0.0, 2 * np.pi, 13)[:-1]
 _TRIALS = np.column_stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
 _TRIALS = np.vstack([_TRIALS, 0.5 * _TRIALS])
-_GOOD = np.sin(np.radians(50.0))  # a star whose smallest angle is larger needs no care
-_TOO_LONG = 0.5, 2.0  # what an edge too long costs, at once and per relative excess, in sines of an angle
+_GOOD = np.sin(np.radians(50.0))  # a star whose smallest angle is larger is left as it is
+_TOO_LONG = 0.5, 2.0  # penalty of an edge too long, and per relative excess, in sines of an angle
 
 
 def polish(points: Array, movable: Mask, limit: Size, sweeps: int) -> Array:
-    """Move single points so that the worst triangle around each gets better.
+    """Return points (n, 2) [length], moved one by one so that the worst triangle around each becomes better.
 
     A trial move is kept when it raises the smallest angle of the star, edges longer than `limit` counting against
     it (smart smoothing after L. Freitag and C. Ollivier-Gooch, Int. J. Numer. Meth. Engng 40, 1997). Points moved
-    at the same time share no edge.
-
-    Parameters
-    ----------
-    points : ndarray (n, 2)
-        [length].
-    movable : ndarray of bool (n,)
-        Points that may move.
-    limit : callable
-        ``limit(points)`` is the longest edge allowed at points (n,) [length].
-    sweeps : int
-        Number of passes over the bad points, at most.
-
-    Returns
-    -------
-    ndarray (n, 2)
+    at the same time share no edge. Of the `points` (n, 2) [length] only those `movable` (n,) of bool move, in at most so many
+    `sweeps`; ``limit(points)``, `limit` (n,) [length], is the longest edge allowed there.
     """
     points = points.copy()
     radius, moved = 0.1, True

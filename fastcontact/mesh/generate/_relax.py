@@ -1,4 +1,4 @@
-"""Spread points evenly: they repel each other along the edges of their triangulation."""
+"""Spread points evenly, by repulsive forces along the edges of their triangulation."""
 
 from __future__ import annotations
 
@@ -20,25 +20,11 @@ _KEPT = 4  # steps with one triangulation
 
 
 def relax(points: Array, movable: Mask, size: Size, steps: int) -> Array:
-    """Spread the movable points by repulsive bars along the edges.
+    """Return points (n, 2) [length], the movable ones spread by repulsive bars along the edges.
 
     The bars of a truss push its nodes apart until the lengths follow the size function (P.-O. Persson and
-    G. Strang, A simple mesh generator in MATLAB, SIAM Review 46, 2004, section 2).
-
-    Parameters
-    ----------
-    points : ndarray (n, 2)
-        [length].
-    movable : ndarray of bool (n,)
-        Points that may move.
-    size : callable
-        ``size(points)`` is the wanted edge length (n,) [length].
-    steps : int
-        Number of moves.
-
-    Returns
-    -------
-    ndarray (n, 2)
+    G. Strang, A simple mesh generator in MATLAB, SIAM Review 46, 2004, section 2). Of the `points` (n, 2) [length] those
+    `movable` (n,) of bool move, in so many `steps`; ``size(points)``, `size` (n,) [length], is the wanted length of edges.
     """
     points = points.copy()
     if not movable.any():

@@ -1,4 +1,4 @@
-"""First guess of the inner points of a convex outline: nearly equilateral already."""
+"""First guess of the inner points of a convex outline; their triangles are nearly equilateral."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _CLEAR = 0.6  # seeds stay this many edge lengths off the outline
 
 
 def inner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
-    """Points (m, 2) inside the convex polygon `outline` (n, 2), about ``density * spacing`` apart [length]."""
+    """Return points (m, 2) [length] inside a convex `outline` (n, 2) [length], about ``density * spacing`` apart."""
     from scipy.spatial import cKDTree
 
     low, high = outline.min(axis=0), outline.max(axis=0)
@@ -30,7 +30,7 @@ def inner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
 
 
 def _apart(seeds: Array, outline: Array, spacing: Spacing, density: float) -> Array:
-    """The seeds (m, 2) that stand off the outline and off the seeds before them, where a body is a few edges wide."""
+    """Return the seeds (m, 2) far enough from the outline and from the seeds before them, where a body is narrow."""
     kept: list[Array] = []
     for seed, depth, size in zip(seeds, _depth(outline, seeds), density * spacing(seeds), strict=True):
         if depth > 0.4 * size and all(np.hypot(*(seed - other)) > 0.7 * size for other in kept):

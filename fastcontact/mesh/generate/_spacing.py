@@ -1,4 +1,4 @@
-"""Where the nodes of a line stand: equal, geometric, or after a size function."""
+"""Places of the nodes of a line: equal or geometric segments, or segments after a size function."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ class Spacing:
         return self.near == self.far
 
     def at_distance(self, distance: Array | float) -> Array:
-        """Edge length at the given distance from the pole [length]."""
+        """Return the edge length (...) [length] at `distance` (...) [length] from the pole."""
         ramp = np.clip((np.asarray(distance) - self.plateau) / (self.reach - self.plateau), 0.0, 1.0)
         return self.near + (self.far - self.near) * ramp
 
     def __call__(self, points: Array) -> Array:
-        """Edge length (n,) wanted at `points` (n, 2) [length]."""
+        """Return the edge length (n,) [length] wanted at `points` (n, 2) [length]."""
         return self.at_distance(np.hypot(points[:, 0] - self.pole[0], points[:, 1] - self.pole[1]))
 
 
@@ -58,7 +58,7 @@ def segments_for(length: float, size: float) -> int:
 
 
 def geometric(length: float, first: float, last: float) -> Array:
-    """Relative abscissae (n + 1,) from 0 to 1 of segments in geometric progression.
+    """Return relative abscissae (n + 1,) [-] from 0 to 1 of segments in geometric progression.
 
     The ratio of the last segment to the first is exactly ``last / first``; n is the smallest number for which no
     segment is longer than wanted, so all are shorter than asked by one common factor. From the sum of a geometric
@@ -78,7 +78,10 @@ def geometric(length: float, first: float, last: float) -> Array:
 
 
 def divided(curve: Curve, length: float, spacing: Spacing) -> Array:
-    """Points (n + 1, 2) on `curve` (parameter 0 to 1, constant speed), no segment longer than its `spacing`."""
+    """Return points (n + 1, 2) [length] on a curve, no segment longer than its `spacing`.
+
+    `curve` (n,) [-] maps parameters from 0 to 1 to points at constant speed.
+    """
     if spacing.uniform:
         return curve(np.linspace(0.0, 1.0, segments_for(length, spacing.far) + 1))
     # The integral of ds / h counts the segments; 16 samples per smallest segment resolve it.

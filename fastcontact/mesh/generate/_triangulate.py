@@ -15,30 +15,18 @@ from fastcontact.mesh.generate._spacing import Spacing
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 
-# Inner points stand closer than the longest edge allowed, for no triangulation has all its edges equal: fractions
-# of it to try in turn, and the smallest angle [degrees] with which an attempt, or a better one before, is taken.
+# Inner points stand closer than the longest edge allowed, since no triangulation has all its edges equal: fractions of it to
+# try one after the other, and the smallest angle [degrees] with which an attempt, or a better one before, is accepted.
 _ATTEMPTS = ((0.84, 35.0), (0.82, 35.0), (0.80, 33.0), (0.78, 31.0), (0.75, 29.0), (0.70, 20.0))
 _ROUNDS = 8  # of adding points where edges are too long
-_AROUND = 3.0  # edge lengths from an added point within which points give way to it
+_AROUND = 3.0  # edge lengths from an added point within which points move
 
 
 def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Numbers]:
-    """Fill a convex polygon with triangles.
+    """Return points (n_points, 2) [length] and triangles (n_triangles, 3), counter-clockwise, that fill a convex polygon.
 
-    Parameters
-    ----------
-    outline : ndarray (n, 2)
-        Corners of the polygon, counter-clockwise. They become the first n points, and no other point lies on the
-        outline [length].
-    spacing : Spacing
-        Longest edge allowed, at the middle of each inner edge [length].
-
-    Returns
-    -------
-    points : ndarray (n_points, 2)
-        [length].
-    triangles : ndarray of int (n_triangles, 3)
-        Counter-clockwise.
+    The corners of the `outline` (n, 2) [length], counter-clockwise, become the first n points, and no other point lies on it.
+    `spacing` gives the longest edge allowed, at the middle of each inner edge.
 
     Raises
     ------
@@ -60,7 +48,7 @@ def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Numbers]:
 
 
 def smallest_angle(points: Array, triangles: Numbers) -> float:
-    """Smallest corner angle of the triangles [degrees]."""
+    """Return the smallest angle [degrees] of `triangles` (n_triangles, 3) on `points` (n, 2) [length]."""
     ahead = points[np.roll(triangles, -1, axis=1)] - points[triangles]
     behind = points[np.roll(triangles, 1, axis=1)] - points[triangles]
     cross = ahead[..., 0] * behind[..., 1] - ahead[..., 1] * behind[..., 0]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import MeshError
 from fastcontact.mesh.generate._blocks import SIDES, rectangular, structured
-from fastcontact.mesh.generate._check import FACES, TRIANGLES, count, number, one_of, pair, positive, within
+from fastcontact.mesh.generate._check import FACES, TRIANGLES, count, each, number, one_of, positive, within
 from fastcontact.mesh.generate._outline import filled, straight
 from fastcontact.mesh.generate._places import with_points_at
 from fastcontact.mesh.generate._spacing import Spacing, divided, geometric, segments_for
@@ -49,16 +49,11 @@ def block(
         Name of the solid group.
     distortion : float
         How far inner nodes are moved, 0 to 0.24 of a cell, in a fixed pattern.
-
-    Raises
-    ------
-    MeshError
-        If an argument is out of range.
     """
     one_of("element", element, FACES)
-    width, height = (positive(f"size[{i}]", value) for i, value in enumerate(pair("size", size)))
-    n, m = (count(f"divisions[{i}]", value) for i, value in enumerate(pair("divisions", divisions)))
-    left, bottom = (number(f"origin[{i}]", value) for i, value in enumerate(pair("origin", origin)))
+    width, height = each(positive, "size", size)
+    n, m = each(count, "divisions", divisions)
+    left, bottom = each(number, "origin", origin)
     amount = within("distortion", distortion, 0.0, 0.24)
     grid = rectangular(left + width * np.linspace(0, 1, n + 1), bottom + height * np.linspace(0, 1, m + 1))
     grid += _pattern(n, m) * amount * np.array([width / n, height / m])
@@ -106,19 +101,12 @@ def block_on_block(
     divisions_lower, divisions_upper : (int, int)
         Cells along the widths and the heights.
     shift : float
-        x of the upper block's left side; the lower one's stands at 0 [length].
+        x of the upper block's left side; the lower one's stands at 0. The blocks must face each other [length].
     distortion : float
         How far inner nodes are moved, 0 to 0.24 of a cell, in a fixed pattern.
-
-    Raises
-    ------
-    MeshError
-        If an argument is out of range, or the blocks do not face each other.
     """
-    width_lower, height = (
-        positive(f"size_lower[{i}]", value) for i, value in enumerate(pair("size_lower", size_lower))
-    )
-    width_upper = positive("size_upper[0]", pair("size_upper", size_upper)[0])
+    width_lower, height = each(positive, "size_lower", size_lower)
+    width_upper, _ = each(positive, "size_upper", size_upper)
     if not -width_upper < number("shift", shift) < width_lower:
         raise MeshError(
             f"shift = {shift:g} is out of range: the blocks face each other between {-width_upper:g} and "
@@ -166,18 +154,12 @@ def cylinder_on_block(
         Longest edges far from the contact, R/10 by default [length].
     contact_size : float, optional
         Edges along the surfaces at the contact, R/100 by default [length].
-
-    Raises
-    ------
-    MeshError
-        If an argument is out of range.
     """
     one_of("element", element, FACES)
     R = positive("R", R)
     far = R / 10 if size is None else positive("size", size, R / 2, "R/2")
     near = min(R / 100, far) if contact_size is None else positive("contact_size", contact_size, far, "size")
-    extent = (2 * R, 2 * R) if block_size is None else pair("block_size", block_size)
-    width, height = (positive(f"block_size[{i}]", value) for i, value in enumerate(extent))
+    width, height = each(positive, "block_size", (2 * R, 2 * R) if block_size is None else block_size)
     if element in TRIANGLES:
         foundation = _free_block(element, width, height, Spacing(near, far, reach=R))
     else:
@@ -198,13 +180,9 @@ def _cylinder(element: str, R: float, near: float, far: float) -> Mesh:
 
 
 _BLOCK_NAMES = {
-    "BLOCK": "BLOCK",
-    "BOTTOM": "BLOCK_BOTTOM",
-    "RIGHT": "BLOCK_SIDE",
-    "TOP": "CONT_BLOCK",
-    "LEFT": "AXIS",
+    "BLOCK": "BLOCK", "BOTTOM": "BLOCK_BOTTOM", "RIGHT": "BLOCK_SIDE", "TOP": "CONT_BLOCK", "LEFT": "AXIS",
     "TOP_LEFT": "POLE_BLOCK",
-}
+}  # fmt: skip
 
 
 def _graded_block(element: str, width: float, height: float, near: float, far: float) -> Mesh:

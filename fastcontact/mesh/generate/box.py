@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.elements import Element
-from fastcontact.mesh.generate._check import affordable, count, number, one_of, positive
+from fastcontact.mesh.generate._check import affordable, count, each, number, one_of, positive
 from fastcontact.mesh.mesh import Mesh
 
 Indices = NDArray[np.int64]
@@ -56,11 +53,6 @@ def box(
     name : str
         Name of the solid group.
 
-    Raises
-    ------
-    MeshError
-        If an argument is out of range.
-
     Examples
     --------
     >>> mesh = box((2.0, 1.0, 1.0), (2, 1, 1), "wedge6")
@@ -68,9 +60,8 @@ def box(
     (12, 4, ['quad4', 'tri3', 'wedge6'])
     """
     solid = elements.get(one_of("element", element, SOLIDS))
-    lengths = np.array([positive(f"size[{i}]", value) for i, value in enumerate(_triple("size", size))])
-    shape = np.array([count(f"divisions[{i}]", value) for i, value in enumerate(_triple("divisions", divisions))])
-    corner = np.array([number(f"origin[{i}]", value) for i, value in enumerate(_triple("origin", origin))])
+    lengths, corner = np.array(each(positive, "size", size, 3)), np.array(each(number, "origin", origin, 3))
+    shape = np.array(each(count, "divisions", divisions, 3))
     block, lattice = _solids(solid, shape)
     facets, sides = _sides(solid, block, lattice, STEPS * shape)
     cells, groups, first = {element: block}, {name: np.arange(len(block))}, len(block)
@@ -80,12 +71,6 @@ def box(
             groups[side] = np.concatenate([groups.get(side, rows[:0]), first + rows])
         first += len(found)
     return Mesh(corner + lattice / (STEPS * shape) * lengths, cells, groups)
-
-
-def _triple(name: str, value: Any) -> tuple[Any, Any, Any]:
-    if isinstance(value, str) or not hasattr(value, "__len__") or len(value) != 3:
-        raise MeshError(f"{name} must be three numbers, not {value!r}")
-    return value[0], value[1], value[2]
 
 
 def _solids(solid: Element, shape: Indices) -> tuple[Indices, Indices]:

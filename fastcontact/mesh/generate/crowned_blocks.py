@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import MeshError
-from fastcontact.mesh.generate._check import QUADRANGLES, one_of, positive, segments
-from fastcontact.mesh.generate._places import with_points_at
-from fastcontact.mesh.generate.blocks import block
+from fastcontact.mesh.generate._check import QUADRANGLES, growth_of, one_of, positive, segments
+from fastcontact.mesh.generate._lattice import growing, on_lines
+from fastcontact.mesh.generate._places import with_cells_inside, with_points_at
 from fastcontact.mesh.generate.transform import mirrored, renamed, union
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
+_NAMES = {"LOWER": "LOWER", "TOP": "CONT_LOWER", "BOTTOM": "FAR_LOWER"}
 
 
 def crowned_blocks(
@@ -26,8 +27,8 @@ def crowned_blocks(
 ) -> Mesh:
     """Two blocks above each other whose facing sides are parabolas of radius R that touch at the origin.
 
-    Both stand for half planes. They are whole, x < 0 as well, so that they can be drawn along, and mirror each other, so
-    that nodes match and like materials do not couple pressure and shear. Groups of cells: LOWER, UPPER, CONT_LOWER,
+    Both represent half planes. They are whole, x < 0 as well, for tangential loads, and mirror each other, so that nodes
+    match and equal materials do not couple pressure and shear. Groups of cells: LOWER, UPPER, CONT_LOWER,
     CONT_UPPER (their facing sides around the origin), FAR_LOWER, FAR_UPPER (the flat sides far from it). Groups of
     points: POLE_LOWER, POLE_UPPER (two points at the origin).
 
@@ -47,11 +48,6 @@ def crowned_blocks(
     growth : float
         Length of an edge beyond over that of its neighbour nearer to the origin, more than 1.
 
-    Raises
-    ------
-    MeshError
-        If an argument is out of range.
-
     Examples
     --------
     >>> mesh = crowned_blocks(contact_size=0.1)
@@ -59,35 +55,23 @@ def crowned_blocks(
     False
     """
     one_of("element", element, QUADRANGLES)
-    R, whole = positive("R", R), positive("extent", extent)
+    R, whole, rate = positive("R", R), positive("extent", extent), growth_of("growth", growth)
     if whole > R:
         raise MeshError(f"extent = {whole:g} is out of range: it must be at most R = {R:g}")
     fine = positive("contact_radius", contact_radius, whole / 2, "extent/2")
     size = positive("contact_size", contact_size, fine, "contact_radius")
-    if not (rate := positive("growth", growth)) > 1.0:
-        raise MeshError(f"growth = {growth:g} is out of range: it must be more than 1")
     right, down = _lines(size, fine, whole, rate), _lines(size, size, whole, rate)
-    x, y = np.concatenate([-right[:0:-1], right]), -down[::-1]
-    lattice = block((len(x) - 1.0, len(y) - 1.0), (len(x) - 1, len(y) - 1), element, name="LOWER")
-    across, up = (np.interp(p, np.arange(len(v)), v) for p, v in zip(lattice.points.T, (x, y), strict=True))
+    lattice = on_lines(element, [np.concatenate([-right[:0:-1], right]), -down[::-1]], "LOWER")
+    across, up = lattice.points.T
     crown = across**2 / (2 * R) * (1 + up / whole)  # fades away downward
-    lower = _named(lattice.replace(points=np.column_stack([across, up - crown])), across, 1.2 * fine)
+    lower = renamed(lattice.replace(points=np.column_stack([across, up - crown])), _NAMES.get)
+    lower = with_cells_inside(lower, "CONT_LOWER", "CONT_LOWER", lambda points: np.abs(points[:, 0]) <= 1.2 * fine)
+    lower = with_points_at(lower, {"POLE_LOWER": (0.0, 0.0)})
     upper = mirrored(lower, "y", rename=lambda name: name.replace("LOWER", "UPPER"))
     return union(lower, upper)
 
 
 def _lines(size: float, fine: float, length: float, growth: float) -> Array:
-    """Return places from 0 to `length`: edges of about `size` up to `fine`, then each `growth` times the last."""
+    """Return places (n + 1,) [length] from 0 to `length`: about `size` apart up to `fine`, then growing."""
     equal = np.linspace(0.0, fine, segments(round(fine / size)) + 1)
-    n = segments(np.log1p((length - fine) * (growth - 1.0) / (size * growth)) / np.log(growth))
-    beyond = np.cumsum(growth ** np.arange(n))
-    return np.concatenate([equal, fine + (length - fine) * beyond / beyond[-1]])
-
-
-def _named(mesh: Mesh, across: Array, reach: float) -> Mesh:
-    """Return the lower block with its groups, the contact up to |x| = `reach`."""
-    mesh = renamed(mesh, {"LOWER": "LOWER", "TOP": "CONT_LOWER", "BOTTOM": "FAR_LOWER"}.get)
-    ((kind, rows),) = mesh.split(mesh.cell_groups["CONT_LOWER"]).items()
-    inside = (np.abs(across[mesh.cells[kind][rows]]) <= reach).all(axis=1)
-    mesh = mesh.with_groups(cells={"CONT_LOWER": mesh.offsets[kind] + rows[inside]})
-    return with_points_at(mesh, {"POLE_LOWER": (0.0, 0.0)})
+    return np.concatenate([equal, fine + growing(length - fine, size * growth, growth)[1:]])

@@ -1,8 +1,8 @@
-"""Local refinement of 2D meshes: triangles and quadrangles quartered where wanted, neighbours made to fit.
+"""Local refinement of 2D meshes: triangles and quadrangles are divided in four where wanted, and their neighbours adapted.
 
-A forest holds every cell of a first mesh and its descendants. Marked leaves are quartered ("red"); neighbours of smaller
-leaves are divided for the mesh only ("green": Bank, Sherman and Weiser, 1983), never for good, so angles do not
-deteriorate however often one refines.
+A forest holds every cell of a first mesh and its descendants; the cells without descendants are its leaves. Marked leaves are
+divided in four ("red"). Neighbours of smaller leaves are divided in the mesh, but not in the forest ("green": Bank, Sherman
+and Weiser, 1983), so that angles do not deteriorate however often one refines.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.generate.quadratic import Curve, edges_on
+from fastcontact.mesh.generate.quadratic import Curve, centres, edges_on
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 
@@ -48,7 +48,7 @@ class _Leaves:
 
 
 class Forest:
-    """A mesh that can be refined again and again, here and there.
+    """A mesh that can be refined locally, as often as wanted.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class Forest:
         return sum(len(self._leaves[name].corners) for name in self.solids)
 
     def refine(self, marked: Mask) -> None:
-        """Quarter the marked solid leaves, and others so that no edge is divided more than once on one side.
+        """Divide the marked solid leaves in four, and others so that no edge is divided more than once on one side.
 
         Parameters
         ----------
@@ -143,6 +143,7 @@ class Forest:
         self._middle = np.concatenate([self._middle, numbers])[order]
 
     def _quarter(self, name: str, mask: Mask) -> None:
+        """Divide the marked leaves of one kind."""
         leaves = self._leaves[name]
         parents = leaves.corners[mask]
         keys = self._edges(name, parents)
@@ -150,7 +151,7 @@ class Forest:
         lattice = [parents, self._middles(keys)]
         if name == "quad4":
             lattice.append(len(self.points) + np.arange(len(parents))[:, None])
-            self.points = np.concatenate([self.points, self._centres(parents, lattice[1])])
+            self.points = np.concatenate([self.points, centres(self.points[parents], self.points[lattice[1]])])
         points = np.concatenate(lattice, axis=1)
         children = points[:, RED[name]].reshape(-1, CORNERS[name])
         self._leaves[name] = _Leaves(
@@ -158,12 +159,8 @@ class Forest:
             np.concatenate([leaves.root[~mask], np.repeat(leaves.root[mask], len(RED[name]))]),
         )
 
-    def _centres(self, corners: Indices, middles: Indices) -> Array:
-        """Centres of quadrangles, where the shape functions of the curved cell put them."""
-        return 0.5 * self.points[middles].sum(axis=1) - 0.25 * self.points[corners].sum(axis=1)
-
     def _too_coarse(self, name: str) -> Mask:
-        """Leaves that green division cannot make fit: an edge divided twice, or too many edges divided."""
+        """Return the leaves (n,) that green division cannot adapt: an edge is divided twice, or too many edges are."""
         corners = self._leaves[name].corners
         keys = self._edges(name, corners)
         middles = self._middles(keys)
@@ -188,7 +185,7 @@ class Forest:
             self._quarter("line2", mask)
 
     def mesh(self) -> tuple[Mesh, Indices]:
-        """Return the mesh of all leaves, and for its solid cells (as in `Mesh.solids`) the leaf each belongs to.
+        """Return the mesh of all leaves, and the leaf (n,) of each of its solid cells, in the order of `Mesh.solids`.
 
         Groups of cells hold the descendants of their cells; a new point joins the groups that hold both ends of its edge.
         """
@@ -210,7 +207,7 @@ class Forest:
         return mesh, np.concatenate([np.concatenate(owners[kind]) for kind in mesh.solids])
 
     def _fitted(self, name: str, corners: Indices) -> list[tuple[str, Indices, Indices]]:
-        """Return kinds, cells and their leaves: leaves as they are, or green where edges are divided."""
+        """Return kinds, cells and their leaves: whole, or divided (green) where their edges are."""
         if name == "line2":
             return [(name, corners, np.arange(len(corners)))]
         middles = self._middles(self._edges(name, corners))

@@ -1,4 +1,4 @@
-"""A block that is finest around one corner of its top, where an indenter stands: two symmetric halves or quarters of it."""
+"""Half or quarter of a block under an indenter, finest around one corner of its top."""
 
 from __future__ import annotations
 
@@ -7,21 +7,17 @@ from numpy.typing import NDArray
 
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate._check import FACES, one_of, positive, unused
-from fastcontact.mesh.generate._places import with_points_at
-from fastcontact.mesh.generate._spacing import Spacing, divided
-from fastcontact.mesh.generate.blocks import block
-from fastcontact.mesh.generate.box import SOLIDS, box
+from fastcontact.mesh.generate._lattice import graded, on_lines
+from fastcontact.mesh.generate._places import with_cells_inside, with_points_at
+from fastcontact.mesh.generate._spacing import Spacing
+from fastcontact.mesh.generate.box import SOLIDS
 from fastcontact.mesh.generate.transform import renamed
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
 
 _NAMES_2D = {"LEFT": "SYMMETRY_X", "RIGHT": "SIDE", "TOP": "TOP", "BOTTOM": "BOTTOM"}
-_NAMES_3D = {
-    "XMIN": "SYMMETRY_X",
-    "YMIN": "SYMMETRY_Y",
-    "XMAX": "SIDE",
-    "YMAX": "SIDE",
+_NAMES_3D = {"XMIN": "SYMMETRY_X", "YMIN": "SYMMETRY_Y", "XMAX": "SIDE", "YMAX": "SIDE"} | {
     "ZMAX": "TOP",
     "ZMIN": "BOTTOM",
 }
@@ -41,8 +37,8 @@ def graded_block(
 ) -> Mesh:
     """Block under an indenter: x >= 0, and y >= 0 in three dimensions, its top at height 0, finest at the origin.
 
-    For half planes and half spaces in contact with a rigid obstacle: 8 contact radii of width and depth leave a few
-    thousandths of the pressure. The height is the last coordinate, as for obstacles. Groups of cells: BLOCK, TOP,
+    It stands for a half plane or half space in contact with a rigid obstacle: with 8 contact radii of width and depth the
+    pressure is wrong by a few thousandths. The height is the last coordinate, as for obstacles. Groups of cells: BLOCK, TOP,
     CONTACT (the finely meshed part of the top), BOTTOM, SIDE, SYMMETRY_X (x = 0) and, in three dimensions, SYMMETRY_Y
     (y = 0). Group of points: POLE (the origin).
 
@@ -54,11 +50,9 @@ def graded_block(
         Extent along x, and along y in three dimensions [length].
     depth : float, optional
         Extent downward, `width` by default [length].
-    contact_radius : float, optional
-        Distance from the origin up to which `contact_size` holds, width/10 by default; half as deep. Choose it a little
-        wider than the contact [length].
-    contact_radius_y : float, optional
-        The same along y, for elliptical contacts in three dimensions; `contact_radius` by default [length].
+    contact_radius, contact_radius_y : float, optional
+        Distances along x, and along y in three dimensions, up to which `contact_size` holds; width/10 and `contact_radius`
+        by default; half as deep. Choose them a little wider than the contact [length].
     contact_size : float, optional
         Edges at the contact, a tenth of the smaller radius by default [length].
     size : float, optional
@@ -66,19 +60,13 @@ def graded_block(
     growth : float
         Increase of the edges over the distance beyond, until they reach `size`.
 
-    Raises
-    ------
-    MeshError
-        If an argument is out of range.
-
     Examples
     --------
     >>> mesh = graded_block("tet4", width=8.0, contact_radius=1.0, contact_radius_y=2.0, contact_size=0.5)
     >>> mesh.dim, mesh.point("POLE") in mesh.points_of("CONTACT")
     (3, True)
     """
-    one_of("element", element, (*FACES, *SOLIDS))
-    dim = elements.get(element).dim
+    dim = elements.get(one_of("element", element, (*FACES, *SOLIDS))).dim
     width = positive("width", width)
     depth = width if depth is None else positive("depth", depth)
     radius = width / 10 if contact_radius is None else positive("contact_radius", contact_radius, width, "width")
@@ -89,42 +77,22 @@ def graded_block(
         radii[1] = positive("contact_radius_y", contact_radius_y, width, "width")
     far = width / 4 if size is None else positive("size", size, width, "width")
     near = min(min(radii) / 10, far) if contact_size is None else positive("contact_size", contact_size, far, "size")
-    growth = positive("growth", growth, 1.0)
-    lines = [_lines(width, radius, near, far, growth) for radius in radii]
-    lines.append(-_lines(depth, min(*radii, 2 * depth) / 2, near, far, growth)[::-1])
-    return _named(_placed(element, lines), lines, radii)
+    reach = max(far - near, near) / positive("growth", growth, 1.0)
 
+    def places(length: float, plateau: float) -> Array:
+        return graded(length, Spacing(near, far, plateau=plateau, reach=plateau + reach))
 
-def _lines(length: float, plateau: float, near: float, far: float, growth: float) -> Array:
-    """Return places (n + 1,) from 0 to `length`: edges of `near` up to `plateau`, then growing to `far`."""
-    spacing = Spacing(near, far, plateau=plateau, reach=plateau + max(far - near, near) / growth)
-    return divided(lambda s: np.column_stack([length * s, np.zeros(len(s))]), length, spacing)[:, 0]
-
-
-def _placed(element: str, lines: list[Array]) -> Mesh:
-    """Return a lattice of unit cells with its points moved to the grid `lines`."""
-    cells = [len(places) - 1 for places in lines]
-    unit = [float(n) for n in cells]
-    if len(lines) == 2:
-        lattice = block((unit[0], unit[1]), (cells[0], cells[1]), element)
-    else:
-        lattice = box((unit[0], unit[1], unit[2]), (cells[0], cells[1], cells[2]), element, name="BLOCK")
-    moved = [np.interp(x, np.arange(len(places)), places) for x, places in zip(lattice.points.T, lines, strict=True)]
-    return lattice.replace(points=np.column_stack(moved))
+    lines = [*(places(width, radius) for radius in radii), -places(depth, min(*radii, 2 * depth) / 2)[::-1]]
+    return _named(on_lines(element, lines), lines, radii)
 
 
 def _named(mesh: Mesh, lines: list[Array], radii: list[float]) -> Mesh:
     """Return the mesh with the groups of `graded_block`."""
-    names = dict.fromkeys(_CORNERS) | (_NAMES_2D if mesh.dim == 2 else _NAMES_3D)
-    mesh = renamed(mesh, names)
+    mesh = renamed(mesh, dict.fromkeys(_CORNERS) | (_NAMES_2D if mesh.dim == 2 else _NAMES_3D))
     # Grid lines rarely stand at the radius itself: up to the first one not short of it.
     edges = np.array(
         [places[places >= min(radius, places[-1]) * (1 - 1e-9)][0] for places, radius in zip(lines, radii)]
     )
-    chosen = []
-    for name, rows in mesh.split(mesh.cell_groups["TOP"]).items():
-        reach = mesh.points[mesh.cells[name][rows]][:, :, :-1].max(axis=1)
-        inside = (reach <= edges * (1 + 1e-9)).all(axis=1)
-        chosen.append(mesh.offsets[name] + rows[inside])
-    mesh = mesh.with_groups(cells={"CONTACT": np.concatenate(chosen)})
+    fine = edges * (1 + 1e-9)
+    mesh = with_cells_inside(mesh, "CONTACT", "TOP", lambda points: np.all(points[:, :-1] <= fine, axis=1))
     return with_points_at(mesh, {"POLE": [0.0] * mesh.dim})

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.mesh.generate._blocks import structured, transfinite
-from fastcontact.mesh.generate._check import FACES, TRIANGLES, count, one_of, pair, positive, unused, within
+from fastcontact.mesh.generate._check import FACES, TRIANGLES, at_most, count, each, one_of, positive, unused, within
 from fastcontact.mesh.generate._outline import arc, filled, straight
 from fastcontact.mesh.generate._places import with_points_at
 from fastcontact.mesh.generate._spacing import Spacing, divided, geometric
@@ -51,32 +51,20 @@ def half_spheres(
         elements lie on the circle.
     R : float
         Radius [length].
-    size : float, optional
-        Triangles only: longest edge, R/25 by default [length].
-    contact_size : float, optional
-        Triangles only: longest edge at the pole; it grows linearly to `size` at the distance R from the pole. By
-        default the mesh is uniform [length].
+    size, contact_size : float, optional
+        Triangles only: longest edge, R/25 by default, and longest edge at the pole, from which it grows linearly to `size`
+        at the distance R; by default the mesh is uniform [length].
     contact_radius : float, optional
         Triangles only: distance from the pole up to which `contact_size` holds, 0 by default [length].
     arc_sizes : (float, float), optional
-        Quadrangles only: segments of the arc at its pole and at D, in geometric progression between; R/250 and R/25
-        by default. The number of segments is a whole number, so both sizes come out shorter by one common factor
-        [length].
+        Quadrangles only: segments of the arc at its pole and at D, in geometric progression between; R/250 and R/25 by
+        default. The number of segments is whole, so both are shorter in the end by one common factor [length].
     segments : int, optional
         Quadrangles only: segments on the sides of the square A-M, on D-B and on the radial lines M-C, N-D and P-B;
         15 by default.
     radial_sizes : (float, float), optional
         Quadrangles only: segments of the radial line M-C at the contact C and at M, in geometric progression
         between; by default `segments` of them, graded as much as the arc [length].
-
-    Returns
-    -------
-    Mesh
-
-    Raises
-    ------
-    MeshError
-        If an argument is out of range or means nothing to the element.
 
     Examples
     --------
@@ -85,15 +73,9 @@ def half_spheres(
     False
     """
     lower = quarter_disc(
-        element,
-        R=R,
-        size=size,
-        contact_size=contact_size,
-        contact_radius=contact_radius,
-        arc_sizes=arc_sizes,
-        segments=segments,
-        radial_sizes=radial_sizes,
-    )
+        element, R=R, size=size, contact_size=contact_size, contact_radius=contact_radius, arc_sizes=arc_sizes,
+        segments=segments, radial_sizes=radial_sizes,
+    )  # fmt: skip
     return union(lower, mirrored(lower, "y", rename=_UPPER))
 
 
@@ -117,11 +99,6 @@ def quarter_disc(
         As for `half_spheres`.
     body : {"lower", "upper"}
         Which one.
-
-    Raises
-    ------
-    MeshError
-        If an argument is out of range or means nothing to the element.
     """
     one_of("element", element, FACES)
     one_of("body", body, ("lower", "upper"))
@@ -165,29 +142,21 @@ def _of_triangles(R: float, spacing: Spacing) -> Mesh:
 
 
 def _of_quadrangles(
-    R: float,
-    arc_sizes: tuple[float, float] | None,
-    segments: int | None,
-    radial_sizes: tuple[float, float] | None,
+    R: float, arc_sizes: tuple[float, float] | None, segments: int | None, radial_sizes: tuple[float, float] | None
 ) -> Mesh:
     """Lower body in quad4: the square A-P-N-M and the two blocks between it and the arc."""
     n = 15 if segments is None else count("segments", segments)
     length = 0.25 * math.pi * R
-    near, far = (R / 250, R / 25) if arc_sizes is None else _sizes("arc_sizes", arc_sizes, length)
+    near, far = (R / 250, R / 25) if arc_sizes is None else each(at_most(length), "arc_sizes", arc_sizes)
     along = geometric(length, near, far)
     equal = np.linspace(0.0, 1.0, n + 1)
     if radial_sizes is None:
         lengths = (near / far) ** (np.arange(n) / max(n - 1, 1))
         outward = np.append(0.0, np.cumsum(lengths)) / lengths.sum()
     else:
-        at_contact, inside = _sizes("radial_sizes", radial_sizes, 0.5 * R)
+        at_contact, inside = each(at_most(0.5 * R), "radial_sizes", radial_sizes)
         outward = geometric(0.5 * R, inside, at_contact)
     return _three_blocks(R, along, outward, equal)
-
-
-def _sizes(name: str, value: tuple[float, float], length: float) -> tuple[float, float]:
-    first, second = pair(name, value)
-    return positive(f"{name}[0]", first, length), positive(f"{name}[1]", second, length)
 
 
 def _three_blocks(R: float, along: Array, outward: Array, equal: Array) -> Mesh:

@@ -18,14 +18,15 @@ from fastcontact.mesh.topology import outer_facets
 
 Array = NDArray[np.float64]
 Indices = NDArray[Any]
+Mask = NDArray[np.bool_]
 
-# Ends this near to a curve, relative to their edge, lie on it.
-_ON_CURVE = 1e-6
+# Nodes this near to a curve, relative to their edge, lie on it.
+ON_CURVE = 1e-6
 _WITH_CENTRE = {"quad8": "quad9"}
 
 
 class Curve(Protocol):
-    """What `to_quadratic` asks of a curve: the group it carries, and the nearest points on it."""
+    """The true shape of a group of facets."""
 
     @property
     def group(self) -> str | None:
@@ -33,7 +34,7 @@ class Curve(Protocol):
         ...
 
     def project(self, points: Array) -> Array:
-        """Nearest points (n, dim) on the curve."""
+        """Return the points (n, dim) [length] of the curve nearest to `points` (n, dim) [length]."""
         ...
 
 
@@ -46,14 +47,9 @@ class Circle:
     centre : (float, float)
         [length].
     radius : float
-        [length].
+        Greater than 0 [length].
     group : str, optional
         Group of facets that lie on it; by default all outer facets whose ends do.
-
-    Raises
-    ------
-    MeshError
-        If the radius is not a positive number.
     """
 
     centre: tuple[float, float]
@@ -65,7 +61,7 @@ class Circle:
             raise MeshError(f"radius = {self.radius} is out of range: it must be greater than 0")
 
     def project(self, points: Array) -> Array:
-        """Nearest points (n, 2) on the circle."""
+        """Return the points (n, 2) [length] of the circle nearest to `points` (n, 2) [length]."""
         arms = points - np.asarray(self.centre)
         length = np.hypot(arms[:, 0], arms[:, 1])
         # The centre itself has no nearest point: it stays, far from the circle.
@@ -90,7 +86,7 @@ def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool
     Raises
     ------
     MeshError
-        If a cell is quadratic already, `centre_nodes` is asked of a 3D mesh, a curve's group has no edge on the
+        If a cell is quadratic already, `centre_nodes` is given for a 3D mesh, a curve's group has no edge on the
         curve, or a cell is folded by its curved side (its Jacobian is not positive at a quadrature point).
     """
     names = _quadratic_names(mesh, centre_nodes)
@@ -105,7 +101,7 @@ def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool
         mids = mesh.n_points + np.searchsorted(edges, _edge_keys(name, block, mesh.n_points))
         columns = [block, mids]
         if names[name] in _WITH_CENTRE.values():
-            points.append(_centres(mesh.points[block], middles[mids - mesh.n_points]))
+            points.append(centres(mesh.points[block], middles[mids - mesh.n_points]))
             columns.append(n_points + np.arange(len(block))[:, None])
             n_points += len(block)
         cells[names[name]] = np.column_stack(columns)
@@ -115,7 +111,7 @@ def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool
 
 
 def in_element(mesh: Mesh, element: str, curves: Iterable[Curve] = ()) -> Mesh:
-    """Return a checked linear mesh in the wanted element: as it is, or made quadratic on the curves."""
+    """Return a linear mesh, or the quadratic mesh on the curves if `element` is quadratic; its cells are checked."""
     if elements.get(element).order == 1:
         check_cells(mesh)
         return mesh
@@ -136,7 +132,7 @@ def _quadratic_names(mesh: Mesh, centre_nodes: bool) -> dict[str, str]:
 
 
 def _edge_keys(name: str, block: Indices, n_points: int) -> Indices:
-    """One number (n_cells, n_edges) per edge, the same in all cells that share it."""
+    """Return one number for each edge (n_cells, n_edges), the same in all cells that share it."""
     ends = np.sort(block[:, elements.get(name).edges].astype(np.int64), axis=2)
     return ends[:, :, 0] * n_points + ends[:, :, 1]
 
@@ -153,24 +149,30 @@ def _ends(keys: Indices, n_points: int) -> Indices:
 
 
 def edges_on(mesh: Mesh, curve: Curve) -> Indices:
-    """Return the edges of the curve's facets that have both ends on it, each as ``least end << 32 | greatest end``.
+    """Return the edges (n,) of the curve's facets that have both ends on it, each as ``least end << 32 | greatest end``.
 
-    Raises
-    ------
-    MeshError
-        If there is none.
+    MeshError if there is none.
     """
-    facets = outer_facets(mesh) if curve.group is None else mesh.cells_of(curve.group, dim=mesh.dim - 1)
-    ends = _ends(_edges(facets, mesh.n_points), mesh.n_points)
-    places = mesh.points[ends]
-    length = np.linalg.norm(places[:, 1] - places[:, 0], axis=1)
-    flat = places.reshape(-1, mesh.dim)
-    off = np.linalg.norm(curve.project(flat) - flat, axis=1).reshape(-1, 2).max(axis=1)
-    on = off <= _ON_CURVE * length
+    ends = _ends(_edges(facets_of(mesh, curve), mesh.n_points), mesh.n_points)
+    on = all_on(mesh, curve, ends)
     if not on.any():
         where = "outer facets" if curve.group is None else f"group '{curve.group}'"
         raise MeshError(f"no edge of {where} has both ends on {curve}: check its centre and radius")
     return ends[on, 0] << 32 | ends[on, 1]
+
+
+def facets_of(mesh: Mesh, curve: Curve) -> Mapping[str, Indices]:
+    """Return the facets (n, n_nodes) of the curve's group, by facet element."""
+    return outer_facets(mesh) if curve.group is None else mesh.cells_of(curve.group, dim=mesh.dim - 1)
+
+
+def all_on(mesh: Mesh, curve: Curve, nodes: Indices) -> Mask:
+    """Return whether all nodes of each facet or edge (n,) lie on the curve; `nodes` (n, n_nodes), its ends first."""
+    places = mesh.points[nodes]
+    length = np.linalg.norm(places[:, 1] - places[:, 0], axis=1)
+    flat = places.reshape(-1, mesh.dim)
+    off = np.linalg.norm(curve.project(flat) - flat, axis=1).reshape(nodes.shape).max(axis=1)
+    return np.asarray(off <= ON_CURVE * length)
 
 
 def _rows_on(mesh: Mesh, curve: Curve, edges: Indices) -> Indices:
@@ -179,6 +181,9 @@ def _rows_on(mesh: Mesh, curve: Curve, edges: Indices) -> Indices:
     return np.searchsorted(edges, (found >> 32) * mesh.n_points + (found & 0xFFFFFFFF))
 
 
-def _centres(corners: Array, middles: Array) -> Array:
-    """Centre of curved quadrangles (n_cells, dim): where the eight-node shape functions put it."""
+def centres(corners: Array, middles: Array) -> Array:
+    """Return the centres (n, dim) [length] of curved quadrangles, by the eight-node shape functions.
+
+    From their `corners` (n, 4, dim) [length] and `middles` (n, 4, dim) [length] of their sides.
+    """
     return 0.5 * middles.sum(axis=1) - 0.25 * corners.sum(axis=1)

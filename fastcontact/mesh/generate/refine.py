@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.generate.quadratic import Circle, Curve
+from fastcontact.mesh.generate.quadratic import ON_CURVE, Circle, Curve, all_on, facets_of
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
-from fastcontact.mesh.topology import outer_facets
 
 Array = NDArray[np.float64]
 Indices = NDArray[Any]
@@ -36,26 +35,16 @@ _CHILDREN = {
         [[-1.0, 0.0], [0.0, 0.0], [0.0, 1.0], [-1.0, 1.0]],
     ],
 }
-# Nodes this near to a curve, relative to the longest edge of the mesh there, lie on it.
-_ON_CURVE = 1e-6
-# A polyline that turns by more than this from one node to the next is no picture of a circle.
+# A line that turns by more than this from one node to the next does not count as a circle.
 _TURN = np.pi / 5
 
 
 @dataclass(frozen=True, eq=False)
 class _Pattern:
-    """How cells of one element are divided.
+    """How cells of one element are divided: the points of the children, the parent's own nodes first.
 
-    Attributes
-    ----------
-    shape : ndarray (m, n_nodes)
-        Shape functions of the parent at all points of its children; the parent's own nodes come first.
-    children : ndarray of int (n_children, n_nodes)
-        Children by those points.
-    on_edge : ndarray of int (m,)
-        Edge on which a new point lies; -1 for the parent's nodes and for points inside.
-    along : ndarray of int (m,)
-        Position of a new point along its edge, in quarters from the edge's first corner.
+    `shape` (m, n_nodes) has the shape functions of the parent at these points, `children` (n_children, n_nodes) their
+    numbers. A new point lies on the edge `on_edge` (m,) of the parent, -1 for others, `along` (m,) quarters from its begin.
     """
 
     shape: Array
@@ -92,7 +81,7 @@ def _pattern(name: str) -> _Pattern:
 
 
 def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
-    """Return the mesh with every line halved and every triangle and quadrangle quartered.
+    """Return the mesh with every line divided in two and every triangle and quadrangle in four.
 
     New points stand where the parent's shape functions put them; on a curve if they belong to a facet of the curve's
     group all of whose nodes lie on it. Points keep their numbers. Cell groups hold the children of their cells; a new
@@ -130,8 +119,8 @@ def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
 def _numbered(mesh: Mesh) -> tuple[Indices, dict[str, Indices], dict[str, Indices]]:
     """Number the new points: first those on edges, once for all cells that share them, then those inside cells.
 
-    Return the sorted keys of the points on edges; by element the points that its cells bring in, (n, 3) rows of cell,
-    lattice point and place among the new points; by element the points of every cell's lattice.
+    Return the sorted keys of the points on edges; by element the new points of its cells, (n, 3) rows of cell, lattice point
+    and place among the new points; by element the points of every cell's lattice.
     """
     numbers, codes, sources = {}, [], []
     for name, block in mesh.cells.items():
@@ -185,14 +174,7 @@ def _edge_nodes(name: str) -> list[list[int]]:
 
 def _facets_on(mesh: Mesh, curve: Curve) -> list[Indices]:
     """Facets of the curve's group, block by block, all of whose nodes lie on the curve."""
-    facets = outer_facets(mesh) if curve.group is None else mesh.cells_of(curve.group, dim=1)
-    found = []
-    for block in facets.values():
-        places = mesh.points[block]
-        length = np.linalg.norm(places[:, 1] - places[:, 0], axis=1)
-        flat = places.reshape(-1, mesh.dim)
-        off = np.linalg.norm(curve.project(flat) - flat, axis=1).reshape(block.shape)
-        found.append(block[off.max(axis=1) <= _ON_CURVE * length])
+    found = [block[all_on(mesh, curve, block)] for block in facets_of(mesh, curve).values()]
     if not sum(map(len, found)):
         where = "outer facet" if curve.group is None else f"facet of group '{curve.group}'"
         raise MeshError(f"no {where} has all its nodes on {curve}: check its centre and radius")
@@ -267,8 +249,8 @@ def linearised(mesh: Mesh) -> Mesh:
 def circles(mesh: Mesh) -> list[Circle]:
     """Return the circles on which groups of outer facets lie, one a group, so that `refined` can keep to them.
 
-    A circle through the nodes is found by least squares. It counts if all nodes lie on it to rounding, there are more
-    nodes than make a circle, and the line turns gently: four corners of a square lie on a circle, too.
+    A circle through the nodes is found by least squares. It counts if all nodes lie on it to rounding, there are more than
+    three, and the line turns gently: four corners of a square lie on a circle, too.
     """
     found = []
     for group in mesh.cell_groups:
@@ -295,6 +277,6 @@ def _circle(mesh: Mesh, group: str, blocks: list[Indices]) -> Circle | None:
     radius = np.sqrt(max(c + a * a + b * b, 0.0))
     longest = max(np.linalg.norm(np.diff(mesh.points[block[:, :2]], axis=1), axis=2).max() for block in blocks) / size
     off = np.abs(np.hypot(x[:, 0] - a, x[:, 1] - b) - radius).max()
-    if off > _ON_CURVE * longest or longest > 2 * radius * np.sin(_TURN / 2):
+    if off > ON_CURVE * longest or longest > 2 * radius * np.sin(_TURN / 2):
         return None
     return Circle((float(middle[0] + size * a), float(middle[1] + size * b)), float(radius * size), group)

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import MeshError
 from fastcontact.mesh.generate._blocks import structured
-from fastcontact.mesh.generate._check import FACES, TRIANGLES, affordable, count, one_of, pair, positive
-from fastcontact.mesh.generate.quadratic import Circle, to_quadratic
+from fastcontact.mesh.generate._check import FACES, TRIANGLES, affordable, count, each, one_of, positive
+from fastcontact.mesh.generate.quadratic import Circle, in_element
 from fastcontact.mesh.generate.transform import union
 from fastcontact.mesh.mesh import Mesh
 
@@ -41,11 +41,6 @@ def rings(
     divisions_inner, divisions_outer : (int, int)
         Cells along the radius and around the quarter; those around may differ.
 
-    Raises
-    ------
-    MeshError
-        If an argument is out of range.
-
     Examples
     --------
     >>> sorted(rings("quad4").cell_groups)[:4]
@@ -57,16 +52,14 @@ def rings(
     if not a < b < c:
         raise MeshError(f"inner_radius, interface_radius and outer_radius must increase, not {a:g}, {b:g}, {c:g}")
     return union(
-        _ring(element, (a, b), pair("divisions_inner", divisions_inner), "INNER", ("BORE", "CONT_INNER")),
-        _ring(element, (b, c), pair("divisions_outer", divisions_outer), "OUTER", ("CONT_OUTER", "RIM")),
+        _ring(element, (a, b), each(count, "divisions_inner", divisions_inner), "INNER", ("BORE", "CONT_INNER")),
+        _ring(element, (b, c), each(count, "divisions_outer", divisions_outer), "OUTER", ("CONT_OUTER", "RIM")),
     )
 
 
-def _ring(
-    element: str, radii: tuple[float, float], divisions: tuple[int, int], name: str, sides: tuple[str, str]
-) -> Mesh:
+def _ring(element: str, radii: tuple[float, float], divisions: list[int], name: str, sides: tuple[str, str]) -> Mesh:
     """Return a quarter of one ring; its sides are those at the smaller and at the larger radius."""
-    n, m = (count(f"divisions_{name.lower()}[{i}]", value) for i, value in enumerate(divisions))
+    n, m = divisions
     r, angle = np.linspace(*radii, n + 1), np.linspace(0.0, math.pi / 2, m + 1)
     cosine, sine = np.cos(angle), np.sin(angle)
     cosine[-1] = 0.0
@@ -74,7 +67,5 @@ def _ring(
     grid = r[:, None, None] * np.column_stack([cosine, sine])[None]
     groups = {"LEFT": sides[0], "RIGHT": sides[1], "BOTTOM": "SYMMETRY_Y", "TOP": "SYMMETRY_X"}
     mesh = structured(grid, name, groups, triangles=element in TRIANGLES)
-    if element in ("tri3", "quad4"):
-        return mesh
     circles = [Circle((0.0, 0.0), radius, group) for radius, group in zip(radii, sides, strict=True)]
-    return to_quadratic(mesh, circles, centre_nodes=element == "quad9")
+    return in_element(mesh, element, circles)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.mesh.generate._check import count, one_of, pair, positive
+from fastcontact.mesh.generate._check import count, each, one_of, positive
+from fastcontact.mesh.generate._lattice import graded, on_lines
 from fastcontact.mesh.generate._places import with_points_at
-from fastcontact.mesh.generate._spacing import Spacing, divided, segments_for
-from fastcontact.mesh.generate.box import box
+from fastcontact.mesh.generate._spacing import Spacing, segments_for
 from fastcontact.mesh.generate.transform import merge_points, renamed, union
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
@@ -63,11 +63,6 @@ def sphere_on_block(
         Increase of the edges over the distance beyond, until they reach `size`. It bounds the accuracy that a smaller
         `contact_size` brings.
 
-    Raises
-    ------
-    MeshError
-        If an argument is out of range.
-
     Examples
     --------
     >>> mesh = sphere_on_block("tet4", contact_size=5.0)
@@ -76,13 +71,12 @@ def sphere_on_block(
     """
     one_of("element", element, SOLIDS)
     R = positive("R", R)
-    width, height = (R, R) if block_size is None else pair("block_size", block_size)
+    width, height = each(positive, "block_size", (R, R) if block_size is None else block_size)
     sphere = sphere_octant(
         element, R=R, size=size, contact_size=contact_size, contact_radius=contact_radius, growth=growth
     )
     spacing = _spacing(R, size, contact_size, contact_radius, growth)
-    across = _graded(positive("block_size[0]", width), spacing)
-    down = _graded(positive("block_size[1]", height), _shallow(spacing))
+    across, down = graded(width, spacing), graded(height, _shallow(spacing))
     names = {"BLOCK": "BLOCK", "XMIN": "SYMMETRY_X", "YMIN": "SYMMETRY_Z", "ZMIN": "CONT_BLOCK", "ZMAX": "BLOCK_BOTTOM"}
     names |= {"XMAX": "BLOCK_SIDE", "YMAX": "BLOCK_SIDE"}
     block = _mapped(
@@ -108,18 +102,13 @@ def sphere_octant(
     ----------
     element, R, size, contact_size, contact_radius, growth
         As for `sphere_on_block`.
-
-    Raises
-    ------
-    MeshError
-        If an argument is out of range.
     """
     one_of("element", element, SOLIDS)
     R = positive("R", R)
     spacing = _spacing(R, size, contact_size, contact_radius, growth)
     eighth = math.pi / 4
-    around = _graded(R * eighth, spacing) / R
-    outward = 1.0 - _graded((1.0 - INNER) * R, _shallow(spacing))[::-1] / ((1.0 - INNER) * R)
+    around = graded(R * eighth, spacing) / R
+    outward = 1.0 - graded((1.0 - INNER) * R, _shallow(spacing))[::-1] / ((1.0 - INNER) * R)
     upward = np.linspace(0.0, eighth, count("segments", segments_for(R * eighth, spacing.far)) + 1)
 
     def ball(outside: int) -> Map:
@@ -176,17 +165,11 @@ def _shallow(spacing: Spacing) -> Spacing:
     return Spacing(spacing.near, spacing.far, plateau=spacing.plateau - shift, reach=spacing.reach - shift)
 
 
-def _graded(length: float, spacing: Spacing) -> Array:
-    """Return places (n + 1,) from 0 to `length` after a spacing about 0 [length]."""
-    return divided(lambda s: np.column_stack([length * s, np.zeros(len(s))]), length, spacing)[:, 0]
-
-
-def _mapped(element: str, grid: tuple[Array, Array, Array], place: Map, solid: str, names: Mapping[str, str]) -> Mesh:
+def _mapped(element: str, grid: Sequence[Array], place: Map, solid: str, names: Mapping[str, str]) -> Mesh:
     """Return a box with the given grid lines, mapped; of its groups and outer facets those that `names` lists."""
-    divisions = tuple(len(lines) - 1 for lines in grid)
-    lattice = box((1.0, 1.0, 1.0), (divisions[0], divisions[1], divisions[2]), element, name=solid)
-    parameters = [np.interp(x * n, np.arange(n + 1), lines) for x, n, lines in zip(lattice.points.T, divisions, grid)]
-    return renamed(_without_unnamed_facets(lattice.replace(points=place(*parameters)), names), dict(names))
+    lattice = on_lines(element, grid, solid)
+    lattice = lattice.replace(points=place(*lattice.points.T))
+    return renamed(_without_unnamed_facets(lattice, names), dict(names))
 
 
 def _without_unnamed_facets(mesh: Mesh, names: Mapping[str, str]) -> Mesh:

@@ -41,7 +41,6 @@ def on_prism(i, j, k):
 RULES = {
     "gauss_line": (rules.gauss_line(3), on_line, 5),
     "simpson": (rules.simpson_line(), on_line, 3),
-    "trapezium": (rules.trapezium_line(), on_line, 1),
     "subdivided simpson": (rules.subdivided(rules.simpson_line(), 3), on_line, 3),
     "gauss_square": (rules.gauss_square(2), on_square, 3),
     "triangle_1": (rules.triangle_1(), on_triangle, 1),
