@@ -24,7 +24,7 @@ def check_outputs(
     FastcontactError
         If there is no matplotlib for a picture.
     """
-    from fastcontact.mesh.files.targets import checked_target
+    from fastcontact.mesh.files.paths import checked_target
 
     drawn = [str(path) for path in pictures if path]
     source, seen = Path(os.path.realpath(read)), set()

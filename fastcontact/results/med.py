@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh.files.med import AXES, add_field, add_mesh, new_file
-from fastcontact.mesh.files.targets import PathLike
+from fastcontact.mesh.files.paths import PathLike
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results._layout import contact_pressure
+from fastcontact.results.layout import contact_pressure
 from fastcontact.results.step import StepResult
 
 Array = NDArray[np.float64]

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastcontact.errors import CaseError, ContactError, FileError, unknown
-from fastcontact.mesh.files.replacing import replacing
-from fastcontact.mesh.files.targets import PathLike
+from fastcontact.mesh.files.paths import PathLike, replacing
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import ordered_line
 from fastcontact.results.step import ContactResult, StepResult

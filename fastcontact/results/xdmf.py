@@ -7,9 +7,8 @@ from typing import Any
 from xml.etree import ElementTree
 
 from fastcontact.errors import FileError
-from fastcontact.mesh.files.replacing import replacing
-from fastcontact.mesh.files.targets import PathLike, checked_target
-from fastcontact.results import _layout as layout
+from fastcontact.mesh.files.paths import PathLike, checked_target, replacing
+from fastcontact.results import layout
 from fastcontact.results.reader import open_results
 
 Node = ElementTree.Element

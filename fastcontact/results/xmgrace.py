@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastcontact.errors import CaseError, unknown
-from fastcontact.mesh.files.replacing import replacing
-from fastcontact.mesh.files.targets import PathLike
+from fastcontact.mesh.files.paths import PathLike, replacing
 
 STYLES = ("line", "symbols", "line+symbols")
 

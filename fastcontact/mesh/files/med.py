@@ -1,13 +1,12 @@
 """MED files, as Salome and code_aster read and write them: meshes with groups, nodal results at all instants.
 
-With h5py alone. Arrays are stored component by component ("no interlace"), node numbers count from 1. Meshes
-of MED 2.3 to 4.x are read; what is written carries the stamp 3.0.0, which every later library reads, or 4.0.0 where
-there are wedges of 18 nodes, which came with that version.
+With h5py alone. Arrays are stored component by component ("no interlace"), node numbers count from 1. Meshes of MED 2.3 to
+4.x are read. Files are written in version 3.0.0, which all later libraries read, or 4.0.0, the first with wedges of 18 nodes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -17,8 +16,9 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import FileError, MeshError, unknown
 from fastcontact.mesh import elements
-from fastcontact.mesh.files._blocks import VERTEX, Block, build_mesh, check_known
-from fastcontact.mesh.files._med_families import (
+from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_known
+from fastcontact.mesh.files.hdf5 import attribute, opened, values
+from fastcontact.mesh.files.med_families import (
     Families,
     checked_name,
     decoded,
@@ -27,9 +27,7 @@ from fastcontact.mesh.files._med_families import (
     read_families,
     write_families,
 )
-from fastcontact.mesh.files.hdf5 import opened, values
-from fastcontact.mesh.files.replacing import replacing
-from fastcontact.mesh.files.targets import PathLike
+from fastcontact.mesh.files.paths import PathLike, replacing
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -52,18 +50,7 @@ AXES = ("X", "Y", "Z")
 
 @dataclass(frozen=True, eq=False)
 class MedContent:
-    """A mesh of a MED file, with what a reader wants to tell about it.
-
-    Attributes
-    ----------
-    mesh : Mesh
-    name : str
-        Name of the mesh in the file.
-    version : str
-        Version of the format, e.g. ``"3.0.7"``; empty if the file does not say.
-    n_vertices : int
-        Cells of one node; their groups have become groups of points.
-    """
+    """A mesh, its name in the file, the version of the format ("" if unknown), and the number of cells of one node."""
 
     mesh: Mesh
     name: str
@@ -93,7 +80,7 @@ def read_med_mesh(path: PathLike, mesh_name: str | None = None) -> Mesh:
 
 
 def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
-    """Read a mesh and what there is to tell about it; parameters and errors as in `read_med_mesh`."""
+    """Read a mesh with its name and version; parameters and errors as in `read_med_mesh`."""
     with opened(path) as file:
         name = _chosen_mesh(file, path, mesh_name)
         group = file["ENS_MAA"][name]
@@ -105,8 +92,10 @@ def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
 
 
 def _version(file: Any) -> str:
-    info = file["INFOS_GENERALES"].attrs if "INFOS_GENERALES" in file else {}
-    return ".".join(str(int(info[key])) for key in ("MAJ", "MIN", "REL") if key in info)
+    if "INFOS_GENERALES" not in file:
+        return ""
+    info = file["INFOS_GENERALES"]
+    return ".".join(str(int(attribute(info, key))) for key in ("MAJ", "MIN", "REL") if key in info.attrs)
 
 
 def _chosen_mesh(file: Any, path: PathLike, mesh_name: str | None) -> str:
@@ -124,10 +113,10 @@ def _chosen_mesh(file: Any, path: PathLike, mesh_name: str | None) -> str:
 
 
 def _read_mesh(file: Any, group: Any) -> tuple[Mesh, int]:
-    if int(group.attrs.get("TYP", 0)) != 0:
+    if int(attribute(group, "TYP", 0)) != 0:
         raise MeshError("it is a structured grid: convert it to an unstructured mesh")
     step = _first_step(group)
-    points = _read_points(step, group.attrs)
+    points = _read_points(step, group)
     name = group.name.rsplit("/", 1)[-1]
     folders = [folder for folder in (group.get("FAS"), file.get(f"FAS/{name}")) if folder is not None]
     families: Families = {}
@@ -155,17 +144,22 @@ def _first_step(group: Any) -> Any:
     steps = [entry for entry in group.values() if "NOE" in entry]
     if not steps:
         raise MeshError("it has no nodes: check that the file is complete")
-    return min(steps, key=lambda step: (int(step.attrs["NDT"]), int(step.attrs["NOR"])))
+    return min(steps, key=_order)
 
 
-def _read_points(step: Any, mesh_attributes: Mapping[str, Any]) -> Array:
+def _order(step: Any) -> tuple[int, int]:
+    """Return the numbers by which time steps are sorted."""
+    return int(attribute(step, "NDT")), int(attribute(step, "NOR"))
+
+
+def _read_points(step: Any, mesh: Any) -> Array:
     flat = values(step["NOE"], "COO")
-    attributes = step["NOE"]["COO"].attrs
-    system = int(mesh_attributes.get("REP", attributes.get("REP", 0)))
+    stored = step["NOE"]["COO"]
+    system = int(attribute(mesh if "REP" in mesh.attrs else stored, "REP", 0))
     if system != 0:
         kind = {1: "cylindrical", 2: "spherical"}.get(system, f"of kind {system}")
         raise MeshError(f"its coordinates are {kind}: convert them to Cartesian ones")
-    count = int(attributes["NBR"])
+    count = int(attribute(stored, "NBR"))
     dim = len(flat) // max(count, 1)
     if count == 0 or dim * count != len(flat):
         raise MeshError(f"it has {len(flat)} coordinates for {count} nodes: check that the file is complete")
@@ -204,7 +198,7 @@ def _cell_count(entry: Any) -> int:
     index = entry.get("INN")
     if index is not None:
         return max(len(index) - 1, 0)
-    return int(entry["NOD"].attrs.get("NBR", 0)) if "NOD" in entry else 0
+    return int(attribute(entry["NOD"], "NBR", 0)) if "NOD" in entry else 0
 
 
 def _read_nodes(entry: Any, code: str) -> NDArray[Any]:
@@ -219,7 +213,7 @@ def _read_nodes(entry: Any, code: str) -> NDArray[Any]:
 def write_med_mesh(path: PathLike, mesh: Mesh, *, mesh_name: str = "mesh") -> None:
     """Write a mesh with all its groups; the file appears only when it is complete.
 
-    When the file is read again, the elements stand in alphabetical order of their MED codes.
+    A reader gets the elements in alphabetical order of their MED codes.
 
     Parameters
     ----------
@@ -332,20 +326,7 @@ def _step_key(number: int, iteration: int) -> str:
 def add_field(
     file: Any, name: str, components: tuple[str, ...], field: Array, instant: tuple[int, float], mesh_name: str
 ) -> None:
-    """Add a nodal field to a file at one instant.
-
-    Parameters
-    ----------
-    file : h5py.File
-    name : str
-        Of the field.
-    components : tuple of str
-    field : ndarray (n_points, n_components)
-    instant : (int, float)
-        Number and time.
-    mesh_name : str
-        The mesh in the file that the field belongs to.
-    """
+    """Add a nodal field (n_points, n_components) to an open file, at an instant given by its number and time."""
     number, time = instant
     where = f"CHA/{name}"
     if where not in file:
@@ -372,9 +353,9 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
     Returns
     -------
     times : ndarray (n_instants,)
-        In the order of the file's step numbers.
+        In the order of the file's step numbers [-]: the load factor in files of fastcontact.
     values : ndarray (n_instants, n_points, n_components)
-        NaN at points where the file gives no value.
+        NaN at points without a value; in the unit of the field, e.g. [length] for ``"DEPL"``.
 
     Raises
     ------
@@ -389,20 +370,20 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
         instants = [entry for entry in group.values() if "NOE" in entry and "PDT" in entry.attrs]
         if not instants:
             raise FileError(f"field '{field}' of '{path}' has no values at nodes in the layout of MED 3 or 4")
-        instants.sort(key=lambda entry: (int(entry.attrs["NDT"]), int(entry.attrs["NOR"])))
-        times = np.array([entry.attrs["PDT"] for entry in instants], np.float64)
+        instants.sort(key=_order)
+        times = np.array([attribute(entry, "PDT") for entry in instants], np.float64)
         n_points = _field_size(file, group, instants)
-        n_components = int(group.attrs["NCO"])
+        n_components = int(attribute(group, "NCO"))
         return times, np.stack([_read_instant(file, entry["NOE"], n_points, n_components) for entry in instants])
 
 
 def _field_size(file: Any, group: Any, instants: list[Any]) -> int:
     """Return the number of points of the field's mesh, or of the field where the mesh is in another file."""
-    name = decoded(bytes(group.attrs["MAI"]))
+    name = decoded(bytes(attribute(group, "MAI")))
     if f"ENS_MAA/{name}" in file:
         mesh = file[f"ENS_MAA/{name}"]
-        return len(_read_points(_first_step(mesh), mesh.attrs))
-    n_components = int(group.attrs["NCO"])
+        return len(_read_points(_first_step(mesh), mesh))
+    n_components = int(attribute(group, "NCO"))
     return max(values(profile, "CO").size // n_components for entry in instants for profile in entry["NOE"].values())
 
 

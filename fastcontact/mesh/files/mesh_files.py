@@ -10,9 +10,8 @@ from types import MappingProxyType
 
 from fastcontact.errors import FileError
 from fastcontact.mesh import topology
-from fastcontact.mesh.files import _meshio, med
-from fastcontact.mesh.files.replacing import existing_file, replacing
-from fastcontact.mesh.files.targets import PathLike, checked_target
+from fastcontact.mesh.files import med, meshio_files
+from fastcontact.mesh.files.paths import PathLike, checked_target, existing_file, replacing
 from fastcontact.mesh.mesh import Mesh
 
 logger = logging.getLogger("fastcontact")
@@ -96,7 +95,7 @@ def read_mesh_report(path: PathLike, *, mesh_name: str | None = None, orient: bo
     elif mesh_name is not None:
         raise FileError(f"'{path}' is no MED file, so its mesh has no name: leave out mesh_name='{mesh_name}'")
     else:
-        other = _meshio.read(found)
+        other = meshio_files.read(found)
         mesh, file_format, name = other.mesh, other.format, ""
         dropped = {"vertex": other.n_vertices, "duplicate": other.n_duplicates}
     mesh, n_turned = topology.oriented(mesh) if orient else (mesh, 0)
@@ -139,4 +138,4 @@ def write_mesh(path: PathLike, mesh: Mesh) -> None:
         med.write_med_mesh(target, mesh)
         return
     with replacing(target) as temporary:
-        _meshio.write(target, temporary, mesh)
+        meshio_files.write(target, temporary, mesh)

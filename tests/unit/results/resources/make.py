@@ -18,7 +18,7 @@ import numpy as np
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, box
-from fastcontact.results import _layout as layout
+from fastcontact.results import layout
 
 HERE = Path(__file__).parent
 CASE_TEXT = 'title = "old"\n'
