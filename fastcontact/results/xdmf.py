@@ -13,15 +13,15 @@ from fastcontact.results.reader import open_results
 
 Node = ElementTree.Element
 
-# XDMF puts the six components of a symmetric tensor in an order that is not VTK's, so they go one by one.
+# XDMF orders the six components of a symmetric tensor otherwise than VTK, so each is a field of its own.
 STRESS_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 
 def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
     """Write an XDMF file that refers to the steps of a result file, for ParaView before 5.12.
 
-    The XDMF file holds no numbers, only where they stand in the result file: move the two together. It shows
-    the steps that were complete when it was written.
+    The XDMF file holds no numbers, only their places in the result file: move the two together. It shows the steps that
+    were complete when it was written.
 
     Parameters
     ----------
@@ -33,8 +33,8 @@ def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
     Raises
     ------
     FileError
-        If the results cannot be read or hold no step, XDMF has no word for an element or for the name of the
-        result file, or the XDMF file cannot be written.
+        If the results cannot be read or hold no step, XDMF lacks an element, the result file has a name that XDMF cannot
+        refer to, or the XDMF file cannot be written.
     """
     target = checked_target(xdmf_path)
     with open_results(result_path) as results:

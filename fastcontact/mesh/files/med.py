@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,8 +47,7 @@ FLOAT64 = 6
 AXES = ("X", "Y", "Z")
 
 
-@dataclass(frozen=True, eq=False)
-class MedContent:
+class MedContent(NamedTuple):
     """A mesh, its name in the file, the version of the format ("" if unknown), and the number of cells of one node."""
 
     mesh: Mesh
@@ -61,13 +59,7 @@ class MedContent:
 def read_med_mesh(path: PathLike, mesh_name: str | None = None) -> Mesh:
     """Read a mesh with its groups, cells oriented as they are in the file.
 
-    Of a mesh with several time steps the first one is read.
-
-    Parameters
-    ----------
-    path : path-like
-    mesh_name : str, optional
-        Which mesh to read, where the file holds several.
+    Of several meshes the one called `mesh_name` is read, of several time steps of a mesh the first one.
 
     Raises
     ------
@@ -119,9 +111,7 @@ def _read_mesh(file: Any, group: Any) -> tuple[Mesh, int]:
     points = _read_points(step, group)
     name = group.name.rsplit("/", 1)[-1]
     folders = [folder for folder in (group.get("FAS"), file.get(f"FAS/{name}")) if folder is not None]
-    families: Families = {}
-    for folder in folders:
-        families.update(read_families(folder))
+    families = {number: names for folder in folders for number, names in read_families(folder).items()}
     blocks = list(_read_blocks(step, families))
     point_groups: dict[str, Any] = dict.fromkeys(_group_names(families, +1), ())
     point_groups.update(_members(step["NOE"], len(points), families))
@@ -213,14 +203,7 @@ def _read_nodes(entry: Any, code: str) -> NDArray[Any]:
 def write_med_mesh(path: PathLike, mesh: Mesh, *, mesh_name: str = "mesh") -> None:
     """Write a mesh with all its groups; the file appears only when it is complete.
 
-    A reader gets the elements in alphabetical order of their MED codes.
-
-    Parameters
-    ----------
-    path : path-like
-    mesh : Mesh
-    mesh_name : str
-        Name of the mesh in the file, at most 64 bytes.
+    A reader gets the elements in alphabetical order of their MED codes. `mesh_name` may have 64 bytes.
 
     Raises
     ------
@@ -273,11 +256,7 @@ def add_mesh(file: Any, mesh: Mesh, mesh_name: str) -> None:
     if "/" in mesh_name:
         raise FileError(f"mesh name '{mesh_name}' holds a slash, which separates folders in a MED file: rename it")
     group = file.create_group(f"ENS_MAA/{mesh_name}")
-    _set(
-        group,
-        DIM=max(elements.get(name).dim for name in mesh.cells) if mesh.cells else mesh.dim,
-        ESP=mesh.dim,
-    )
+    _set(group, DIM=max((elements.get(name).dim for name in mesh.cells), default=mesh.dim), ESP=mesh.dim)
     _set(group, REP=0, SRT=0, TYP=0, NXT=NO_STEP, NXI=NO_STEP, UNT="", DES="fastcontact")
     _set(group, NOM=_padded(AXES[: mesh.dim]), UNI=_padded([""] * mesh.dim))
     step = group.create_group(_step_key(NO_STEP, NO_STEP))

@@ -9,7 +9,6 @@ import logging
 import threading
 import warnings
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
@@ -61,16 +60,6 @@ USUAL = (".med", ".msh", ".vtu", ".vtk", ".inp", ".xdmf", ".mesh")
 OTHER_FORMATS = "write .med, .vtu or .msh instead"
 
 
-@dataclass(frozen=True, eq=False)
-class MeshioContent:
-    """A mesh read by meshio: the mesh, its format, and cells left out as vertices and as duplicates."""
-
-    mesh: Mesh
-    format: str
-    n_vertices: int
-    n_duplicates: int
-
-
 def _refusal(action: str, path: Path, reason: str) -> FileError:
     reason = " ".join(reason.split())
     reason = reason if len(reason) <= LONGEST else f"{reason[:LONGEST]}..."
@@ -116,8 +105,8 @@ def _format(path: Path, writing: bool) -> str:
     return "gmsh"
 
 
-def read(path: Path) -> MeshioContent:
-    """Read a mesh and its groups.
+def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
+    """Return a mesh with its groups, the format, and the numbers of cells left out as vertices and as duplicates.
 
     Raises
     ------
@@ -134,12 +123,10 @@ def read(path: Path) -> MeshioContent:
     _log("read", path, found["said"])
     try:
         blocks = merged(_blocks(found, NODE_ORDER.get(file_format, {})))
-        n_duplicates = 0
-        if file_format == "gmsh":
-            # Version 2 of that format repeats a cell for each of its groups.
-            united = [without_duplicates(block) for block in blocks if block.kind != VERTEX]
-            blocks = [block for block, _ in united] + [block for block in blocks if block.kind == VERTEX]
-            n_duplicates = sum(count for _, count in united)
+        n_duplicates = sum(len(block.nodes) for block in blocks)
+        if file_format == "gmsh":  # version 2 of that format repeats a cell for each of its groups
+            blocks = [block if block.kind == VERTEX else without_duplicates(block) for block in blocks]
+        n_duplicates -= sum(len(block.nodes) for block in blocks)
         mesh = build_mesh(found["points"], blocks, _point_groups(found), _cell_group_names(found, file_format))
     except MeshError as error:
         raise MeshError(f"'{path}': {error}") from None
@@ -147,7 +134,7 @@ def read(path: Path) -> MeshioContent:
         # meshio has taken what stands in the file as it is: arrays of any shape and kind.
         raise FileError(f"the parts of '{path}' do not fit together: check the file, or convert it to .med") from error
     n_vertices = sum(len(block.nodes) for block in blocks if block.kind == VERTEX)
-    return MeshioContent(mesh, file_format, n_vertices, n_duplicates)
+    return mesh, file_format, {"vertex": n_vertices, "duplicate": n_duplicates}
 
 
 def _check_before(path: Path, file_format: str) -> None:
@@ -320,12 +307,13 @@ def _with_tags(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
             dim, tag = int(dims[members].max()), len(field_data) + 1
             tags[members[dims[members] == dim]] = tag
             field_data[name] = np.array([tag, dim])
-    cut = {
-        name: len(members) - int((tags[members] == field_data[name][0]).sum())
-        for name, members in mesh.cell_groups.items()
-        if name in field_data
-    }
-    _warn_of_cuts({name: count for name, count in cut.items() if count})
+    kept = {name: int((tags[mesh.cell_groups[name]] == tag).sum()) for name, (tag, _) in field_data.items()}
+    cut = {name: len(rows) - kept[name] for name, rows in mesh.cell_groups.items() if len(rows) > kept.get(name, 0)}
+    if cut:
+        _warn(
+            f"Gmsh files of version 2.2 hold one group a cell: {sum(cut.values())} memberships of the groups "
+            f"{', '.join(cut)} are left out; {KEEPS_ALL}"
+        )
     blocks = np.split(tags, list(mesh.offsets.values())[1:])
     cells, blocks = _with_vertices(parts["cells"], blocks, mesh.point_groups, field_data)
     data = {"gmsh:physical": blocks, "gmsh:geometrical": [np.maximum(block, 1) for block in blocks]}
@@ -349,14 +337,6 @@ def _with_vertices(
     vertices = np.concatenate(list(named.values()))[:, None]
     vertex_tags = np.concatenate([np.full(len(members), tags[name], np.int32) for name, members in named.items()])
     return [*cells, (VERTEX, vertices)], [*blocks, vertex_tags]
-
-
-def _warn_of_cuts(cut: Mapping[str, int]) -> None:
-    if cut:
-        _warn(
-            f"Gmsh files of version 2.2 hold one group a cell: {sum(cut.values())} memberships of the groups "
-            f"{', '.join(cut)} are left out; {KEEPS_ALL}"
-        )
 
 
 def _check_complete(path: Path, temporary: Path, file_format: str, mesh: Mesh) -> None:

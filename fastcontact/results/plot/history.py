@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fastcontact.results.plot._axes import UNITS, Units, new_axes
+from fastcontact.results.plot._axes import UNITS, Units, name_axes, new_axes
 from fastcontact.results.step import StepResult
 
 if TYPE_CHECKING:
@@ -28,9 +28,8 @@ def history(
 
     Parameters
     ----------
-    steps : sequence of StepResult
-    pair : str
-        Name of the contact pair.
+    steps, pair
+        Steps of an analysis, name of a contact pair.
     law : object with ``at_approach(d)``, optional
         A theory, drawn where `approach` is given.
     approach : float, optional
@@ -38,10 +37,6 @@ def history(
     title, units
         As in `pressure_profile`.
     axes : two matplotlib Axes, optional
-
-    Returns
-    -------
-    two matplotlib Axes
     """
     if axes is None:
         first = new_axes(None, (7.0, 6.4))
@@ -60,10 +55,9 @@ def history(
         curves = [law.at_approach(d) for d in fine]
         upper.plot(fine, [c.force for c in curves], "k-", lw=1, label="Hertz, equal approach")
         lower.plot(fine, [c.radius for c in curves], "k-", lw=1, label="Hertz, equal approach")
-    upper.set_ylabel(f"contact force [{units['force']}]")
-    lower.set_ylabel(f"contact radius [{units['length']}]")
-    lower.set_xlabel(f"approach [{units['length']}]" if approach else "load factor")
-    upper.set_title(title or f"Contact '{pair}' over the load")
+    name_axes(upper, "", f"contact force [{units['force']}]", title or f"Contact '{pair}' over the load")
+    along = f"approach [{units['length']}]" if approach else "load factor"
+    name_axes(lower, along, f"contact radius [{units['length']}]", "")
     for ax in axes:
         ax.grid(alpha=0.3)
         ax.legend()

@@ -24,8 +24,8 @@ def contact_zones(
 
     Parameters
     ----------
-    steps : sequence of StepResult
-    pair : str
+    steps, pair
+        Steps of an analysis, name of a contact pair.
     title, units, ax
         As in `pressure_profile`.
 
@@ -46,15 +46,8 @@ def contact_zones(
         if here.any():
             axes.plot(x[here], y[here], "o" if name != "open" else ".", ms=4, color=STATES[name], label=name)
     for step, contact in zip(steps, contacts, strict=True):
-        changed = int(contact.active.sum())
-        axes.annotate(
-            str(changed),
-            (step.load_factor, 1.0),
-            xycoords=("data", "axes fraction"),
-            ha="center",
-            va="bottom",
-            fontsize=7,
-        )
+        place = {"xycoords": ("data", "axes fraction"), "ha": "center", "va": "bottom"}
+        axes.annotate(str(int(contact.active.sum())), (step.load_factor, 1.0), fontsize=7, **place)
     reach = y[closed].max(initial=0.0)
     axes.set_ylim(0.0, 1.5 * reach if 0.0 < 1.5 * reach < y.max() else None)
     axes.set_xlabel("load factor (above: closed nodes)")
