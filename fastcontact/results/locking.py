@@ -14,7 +14,7 @@ from fastcontact.errors import FileError
 
 
 def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
-    """Take `size` bytes from `start` on for an open file, or raise OSError with nothing half written."""
+    """Reserve `size` bytes from `start` on for an open file, or raise OSError before anything is written."""
     if hasattr(os, "posix_fallocate"):
         try:
             os.posix_fallocate(descriptor, start, size)
@@ -27,7 +27,7 @@ def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
 
 
 def left_at(path: Path) -> tuple[int, ...] | None:
-    """Return what tells a file from others at the same path, and from itself once it is changed; None without one."""
+    """Return device, number, size and time of change of the file at a path, by which it is known again; None without one."""
     try:
         found = os.stat(path)
     except OSError:
@@ -36,10 +36,9 @@ def left_at(path: Path) -> tuple[int, ...] | None:
 
 
 class PathLock:
-    """Exclusive right to write one path, held through a file beside it.
+    """Exclusive right to write one path, through a locked file beside it; viewers may lock the result file itself.
 
-    The operating system drops the lock when its process ends, however it ends, so that there are no stale
-    locks. The result file itself is not locked: viewers that lock what they read could not follow a run.
+    The operating system ends the lock with its process, however that ends, so that no lock is left over.
 
     Raises
     ------

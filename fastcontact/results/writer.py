@@ -33,10 +33,10 @@ MARGIN = 1 << 19
 
 
 class ResultWriter:
-    """A result file that takes one step after the other.
+    """A result file to which one step after the other is written.
 
-    The file is begun at once: whatever forbids it shows before any step is computed. From then on it can be
-    opened at any time, by viewers too, and shows all steps so far, even after an exception or a crash.
+    The file is begun at once: errors show before any step is computed. From then on it can be opened at any time, by viewers
+    too, and shows all steps so far, even after an exception or a crash.
 
     Parameters
     ----------
@@ -51,10 +51,10 @@ class ResultWriter:
     overwrite : bool
         Whether an existing result file may be replaced.
     cell_fields : iterable of str
-        Names of the `StepResult.cell_fields` that every step brings; viewers show them, the XDMF sidecar does not.
+        Names of the `StepResult.cell_fields` of every step; viewers show them, the XDMF sidecar does not.
     resume : bool
-        Whether to keep the steps of an existing file of this mesh and write after them. A file that is not there yet, or
-        holds no complete step, is begun. The file is not touched before there is something to add.
+        Whether to keep the steps of an existing file of this mesh and write after them. A file that is missing or holds no
+        complete step is begun. The file is not changed before there is something to add.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class ResultWriter:
     n_steps : int
         Number of steps in the file.
     done : list of StepResult
-        The steps that the file held when it was taken up, for ``solve(..., resume=out.done)``; none without `resume`.
+        The steps that the file held at first, for ``solve(..., resume=out.done)``; none without `resume`.
 
     Raises
     ------
@@ -218,7 +218,7 @@ class ResultWriter:
         self._lock.release()
 
     def _open(self) -> None:
-        """Open a file that was taken up, once there is something to add to it."""
+        """Open a file that is resumed, once there is something to add to it."""
         import h5py
 
         if self._file is None:
@@ -234,7 +234,7 @@ class ResultWriter:
             self._pairs = {json.loads(read_text(pair["name"], self._committed)): pair for pair in pairs}
 
     def _check_in_place(self) -> None:
-        """Refuse to go on writing to a file that nobody would find, or that cannot be written any more."""
+        """Refuse to write to a file that is no longer at its path, or after an error."""
         self._committed.check()
         self._check_ours()
         with contextlib.suppress(OSError):
@@ -243,7 +243,7 @@ class ResultWriter:
         raise FileError(self._gone())
 
     def _check_ours(self) -> None:
-        """Refuse to write into what another program has written."""
+        """Refuse to write into a file that another program has written to."""
         if not self._committed.intact():
             raise FileError(
                 f"'{self.path}' was changed by another program after {self.n_steps} steps, what it holds now is left "
@@ -265,7 +265,7 @@ class ResultWriter:
 
     @contextlib.contextmanager
     def _explained(self, what: str) -> Iterator[None]:
-        """Turn what HDF5 or the system says into one sentence with a remedy; meanwhile signals wait."""
+        """Turn errors of HDF5 and of the system into one sentence with a remedy; meanwhile signals wait."""
         with uninterrupted():
             try:
                 yield
@@ -302,12 +302,11 @@ class ResultWriter:
         self._open()
 
     def _append_step_rows(self, step: StepResult) -> None:
-        """Write the rows that make the step one that viewers see, all but the number of steps."""
         contents.append_rows(self._file, self._mesh, self.n_steps, step, self._cell_fields)
 
 
 class _Resumed(NamedTuple):
-    """What a file holds: its steps, whether its run came to its end, and its case file."""
+    """The steps of a file, whether its run came to its end, and its case file."""
 
     steps: list[StepResult]
     complete: bool
@@ -357,7 +356,7 @@ def _same_mesh(one: Mesh, other: Mesh) -> bool:
 
 
 def _checked_names(cell_fields: Iterable[str], mesh: Mesh) -> tuple[str, ...]:
-    """Return names of cell fields that neither stand in a file already nor cannot be written."""
+    """Return the names of cell fields, if all of them can be written."""
     names = tuple(cell_fields)
     for name in names:
         if name in layout.cell_fields(mesh) or not name.isidentifier():
@@ -368,7 +367,7 @@ def _checked_names(cell_fields: Iterable[str], mesh: Mesh) -> tuple[str, ...]:
 
 
 def _check_replaceable(path: Any, overwrite: bool) -> None:
-    """Refuse to replace a file on request, or when it is plainly something else than a result."""
+    """Refuse to replace a file without `overwrite`, or one that is no result file."""
     import h5py
 
     if not path.exists() or not path.stat().st_size:

@@ -65,8 +65,8 @@ def check_contents(file: Any, path: PathLike) -> None:
     Raises
     ------
     FileError
-        If a link or the values of a data set lead to another file, a data set needs a filter that HDF5 does not bring
-        along or more memory than a file of this size can mean, or groups stand deeper or in more places than in a tree.
+        If a link or the values of a data set lead to another file, a data set needs a foreign filter or more memory than a
+        file of this size can mean, or groups stand too deep or in a circle.
     """
     from h5py import h5d, h5g, h5o
     from h5py.h5l import TYPE_HARD, TYPE_SOFT
@@ -96,7 +96,7 @@ def check_contents(file: Any, path: PathLike) -> None:
 
 
 def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> None:
-    """Refuse a data set whose values stand elsewhere, or whose size cannot be meant."""
+    """Refuse a data set whose values stand elsewhere, or that is too large for its file."""
     from h5py import h5d, h5z
 
     settings = dataset.get_create_plist()

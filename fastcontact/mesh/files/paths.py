@@ -71,10 +71,7 @@ def _may_write(path: Path) -> bool:
 
 @contextlib.contextmanager
 def replacing(path: PathLike) -> Iterator[Path]:
-    """Give a temporary path beside `path`, for a library that opens files itself; move it there on success.
-
-    What stood at `path` is untouched until the new file is complete; after a failure the temporary file is
-    gone.
+    """Give a temporary path beside `path` to write to, which takes its place on success and is removed after a failure.
 
     Raises
     ------
