@@ -140,7 +140,8 @@ class CommittedFile:
 
     def _fail(self, error: BaseException) -> None:
         """Keep the first error, without its frames, which would keep objects of HDF5 open."""
-        self.failure = self.failure or error.with_traceback(None)
+        error = error.with_traceback(None)  # the later ones, too: they may be the same object
+        self.failure = self.failure or error
 
     def _commit(self) -> None:
         waiting = sorted(self._pending.items(), key=lambda entry: self._turn(*entry))

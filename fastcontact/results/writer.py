@@ -269,9 +269,9 @@ class ResultWriter:
         with uninterrupted():
             try:
                 yield
-            except (OSError, RuntimeError, LookupError, ValueError) as error:  # HDF5 has many words for a failed read
+            except Exception as error:  # a failed read shows as errors of many kinds
                 failure = self._committed.failure if self._committed is not None else None
-                if failure is None and not isinstance(error, (OSError, RuntimeError)):
+                if failure is None and (isinstance(error, FileError) or not isinstance(error, (OSError, RuntimeError))):
                     raise
                 told = failure or error
                 if not isinstance(told, Exception):
