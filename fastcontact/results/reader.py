@@ -20,7 +20,7 @@ from fastcontact.mesh.files.paths import PathLike, existing_file
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import layout
 from fastcontact.results.step import ContactResult, StepResult
-from fastcontact.results.texts import RawFile, read_text
+from fastcontact.results.texts import read_text
 
 
 def open_results(path: PathLike) -> Results:
@@ -90,14 +90,13 @@ class Results(Sequence[StepResult]):
         self._file: Any = None
         try:
             with self._explained():
-                self._open()
-                self._read_header(self._file["fastcontact"])
+                self._read_header(self._open())
         except BaseException:
             self.close()
             raise
 
-    def _open(self) -> None:
-        """Open the file with HDF5, if it is one of ours and of a known schema."""
+    def _open(self) -> Any:
+        """Open the file with HDF5, if it is one of ours and of a known schema; return our group in it."""
         import h5py
 
         self._file = h5py.File(self._raw, "r")
@@ -111,6 +110,7 @@ class Results(Sequence[StepResult]):
             raise FileError(
                 f"'{self.path}' has schema {self.schema}, this fastcontact reads up to {layout.SCHEMA}: update it"
             )
+        return self._file["fastcontact"]
 
     def _read_header(self, own: Any) -> None:
         self._n_steps = _integer(self._file["VTKHDF/Steps"], "NSteps")
@@ -302,11 +302,11 @@ def _integer(group: Any, name: str) -> int:
     return int(group.attrs[name])
 
 
-def _read_json(dataset: Any, raw: RawFile) -> Any:
+def _read_json(dataset: Any, raw: Any) -> Any:
     return json.loads(read_text(dataset, raw))
 
 
-def _read_mesh(stored: Any, raw: RawFile) -> Mesh:
+def _read_mesh(stored: Any, raw: Any) -> Mesh:
     return Mesh(
         points=stored["points"][:, : _integer(stored, "dim")],
         cells={name: stored["cells"][name][()] for name in _read_json(stored["elements"], raw)},
@@ -315,7 +315,7 @@ def _read_mesh(stored: Any, raw: RawFile) -> Mesh:
     )
 
 
-def _read_groups(group: Any, raw: RawFile) -> dict[str, NDArray[np.int32]]:
+def _read_groups(group: Any, raw: Any) -> dict[str, NDArray[np.int32]]:
     names = _read_json(group["names"], raw)
     if group["sizes"].shape != (len(names),):
         raise ValueError(f"'{group.name}' has {len(names)} names for sizes of shape {group['sizes'].shape}")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import struct
-from typing import Any, Protocol
+from typing import Any
 
 SIGNATURE = b"GCOL\x01\0\0\0"  # with version and reserved bytes
 HEAD = struct.Struct("<8sQ")  # of a collection: signature, size
@@ -16,20 +16,8 @@ OBJECT = struct.Struct("<H6xQ")  # of an object: number, size; the free room at 
 REFERENCE = struct.Struct("<IQI")  # in a data set: length of the text, place of the collection, number of the object
 
 
-class RawFile(Protocol):
-    """A file open for reading, or an object that can be read in the same way."""
-
-    def seek(self, position: int, whence: int = 0, /) -> int:
-        """Set the position."""
-        ...
-
-    def read(self, size: int, /) -> bytes:
-        """Return the next bytes."""
-        ...
-
-
-def read_text(dataset: Any, raw: RawFile) -> str:
-    """Return the text in a data set of one text; `raw` is the file in which it stands, with addresses of eight bytes.
+def read_text(dataset: Any, raw: Any) -> str:
+    """Return the text in a data set of one text; `raw` is its open file, with addresses of eight bytes.
 
     Raises
     ------
@@ -56,7 +44,7 @@ def read_text(dataset: Any, raw: RawFile) -> str:
     raise ValueError(f"its texts are damaged at byte {at}")
 
 
-def _unpacked(kind: struct.Struct, raw: RawFile, place: int, end: int) -> tuple[Any, ...]:
+def _unpacked(kind: struct.Struct, raw: Any, place: int, end: int) -> tuple[Any, ...]:
     if place + kind.size > end:
         raise ValueError(f"its texts are damaged: they stand at byte {place} of {end}")
     raw.seek(place)

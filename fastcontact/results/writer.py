@@ -13,7 +13,7 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -122,12 +122,11 @@ class ResultWriter:
     def _take_up(self, kinematics: str, case_text: str) -> None:
         """Look whether the file holds steps to write after."""
         left = left_at(self.path)
-        found = _steps_to_resume(self.path, self._mesh, kinematics, self._cell_fields)
-        if found is not None:
-            self.done, self._ended, self._left = found.steps, found.complete, left
-            self.n_steps = len(self.done)
-            if case_text and case_text != found.case_text:
-                self._notes = {"case": case_text}
+        self.done, self._ended, old_case = _steps_to_resume(self.path, self._mesh, kinematics, self._cell_fields)
+        self.n_steps = len(self.done)
+        if self.done:
+            self._left = left
+            self._notes = {"case": case_text} if case_text not in ("", old_case) else {}
 
     def __enter__(self) -> ResultWriter:
         return self
@@ -271,7 +270,7 @@ class ResultWriter:
                 yield
             except Exception as error:  # a failed read shows as errors of many kinds
                 failure = self._committed.failure if self._committed is not None else None
-                if failure is None and (isinstance(error, FileError) or not isinstance(error, (OSError, RuntimeError))):
+                if isinstance(error, FileError) or (failure is None and not isinstance(error, (OSError, RuntimeError))):
                     raise
                 told = failure or error
                 if not isinstance(told, Exception):
@@ -305,16 +304,10 @@ class ResultWriter:
         contents.append_rows(self._file, self._mesh, self.n_steps, step, self._cell_fields)
 
 
-class _Resumed(NamedTuple):
-    """The steps of a file, whether its run came to its end, and its case file."""
-
-    steps: list[StepResult]
-    complete: bool
-    case_text: str
-
-
-def _steps_to_resume(path: Path, mesh: Mesh, kinematics: str, cell_fields: Sequence[str]) -> _Resumed | None:
-    """Return what the file at `path` holds; None if there is none, or none with a complete step.
+def _steps_to_resume(
+    path: Path, mesh: Mesh, kinematics: str, cell_fields: Sequence[str]
+) -> tuple[list[StepResult], bool, str]:
+    """Return the steps of the file at `path`, if there is one, whether its run came to its end, and its case file.
 
     Raises
     ------
@@ -322,10 +315,10 @@ def _steps_to_resume(path: Path, mesh: Mesh, kinematics: str, cell_fields: Seque
         If the file is no result file or damaged, or its steps cannot be followed by steps of this mesh.
     """
     if not path.exists() or not path.stat().st_size:
-        return None
+        return [], False, ""
     with Results(path) as old:
         if not len(old):
-            return None
+            return [], False, ""
         begin_anew = "or start anew without resuming, which replaces the file"
         if old.schema < layout.SCHEMA:
             raise FileError(
@@ -341,7 +334,7 @@ def _steps_to_resume(path: Path, mesh: Mesh, kinematics: str, cell_fields: Seque
                 f"the steps in '{path}' hold the cell fields {names or 'none'}, not {sorted(cell_fields) or 'none'}: ask "
                 f"for the same ones, {begin_anew}"
             )
-        return _Resumed(list(old), old.complete, old.case_text)
+        return list(old), old.complete, old.case_text
 
 
 def _same_mesh(one: Mesh, other: Mesh) -> bool:

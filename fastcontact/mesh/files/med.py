@@ -123,7 +123,7 @@ def _read_mesh(file: Any, group: Any) -> tuple[Mesh, int]:
 
 
 def _group_names(families: Families, sign: int) -> list[str]:
-    """Return the groups of all families of points (+1) or cells (-1), also of families without members."""
+    """Return the groups of all families of points (+1) or cells (-1), empty ones, too."""
     return [name for number in sorted(families, key=abs) if number * sign > 0 for name in families[number]]
 
 

@@ -35,7 +35,7 @@ def unpacked(values: NDArray[np.uint8]) -> Any:
     ValueError
         If the bytes are not whole, or not from `packed`.
     """
-    raw = memoryview(np.ascontiguousarray(values, np.uint8))
+    raw = np.ascontiguousarray(values, np.uint8).data
     line, found, _ = bytes(raw[:200]).partition(b"\n")
     if not found:
         raise ValueError("no packed data")
@@ -64,7 +64,8 @@ def _without_arrays(data: Any, arrays: io.BytesIO) -> Any:
 def _with_arrays(data: Any, raw: memoryview) -> Any:
     if isinstance(data, dict):
         if _ARRAY in data:
-            return _array(*data[_ARRAY], raw)
+            place, kind, shape = data[_ARRAY]
+            return _array(place, kind, shape, raw)
         return {key: _with_arrays(value, raw) for key, value in data.items()}
     if isinstance(data, list):
         return [_with_arrays(value, raw) for value in data]
