@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fastcontact.errors import CaseError, FileError, unknown
 from fastcontact.mesh.files.paths import PathLike, replacing
@@ -91,35 +91,9 @@ def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None
     return _table(columns | _fields(step, line.points))
 
 
-def with_theory(table: Table, name: str, function: Callable[[Any], ArrayLike], along: str = "radius") -> Table:
-    """Return the table (m,) with a further column `name`, a function of the column `along`.
-
-    The function maps the values (m,), or one value at a time, to the new ones.
-
-    Raises
-    ------
-    CaseError
-        If there is no column `along`, there is a column `name` already, or the function gives another number of values.
-
-    Examples
-    --------
-    >>> line = np.array([(0.0,), (2.0,)], dtype=[("radius", float)])
-    >>> with_theory(line, "square", lambda r: r**2)["square"]
-    array([0., 4.])
-    """
-    columns = _columns(table)
-    if along not in columns:
-        raise CaseError(unknown("column", along, columns))
-    if name in columns:
-        raise CaseError(f"the table has a column '{name}' already: give the theory another name")
-    where = columns[along]
-    try:
-        values = np.asarray(function(where), np.float64)
-    except (TypeError, ValueError):  # a function of one number, such as those of module math
-        values = np.array([float(np.asarray(function(value))) for value in where.tolist()])
-    if values.shape not in ((), where.shape):
-        raise CaseError(f"'{name}' gives {values.shape} values for the {where.shape} values of '{along}'")
-    return _table({**columns, name: np.broadcast_to(values, where.shape)})
+def with_column(table: Table, name: str, values: NDArray[Any]) -> Table:
+    """Return a table (m,) with one column more, `values` (m,) under `name`."""
+    return _table({**_columns(table), name: values})
 
 
 def write_csv(path: PathLike, table: Table, units: Mapping[str, str] | None = None) -> None:

@@ -100,18 +100,15 @@ def _geometry(grid: Node, reference: str, sizes: dict[str, int]) -> None:
 def _fields(grid: Node, reference: str, n_points: int, number: int, n_steps: int) -> None:
     for name, width in layout.POINT_FIELDS.items():
         address, rows = f"{reference}:/VTKHDF/PointData/{name}", n_points * n_steps
+        parts = [(name, 0, width)]  # label, first column and number of columns of each field
         if name == "stress":
-            for column, component in enumerate(STRESS_COMPONENTS):
-                attribute = _child(grid, "Attribute", Name=f"stress_{component}", AttributeType="Scalar", Center="Node")
-                selection = ((number * n_points, column), (1, 1), (n_points, 1))
-                _hyperslab(attribute, address, (rows, width), selection)
-            continue
-        kind = "Vector" if width == 3 else "Scalar"
-        attribute = _child(grid, "Attribute", Name=name, AttributeType=kind, Center="Node")
-        if width == 1:
-            _hyperslab(attribute, address, (rows,), ((number * n_points,), (1,), (n_points,)))
-        else:
-            _hyperslab(attribute, address, (rows, width), ((number * n_points, 0), (1, 1), (n_points, width)))
+            parts = [(f"stress_{component}", column, 1) for column, component in enumerate(STRESS_COMPONENTS)]
+        for label, column, count in parts:
+            kind = "Vector" if count == 3 else "Scalar"
+            attribute = _child(grid, "Attribute", Name=label, AttributeType=kind, Center="Node")
+            shape, selection = (rows, width), ((number * n_points, column), (1, 1), (n_points, count))
+            dims = 1 if width == 1 else 2
+            _hyperslab(attribute, address, shape[:dims], tuple(row[:dims] for row in selection))
 
 
 def _hyperslab(parent: Node, address: str, shape: tuple[int, ...], selection: tuple[tuple[int, ...], ...]) -> None:

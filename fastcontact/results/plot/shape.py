@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.contact.search.closest import flat_triangles
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import UNITS, Units, name_axes, new_axes
@@ -92,9 +93,9 @@ def _draw(ax: Axes, mesh: Mesh, place: Array, step: StepResult, edges: bool | No
     from matplotlib.tri import Triangulation
 
     loops = [cells[:, _outline(name)] for name, cells in mesh.solids.items()]
-    triangles = np.concatenate([_fan(name, cells) for name, cells in mesh.solids.items()])
+    flat = [cells[:, flat_triangles(cells.shape[1])].reshape(-1, 3) for cells in mesh.solids.values()]
     field = ax.tripcolor(
-        Triangulation(place[:, 0], place[:, 1], triangles), step.von_mises, shading="gouraud", cmap="viridis"
+        Triangulation(place[:, 0], place[:, 1], np.concatenate(flat)), step.von_mises, shading="gouraud", cmap="viridis"
     )
     if edges if edges is not None else sum(map(len, loops)) <= MOST_EDGES:
         for loop in loops:
@@ -109,16 +110,3 @@ def _outline(name: str) -> list[int]:
     if element.order == 1:
         return list(range(element.n_corners))
     return [node for facet in element.facets for node in (facet[0], facet[2])]
-
-
-def _fan(name: str, cells: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return triangles (n, 3) that cover the cells: corner triangles and the inner rest for quadratic ones."""
-    outline = _outline(name)
-    if elements.get(name).order == 1:
-        parts = [(outline[0], outline[i], outline[i + 1]) for i in range(1, len(outline) - 1)]
-    else:
-        middle = outline[1::2]
-        parts = [(outline[i - 1], outline[i], outline[i + 1]) for i in range(0, len(outline) - 1, 2)]
-        parts[0] = (outline[-1], outline[0], outline[1])
-        parts += [(middle[0], middle[i], middle[i + 1]) for i in range(1, len(middle) - 1)]
-    return np.concatenate([cells[:, list(part)] for part in parts])

@@ -19,7 +19,7 @@ from fastcontact.results.tables import (
     contact_table,
     line_table,
     read_csv,
-    with_theory,
+    with_column,
     write_csv,
 )
 
@@ -124,32 +124,12 @@ def test_line_table_follows_the_line() -> None:
         line_table(MESH, step, "EGDE")
 
 
-@pytest.mark.parametrize(
-    "function",
-    [
-        lambda r: np.sqrt(np.maximum(4.0 - r**2, 0.0)),
-        lambda r: math.sqrt(max(4.0 - r * r, 0.0)),
-        lambda r: math.sqrt(4.0 - r**2) if r < 2.0 else 0.0,
-    ],
-    ids=["arrays", "numbers", "a branch"],
-)
-def test_theory_may_be_any_callable(function) -> None:
-    table = with_theory(contact_table(contact_result("c", 3)), "hertz", function)
-    np.testing.assert_allclose(table["hertz"], [0.0, math.sqrt(4 - 1.5**2), 2.0], rtol=1e-15)
-    assert table.dtype.names[-1] == "hertz"
-    assert table["point"].tolist() == [0, 4, 1]
-
-
-def test_theory_along_another_column_and_its_errors() -> None:
+def test_a_table_with_one_column_more() -> None:
     table = contact_table(contact_result("c", 3))
-    np.testing.assert_array_equal(with_theory(table, "twice", lambda s: 2 * s, "abscissa")["twice"], [0, 5, 10])
-    np.testing.assert_array_equal(with_theory(table, "flat", lambda s: 7.0)["flat"], [7, 7, 7])
-    with pytest.raises(CaseError, match="unknown column 'abcissa': did you mean 'abscissa'"):
-        with_theory(table, "t", np.sqrt, "abcissa")
-    with pytest.raises(CaseError, match="has a column 'gap' already"):
-        with_theory(table, "gap", np.sqrt)
-    with pytest.raises(CaseError, match=r"'t' gives \(2,\) values for the \(3,\) values of 'radius'"):
-        with_theory(table, "t", lambda r: r[1:])
+    more = with_column(table, "twice", 2 * table["abscissa"])
+    assert more["twice"].tolist() == [0, 5, 10]
+    assert more.dtype.names == (*table.dtype.names, "twice")
+    assert more["point"].tolist() == [0, 4, 1]
 
 
 # --------------------------------------------------------------------------------------------------- CSV
