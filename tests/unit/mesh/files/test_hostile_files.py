@@ -1,8 +1,12 @@
 """Files that declare what they cannot hold are refused within limits of memory and time."""
 
+import errno
+import os
 import struct
+import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -73,12 +77,15 @@ def test_a_text_of_another_size_is_refused_at_once(results, size):
     assert time.process_time() - started < 2
 
 
-@pytest.mark.parametrize("place", [0, 40, 2**62, 2**64 - 1])
+@pytest.mark.parametrize("place", [0, 40, 2**62, 2**64 - 1, "of no number"])
 def test_a_text_that_stands_elsewhere_is_refused(results, place):
     data = bytearray(results.read_bytes())
     with h5py.File(results) as file:
         at = file["fastcontact/case"].id.get_offset()
-    struct.pack_into("<Q", data, at + 4, place)
+    if place == "of no number":
+        struct.pack_into("<I", data, at + 12, 60_000)
+    else:
+        struct.pack_into("<Q", data, at + 4, place)
     results.write_bytes(data)
     with pytest.raises(FileError, match="its texts are damaged"):
         fc.open_results(results)
@@ -264,6 +271,33 @@ def test_without_an_interpreter_to_start_files_are_read_in_the_same_process(tmp_
     fc.write_mesh(tmp_path / "mesh.vtu", MESH)
     monkeypatch.setattr(sys, "executable", name)
     assert fc.read_mesh(tmp_path / "mesh.vtu").n_cells == MESH.n_cells
+
+
+def test_when_no_process_can_be_started(tmp_path, monkeypatch):
+    def refuse(*_, **__):
+        raise OSError(errno.ENOMEM, os.strerror(errno.ENOMEM))
+
+    fc.write_mesh(tmp_path / "mesh.vtu", MESH)
+    monkeypatch.setattr(subprocess, "run", refuse)
+    with pytest.raises(FileError, match=r"no process can be started: Cannot allocate memory"):
+        fc.read_mesh(tmp_path / "mesh.vtu")
+
+
+def test_cells_of_several_sizes_are_no_array(tmp_path, monkeypatch):
+    cells = [SimpleNamespace(type="polygon", data=[[0, 1, 2], [0, 1, 2, 3]])]
+    nothing = {key: {} for key in ("cell_data", "point_data", "cell_sets", "point_sets", "field_data")}
+    found = SimpleNamespace(points=[["a"]], cells=cells, **nothing)
+    monkeypatch.setattr(meshio_process, "library", lambda: SimpleNamespace(read=lambda *_, **__: found))
+    content = meshio_process.plain_content(tmp_path / "mesh.vtu", "vtu")
+    assert content == {"points": None, "cells": [["polygon", 2, None]], **nothing, "said": ""}
+
+
+def test_a_mesh_without_optional_attributes(tmp_path):
+    write_med_mesh(tmp_path / "mesh.med", MESH)
+    with h5py.File(tmp_path / "mesh.med", "r+") as file:
+        for name in ("TYP", "REP"):
+            del file["ENS_MAA/mesh"].attrs[name]
+    assert fc.read_mesh(tmp_path / "mesh.med").n_points == MESH.n_points
 
 
 def test_an_abaqus_file_that_includes_another(tmp_path):
