@@ -22,7 +22,7 @@ def check_outputs(
     output, or the suffix of a picture is of no known format. Raises FastcontactError if there is no matplotlib for a
     picture.
     """
-    from fastcontact.mesh.files.targets import checked_target
+    from fastcontact.mesh.files.paths import checked_target
 
     drawn = [str(path) for path in pictures if path]
     source, seen = Path(os.path.realpath(read)), set()

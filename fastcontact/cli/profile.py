@@ -25,7 +25,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Write the files of the options, or print the table if there are none."""
     from fastcontact.results.reader import open_results
-    from fastcontact.results.tables import contact_table, with_theory, write_csv
+    from fastcontact.results.tables import contact_table, with_column, write_csv
 
     with open_results(options.file) as results:
         step = _results.chosen_step(results, options.step)
@@ -35,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
     table = contact_table(contact, step)
     theories = _theories(case, name, contact)
     for label, theory in theories.items():
-        table = with_theory(table, f"pressure_{label.replace(' ', '_')}", theory.pressure)
+        table = with_column(table, f"pressure_{label.replace(' ', '_')}", theory.pressure(table["radius"]))
     if options.csv:
         write_csv(options.csv, table)
     if options.agr:

@@ -1,1 +1,1 @@
-"""Results of load steps: plain data, result files, tables, pictures."""
+"""Results of load steps: plain data (step), the result file (layout, writer, reader), tables, other formats, pictures."""

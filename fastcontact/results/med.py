@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh.files.med import AXES, add_field, add_mesh, new_file
-from fastcontact.mesh.files.targets import PathLike
+from fastcontact.mesh.files.paths import PathLike
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results._layout import contact_pressure
+from fastcontact.results.layout import contact_pressure
 from fastcontact.results.step import StepResult
 
 Array = NDArray[np.float64]
@@ -24,11 +24,9 @@ def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *
     """Write a mesh and nodal results at all instants, for Salome and ParaVis.
 
     - DEPL (DX, DY [, DZ]): displacement [length].
-    - SIEF_NOEU (SIXX, SIYY, SIZZ, SIXY [, SIXZ, SIYZ]): stress [pressure]; in axisymmetry SIXX is radial,
-      SIYY axial, SIZZ hoop.
+    - SIEF_NOEU (SIXX, SIYY, SIZZ, SIXY [, SIXZ, SIYZ]): stress [pressure]; in axisymmetry radial, axial, hoop, shear.
     - SIEQ_NOEU (VMIS, VMIS_SG): equivalent stress, and with the sign of the trace [pressure].
-    - REAC_NODA (DX, DY [, DZ]): reactions [force]; in axisymmetry of the full circle, where code_aster gives
-      those of one radian.
+    - REAC_NODA (DX, DY [, DZ]): reactions [force]; in axisymmetry of the full circle, not of one radian as in code_aster.
     - PRES_CONT (PRES): contact pressure [pressure], zero off the contact surfaces.
 
     The instant is the load factor of the step, the order number its index.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, overload
@@ -14,16 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import FileError
-from fastcontact.mesh.files.hdf5 import check_contents
-from fastcontact.mesh.files.replacing import existing_file
-from fastcontact.mesh.files.targets import PathLike
+from fastcontact.mesh.files.hdf5 import check_contents, is_hdf5
+from fastcontact.mesh.files.packing import unpacked
+from fastcontact.mesh.files.paths import PathLike, existing_file
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results import _layout as layout
-from fastcontact.results._packing import unpacked
-from fastcontact.results._step_checks import check_contact
+from fastcontact.results import layout
 from fastcontact.results.step import ContactResult, StepResult
-
-_DAMAGED = "is truncated or damaged"
+from fastcontact.results.texts import read_text
 
 
 def open_results(path: PathLike) -> Results:
@@ -52,7 +49,7 @@ def open_results(path: PathLike) -> Results:
 
 
 class Results(Sequence[StepResult]):
-    """The steps of a result file, each read when asked for, and what the file says beside them.
+    """The steps of a result file, each read when it is used, and what the file says beside them.
 
     Steps are plain NumPy data: they stay valid when the file is closed.
 
@@ -83,21 +80,44 @@ class Results(Sequence[StepResult]):
 
     def __init__(self, path: PathLike) -> None:
         self.path = Path(path)
-        self._file, self._below = _opened(self.path)
+        existing_file(self.path)
+        if not os.access(path, os.R_OK, effective_ids=os.access in os.supports_effective_ids):
+            raise FileError(f"'{path}' may not be read: ask its owner for the permission")
+        if not is_hdf5(self.path):
+            raise FileError(f"'{path}' is no HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
+        # A file object of our own: by its name HDF5 would return a file that this process has open, as it was then.
+        self._raw = open(path, "rb")  # noqa: SIM115
+        self._file: Any = None
         try:
             with self._explained():
-                self._read_header(self._file["fastcontact"])
+                self._read_header(self._open())
         except BaseException:
             self.close()
             raise
 
+    def _open(self) -> Any:
+        """Open the file with HDF5, if it is one of ours and of a known schema; return our group in it."""
+        import h5py
+
+        self._file = h5py.File(self._raw, "r")
+        if self._file.userblock_size or self._file.id.get_create_plist().get_sizes() != (8, 8):
+            raise ValueError("its addresses are none of ours")
+        check_contents(self._file, self.path)
+        if "fastcontact" not in self._file:
+            raise FileError(f"'{self.path}' holds no fastcontact results: name a file that fastcontact wrote (.vtkhdf)")
+        self.schema = _integer(self._file["fastcontact"], "schema")
+        if self.schema > layout.SCHEMA:
+            raise FileError(
+                f"'{self.path}' has schema {self.schema}, this fastcontact reads up to {layout.SCHEMA}: update it"
+            )
+        return self._file["fastcontact"]
+
     def _read_header(self, own: Any) -> None:
-        self.schema = _integer(own, "schema")
         self._n_steps = _integer(self._file["VTKHDF/Steps"], "NSteps")
-        self.mesh = _read_mesh(own["mesh"])
-        self.kinematics: str = _text(own["kinematics"])
-        self.case_text: str = _text(own["case"])
-        self.versions: dict[str, str] = _text(own["versions"])
+        self.mesh = _read_mesh(own["mesh"], self._raw)
+        self.kinematics: str = _read_json(own["kinematics"], self._raw)
+        self.case_text: str = _read_json(own["case"], self._raw)
+        self.versions: dict[str, str] = _read_json(own["versions"], self._raw)
         self._rows = own["steps"][: self._n_steps]
         if len(self._rows) != self._n_steps or self._rows.ndim != 1:
             raise ValueError(f"only {len(self._rows)} of {self._n_steps} steps")
@@ -116,7 +136,7 @@ class Results(Sequence[StepResult]):
     def _run_record(self, own: Any) -> dict[str, Any] | None:
         """Return how the run ended; None while it goes on, after a crash, and when steps have been added since."""
         if "runs" not in own:  # schema 1
-            return _text(own["run"]) if "run" in own else None
+            return _read_json(own["run"], self._raw) if "run" in own else None
         rows = own["runs"][-1:]
         if not len(rows) or rows["n_steps"][0] != self._n_steps or not rows["count"][0]:
             return None
@@ -141,10 +161,9 @@ class Results(Sequence[StepResult]):
         """
         if isinstance(number, slice):
             return [self._read_step(position) for position in range(*number.indices(self._n_steps))]
-        position = range(self._n_steps)[number] if -self._n_steps <= number < self._n_steps else -1
-        if position < 0:
+        if not -self._n_steps <= number < self._n_steps:
             raise IndexError(f"'{self.path}' has {self._n_steps} steps, so there is no step at position {number}")
-        return self._read_step(position)
+        return self._read_step(range(self._n_steps)[number])
 
     def __enter__(self) -> Results:
         return self
@@ -160,8 +179,9 @@ class Results(Sequence[StepResult]):
 
     def close(self) -> None:
         """Close the file; the steps already read stay valid, no further ones can be read."""
-        self._file.close()
-        self._below.close()
+        if self._file is not None:
+            self._file.close()
+        self._raw.close()
 
     def to_pyvista(self, step: int | StepResult) -> Any:
         """Return a step as a ``pyvista.UnstructuredGrid`` of the solid cells, with all fields and groups.
@@ -220,7 +240,7 @@ class Results(Sequence[StepResult]):
             )
 
     def _restart(self, number: int) -> dict[str, Any] | None:
-        """Return the restart state of the last step; None where there is none, or steps were written since we opened."""
+        """Return the restart data of the last step; None where there are none, or steps were written since we opened."""
         own, name = self._file["fastcontact"], layout.restart_table(number)
         try:
             kept = unpacked(own[name][()]) if name in own else {}
@@ -237,9 +257,9 @@ class Results(Sequence[StepResult]):
     def _cell_fields(self, number: int) -> dict[str, NDArray[np.float64]]:
         data, n = self._file["VTKHDF/CellData"], len(self._file["VTKHDF/Types"])
         fields = {name: data[name][number * n : (number + 1) * n] for name in self.cell_field_names}
-        wrong = [name for name, values in fields.items() if values.shape != (n,) or values.dtype.kind not in "biuf"]
-        if wrong:
-            raise ValueError(f"{wrong[0]} of step {number} is cut off or of another kind")
+        for name, values in fields.items():
+            if values.shape != (n,) or values.dtype.kind not in "biuf":
+                raise ValueError(f"{name} of step {number} is cut off or of another kind")
         return fields
 
     def _field(self, name: str, number: int, width: int | None = None) -> NDArray[np.float64]:
@@ -250,63 +270,30 @@ class Results(Sequence[StepResult]):
             raise ValueError(f"{name} of step {number} is cut off or of another kind")
         return values
 
-    def _contact(self, number: int, formulations: dict[str, str]) -> dict[str, ContactResult]:
+    def _contact(self, number: int, formulations: Mapping[str, str]) -> dict[str, ContactResult]:
         if not formulations:
             return {}
-        pairs = {_text(pair["name"]): pair for pair in self._file["fastcontact/contact"].values()}
+        pairs = {_read_json(pair["name"], self._raw): pair for pair in self._file["fastcontact/contact"].values()}
         found = {name: _read_contact(pairs[name], number, name, kind) for name, kind in formulations.items()}
         for name, contact in found.items():
             if contact.force.shape != (self.mesh.dim,) or contact.points.dtype.kind not in "iu":
                 raise ValueError(f"the contact table of '{name}' is of another kind")
-            check_contact(f"step {number}, contact '{name}'", contact, self.mesh)
+            layout.check_contact(f"step {number}, contact '{name}'", contact, self.mesh)
         return found
 
     @contextlib.contextmanager
     def _explained(self) -> Iterator[None]:
-        """Turn whatever a broken file makes of HDF5 and of our own reading into one sentence."""
+        """Turn whatever HDF5 and our own reading raise on a broken file into one sentence."""
         try:
             yield
         except (FileError, Warning):
             raise
         except Exception as error:  # what HDF5, and numbers that make no sense, can raise has no end
+            lines = str(error).splitlines()
+            reason = lines[0][:200] if lines else type(error).__name__
             raise FileError(
-                f"'{self.path}' {_DAMAGED} ({_reason(error)}): compute it again or restore a copy"
+                f"'{self.path}' is truncated or damaged ({reason}): compute it again or restore a copy"
             ) from error
-
-
-def _reason(error: Exception) -> str:
-    """Return the first line of what an error says."""
-    lines = str(error).splitlines()
-    return lines[0][:200] if lines else type(error).__name__
-
-
-def _opened(path: Path) -> tuple[Any, Any]:
-    """Return the open file, and that below it, once sure that it is one of ours and not from the future."""
-    import h5py
-
-    existing_file(path)
-    if not os.access(path, os.R_OK, effective_ids=os.access in os.supports_effective_ids):
-        raise FileError(f"'{path}' may not be read: ask its owner for the permission")
-    if not h5py.is_hdf5(path):
-        raise FileError(f"'{path}' is no HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
-    # A file object of our own: HDF5 would hand out again what this process has open, with what it knew of the file then.
-    below = open(path, "rb")  # noqa: SIM115
-    try:
-        file = h5py.File(below, "r")
-        if file.userblock_size or file.id.get_create_plist().get_sizes() != (8, 8):
-            raise ValueError("its addresses are none of ours")
-        check_contents(file, path, below)
-        schema = _integer(file["fastcontact"], "schema") if "fastcontact" in file else None
-        if schema is None:
-            raise FileError(f"'{path}' holds no fastcontact results: name a file that fastcontact wrote (.vtkhdf)")
-        if schema > layout.SCHEMA:
-            raise FileError(f"'{path}' has schema {schema}, this fastcontact reads up to {layout.SCHEMA}: update it")
-    except BaseException as error:
-        below.close()
-        if isinstance(error, FileError) or not isinstance(error, Exception):
-            raise
-        raise FileError(f"'{path}' {_DAMAGED} ({_reason(error)}): compute it again or restore a copy") from error
-    return file, below
 
 
 def _integer(group: Any, name: str) -> int:
@@ -315,24 +302,21 @@ def _integer(group: Any, name: str) -> int:
     return int(group.attrs[name])
 
 
-def _text(dataset: Any) -> Any:
-    # One text where `check_contents` has seen it, and not in the pieces of a table.
-    if dataset.shape != () or dataset.id.get_offset() is None:
-        raise ValueError(f"'{dataset.name}' is no text")
-    return json.loads(dataset[()])
+def _read_json(dataset: Any, raw: Any) -> Any:
+    return json.loads(read_text(dataset, raw))
 
 
-def _read_mesh(stored: Any) -> Mesh:
+def _read_mesh(stored: Any, raw: Any) -> Mesh:
     return Mesh(
         points=stored["points"][:, : _integer(stored, "dim")],
-        cells={name: stored["cells"][name][()] for name in _text(stored["elements"])},
-        cell_groups=_read_groups(stored["cell_groups"]),
-        point_groups=_read_groups(stored["point_groups"]),
+        cells={name: stored["cells"][name][()] for name in _read_json(stored["elements"], raw)},
+        cell_groups=_read_groups(stored["cell_groups"], raw),
+        point_groups=_read_groups(stored["point_groups"], raw),
     )
 
 
-def _read_groups(group: Any) -> dict[str, NDArray[np.int32]]:
-    names = _text(group["names"])
+def _read_groups(group: Any, raw: Any) -> dict[str, NDArray[np.int32]]:
+    names = _read_json(group["names"], raw)
     if group["sizes"].shape != (len(names),):
         raise ValueError(f"'{group.name}' has {len(names)} names for sizes of shape {group['sizes'].shape}")
     members = np.split(group["members"][()], np.cumsum(group["sizes"][()])[:-1])
@@ -349,7 +333,7 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
     for mask in {"active", "sticking"} & set(columns):
         columns[mask] = columns[mask].astype(bool)
     inner, outer = step["radius"].tolist()
-    # Early files of schema 1 know no shear and no sticking, no dissipation, no obstacles: what they hold came without.
+    # Early files of schema 1 have no shear, sticking, dissipation or obstacles: their analyses had none.
     known = step.dtype.names
     moved = step["obstacle_displacement"].copy() if "obstacle_displacement" in known else np.array([np.nan])
     return ContactResult(

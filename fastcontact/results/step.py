@@ -1,4 +1,4 @@
-"""What a load step leaves behind: plain data, no mesh, no file, no solver."""
+"""Results of a load step as plain data."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class ContactResult:
     coordinates : ndarray (m, dim)
         Reference coordinates [length].
     abscissa : ndarray (m,)
-        Length along the reference surface from its first node; in 3D the distance from the axis of first contact: the
-        line through the secondary node with the smallest gap before any load (of equally close ones that nearest to the
-        origin) along the normal faced there [length].
+        Length along the reference surface from its first node; in 3D the distance from the axis of first contact, the line
+        along the normal through the node with the smallest gap before any load (of equal ones the nearest to the origin)
+        [length].
     gap : ndarray (m,)
         Open positive, closed zero, clearance included; negative by what a penalty lets penetrate [length].
     pressure : ndarray (m,)
@@ -54,7 +54,7 @@ class ContactResult:
     dissipation : float
         Work of friction in this step [energy].
     obstacle_displacement : ndarray (dim,), optional
-        How far a rigid obstacle stands from its place at rest [length]; None for contact between bodies.
+        Displacement of a rigid obstacle [length]; None for contact between bodies.
     """
 
     name: str
@@ -85,10 +85,10 @@ class ContactResult:
     def stick_radius(self) -> tuple[float, float]:
         """Bracket of the stick zone, as `radius`: the outermost node that sticks, and the next one; NaN if none does."""
         place = np.abs(self.coordinates[:, 0]) if self.coordinates.shape[1] == 2 else self.abscissa
-        held = self.active & self.sticking
-        if not held.any():
+        sticking = self.active & self.sticking
+        if not sticking.any():
             return float("nan"), float("nan")
-        inside = place[held].max()
+        inside = place[sticking].max()
         return float(inside), float(place[place > inside].min(initial=np.inf))
 
     @property
@@ -98,10 +98,7 @@ class ContactResult:
 
     @property
     def penetration(self) -> float:
-        """How far closed nodes lie inside the other side at most [length].
-
-        Pressure over stiffness with a penalty; else what a weighted gap leaves between the nodes of both sides.
-        """
+        """Largest depth of closed nodes inside the other side [length]: of a penalty, or between nodes of weighted gaps."""
         return float(-self.gap[self.active].min(initial=0.0))
 
 
@@ -114,7 +111,7 @@ class StepResult:
     index : int
         1 for the first step.
     load_factor : float
-        Pseudo-time of the step.
+        Pseudo-time of the step [-].
     displacement : ndarray (n_points, dim)
         [length].
     stress : ndarray (n_points, 4) or (n_points, 6)
@@ -129,14 +126,13 @@ class StepResult:
         By contact pair.
     iterations : dict
         ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``, ``history`` (list of dict). If contact
-        alone holds bodies, ``regularised``: what was made regular, and by how much; see `floating.Floating.report`.
+        alone holds bodies, ``regularised``: their springs and the forces in them.
     warnings : tuple of str
-        What the step warned of.
+        Warnings of the step.
     cell_fields : dict of str to ndarray (n_solids,)
         Further numbers of every solid cell, in the order of ``mesh.solids``, e.g. an estimated error [unit of the field].
     restart : dict, optional
-        What the next step owes to this one and those before it, see `restart`: plain numbers, strings and arrays. Result
-        files keep that of their last step.
+        Restart data for the next step: plain numbers, strings and arrays. Result files keep those of their last step.
     """
 
     index: int

@@ -1,19 +1,18 @@
-"""Results as tables: NumPy structured arrays, one row a node or a step, and CSV files of them."""
+"""Results as tables: NumPy structured arrays with a row for each node, and CSV files of them."""
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from fastcontact.errors import CaseError, ContactError, FileError, unknown
-from fastcontact.mesh.files.replacing import replacing
-from fastcontact.mesh.files.targets import PathLike
+from fastcontact.errors import CaseError, FileError, unknown
+from fastcontact.mesh.files.paths import PathLike, replacing
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import ordered_line
 from fastcontact.results.step import ContactResult, StepResult
@@ -23,9 +22,6 @@ Columns = dict[str, NDArray[Any]]
 
 AXES = ("x", "y", "z")
 STRESS_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
-
-# Columns of words; in any other column of a CSV file what looks like a number is one.
-WORDS = ("group",)
 
 
 def contact_table(contact: ContactResult, step: StepResult | None = None) -> Table:
@@ -42,7 +38,7 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Tab
     structured ndarray (m,)
         ``point``; ``x``, ``y`` (``z``), ``abscissa``, ``radius`` (distance from the axis), ``gap`` [length];
         ``pressure`` [pressure]; ``multiplier`` [force or pressure]; ``force_x`` ... [force]; ``shear_x`` ...
-        [pressure]; ``active``, ``sticking``. With `step` also ``displacement_x`` ... [length],
+        [pressure]; ``active``, ``sticking`` (true or false). With `step` also ``displacement_x`` ... [length],
         ``stress_xx`` ..., ``von_mises``, ``von_mises_signed`` [pressure].
     """
     columns = {
@@ -95,126 +91,9 @@ def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None
     return _table(columns | _fields(step, line.points))
 
 
-def point_table(mesh: Mesh, step: StepResult, groups: str | Iterable[str]) -> Table:
-    """Return the fields at the points of some groups, one row a point, group by group.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    step : StepResult
-    groups : str or iterable of str
-        Names of groups, of points or of cells.
-
-    Returns
-    -------
-    structured ndarray (m,)
-        ``group``, then the columns of `line_table` but for ``abscissa``.
-
-    Raises
-    ------
-    MeshError
-        If there is no such group.
-    """
-    names = [groups] if isinstance(groups, str) else list(groups)
-    members = [mesh.points_of(name) for name in names]
-    points = np.concatenate([np.empty(0, np.int32), *members])
-    coordinates = mesh.points[points]
-    columns = {
-        "group": np.repeat(np.array(names, dtype=np.str_), [len(m) for m in members]),
-        "point": points,
-        **_by_axis("", coordinates),
-        "radius": _radius(coordinates),
-    }
-    return _table(columns | _fields(step, points))
-
-
-def history_table(steps: Iterable[StepResult], contact: str | None = None) -> Table:
-    """Return how an analysis went, one row a step.
-
-    Parameters
-    ----------
-    steps : iterable of StepResult
-        Steps of one analysis, such as an open result file: they are read one at a time.
-    contact : str, optional
-        The contact pair to follow; may be left out when there is one, or none at all.
-
-    Returns
-    -------
-    structured ndarray (n_steps,)
-        ``step``, ``load_factor``; of the pair ``force_x`` ... (resultant on the secondary side) [force],
-        ``radius_inside`` and ``radius_outside`` (bracket of the contact radius) [length], ``pressure_max``
-        [pressure]; ``von_mises_max`` [pressure].
-
-    Raises
-    ------
-    ContactError
-        If there is no such pair, or several and none is named.
-    """
-    rows: list[dict[str, float]] = []
-    for step in steps:
-        row = {"step": step.index, "load_factor": step.load_factor}
-        if pair := _pair(step, contact):
-            row |= {f"force_{axis}": float(force) for axis, force in zip(AXES, pair.force)}
-            row |= {"radius_inside": pair.radius[0], "radius_outside": pair.radius[1]}
-            row["pressure_max"] = pair.pressure_max
-        rows.append({**row, "von_mises_max": float(step.von_mises.max(initial=0.0))})
-    names = dict.fromkeys(name for row in rows for name in row)
-    columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
-    return _table(columns or {"step": np.empty(0, np.int64), "load_factor": np.empty(0)})
-
-
-def _pair(step: StepResult, name: str | None) -> ContactResult | None:
-    if name is None:
-        if len(step.contact) > 1:
-            raise ContactError(f"there are the contact pairs {', '.join(step.contact)}: name the one to follow")
-        return next(iter(step.contact.values()), None)
-    if name not in step.contact:
-        raise ContactError(unknown("contact pair", name, step.contact))
-    return step.contact[name]
-
-
-def with_theory(table: Table, name: str, function: Callable[[Any], ArrayLike], along: str = "radius") -> Table:
-    """Return the table with one more column, a function of another column.
-
-    Parameters
-    ----------
-    table : structured ndarray (m,)
-    name : str
-        Name of the new column.
-    function : callable
-        Maps the values (m,) of the column `along`, or one value at a time, to the new ones.
-    along : str
-        The column to sample along.
-
-    Returns
-    -------
-    structured ndarray (m,)
-
-    Raises
-    ------
-    CaseError
-        If there is no column `along`, there is a column `name` already, or the function gives another number
-        of values.
-
-    Examples
-    --------
-    >>> line = np.array([(0.0,), (2.0,)], dtype=[("radius", float)])
-    >>> with_theory(line, "square", lambda r: r**2)["square"]
-    array([0., 4.])
-    """
-    columns = _columns(table)
-    if along not in columns:
-        raise CaseError(unknown("column", along, columns))
-    if name in columns:
-        raise CaseError(f"the table has a column '{name}' already: give the theory another name")
-    where = columns[along]
-    try:
-        values = np.asarray(function(where), np.float64)
-    except (TypeError, ValueError):  # a function of one number, such as those of module math
-        values = np.array([float(np.asarray(function(value))) for value in where.tolist()])
-    if values.shape not in ((), where.shape):
-        raise CaseError(f"'{name}' gives {values.shape} values for the {where.shape} values of '{along}'")
-    return _table({**columns, name: np.broadcast_to(values, where.shape)})
+def with_column(table: Table, name: str, values: NDArray[Any]) -> Table:
+    """Return a table (m,) with one column more, `values` (m,) under `name`."""
+    return _table({**_columns(table), name: values})
 
 
 def write_csv(path: PathLike, table: Table, units: Mapping[str, str] | None = None) -> None:
@@ -250,24 +129,15 @@ def write_csv(path: PathLike, table: Table, units: Mapping[str, str] | None = No
 
 
 def read_csv(path: PathLike) -> tuple[Table, dict[str, str]]:
-    """Read a table that `write_csv` wrote.
+    """Read a table (m,) that `write_csv` wrote, and the units of the columns that have one.
 
-    Parameters
-    ----------
-    path : path-like
-
-    Returns
-    -------
-    table : structured ndarray (m,)
-        Columns of int64, float64, bool or str, by what stands in them.
-    units : dict of str to str
-        Units of the columns that have one.
+    Columns are int64, float64, bool or str, whichever fits their values.
 
     Raises
     ------
     FileError
-        If the file cannot be read, is empty, two columns have one name or one has none, or a line has not as many values
-        as the header.
+        If the file cannot be read, is empty, two columns have one name or one has none, or a line has another number of
+        values than the header.
     """
     try:
         with open(Path(path), encoding="utf-8", newline="") as file:
@@ -289,7 +159,7 @@ def read_csv(path: PathLike) -> tuple[Table, dict[str, str]]:
         if named:
             units[name] = named[2]
         texts = [row[position] for row in rows]
-        columns[name] = np.array(texts, dtype=np.str_) if name in WORDS else _values(texts)
+        columns[name] = _values(texts)
     return _table(columns), units
 
 

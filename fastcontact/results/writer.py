@@ -1,9 +1,8 @@
-"""Write the steps of an analysis to one VTKHDF file, step by step, so that a crash costs no finished step.
+"""Write the steps of an analysis to one result file, step by step, so that a crash costs no finished step.
 
-The group /VTKHDF is what viewers read; /fastcontact holds what they have no place for. The order of writing
-is the promise: data first, flush, then the step's rows with the number of steps last, flush. Uncompressed
-tables grow in place and each step's fields are chunks of their own, so that nothing of a finished step moves.
-Room on the disk is reserved before, because HDF5 loses the whole file when one of its writes fails.
+Data are written first, then the rows of the step, the number of steps last, with a flush after each. Uncompressed tables grow
+in place and the fields of each step are chunks of their own, so that nothing of a finished step moves. Room on the disk is
+reserved before, because HDF5 loses the whole file when one of its writes fails.
 """
 
 from __future__ import annotations
@@ -11,33 +10,33 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 import numpy as np
 
 from fastcontact.errors import ConvergenceError, FileError, ModelError
-from fastcontact.mesh.files.targets import PathLike, PathLock, checked_target, left_at, reserve
+from fastcontact.mesh.files.packing import packed
+from fastcontact.mesh.files.paths import PathLike, checked_target
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results import _appending as appending
-from fastcontact.results._commits import CommittedFile
-from fastcontact.results._header import as_json, write_geometry, write_own
-from fastcontact.results._packing import packed
-from fastcontact.results._resuming import taken_up
-from fastcontact.results._step_checks import check_cell_fields, check_shapes, checked_fields
-from fastcontact.results._uninterrupted import uninterrupted
+from fastcontact.results import contents, layout
+from fastcontact.results.committed_file import CommittedFile, uninterrupted
+from fastcontact.results.locking import PathLock, left_at, reserve
+from fastcontact.results.reader import Results
 from fastcontact.results.step import StepResult
+from fastcontact.results.texts import read_text
 
 # Room for HDF5's own records [bytes].
 MARGIN = 1 << 19
 
 
 class ResultWriter:
-    """A result file that takes one step after the other.
+    """A result file to which one step after the other is written.
 
-    The file is begun at once: whatever forbids it shows before any step is computed. From then on it can be
-    opened at any time, by viewers too, and shows all steps so far, even after an exception or a crash.
+    The file is begun at once: errors show before any step is computed. From then on it can be opened at any time, by viewers
+    too, and shows all steps so far, even after an exception or a crash.
 
     Parameters
     ----------
@@ -52,10 +51,10 @@ class ResultWriter:
     overwrite : bool
         Whether an existing result file may be replaced.
     cell_fields : iterable of str
-        Names of the `StepResult.cell_fields` that every step brings; viewers show them, the XDMF sidecar does not.
+        Names of the `StepResult.cell_fields` of every step; viewers show them, the XDMF sidecar does not.
     resume : bool
-        Whether to keep the steps of an existing file of this mesh and write after them. A file that is not there yet, or
-        holds no complete step, is begun. The file is not touched before there is something to add.
+        Whether to keep the steps of an existing file of this mesh and write after them. A file that is missing or holds no
+        complete step is begun. The file is not changed before there is something to add.
 
     Attributes
     ----------
@@ -64,7 +63,7 @@ class ResultWriter:
     n_steps : int
         Number of steps in the file.
     done : list of StepResult
-        The steps that the file held when it was taken up, for ``solve(..., resume=out.done)``; none without `resume`.
+        The steps that the file held at first, for ``solve(..., resume=out.done)``; none without `resume`.
 
     Raises
     ------
@@ -100,13 +99,13 @@ class ResultWriter:
         self.path = checked_target(path)
         self.n_steps = 0
         self.done: list[StepResult] = []
-        self._cell_fields = checked_fields(cell_fields, mesh)
+        self._cell_fields = _checked_names(cell_fields, mesh)
         self._mesh: Mesh = mesh
         self._pairs: dict[str, Any] = {}
         self._file: Any = None
-        self._below: Any = None
+        self._committed: Any = None
         self._closed = self._ended = False
-        self._new_case: str | None = None
+        self._notes: dict[str, str] = {}  # of the next step: the case file, if another one is resumed
         self._left: tuple[int, ...] | None = None
         with self._explained("begun"):
             self._lock = PathLock(self.path)
@@ -123,11 +122,11 @@ class ResultWriter:
     def _take_up(self, kinematics: str, case_text: str) -> None:
         """Look whether the file holds steps to write after."""
         left = left_at(self.path)
-        found = taken_up(self.path, self._mesh, kinematics, self._cell_fields)
-        if found is not None:
-            self.done, self._ended, self._left = found.steps, found.complete, left
-            self.n_steps = len(self.done)
-            self._new_case = case_text if case_text and case_text != found.case_text else None
+        self.done, self._ended, old_case = _steps_to_resume(self.path, self._mesh, kinematics, self._cell_fields)
+        self.n_steps = len(self.done)
+        if self.done:
+            self._left = left
+            self._notes = {"case": case_text} if case_text not in ("", old_case) else {}
 
     def __enter__(self) -> ResultWriter:
         return self
@@ -157,17 +156,15 @@ class ResultWriter:
         """
         if self._closed:
             raise FileError(f"'{self.path}' is closed: write steps before close, or inside the with block")
-        check_shapes(self._mesh, step)
-        check_cell_fields(self._mesh, step, self._cell_fields)
+        layout.check_step(self._mesh, step, self._cell_fields)
         with self._explained(f"written at step {step.index}"):
             self._open()
             self._check_in_place()
             restart = packed({"step": self.n_steps, "restart": step.restart})
-            self._reserve(appending.step_size(self._mesh, step) + restart.nbytes)
-            appending.append_fields(self._file, self._mesh, self.n_steps, step, self._cell_fields)
-            notes = {} if self._new_case is None else {"case": self._new_case}
-            appending.append_tables(self._file, self._mesh, self.n_steps, step, self._pairs, notes)
-            appending.set_restart(self._file, self.n_steps, restart)
+            self._reserve(contents.step_size(self._mesh, step) + restart.nbytes)
+            contents.append_fields(self._file, self._mesh, self.n_steps, step, self._cell_fields)
+            contents.append_tables(self._file, self._mesh, self.n_steps, step, self._pairs, self._notes)
+            contents.set_restart(self._file, self.n_steps, restart)
             self._flush()
             self._append_step_rows(step)
             self._flush()
@@ -203,14 +200,14 @@ class ResultWriter:
                 self._open()
                 try:
                     self._check_ours()
-                    if self._below.writable:
-                        self._reserve(len(as_json(run)))
-                        appending.append_run(self._file, self.n_steps, run, self._flush)
+                    if self._committed.writable:
+                        self._reserve(len(contents.as_json(run)))
+                        contents.append_run(self._file, self.n_steps, run, self._flush)
                 finally:
                     try:
                         self._file.close()
                     finally:
-                        self._below.close()
+                        self._committed.close()
         finally:
             self._file = None
             self._give_up()
@@ -220,32 +217,33 @@ class ResultWriter:
         self._lock.release()
 
     def _open(self) -> None:
-        """Open a file that was taken up, once there is something to add to it."""
+        """Open a file that is resumed, once there is something to add to it."""
         import h5py
 
         if self._file is None:
             if self._left is not None and self._left != left_at(self.path):
                 raise FileError(self._gone())
-            self._below = CommittedFile(self.path)
+            self._committed = CommittedFile(self.path)
             try:
-                self._file = h5py.File(self._below, "r+")
+                self._file = h5py.File(self._committed, "r+")
             except BaseException:
-                self._below.close()
+                self._committed.close()
                 raise
-            self._pairs = {json.loads(pair["name"][()]): pair for pair in self._file["fastcontact/contact"].values()}
+            pairs = self._file["fastcontact/contact"].values()
+            self._pairs = {json.loads(read_text(pair["name"], self._committed)): pair for pair in pairs}
 
     def _check_in_place(self) -> None:
-        """Refuse to go on writing to a file that nobody would find, or that cannot be written any more."""
-        self._below.check()
+        """Refuse to write to a file that is no longer at its path, or after an error."""
+        self._committed.check()
         self._check_ours()
         with contextlib.suppress(OSError):
-            if os.path.samestat(os.fstat(self._below.fileno()), os.stat(self.path)):
+            if os.path.samestat(os.fstat(self._committed.fileno()), os.stat(self.path)):
                 return
         raise FileError(self._gone())
 
     def _check_ours(self) -> None:
-        """Refuse to write into what another program has written."""
-        if not self._below.intact():
+        """Refuse to write into a file that another program has written to."""
+        if not self._committed.intact():
             raise FileError(
                 f"'{self.path}' was changed by another program after {self.n_steps} steps, what it holds now is left "
                 "alone: let no other program write to it, name another file and start again"
@@ -259,20 +257,20 @@ class ResultWriter:
 
     def _flush(self) -> None:
         self._file.flush()
-        self._below.check()
+        self._committed.check()
 
     def _reserve(self, size: int) -> None:
-        reserve(self._below.fileno(), self.path.parent, self._below.end, size + MARGIN)
+        reserve(self._committed.fileno(), self.path.parent, self._committed.end, size + MARGIN)
 
     @contextlib.contextmanager
     def _explained(self, what: str) -> Iterator[None]:
-        """Turn what HDF5 or the system says into one sentence with a remedy; meanwhile signals wait."""
+        """Turn errors of HDF5 and of the system into one sentence with a remedy; meanwhile signals wait."""
         with uninterrupted():
             try:
                 yield
-            except (OSError, RuntimeError, LookupError, ValueError) as error:  # HDF5 has many words for a failed read
-                failure = self._below.failure if self._below is not None else None
-                if failure is None and not isinstance(error, (OSError, RuntimeError)):
+            except Exception as error:  # a failed read shows as errors of many kinds
+                failure = self._committed.failure if self._committed is not None else None
+                if isinstance(error, FileError) or (failure is None and not isinstance(error, (OSError, RuntimeError))):
                     raise
                 told = failure or error
                 if not isinstance(told, Exception):
@@ -290,11 +288,11 @@ class ResultWriter:
         temporary = self.path.with_name(f".{self.path.name}.tmp")
         try:
             with open(temporary, "wb") as probe:
-                size = appending.header_size(self._mesh) + len(case_text) + MARGIN
+                size = contents.header_size(self._mesh) + len(case_text) + MARGIN
                 reserve(probe.fileno(), temporary.parent, 0, size)
             with h5py.File(temporary, "w", locking=False) as file:
-                write_geometry(file, self._mesh, self._cell_fields)
-                write_own(file, self._mesh, kinematics, case_text)
+                contents.write_geometry(file, self._mesh, self._cell_fields)
+                contents.write_own(file, self._mesh, kinematics, case_text)
             os.replace(temporary, self.path)
         finally:
             with contextlib.suppress(OSError):
@@ -303,12 +301,66 @@ class ResultWriter:
         self._open()
 
     def _append_step_rows(self, step: StepResult) -> None:
-        """Write the rows that make the step one that viewers see, all but the number of steps."""
-        appending.append_rows(self._file, self._mesh, self.n_steps, step, self._cell_fields)
+        contents.append_rows(self._file, self._mesh, self.n_steps, step, self._cell_fields)
+
+
+def _steps_to_resume(
+    path: Path, mesh: Mesh, kinematics: str, cell_fields: Sequence[str]
+) -> tuple[list[StepResult], bool, str]:
+    """Return the steps of the file at `path`, if there is one, whether its run came to its end, and its case file.
+
+    Raises
+    ------
+    FileError
+        If the file is no result file or damaged, or its steps cannot be followed by steps of this mesh.
+    """
+    if not path.exists() or not path.stat().st_size:
+        return [], False, ""
+    with Results(path) as old:
+        if not len(old):
+            return [], False, ""
+        begin_anew = "or start anew without resuming, which replaces the file"
+        if old.schema < layout.SCHEMA:
+            raise FileError(
+                f"'{path}' was written by an earlier fastcontact, which kept nothing to go on from: name another file "
+                f"{begin_anew}"
+            )
+        if not _same_mesh(old.mesh, mesh) or old.kinematics != kinematics:
+            what = "kinematics" if _same_mesh(old.mesh, mesh) else "mesh"
+            raise FileError(f"'{path}' belongs to another {what}: resume the case it was begun for, {begin_anew}")
+        names = sorted(old.cell_field_names)
+        if names != sorted(cell_fields):
+            raise FileError(
+                f"the steps in '{path}' hold the cell fields {names or 'none'}, not {sorted(cell_fields) or 'none'}: ask "
+                f"for the same ones, {begin_anew}"
+            )
+        return list(old), old.complete, old.case_text
+
+
+def _same_mesh(one: Mesh, other: Mesh) -> bool:
+    """Return whether points, cells and groups of two meshes are the same."""
+    if not np.array_equal(one.points, other.points):
+        return False
+    for kind in ("cells", "cell_groups", "point_groups"):
+        ours, theirs = getattr(one, kind), getattr(other, kind)
+        if list(ours) != list(theirs) or not all(np.array_equal(ours[name], theirs[name]) for name in ours):
+            return False
+    return True
+
+
+def _checked_names(cell_fields: Iterable[str], mesh: Mesh) -> tuple[str, ...]:
+    """Return the names of cell fields, if all of them can be written."""
+    names = tuple(cell_fields)
+    for name in names:
+        if name in layout.cell_fields(mesh) or not name.isidentifier():
+            raise FileError(
+                f"'{name}' cannot be the name of a cell field: it is taken or no plain word; choose another"
+            )
+    return names
 
 
 def _check_replaceable(path: Any, overwrite: bool) -> None:
-    """Refuse to replace a file on request, or when it is plainly something else than a result."""
+    """Refuse to replace a file without `overwrite`, or one that is no result file."""
     import h5py
 
     if not path.exists() or not path.stat().st_size:

@@ -7,22 +7,21 @@ from typing import Any
 from xml.etree import ElementTree
 
 from fastcontact.errors import FileError
-from fastcontact.mesh.files.replacing import replacing
-from fastcontact.mesh.files.targets import PathLike, checked_target
-from fastcontact.results import _layout as layout
+from fastcontact.mesh.files.paths import PathLike, checked_target, replacing
+from fastcontact.results import layout
 from fastcontact.results.reader import open_results
 
 Node = ElementTree.Element
 
-# XDMF puts the six components of a symmetric tensor in an order that is not VTK's, so they go one by one.
+# XDMF orders the six components of a symmetric tensor otherwise than VTK, so each is a field of its own.
 STRESS_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 
 def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
     """Write an XDMF file that refers to the steps of a result file, for ParaView before 5.12.
 
-    The XDMF file holds no numbers, only where they stand in the result file: move the two together. It shows
-    the steps that were complete when it was written.
+    The XDMF file holds no numbers, only their places in the result file: move the two together. It shows the steps that
+    were complete when it was written.
 
     Parameters
     ----------
@@ -34,8 +33,8 @@ def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
     Raises
     ------
     FileError
-        If the results cannot be read or hold no step, XDMF has no word for an element or for the name of the
-        result file, or the XDMF file cannot be written.
+        If the results cannot be read or hold no step, XDMF lacks an element, the result file has a name that XDMF cannot
+        refer to, or the XDMF file cannot be written.
     """
     target = checked_target(xdmf_path)
     with open_results(result_path) as results:
@@ -101,18 +100,15 @@ def _geometry(grid: Node, reference: str, sizes: dict[str, int]) -> None:
 def _fields(grid: Node, reference: str, n_points: int, number: int, n_steps: int) -> None:
     for name, width in layout.POINT_FIELDS.items():
         address, rows = f"{reference}:/VTKHDF/PointData/{name}", n_points * n_steps
+        parts = [(name, 0, width)]  # label, first column and number of columns of each field
         if name == "stress":
-            for column, component in enumerate(STRESS_COMPONENTS):
-                attribute = _child(grid, "Attribute", Name=f"stress_{component}", AttributeType="Scalar", Center="Node")
-                selection = ((number * n_points, column), (1, 1), (n_points, 1))
-                _hyperslab(attribute, address, (rows, width), selection)
-            continue
-        kind = "Vector" if width == 3 else "Scalar"
-        attribute = _child(grid, "Attribute", Name=name, AttributeType=kind, Center="Node")
-        if width == 1:
-            _hyperslab(attribute, address, (rows,), ((number * n_points,), (1,), (n_points,)))
-        else:
-            _hyperslab(attribute, address, (rows, width), ((number * n_points, 0), (1, 1), (n_points, width)))
+            parts = [(f"stress_{component}", column, 1) for column, component in enumerate(STRESS_COMPONENTS)]
+        for label, column, count in parts:
+            kind = "Vector" if count == 3 else "Scalar"
+            attribute = _child(grid, "Attribute", Name=label, AttributeType=kind, Center="Node")
+            shape, selection = (rows, width), ((number * n_points, column), (1, 1), (n_points, count))
+            dims = 1 if width == 1 else 2
+            _hyperslab(attribute, address, shape[:dims], tuple(row[:dims] for row in selection))
 
 
 def _hyperslab(parent: Node, address: str, shape: tuple[int, ...], selection: tuple[tuple[int, ...], ...]) -> None:

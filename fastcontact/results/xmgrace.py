@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastcontact.errors import CaseError, unknown
-from fastcontact.mesh.files.replacing import replacing
-from fastcontact.mesh.files.targets import PathLike
+from fastcontact.mesh.files.paths import PathLike, replacing
 
 STYLES = ("line", "symbols", "line+symbols")
 
@@ -31,13 +30,8 @@ N_SYMBOLS, N_LINE_STYLES = 6, 5
 
 # Grace writes Latin-1; Greek comes from the Symbol font, letter for letter.
 _GREEK = dict(zip("αβγδεζηθικλμνξοπρςστυφχψωΓΔΘΛΞΠΣΦΨΩ", "abgdezhqiklmnxoprVstufcywGDQLXPSFYW"))
-_MARKUP = {letter: f"\\f{{Symbol}}{symbol}\\f{{}}" for letter, symbol in _GREEK.items()} | {
-    "\\": "\\\\",
-    '"': '\\"',
-}
-_PLAIN = str.maketrans(
-    {"\u2212": "-", "\u2013": "-", "\u2014": "-", "\u2018": "'", "\u2019": "'", "\u201c": '"', "\u201d": '"'}
-)
+_MARKUP = {letter: f"\\f{{Symbol}}{symbol}\\f{{}}" for letter, symbol in _GREEK.items()} | {"\\": "\\\\", '"': '\\"'}
+_PLAIN = str.maketrans("\u2212\u2013\u2014\u2018\u2019\u201c\u201d", "---''\"\"")
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +41,7 @@ class Curve:
     Parameters
     ----------
     x, y : array_like (n,)
-        Where a value is not finite the point is left out.
+        Coordinates, in the units of the axes; points with a value that is not finite are left out.
     legend : str
         Text in the legend; empty for none.
     style : {"line", "symbols", "line+symbols"}
@@ -120,17 +114,9 @@ def write_agr(
 
 
 def round_axis(values: ArrayLike) -> tuple[float, float, float]:
-    """Return first tick, last tick and tick distance of an axis that holds all values between round numbers.
+    """Return first tick, last tick and tick distance of an axis that holds all finite `values` (n,) between round numbers.
 
-    Parameters
-    ----------
-    values : array_like (n,)
-        Finite numbers, at least one.
-
-    Returns
-    -------
-    (float, float, float)
-        The distance is 1, 2 or 5 times a power of ten; there are 4 to 10 intervals.
+    The distance is 1, 2 or 5 times a power of ten; there are 4 to 10 intervals.
 
     Examples
     --------
@@ -169,17 +155,14 @@ def _axis(name: str, label: str, axis: tuple[float, float, float]) -> list[str]:
     low, high, distance = axis
     largest = max(abs(low), abs(high))
     digits = max(math.floor(math.log10(largest)) - math.floor(math.log10(distance)), 0)  # that tell ticks apart
-    style = "exponential" if largest >= 1e6 or largest < 1e-3 else "general"
+    exponential = largest >= 1e6 or largest < 1e-3
+    ticks = [f"major {distance:.12g}", "minor ticks 1"]
+    ticks += ["major grid on", "major color 1", "major linestyle 2", "major linewidth 0.5"]
     return [
         f'@    {name}axis  label "{escaped(label)}"',
-        f"@    {name}axis  tick major {distance:.12g}",
-        f"@    {name}axis  tick minor ticks 1",
-        f"@    {name}axis  tick major grid on",
-        f"@    {name}axis  tick major color 1",
-        f"@    {name}axis  tick major linestyle 2",
-        f"@    {name}axis  tick major linewidth 0.5",
-        f"@    {name}axis  ticklabel format {style}",
-        f"@    {name}axis  ticklabel prec {digits if style == 'exponential' else max(digits + 1, 6)}",
+        *(f"@    {name}axis  tick {setting}" for setting in ticks),
+        f"@    {name}axis  ticklabel format {'exponential' if exponential else 'general'}",
+        f"@    {name}axis  ticklabel prec {digits if exponential else max(digits + 1, 6)}",
     ]
 
 
@@ -193,31 +176,14 @@ def _legend(curves: Sequence[Curve], x_axis: tuple[float, ...], y_axis: tuple[fl
         left += int((upper & (along < 0.45)).sum())
     place = "0.82, 0.82" if right <= left else "0.21, 0.82"
     state = "on" if any(curve.legend for curve in curves) else "off"
-    return [
-        f"@    legend {state}",
-        "@    legend loctype view",
-        f"@    legend {place}",
-        "@    legend box color 1",
-        "@    legend box pattern 1",
-        "@    legend box fill color 0",
-        "@    legend box fill pattern 1",
-        "@    legend char size 0.8",
-    ]
+    box = ["box color 1", "box pattern 1", "box fill color 0", "box fill pattern 1", "char size 0.8"]
+    return [f"@    legend {setting}" for setting in (state, "loctype view", place, *box)]
 
 
 def _set_style(number: int, curve: Curve) -> list[str]:
     colour = 1 + number % (len(COLOURS) - 1)
     symbol = 1 + number % N_SYMBOLS if "symbols" in curve.style else 0
     line = 1 + number // (len(COLOURS) - 1) % N_LINE_STYLES if "line" in curve.style else 0
-    name = f"@    s{number}"
-    return [
-        f"{name} type xy",
-        f"{name} symbol {symbol}",
-        f"{name} symbol size 0.6",
-        f"{name} symbol color {colour}",
-        f"{name} line type {1 if line else 0}",
-        f"{name} line linestyle {line}",
-        f"{name} line linewidth 1.5",
-        f"{name} line color {colour}",
-        f'{name} legend "{escaped(curve.legend)}"',
-    ]
+    settings = ["type xy", f"symbol {symbol}", "symbol size 0.6", f"symbol color {colour}"]
+    settings += [f"line type {min(line, 1)}", f"line linestyle {line}", "line linewidth 1.5", f"line color {colour}"]
+    return [f"@    s{number} {setting}" for setting in (*settings, f'legend "{escaped(curve.legend)}"')]

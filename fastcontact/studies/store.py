@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fastcontact.errors import FileError
-from fastcontact.mesh.files.replacing import replacing
+from fastcontact.mesh.files.paths import replacing
 from fastcontact.studies.job import Job
 
 

@@ -3,7 +3,8 @@
 import errno
 import os
 
-from fastcontact.mesh.files import targets
+from fastcontact.mesh.files import paths
+from fastcontact.results import locking
 
 
 def full_disk(patch, folder):
@@ -14,17 +15,17 @@ def full_disk(patch, folder):
 
 
 def protected_folder(patch, folder):
-    patch.setattr(targets, "_may_write", lambda path: not path.is_dir())
+    patch.setattr(paths, "_may_write", lambda path: not path.is_dir())
 
 
 def protected_file(patch, folder):
     (folder / "old.vtkhdf").touch()
-    patch.setattr(targets, "_may_write", lambda path: path.is_dir())
+    patch.setattr(paths, "_may_write", lambda path: path.is_dir())
 
 
 def other_writer(patch, folder):
     # Kept by the patch until the test ends.
-    patch.setattr(targets, "held_by_a_test", targets.PathLock(folder / "busy.vtkhdf"), raising=False)
+    patch.setattr(locking, "held_by_a_test", locking.PathLock(folder / "busy.vtkhdf"), raising=False)
 
 
 def other_results(patch, folder):

@@ -17,10 +17,9 @@ import fastcontact as fc
 from fastcontact.cases import case as cases
 from fastcontact.cli import _pictures, _results
 from fastcontact.cli._outputs import write_json
-from fastcontact.mesh.files import _abaqus, hdf5, replacing
-from fastcontact.mesh.files._blocks import build_mesh
+from fastcontact.mesh.files import abaqus, hdf5, packing, paths
+from fastcontact.mesh.files.blocks import build_mesh
 from fastcontact.mesh.generate import block, block_on_block
-from fastcontact.results import _packing
 
 
 def held():
@@ -81,22 +80,22 @@ def pipe(folder):
 
 
 def vanished(folder):
-    with replacing.replacing(folder / "a.txt"):
+    with paths.replacing(folder / "a.txt"):
         pass  # nothing was written that could be put in place
 
 
 def packed_of_another_kind():
-    values = _packing.packed({"a": np.arange(3.0)})
+    values = packing.packed({"a": np.arange(3.0)})
     raw = values.tobytes().replace(b"<f8", b"|O8")
     line, _, body = raw.partition(b"\n")
     old = b"%d" % zlib.crc32(body.replace(b"|O8", b"<f8"))
-    _packing.unpacked(np.frombuffer(line.replace(old, b"%d" % zlib.crc32(body)) + b"\n" + body, np.uint8))
+    packing.unpacked(np.frombuffer(line.replace(old, b"%d" % zlib.crc32(body)) + b"\n" + body, np.uint8))
 
 
 def packed_and_changed():
-    values = _packing.packed({"a": np.arange(3.0)}).copy()
+    values = packing.packed({"a": np.arange(3.0)}).copy()
     values[-1] ^= 1
-    _packing.unpacked(values)
+    packing.unpacked(values)
 
 
 def resulting(folder, change):
@@ -139,7 +138,7 @@ def not_announced(folder):
 def changed_by_others(folder, patch):
     model = held()
     with fc.ResultWriter(folder / "a.vtkhdf", model) as out:
-        patch.setattr(type(out._below), "intact", lambda self: False)
+        patch.setattr(type(out._committed), "intact", lambda self: False)
         fc.solve(model, fc.linear_ramp(1), on_step=out.write)
 
 
@@ -183,12 +182,12 @@ CALLS = [
     ("a summary on a full disk", lambda patch: full(patch, write_json), fc.errors.FileError, r"cannot write 'a\.json': No space left on device"),
     ("a mesh from a pipe", pipe, fc.errors.FileError, r"pipe\.med' is a device or a pipe: name a plain file"),
     ("a file that was never made", vanished, fc.errors.FileError, r"a\.txt' cannot be written: No such file or directory"),
-    ("an Abaqus file that cannot be read", lambda folder: _abaqus.check_readable(folder), fc.errors.FileError, r"cannot read '.*': .*Is a directory"),
+    ("an Abaqus file that cannot be read", lambda folder: abaqus.check_readable(folder), fc.errors.FileError, r"cannot read '.*': .*Is a directory"),
     ("coordinates in words", lambda: build_mesh([["a", "b"]], [], {}), fc.MeshError, r"its coordinates are no numbers: check that the file is complete"),
     ("an HDF5 file with groups in a circle", lambda folder: opened(folder, circle), fc.errors.FileError, r"spoilt\.h5' has groups in a circle or too deep, at '.*': write it anew"),
     ("an HDF5 file with a strange filter", lambda folder: opened(folder, lzf), fc.errors.FileError, r"is packed by the filter 32000, which not every HDF5 knows: use gzip"),
     ("an HDF5 file with texts for numbers", lambda folder: opened(folder, texts), fc.errors.FileError, r"holds no plain numbers: the file is damaged, write it anew"),
-    ("packed data without head", lambda: _packing.unpacked(np.zeros(300, np.uint8)), ValueError, r"no packed data"),
+    ("packed data without head", lambda: packing.unpacked(np.zeros(300, np.uint8)), ValueError, r"no packed data"),
     ("packed data that were changed", packed_and_changed, ValueError, r"packed data are cut off or changed"),
     ("packed data of another kind", packed_of_another_kind, ValueError, r"an array of \|O8 is none of ours"),
     ("a result whose kinematics are a number", lambda folder: resulting(folder, kinematics_in_numbers), fc.errors.FileError, r"its kinematics or its case is no text"),

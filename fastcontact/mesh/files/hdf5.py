@@ -1,18 +1,21 @@
-"""HDF5 files from elsewhere, opened with care: nothing outside the file is read, and damage is named."""
+"""HDF5 files from elsewhere, opened with care: nothing outside the file is read, and damage is named.
+
+Before anything is read the whole tree is looked through. Only numbers and strings of fixed length are read: texts of variable
+length stand in a heap of the file, and on some damaged heaps HDF5 never returns.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import FastcontactError, FileError
-from fastcontact.mesh.files import _heaps
-from fastcontact.mesh.files.replacing import existing_file
-from fastcontact.mesh.files.targets import PathLike
+from fastcontact.mesh.files.paths import PathLike, existing_file
 
 # What a data set may take in memory: this much [bytes], or this many times the size of its file if that is more.
 # Zeros compress a thousandfold, but no whole file does that holds a mesh or results.
@@ -23,6 +26,13 @@ FEW_OBJECTS = 1000
 DEEPEST = 64
 # Kinds of numbers, and strings of fixed length: no references, no variable lengths, no records.
 PLAIN_KINDS = "iufS"
+
+
+def is_hdf5(path: Path) -> bool:
+    """Return whether a file is an HDF5 file."""
+    import h5py
+
+    return bool(h5py.is_hdf5(path))
 
 
 @contextmanager
@@ -38,10 +48,9 @@ def opened(path: PathLike) -> Iterator[Any]:
 
     found = existing_file(path)
     try:
-        if not h5py.is_hdf5(found):
+        if not is_hdf5(found):
             raise FileError(f"'{path}' is not an HDF5 file: check that it is complete and has the right suffix")
         with h5py.File(found, "r") as file:
-            _heaps.check_all(found, file.id.get_create_plist().get_sizes()[1])
             check_contents(file, path)
             yield file
     except (FastcontactError, Warning):
@@ -50,14 +59,14 @@ def opened(path: PathLike) -> Iterator[Any]:
         raise FileError(f"cannot read '{path}', it is damaged or incomplete: write it anew") from error
 
 
-def check_contents(file: Any, path: PathLike, below: _heaps.Bytes | None = None) -> None:
-    """Look through an open HDF5 file before anything in it is read; with the file `below` it, also where it keeps its texts.
+def check_contents(file: Any, path: PathLike) -> None:
+    """Look through an open HDF5 file before anything in it is read.
 
     Raises
     ------
     FileError
-        If a link or the values of a data set lead to another file, a data set wants a filter that HDF5 does not bring
-        along or more memory than a file of this size can mean, or groups stand deeper or in more places than in a tree.
+        If a link or the values of a data set lead to another file, a data set needs a foreign filter or more memory than a
+        file of this size can mean, or groups stand too deep or in a circle.
     """
     from h5py import h5d, h5g, h5o
     from h5py.h5l import TYPE_HARD, TYPE_SOFT
@@ -78,8 +87,6 @@ def check_contents(file: Any, path: PathLike, below: _heaps.Bytes | None = None)
             item = h5o.open(group, raw)
             if isinstance(item, h5d.DatasetID):
                 _check_dataset(item, f"'{name}' of '{path}'", limit, file.id.get_filesize())
-                if below is not None and item.dtype.hasobject and item.get_offset() is not None:
-                    _heaps.check_texts(below, item.get_offset(), item.get_space().get_simple_extent_npoints(), path)
             elif isinstance(item, h5g.GroupID):
                 address = h5o.get_info(item).addr
                 if address in seen or depth >= DEEPEST:
@@ -89,7 +96,7 @@ def check_contents(file: Any, path: PathLike, below: _heaps.Bytes | None = None)
 
 
 def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> None:
-    """Refuse a data set whose values stand elsewhere, or whose size cannot be meant."""
+    """Refuse a data set whose values stand elsewhere, or that is too large for its file."""
     from h5py import h5d, h5z
 
     settings = dataset.get_create_plist()
@@ -133,3 +140,20 @@ def values(group: Any, name: str) -> NDArray[Any]:
     if not isinstance(dataset, h5py.Dataset) or dataset.dtype.base.kind not in PLAIN_KINDS:
         raise FileError(f"{where} holds no plain numbers: the file is damaged, write it anew")
     return np.asarray(dataset[()])
+
+
+def attribute(item: Any, name: str, default: Any = None) -> Any:
+    """Return an attribute of a group or a data set, a number or a string of fixed length.
+
+    Raises
+    ------
+    KeyError
+        If it is missing and there is no `default`.
+    FileError
+        If it is of another kind.
+    """
+    if name not in item.attrs and default is not None:
+        return default
+    if item.attrs.get_id(name).dtype.base.kind not in PLAIN_KINDS:
+        raise FileError(f"'{name}' of '{item.name}' of '{item.file.filename}' is no plain number: write the file anew")
+    return item.attrs[name]

@@ -1,24 +1,23 @@
 """MED files, as Salome and code_aster read and write them: meshes with groups, nodal results at all instants.
 
-With h5py alone. Arrays are stored component by component ("no interlace"), node numbers count from 1. Meshes
-of MED 2.3 to 4.x are read; what is written carries the stamp 3.0.0, which every later library reads, or 4.0.0 where
-there are wedges of 18 nodes, which came with that version.
+With h5py alone. Arrays are stored component by component ("no interlace"), node numbers count from 1. Meshes of MED 2.3 to
+4.x are read. Files are written in version 3.0.0, which all later libraries read, or 4.0.0, the first with wedges of 18 nodes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import FileError, MeshError, unknown
 from fastcontact.mesh import elements
-from fastcontact.mesh.files._blocks import VERTEX, Block, build_mesh, check_known
-from fastcontact.mesh.files._med_families import (
+from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_known
+from fastcontact.mesh.files.hdf5 import attribute, opened, values
+from fastcontact.mesh.files.med_families import (
     Families,
     checked_name,
     decoded,
@@ -27,9 +26,7 @@ from fastcontact.mesh.files._med_families import (
     read_families,
     write_families,
 )
-from fastcontact.mesh.files.hdf5 import opened, values
-from fastcontact.mesh.files.replacing import replacing
-from fastcontact.mesh.files.targets import PathLike
+from fastcontact.mesh.files.paths import PathLike, replacing
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -50,20 +47,8 @@ FLOAT64 = 6
 AXES = ("X", "Y", "Z")
 
 
-@dataclass(frozen=True, eq=False)
-class MedContent:
-    """A mesh of a MED file, with what a reader wants to tell about it.
-
-    Attributes
-    ----------
-    mesh : Mesh
-    name : str
-        Name of the mesh in the file.
-    version : str
-        Version of the format, e.g. ``"3.0.7"``; empty if the file does not say.
-    n_vertices : int
-        Cells of one node; their groups have become groups of points.
-    """
+class MedContent(NamedTuple):
+    """A mesh, its name in the file, the version of the format ("" if unknown), and the number of cells of one node."""
 
     mesh: Mesh
     name: str
@@ -74,13 +59,7 @@ class MedContent:
 def read_med_mesh(path: PathLike, mesh_name: str | None = None) -> Mesh:
     """Read a mesh with its groups, cells oriented as they are in the file.
 
-    Of a mesh with several time steps the first one is read.
-
-    Parameters
-    ----------
-    path : path-like
-    mesh_name : str, optional
-        Which mesh to read, where the file holds several.
+    Of several meshes the one called `mesh_name` is read, of several time steps of a mesh the first one.
 
     Raises
     ------
@@ -93,7 +72,7 @@ def read_med_mesh(path: PathLike, mesh_name: str | None = None) -> Mesh:
 
 
 def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
-    """Read a mesh and what there is to tell about it; parameters and errors as in `read_med_mesh`."""
+    """Read a mesh with its name and version; parameters and errors as in `read_med_mesh`."""
     with opened(path) as file:
         name = _chosen_mesh(file, path, mesh_name)
         group = file["ENS_MAA"][name]
@@ -105,8 +84,10 @@ def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
 
 
 def _version(file: Any) -> str:
-    info = file["INFOS_GENERALES"].attrs if "INFOS_GENERALES" in file else {}
-    return ".".join(str(int(info[key])) for key in ("MAJ", "MIN", "REL") if key in info)
+    if "INFOS_GENERALES" not in file:
+        return ""
+    info = file["INFOS_GENERALES"]
+    return ".".join(str(int(attribute(info, key))) for key in ("MAJ", "MIN", "REL") if key in info.attrs)
 
 
 def _chosen_mesh(file: Any, path: PathLike, mesh_name: str | None) -> str:
@@ -124,15 +105,13 @@ def _chosen_mesh(file: Any, path: PathLike, mesh_name: str | None) -> str:
 
 
 def _read_mesh(file: Any, group: Any) -> tuple[Mesh, int]:
-    if int(group.attrs.get("TYP", 0)) != 0:
+    if int(attribute(group, "TYP", 0)) != 0:
         raise MeshError("it is a structured grid: convert it to an unstructured mesh")
     step = _first_step(group)
-    points = _read_points(step, group.attrs)
+    points = _read_points(step, group)
     name = group.name.rsplit("/", 1)[-1]
     folders = [folder for folder in (group.get("FAS"), file.get(f"FAS/{name}")) if folder is not None]
-    families: Families = {}
-    for folder in folders:
-        families.update(read_families(folder))
+    families = {number: names for folder in folders for number, names in read_families(folder).items()}
     blocks = list(_read_blocks(step, families))
     point_groups: dict[str, Any] = dict.fromkeys(_group_names(families, +1), ())
     point_groups.update(_members(step["NOE"], len(points), families))
@@ -144,7 +123,7 @@ def _read_mesh(file: Any, group: Any) -> tuple[Mesh, int]:
 
 
 def _group_names(families: Families, sign: int) -> list[str]:
-    """Return the groups of all families of points (+1) or cells (-1), also of families without members."""
+    """Return the groups of all families of points (+1) or cells (-1), empty ones, too."""
     return [name for number in sorted(families, key=abs) if number * sign > 0 for name in families[number]]
 
 
@@ -155,17 +134,22 @@ def _first_step(group: Any) -> Any:
     steps = [entry for entry in group.values() if "NOE" in entry]
     if not steps:
         raise MeshError("it has no nodes: check that the file is complete")
-    return min(steps, key=lambda step: (int(step.attrs["NDT"]), int(step.attrs["NOR"])))
+    return min(steps, key=_order)
 
 
-def _read_points(step: Any, mesh_attributes: Mapping[str, Any]) -> Array:
+def _order(step: Any) -> tuple[int, int]:
+    """Return the numbers by which time steps are sorted."""
+    return int(attribute(step, "NDT")), int(attribute(step, "NOR"))
+
+
+def _read_points(step: Any, mesh: Any) -> Array:
     flat = values(step["NOE"], "COO")
-    attributes = step["NOE"]["COO"].attrs
-    system = int(mesh_attributes.get("REP", attributes.get("REP", 0)))
+    stored = step["NOE"]["COO"]
+    system = int(attribute(mesh if "REP" in mesh.attrs else stored, "REP", 0))
     if system != 0:
         kind = {1: "cylindrical", 2: "spherical"}.get(system, f"of kind {system}")
         raise MeshError(f"its coordinates are {kind}: convert them to Cartesian ones")
-    count = int(attributes["NBR"])
+    count = int(attribute(stored, "NBR"))
     dim = len(flat) // max(count, 1)
     if count == 0 or dim * count != len(flat):
         raise MeshError(f"it has {len(flat)} coordinates for {count} nodes: check that the file is complete")
@@ -204,7 +188,7 @@ def _cell_count(entry: Any) -> int:
     index = entry.get("INN")
     if index is not None:
         return max(len(index) - 1, 0)
-    return int(entry["NOD"].attrs.get("NBR", 0)) if "NOD" in entry else 0
+    return int(attribute(entry["NOD"], "NBR", 0)) if "NOD" in entry else 0
 
 
 def _read_nodes(entry: Any, code: str) -> NDArray[Any]:
@@ -219,14 +203,7 @@ def _read_nodes(entry: Any, code: str) -> NDArray[Any]:
 def write_med_mesh(path: PathLike, mesh: Mesh, *, mesh_name: str = "mesh") -> None:
     """Write a mesh with all its groups; the file appears only when it is complete.
 
-    When the file is read again, the elements stand in alphabetical order of their MED codes.
-
-    Parameters
-    ----------
-    path : path-like
-    mesh : Mesh
-    mesh_name : str
-        Name of the mesh in the file, at most 64 bytes.
+    A reader gets the elements in alphabetical order of their MED codes. `mesh_name` may have 64 bytes.
 
     Raises
     ------
@@ -279,11 +256,7 @@ def add_mesh(file: Any, mesh: Mesh, mesh_name: str) -> None:
     if "/" in mesh_name:
         raise FileError(f"mesh name '{mesh_name}' holds a slash, which separates folders in a MED file: rename it")
     group = file.create_group(f"ENS_MAA/{mesh_name}")
-    _set(
-        group,
-        DIM=max(elements.get(name).dim for name in mesh.cells) if mesh.cells else mesh.dim,
-        ESP=mesh.dim,
-    )
+    _set(group, DIM=max((elements.get(name).dim for name in mesh.cells), default=mesh.dim), ESP=mesh.dim)
     _set(group, REP=0, SRT=0, TYP=0, NXT=NO_STEP, NXI=NO_STEP, UNT="", DES="fastcontact")
     _set(group, NOM=_padded(AXES[: mesh.dim]), UNI=_padded([""] * mesh.dim))
     step = group.create_group(_step_key(NO_STEP, NO_STEP))
@@ -332,20 +305,7 @@ def _step_key(number: int, iteration: int) -> str:
 def add_field(
     file: Any, name: str, components: tuple[str, ...], field: Array, instant: tuple[int, float], mesh_name: str
 ) -> None:
-    """Add a nodal field to a file at one instant.
-
-    Parameters
-    ----------
-    file : h5py.File
-    name : str
-        Of the field.
-    components : tuple of str
-    field : ndarray (n_points, n_components)
-    instant : (int, float)
-        Number and time.
-    mesh_name : str
-        The mesh in the file that the field belongs to.
-    """
+    """Add a nodal field (n_points, n_components) to an open file, at an instant given by its number and time."""
     number, time = instant
     where = f"CHA/{name}"
     if where not in file:
@@ -372,7 +332,7 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
     Returns
     -------
     times : ndarray (n_instants,)
-        In the order of the file's step numbers.
+        In the order of the file's step numbers [-]: the load factor in files of fastcontact.
     values : ndarray (n_instants, n_points, n_components)
         NaN at points without a value; in the unit of the field, e.g. [length] for ``"DEPL"``.
 
@@ -389,20 +349,20 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
         instants = [entry for entry in group.values() if "NOE" in entry and "PDT" in entry.attrs]
         if not instants:
             raise FileError(f"field '{field}' of '{path}' has no values at nodes in the layout of MED 3 or 4")
-        instants.sort(key=lambda entry: (int(entry.attrs["NDT"]), int(entry.attrs["NOR"])))
-        times = np.array([entry.attrs["PDT"] for entry in instants], np.float64)
+        instants.sort(key=_order)
+        times = np.array([attribute(entry, "PDT") for entry in instants], np.float64)
         n_points = _field_size(file, group, instants)
-        n_components = int(group.attrs["NCO"])
+        n_components = int(attribute(group, "NCO"))
         return times, np.stack([_read_instant(file, entry["NOE"], n_points, n_components) for entry in instants])
 
 
 def _field_size(file: Any, group: Any, instants: list[Any]) -> int:
     """Return the number of points of the field's mesh, or of the field where the mesh is in another file."""
-    name = decoded(bytes(group.attrs["MAI"]))
+    name = decoded(bytes(attribute(group, "MAI")))
     if f"ENS_MAA/{name}" in file:
         mesh = file[f"ENS_MAA/{name}"]
-        return len(_read_points(_first_step(mesh), mesh.attrs))
-    n_components = int(group.attrs["NCO"])
+        return len(_read_points(_first_step(mesh), mesh))
+    n_components = int(attribute(group, "NCO"))
     return max(values(profile, "CO").size // n_components for entry in instants for profile in entry["NOE"].values())
 
 

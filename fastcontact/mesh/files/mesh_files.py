@@ -1,4 +1,4 @@
-"""Mesh files of any format, in and out: MED through our own reader and writer, the rest through meshio."""
+"""Read and write mesh files: MED by our own reader and writer, all other formats by meshio."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from types import MappingProxyType
 
 from fastcontact.errors import FileError
 from fastcontact.mesh import topology
-from fastcontact.mesh.files import _meshio, med
-from fastcontact.mesh.files.replacing import existing_file, replacing
-from fastcontact.mesh.files.targets import PathLike, checked_target
+from fastcontact.mesh.files import med, meshio_files
+from fastcontact.mesh.files.paths import PathLike, checked_target, existing_file, replacing
 from fastcontact.mesh.mesh import Mesh
 
 logger = logging.getLogger("fastcontact")
@@ -23,20 +22,11 @@ MED_SUFFIXES = (".med", ".mmed", ".rmed")
 
 @dataclass(frozen=True)
 class MeshReport:
-    """What happened while a mesh was read.
+    """What was found in a mesh file: format (with its version), name of the mesh, and what was changed.
 
-    Attributes
-    ----------
-    path : str
-    format : str
-        Format and, where the file tells it, its version, e.g. ``"MED 3.0.7"``.
-    mesh_name : str
-        Name of the mesh in the file; empty where the format has none.
-    n_turned : int
-        Solid cells whose nodes were reordered because they were inside out (clockwise in 2D).
-    dropped : mapping of str to int
-        Kinds of cells that are not in the mesh, with their number: ``"vertex"`` (cells of one node; their
-        groups are now groups of points), ``"duplicate"`` (cells that Gmsh repeats for each of their groups).
+    `n_turned` solid cells were inside out (clockwise in 2D) and got another order of nodes. `dropped` are the numbers of
+    cells left out: ``"vertex"``, cells of one node, whose groups are now groups of points, and ``"duplicate"``, cells that
+    Gmsh repeats for each of their groups.
     """
 
     path: str
@@ -87,7 +77,7 @@ def read_mesh(path: PathLike, *, mesh_name: str | None = None, orient: bool = Tr
 
 
 def read_mesh_report(path: PathLike, *, mesh_name: str | None = None, orient: bool = True) -> tuple[Mesh, MeshReport]:
-    """Read a mesh, and tell what happened; parameters and errors as in `read_mesh`."""
+    """Read a mesh and return it with a report; parameters and errors as in `read_mesh`."""
     found = existing_file(path)
     if found.suffix.lower() in MED_SUFFIXES:
         content = med.read_med(found, mesh_name)
@@ -96,9 +86,8 @@ def read_mesh_report(path: PathLike, *, mesh_name: str | None = None, orient: bo
     elif mesh_name is not None:
         raise FileError(f"'{path}' is no MED file, so its mesh has no name: leave out mesh_name='{mesh_name}'")
     else:
-        other = _meshio.read(found)
-        mesh, file_format, name = other.mesh, other.format, ""
-        dropped = {"vertex": other.n_vertices, "duplicate": other.n_duplicates}
+        mesh, file_format, dropped = meshio_files.read(found)
+        name = ""
     mesh, n_turned = topology.oriented(mesh) if orient else (mesh, 0)
     left_out = MappingProxyType({kind: count for kind, count in dropped.items() if count})
     report = MeshReport(str(path), file_format, name, n_turned, left_out)
@@ -139,4 +128,4 @@ def write_mesh(path: PathLike, mesh: Mesh) -> None:
         med.write_med_mesh(target, mesh)
         return
     with replacing(target) as temporary:
-        _meshio.write(target, temporary, mesh)
+        meshio_files.write(target, temporary, mesh)

@@ -7,10 +7,9 @@ from __future__ import annotations
 
 from fastcontact.results.plot._axes import UNITS
 from fastcontact.results.plot.axis import axis_stress
-from fastcontact.results.plot.history import history
+from fastcontact.results.plot.history import contact_zones, history
 from fastcontact.results.plot.profile import pressure_profile
 from fastcontact.results.plot.shape import deformed_shape
 from fastcontact.results.plot.view import view
-from fastcontact.results.plot.zones import contact_zones
 
 __all__ = ["UNITS", "axis_stress", "contact_zones", "deformed_shape", "history", "pressure_profile", "view"]

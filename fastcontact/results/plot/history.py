@@ -1,4 +1,4 @@
-"""Force and contact radius of a contact pair over the load."""
+"""A contact pair over the load: force and radius; nodes that are open, stick and slide."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fastcontact.results.plot._axes import UNITS, Units, new_axes
+from fastcontact.errors import FastcontactError
+from fastcontact.results.plot._axes import UNITS, Units, name_axes, new_axes
 from fastcontact.results.step import StepResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+STATES = {"open": "0.85", "closed": "C0", "sliding": "C1"}
 
 
 def history(
@@ -28,9 +31,8 @@ def history(
 
     Parameters
     ----------
-    steps : sequence of StepResult
-    pair : str
-        Name of the contact pair.
+    steps, pair
+        Steps of an analysis, name of a contact pair.
     law : object with ``at_approach(d)``, optional
         A theory, drawn where `approach` is given.
     approach : float, optional
@@ -38,10 +40,6 @@ def history(
     title, units
         As in `pressure_profile`.
     axes : two matplotlib Axes, optional
-
-    Returns
-    -------
-    two matplotlib Axes
     """
     if axes is None:
         first = new_axes(None, (7.0, 6.4))
@@ -60,12 +58,51 @@ def history(
         curves = [law.at_approach(d) for d in fine]
         upper.plot(fine, [c.force for c in curves], "k-", lw=1, label="Hertz, equal approach")
         lower.plot(fine, [c.radius for c in curves], "k-", lw=1, label="Hertz, equal approach")
-    upper.set_ylabel(f"contact force [{units['force']}]")
-    lower.set_ylabel(f"contact radius [{units['length']}]")
-    lower.set_xlabel(f"approach [{units['length']}]" if approach else "load factor")
-    upper.set_title(title or f"Contact '{pair}' over the load")
+    name_axes(upper, "", f"contact force [{units['force']}]", title or f"Contact '{pair}' over the load")
+    along = f"approach [{units['length']}]" if approach else "load factor"
+    name_axes(lower, along, f"contact radius [{units['length']}]", "")
     for ax in axes:
         ax.grid(alpha=0.3)
         ax.legend()
         ax.set_ylim(bottom=0.0)
+    return axes
+
+
+def contact_zones(
+    steps: Sequence[StepResult], pair: str, *, title: str = "", units: Units = UNITS, ax: Axes | None = None
+) -> Axes:
+    """Plot the state of every secondary node over the load: open, closed (sticking, with friction) or sliding.
+
+    Parameters
+    ----------
+    steps, pair
+        Steps of an analysis, name of a contact pair.
+    title, units, ax
+        As in `pressure_profile`.
+
+    Raises
+    ------
+    FastcontactError
+        If there is no step.
+    """
+    if not steps:
+        raise FastcontactError("there is no step whose contact could be plotted")
+    axes = new_axes(ax, (7.4, 5.2))
+    contacts = [step.contact[pair] for step in steps]
+    x = np.concatenate([np.full(len(c.points), step.load_factor) for step, c in zip(steps, contacts, strict=True)])
+    y = np.concatenate([c.abscissa for c in contacts])
+    closed = np.concatenate([c.active for c in contacts])
+    sliding = closed & ~np.concatenate([c.sticking for c in contacts])
+    for name, here in (("open", ~closed), ("closed", closed & ~sliding), ("sliding", sliding)):
+        if here.any():
+            axes.plot(x[here], y[here], "o" if name != "open" else ".", ms=4, color=STATES[name], label=name)
+    for step, contact in zip(steps, contacts, strict=True):
+        place = {"xycoords": ("data", "axes fraction"), "ha": "center", "va": "bottom"}
+        axes.annotate(str(int(contact.active.sum())), (step.load_factor, 1.0), fontsize=7, **place)
+    reach = y[closed].max(initial=0.0)
+    axes.set_ylim(0.0, 1.5 * reach if 0.0 < 1.5 * reach < y.max() else None)
+    axes.set_xlabel("load factor (above: closed nodes)")
+    axes.set_ylabel(f"distance along the secondary surface [{units['length']}]")
+    axes.set_title(title or f"Contact '{pair}' over the load", pad=16)
+    axes.legend(loc="upper left", fontsize=8)
     return axes

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.results.plot._axes import UNITS, Units, new_axes
+from fastcontact.results.plot._axes import UNITS, Units, name_axes, new_axes
 from fastcontact.results.step import ContactResult
 
 if TYPE_CHECKING:
@@ -42,10 +42,6 @@ def pressure_profile(
     units : mapping
         Names of the units of ``length`` and ``pressure`` for the labels.
     ax : matplotlib Axes, optional
-
-    Returns
-    -------
-    matplotlib Axes
     """
     ax = new_axes(ax, (7.0, 4.6))
     flat = contact.coordinates.shape[1] == 2
@@ -56,14 +52,8 @@ def pressure_profile(
     shown = r <= reach
     for style, (legend, curve) in zip(("-", "--", ":", "-."), theories.items(), strict=False):
         x = np.append(np.linspace(0.0, curve.radius, 400), reach)
-        ax.plot(
-            x,
-            curve.pressure(x),
-            style,
-            color="black",
-            lw=1.1,
-            label=f"{legend} ($p_0$ = {curve.pressure_max:.1f})",
-        )
+        label = f"{legend} ($p_0$ = {curve.pressure_max:.1f})"
+        ax.plot(x, curve.pressure(x), style, color="black", lw=1.1, label=label)
     label = f"{contact.formulation.replace('_', '-')} ($p$ max = {contact.pressure_max:.1f})"
     ax.plot(r[shown], contact.pressure[shown], "o-" if flat else "o", color="tab:blue", ms=4, lw=0.8, label=label)
     if stress is not None:
@@ -72,9 +62,8 @@ def pressure_profile(
     inside, outside = contact.radius
     if np.isfinite(inside) and np.isfinite(outside):
         ax.axvspan(inside, outside, color="tab:blue", alpha=0.15, lw=0, label=f"edge: {inside:.2f} to {outside:.2f}")
-    ax.set_xlabel(f"distance from the axis [{units['length']}]")
-    ax.set_ylabel(f"contact pressure [{units['pressure']}]")
-    ax.set_title(title or f"Contact '{contact.name}'")
+    x_name, y_name = f"distance from the axis [{units['length']}]", f"contact pressure [{units['pressure']}]"
+    name_axes(ax, x_name, y_name, title or f"Contact '{contact.name}'")
     ax.set_xlim(0.0, reach)
     ax.set_ylim(bottom=0.0)
     ax.grid(alpha=0.3)

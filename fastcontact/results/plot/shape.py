@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.contact.search.closest import flat_triangles
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNITS, Units, new_axes
+from fastcontact.results.plot._axes import UNITS, Units, name_axes, new_axes
 from fastcontact.results.plot.solid import MOST_EDGES, draw_solid
 from fastcontact.results.step import StepResult
 
@@ -51,10 +52,6 @@ def deformed_shape(
         In 3D, height of the eye over the x-y plane and its direction around z [degrees].
     ax : matplotlib Axes, optional
         In 3D with ``projection="3d"``.
-
-    Returns
-    -------
-    matplotlib Axes
     """
     solid = mesh.dim == 3
     place = mesh.points + scale * step.displacement
@@ -71,11 +68,10 @@ def deformed_shape(
     axes.plot(*([x] for x in place[top]), "o", mfc="none", mec="red", ms=9, mew=1.5, label=label, zorder=10)
     axes.figure.colorbar(field, ax=axes, label=f"von Mises stress [{units['pressure']}]", shrink=0.6 if solid else 0.8)
     axes.set_aspect("equal")
-    axes.set_xlabel(f"x [{units['length']}]")
-    axes.set_ylabel(f"y [{units['length']}]")
+    title = title or f"Deformed shape (displacements x {scale:g}), load factor {step.load_factor:g}"
+    name_axes(axes, f"x [{units['length']}]", f"y [{units['length']}]", title)
     if solid:
         axes.set_zlabel(f"z [{units['length']}]")
-    axes.set_title(title or f"Deformed shape (displacements x {scale:g}), load factor {step.load_factor:g}")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.02 if solid else -0.09 if ax is not None else _below(both)))
     return axes
 
@@ -97,9 +93,9 @@ def _draw(ax: Axes, mesh: Mesh, place: Array, step: StepResult, edges: bool | No
     from matplotlib.tri import Triangulation
 
     loops = [cells[:, _outline(name)] for name, cells in mesh.solids.items()]
-    triangles = np.concatenate([_fan(name, cells) for name, cells in mesh.solids.items()])
+    flat = [cells[:, flat_triangles(cells.shape[1])].reshape(-1, 3) for cells in mesh.solids.values()]
     field = ax.tripcolor(
-        Triangulation(place[:, 0], place[:, 1], triangles), step.von_mises, shading="gouraud", cmap="viridis"
+        Triangulation(place[:, 0], place[:, 1], np.concatenate(flat)), step.von_mises, shading="gouraud", cmap="viridis"
     )
     if edges if edges is not None else sum(map(len, loops)) <= MOST_EDGES:
         for loop in loops:
@@ -114,16 +110,3 @@ def _outline(name: str) -> list[int]:
     if element.order == 1:
         return list(range(element.n_corners))
     return [node for facet in element.facets for node in (facet[0], facet[2])]
-
-
-def _fan(name: str, cells: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return triangles (n, 3) that cover the cells: corner triangles and the inner rest for quadratic ones."""
-    outline = _outline(name)
-    if elements.get(name).order == 1:
-        parts = [(outline[0], outline[i], outline[i + 1]) for i in range(1, len(outline) - 1)]
-    else:
-        middle = outline[1::2]
-        parts = [(outline[i - 1], outline[i], outline[i + 1]) for i in range(0, len(outline) - 1, 2)]
-        parts[0] = (outline[-1], outline[0], outline[1])
-        parts += [(middle[0], middle[i], middle[i + 1]) for i in range(1, len(middle) - 1)]
-    return np.concatenate([cells[:, list(part)] for part in parts])

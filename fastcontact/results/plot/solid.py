@@ -21,21 +21,10 @@ CUTS = 2
 
 
 def draw_solid(ax: Any, mesh: Mesh, place: Array, values: Array, edges: bool | None, view: tuple[float, float]) -> Any:
-    """Draw the facets of the outer surface that face the eye; return what carries the colours.
+    """Draw the facets of the outer surface that face the eye; return what a colour bar is made of.
 
-    Parameters
-    ----------
-    ax : matplotlib Axes
-        With ``projection="3d"``.
-    mesh : Mesh
-    place : ndarray (n_points, 3)
-        Positions of the points [length].
-    values : ndarray (n_points,)
-        Field for the colours.
-    edges : bool, optional
-        Draw the outlines of facets; by default up to MOST_EDGES.
-    view : (float, float)
-        Height and direction of the eye [degrees].
+    The points stand at `place` (n_points, 3) [length] and are coloured by `values` (n_points,). Outlines of facets are drawn
+    if `edges` says so, by default up to MOST_EDGES. `view` is height and direction of the eye [degrees].
     """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -69,9 +58,7 @@ def draw_solid(ax: Any, mesh: Mesh, place: Array, values: Array, edges: bool | N
     ax.add_collection3d(Poly3DCollection(polygons, facecolors=faces, edgecolors=lines, linewidths=0.3))
     ax.set_proj_type("ortho")
     ax.view_init(elev=view[0], azim=view[1])
-    for setter, low, high in zip(
-        (ax.set_xlim, ax.set_ylim, ax.set_zlim), place.min(axis=0), place.max(axis=0), strict=True
-    ):
+    for setter, low, high in zip((ax.set_xlim, ax.set_ylim, ax.set_zlim), place.min(axis=0), place.max(axis=0)):
         setter(low, high)
     return ScalarMappable(norm, "viridis")
 
@@ -109,9 +96,8 @@ def _outline(name: str, corners: Array, eye: Array) -> Array:
     element = elements.get(name)
     ends = [(a, b) for a, b in element.edges]
     if element.order == 2:
-        ends = [
-            side for k, (a, b) in enumerate(ends) for side in ((a, element.n_corners + k), (element.n_corners + k, b))
-        ]
+        middles = range(element.n_corners, element.n_corners + len(ends))
+        ends = [side for (a, b), middle in zip(ends, middles) for side in ((a, middle), (middle, b))]
     size = np.linalg.norm(np.ptp(corners, axis=1), axis=1)
     nearer = corners[:, np.array(ends)] + (size[:, None] * eye)[:, None, None]
     return np.asarray(nearer.reshape(-1, 2, 3))

@@ -13,7 +13,7 @@ def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "",
 
     Parameters
     ----------
-    results : io.result_reader.Results
+    results : Results
         An open result file.
     step : StepResult
     scale : float

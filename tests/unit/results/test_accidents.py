@@ -18,8 +18,8 @@ import pytest
 from test_result_files import MESH, assert_same, step_result
 
 from fastcontact import FileError, ResultWriter, open_results
-from fastcontact.results import _commits
-from fastcontact.results._uninterrupted import uninterrupted
+from fastcontact.results import committed_file
+from fastcontact.results.committed_file import uninterrupted
 
 
 @pytest.fixture
@@ -36,15 +36,15 @@ def assert_holds(path: Path, n_steps: int) -> None:
 
 def failing_after(count: int, error: BaseException, monkeypatch: pytest.MonkeyPatch, name: str) -> list[int]:
     """Let every call of a method of the file fail after the first `count`; the list tells how many were made."""
-    method, calls = getattr(_commits.CommittedFile, name), []
+    method, calls = getattr(committed_file.CommittedFile, name), []
 
-    def fail(self: _commits.CommittedFile, *arguments: object) -> object:
+    def fail(self: committed_file.CommittedFile, *arguments: object) -> object:
         calls.append(len(calls))
         if len(calls) > count:
             raise error
         return method(self, *arguments)
 
-    monkeypatch.setattr(_commits.CommittedFile, name, fail)
+    monkeypatch.setattr(committed_file.CommittedFile, name, fail)
     return calls
 
 
@@ -185,14 +185,14 @@ def test_a_file_that_is_taken_up_and_then_changes_is_left_alone(how: str, path: 
 
 def test_a_pair_is_in_the_file_as_a_whole_or_not_at_all(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Stopped by hand while the first step brings its contact pairs."""
-    import fastcontact.results._appending as appending
+    from fastcontact.results import contents
 
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
     def stopped(which: str) -> None:
         with ResultWriter(path, MESH) as out:
-            monkeypatch.setattr(appending, which, stop)
+            monkeypatch.setattr(contents, which, stop)
             out.write(step_result(1))
 
     for which in ("growing_table", "_append_contact"):
@@ -219,9 +219,9 @@ def interruptible() -> Iterator[None]:
 @pytest.mark.usefixtures("interruptible")
 def test_a_signal_waits_for_the_end_of_a_write(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The step that is being written is complete, counted, and in the record of how the run ended."""
-    put, seen = _commits.CommittedFile._put, []
+    put, seen = committed_file.CommittedFile._put, []
 
-    def interrupted(self: _commits.CommittedFile, place: int, data: bytes) -> None:
+    def interrupted(self: committed_file.CommittedFile, place: int, data: bytes) -> None:
         if not seen:
             signal.raise_signal(signal.SIGINT)
         seen.append(place)
@@ -230,7 +230,7 @@ def test_a_signal_waits_for_the_end_of_a_write(path: Path, monkeypatch: pytest.M
     def run() -> None:
         with ResultWriter(path, MESH) as out:
             out.write(step_result(0))
-            monkeypatch.setattr(_commits.CommittedFile, "_put", interrupted)
+            monkeypatch.setattr(committed_file.CommittedFile, "_put", interrupted)
             out.write(step_result(1))
             pytest.fail("the signal was lost")
 

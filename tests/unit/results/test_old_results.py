@@ -14,7 +14,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact import FileError, ResultWriter, open_results
-from fastcontact.results import _layout as layout
+from fastcontact.results import layout
 
 RESOURCES = Path(__file__).parent / "resources"
 FILES = sorted(path.name.removesuffix(".vtkhdf.gz") for path in RESOURCES.glob("*.vtkhdf.gz"))

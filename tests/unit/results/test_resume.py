@@ -18,8 +18,8 @@ from test_result_files import MESH, assert_same, step_result
 
 import fastcontact as fc
 from fastcontact import ConvergenceError, FileError, ModelError, ResultWriter, open_results
-from fastcontact.results import _commits
-from fastcontact.results._packing import packed, unpacked
+from fastcontact.mesh.files.packing import packed, unpacked
+from fastcontact.results import committed_file
 
 
 @pytest.fixture
@@ -57,13 +57,13 @@ def resumed(path: Path, ramp: fc.Ramp, model: fc.Model | None = None, **options)
 def recorded(path: Path, n_steps: int, monkeypatch: pytest.MonkeyPatch) -> tuple[list[tuple[int, bytes]], list[int]]:
     """All writes after the file was begun, and how many of them each step took; the begun file is left in `crashed`."""
     writes: list[tuple[int, bytes]] = []
-    put = _commits.CommittedFile._put
+    put = committed_file.CommittedFile._put
 
-    def record(self: _commits.CommittedFile, place: int, data: bytes) -> None:
+    def record(self: committed_file.CommittedFile, place: int, data: bytes) -> None:
         writes.append((place, bytes(data)))
         put(self, place, data)
 
-    monkeypatch.setattr(_commits.CommittedFile, "_put", record)
+    monkeypatch.setattr(committed_file.CommittedFile, "_put", record)
     ends = []
     with ResultWriter(path, MESH) as out:
         shutil.copy(path, path.with_name("crashed.vtkhdf"))
@@ -108,7 +108,7 @@ def test_a_committed_file_is_a_file(tmp_path: Path) -> None:
     path = tmp_path / "bytes"
     image = bytearray(random.bytes(300))
     path.write_bytes(image)
-    file = _commits.CommittedFile(path)
+    file = committed_file.CommittedFile(path)
     for _ in range(2000):
         place, size = int(random.integers(0, 400)), int(random.integers(1, 60))
         file.seek(place)

@@ -12,16 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from fastcontact.errors import CaseError, ContactError, FileError, MeshError
+from fastcontact.errors import CaseError, FileError, MeshError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.tables import (
     contact_table,
-    history_table,
     line_table,
-    point_table,
     read_csv,
-    with_theory,
+    with_column,
     write_csv,
 )
 
@@ -104,9 +102,10 @@ def test_contact_table_without_rows() -> None:
 
 
 def test_tables_in_space_measure_the_radius_from_the_y_axis() -> None:
-    mesh = Mesh([[3, 7, 4], [0, 1, 0], [-6, 0, 8.0]], {"tri3": [[0, 1, 2]]}, {}, {"P": [0, 1, 2]})
+    points, cells = [[3, 7, 4], [0, 1, 0], [-6, 0, 8.0]], {"tri3": [[0, 1, 2]], "line2": [[0, 1], [1, 2]]}
+    mesh = Mesh(points, cells, {"P": [1, 2]})
     step = step_result(0, (), mesh)
-    table = point_table(mesh, step, "P")
+    table = line_table(mesh, step, "P", 0)
     np.testing.assert_allclose(table["radius"], [5.0, 0.0, 10.0], rtol=1e-15)
     assert {"z", "displacement_z", "stress_yz", "stress_xz"} <= set(table.dtype.names)
     np.testing.assert_array_equal(table["stress_xz"], step.stress[:, 5])
@@ -125,73 +124,12 @@ def test_line_table_follows_the_line() -> None:
         line_table(MESH, step, "EGDE")
 
 
-def test_point_table_goes_group_by_group() -> None:
-    step = step_result(0)
-    table = point_table(MESH, step, ["B", "BOTH"])
-    assert table["group"].tolist() == ["B", "BOTH", "BOTH"]
-    assert table["point"].tolist() == [1, 0, 1]
-    np.testing.assert_array_equal(table["von_mises"], step.von_mises[[1, 0, 1]])
-    assert len(point_table(MESH, step, [])) == 0
-    with pytest.raises(MeshError, match="unknown group"):
-        point_table(MESH, step, "C")
-
-
-def test_history_table() -> None:
-    steps = [step_result(number, ("left", "right")) for number in range(3)]
-    table = history_table(iter(steps), "right")
-    assert table.dtype.names == (
-        "step", "load_factor", "force_x", "force_y", "radius_inside", "radius_outside", "pressure_max",
-        "von_mises_max",
-    )  # fmt: skip
-    assert table["step"].tolist() == [1, 2, 3]
-    assert table["load_factor"].tolist() == [0.25, 0.5, 0.75]
-    assert table["force_y"].tolist() == [11.0, 21.0, 31.0]
-    assert table["radius_inside"].tolist() == [1.0, 2.0, 3.0]
-    assert table["radius_outside"].tolist() == [1.5, 2.5, 3.5]
-    assert table["pressure_max"].tolist() == [0.0, 100.0, 200.0]
-    assert table["von_mises_max"].tolist() == [step.von_mises.max() for step in steps]
-
-
-def test_history_needs_to_know_the_pair() -> None:
-    steps = [step_result(0, ("left", "right"))]
-    with pytest.raises(ContactError, match="contact pairs left, right: name the one"):
-        history_table(steps)
-    with pytest.raises(ContactError, match="unknown contact pair 'rihgt': did you mean 'right'"):
-        history_table(steps, "rihgt")
-    assert "pressure_max" in history_table([step_result(0)]).dtype.names
-    assert history_table([step_result(0, ())]).dtype.names == ("step", "load_factor", "von_mises_max")
-    assert len(history_table([])) == 0
-    late = history_table([step_result(0, ()), step_result(1)])
-    assert np.isnan(late["radius_inside"][0])
-    assert late["radius_inside"][1] == 2.0
-
-
-@pytest.mark.parametrize(
-    "function",
-    [
-        lambda r: np.sqrt(np.maximum(4.0 - r**2, 0.0)),
-        lambda r: math.sqrt(max(4.0 - r * r, 0.0)),
-        lambda r: math.sqrt(4.0 - r**2) if r < 2.0 else 0.0,
-    ],
-    ids=["arrays", "numbers", "a branch"],
-)
-def test_theory_may_be_any_callable(function) -> None:
-    table = with_theory(contact_table(contact_result("c", 3)), "hertz", function)
-    np.testing.assert_allclose(table["hertz"], [0.0, math.sqrt(4 - 1.5**2), 2.0], rtol=1e-15)
-    assert table.dtype.names[-1] == "hertz"
-    assert table["point"].tolist() == [0, 4, 1]
-
-
-def test_theory_along_another_column_and_its_errors() -> None:
+def test_a_table_with_one_column_more() -> None:
     table = contact_table(contact_result("c", 3))
-    np.testing.assert_array_equal(with_theory(table, "twice", lambda s: 2 * s, "abscissa")["twice"], [0, 5, 10])
-    np.testing.assert_array_equal(with_theory(table, "flat", lambda s: 7.0)["flat"], [7, 7, 7])
-    with pytest.raises(CaseError, match="unknown column 'abcissa': did you mean 'abscissa'"):
-        with_theory(table, "t", np.sqrt, "abcissa")
-    with pytest.raises(CaseError, match="has a column 'gap' already"):
-        with_theory(table, "gap", np.sqrt)
-    with pytest.raises(CaseError, match=r"'t' gives \(2,\) values for the \(3,\) values of 'radius'"):
-        with_theory(table, "t", lambda r: r[1:])
+    more = with_column(table, "twice", 2 * table["abscissa"])
+    assert more["twice"].tolist() == [0, 5, 10]
+    assert more.dtype.names == (*table.dtype.names, "twice")
+    assert more["point"].tolist() == [0, 4, 1]
 
 
 # --------------------------------------------------------------------------------------------------- CSV
@@ -213,8 +151,7 @@ def test_tables_come_back_from_csv(tmp_path: Path) -> None:
     for table in (
         contact_table(step.contact["c"], step),
         line_table(MESH, step, "EDGE"),
-        point_table(MESH.with_groups(points={'1, "quoted"': [3], "2": [4]}), step, ['1, "quoted"', "2"]),
-        history_table([step_result(0), step_result(1)]),
+        np.array([('1, "quoted"', 1.5), ("two", math.inf)], [("name", "U12"), ("pressure", float)]),
     ):
         of_table = {name: unit for name, unit in units.items() if name in table.dtype.names}
         write_csv(path, table, of_table)

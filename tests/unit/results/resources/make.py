@@ -2,7 +2,7 @@
 
     python tests/unit/results/resources/make.py
 
-To be run once when `_result_layout.SCHEMA` is raised, before the release; existing files are never replaced. Small runs
+To be run once when `layout.SCHEMA` is raised, before the release; existing files are never replaced. Small runs
 with all that a file can hold: friction, an obstacle, cell fields, warnings, the restart state.
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, box
-from fastcontact.results import _layout as layout
+from fastcontact.results import layout
 
 HERE = Path(__file__).parent
 CASE_TEXT = 'title = "old"\n'

@@ -1,10 +1,11 @@
-"""Plain data with arrays as one run of bytes, and back: nothing is ever executed, and damage is noticed.
+"""Plain data with arrays as a sequence of bytes and back: nothing in it is executed, and damage is noticed.
 
 A line of ASCII JSON with sizes and checksum, the data as JSON with places instead of arrays, the arrays one after the other.
 """
 
 from __future__ import annotations
 
+import io
 import json
 import zlib
 from typing import Any
@@ -19,23 +20,23 @@ _KINDS = "biuf"
 
 def packed(data: Any) -> NDArray[np.uint8]:
     """Return `data` as bytes (n,): dictionaries with string keys, lists, strings, numbers, None and arrays of numbers."""
-    arrays: list[bytes] = []
+    arrays = io.BytesIO()
     text = json.dumps(_without_arrays(data, arrays)).encode("ascii")
-    body = b"".join([text, *arrays])
+    body = text + arrays.getbuffer()
     head = json.dumps({"text": len(text), "size": len(body), "checksum": zlib.crc32(body)}).encode("ascii")
     return np.frombuffer(head + b"\n" + body, np.uint8)
 
 
 def unpacked(values: NDArray[np.uint8]) -> Any:
-    """Return what `packed` was given; bytes beyond its end do not matter.
+    """Return what `packed` was given, from its bytes (n,); bytes beyond its end do not matter.
 
     Raises
     ------
     ValueError
         If the bytes are not whole, or not from `packed`.
     """
-    raw = values.tobytes()
-    line, found, body = raw[:200].partition(b"\n")
+    raw = np.ascontiguousarray(values, np.uint8).data
+    line, found, _ = bytes(raw[:200]).partition(b"\n")
     if not found:
         raise ValueError("no packed data")
     head = json.loads(line)
@@ -43,13 +44,13 @@ def unpacked(values: NDArray[np.uint8]) -> Any:
     if len(body) != head["size"] or zlib.crc32(body) != head["checksum"]:
         raise ValueError("packed data are cut off or changed")
     text = int(head["text"])
-    return _with_arrays(json.loads(body[:text]), body[text:])
+    return _with_arrays(json.loads(bytes(body[:text])), body[text:])
 
 
-def _without_arrays(data: Any, arrays: list[bytes]) -> Any:
+def _without_arrays(data: Any, arrays: io.BytesIO) -> Any:
     if isinstance(data, np.ndarray):
-        place = sum(map(len, arrays))
-        arrays.append(np.ascontiguousarray(data).tobytes())
+        place = arrays.tell()
+        arrays.write(np.ascontiguousarray(data).data)
         return {_ARRAY: [place, data.dtype.str, list(data.shape)]}
     if isinstance(data, np.generic):
         return data.item()
@@ -60,7 +61,7 @@ def _without_arrays(data: Any, arrays: list[bytes]) -> Any:
     return data
 
 
-def _with_arrays(data: Any, raw: bytes) -> Any:
+def _with_arrays(data: Any, raw: memoryview) -> Any:
     if isinstance(data, dict):
         if _ARRAY in data:
             place, kind, shape = data[_ARRAY]
@@ -71,7 +72,7 @@ def _with_arrays(data: Any, raw: bytes) -> Any:
     return data
 
 
-def _array(place: int, kind: str, shape: list[int], raw: bytes) -> NDArray[Any]:
+def _array(place: int, kind: str, shape: list[int], raw: memoryview) -> NDArray[Any]:
     dtype = np.dtype(kind)
     if dtype.kind not in _KINDS:
         raise ValueError(f"an array of {kind} is none of ours")

@@ -1,4 +1,4 @@
-"""Files on disk: one that must exist, and one that is replaced whole or not at all."""
+"""Paths of files: one that must exist, one that may be written, one that is replaced whole or not at all."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from fastcontact.errors import FileError
-from fastcontact.mesh.files.targets import PathLike, checked_target
+
+PathLike = str | os.PathLike[str]
 
 
 def existing_file(path: PathLike) -> Path:
@@ -39,12 +40,38 @@ def existing_file(path: PathLike) -> Path:
     return found
 
 
+def checked_target(path: PathLike) -> Path:
+    """Return the real path to write to; links are followed, so that the file they name is written.
+
+    Raises
+    ------
+    FileError
+        If the folder is missing, the path is no plain file, or nothing may be written there.
+    """
+    target = Path(os.path.realpath(os.fspath(path)))
+    try:
+        if target.is_dir():
+            raise FileError(f"'{target}' is a folder: name a file in it")
+        if not target.parent.is_dir():
+            raise FileError(f"folder '{target.parent}' does not exist: create it or name another file")
+        if target.exists() and not target.is_file():
+            raise FileError(f"'{target}' is a device or a pipe: name a plain file")
+        if target.exists() and not _may_write(target):
+            raise FileError(f"'{target}' is write-protected: remove the protection or name another file")
+    except OSError as error:
+        raise FileError(f"'{target}' cannot be written ({error.strerror}): name another file") from error
+    if not _may_write(target.parent):
+        raise FileError(f"folder '{target.parent}' is write-protected: name a file in another folder")
+    return target
+
+
+def _may_write(path: Path) -> bool:
+    return os.access(path, os.W_OK, effective_ids=os.access in os.supports_effective_ids)
+
+
 @contextlib.contextmanager
 def replacing(path: PathLike) -> Iterator[Path]:
-    """Give a temporary path beside `path`, for a library that opens files itself; move it there on success.
-
-    What stood at `path` is untouched until the new file is complete; after a failure the temporary file is
-    gone.
+    """Give a temporary path beside `path` to write to, which takes its place on success and is removed after a failure.
 
     Raises
     ------

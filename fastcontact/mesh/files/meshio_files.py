@@ -1,4 +1,4 @@
-"""Everything that touches meshio: its formats in and out, its groups, its habits of printing and exiting."""
+"""Mesh files in the formats of meshio, in and out: their groups, node orders and losses."""
 
 from __future__ import annotations
 
@@ -9,37 +9,37 @@ import logging
 import threading
 import warnings
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.errors import FastcontactError, FastcontactWarning, FileError, MeshError
+from fastcontact.errors import FastcontactWarning, FileError, MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.files import _abaqus
-from fastcontact.mesh.files._blocks import VERTEX, Block, build_mesh, check_known, merged, without_duplicates
-from fastcontact.mesh.files._meshio_guard import bounded
+from fastcontact.mesh.files import abaqus, hdf5
+from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_known, merged, without_duplicates
+from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, TAGS, library, read_in_process
+from fastcontact.mesh.files.paths import existing_file
 from fastcontact.mesh.mesh import Mesh
 
 logger = logging.getLogger("fastcontact")
 
-# meshio prints through the standard streams; only one thread at a time may divert them.
+# meshio's writers print through the standard streams; only one thread at a time may divert them.
 _STREAMS = threading.Lock()
 
-# Integer cell data that mean groups, in the formats of Gmsh, Medit and others; 0 means no group.
-TAGS = ("gmsh:physical", "medit:ref", "tetgen:ref", "netgen:index", "avsucd:material", "cell_tags")
 # What Gmsh calls things of dimension 0 to 3: a tag without a name becomes a group like "curve_7".
 SHAPES = ("point", "curve", "surface", "volume")
-# Formats with named arrays: a group becomes an array of 0 and 1 under its prefix and its quoted name.
+# Formats with named arrays: every group is one.
 ARRAY_FORMATS = ("vtk", "vtu", "xdmf")
-CELL_PREFIX, POINT_PREFIX = "cell_group:", "point_group:"
 # Formats whose writers are known to keep all our cells; of the others, the result is read back.
 COMPLETE_FORMATS = ("vtk", "vtu", "gmsh22", "abaqus")
 # Formats that know points of two coordinates; the others get a zero, and reading drops it again.
 FLAT_FORMATS = ("gmsh22", "abaqus", "medit", "su2", "dolfin-xml")
+# Formats that are HDF5 files.
+HDF5_FORMATS = ("cgns", "h5m", "hmf", "exodus")
 
 # Cells that meshio gets in another order than ours: our node k is its node NODE_ORDER[format][element][k]. It mirrors
 # the linear wedge of VTK, as old documents of VTK want and VTK 9.7 does not, and leaves Gmsh's wedge of 18 nodes alone.
@@ -60,24 +60,16 @@ USUAL = (".med", ".msh", ".vtu", ".vtk", ".inp", ".xdmf", ".mesh")
 OTHER_FORMATS = "write .med, .vtu or .msh instead"
 
 
-@dataclass(frozen=True, eq=False)
-class MeshioContent:
-    """A mesh read by meshio: the mesh, its format, and cells left out as vertices and as duplicates."""
-
-    mesh: Mesh
-    format: str
-    n_vertices: int
-    n_duplicates: int
+def _refusal(action: str, path: Path, reason: str) -> FileError:
+    reason = " ".join(reason.split())
+    reason = reason if len(reason) <= LONGEST else f"{reason[:LONGEST]}..."
+    remedy = "check the file, or convert it to .med" if action == "read" else OTHER_FORMATS
+    return FileError(f"meshio cannot {action} '{path}' ({reason}): {remedy}")
 
 
-def _library() -> Any:
-    """Return the package meshio, its table of dimensions completed: without some cells it can do nothing with them."""
-    import meshio
-    from meshio._mesh import topological_dimension
-
-    for element in elements.ELEMENTS.values():
-        topological_dimension.setdefault(element.meshio, element.dim)
-    return meshio
+def _log(action: str, path: Path, said: str) -> None:
+    if said:
+        logger.info("meshio, to %s %s: %s", action, path, " ".join(said.split()))
 
 
 @contextlib.contextmanager
@@ -87,23 +79,16 @@ def _contained(action: str, path: Path) -> Iterator[None]:
     try:
         with _STREAMS, contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             yield
-    except FastcontactError:
-        raise
     except (Exception, SystemExit) as error:
-        words = said.getvalue() if isinstance(error, SystemExit) else str(error)
-        reason = " ".join(words.split()) or type(error).__name__
-        reason = reason if len(reason) <= LONGEST else f"{reason[:LONGEST]}..."
-        remedy = "check the file, or convert it to .med" if action == "read" else OTHER_FORMATS
-        raise FileError(f"meshio cannot {action} '{path}' ({reason}): {remedy}") from error
-    if said.getvalue():
-        logger.info("meshio, to %s %s: %s", action, path, " ".join(said.getvalue().split()))
+        reason = said.getvalue() if isinstance(error, SystemExit) else str(error)
+        raise _refusal(action, path, reason or type(error).__name__) from error
+    _log(action, path, said.getvalue())
 
 
 def _format(path: Path, writing: bool) -> str:
     """Return meshio's name of the format of a file, by its suffix."""
-    meshio = _library()
     suffixes = ["".join(path.suffixes[i:]).lower() for i in range(len(path.suffixes))]
-    formats = meshio.extension_to_filetypes
+    formats = library().extension_to_filetypes
     names = next((formats[suffix] for suffix in suffixes if suffix in formats), None)
     if names is None:
         near = difflib.get_close_matches(path.suffix, formats, n=1, cutoff=0.7)
@@ -120,8 +105,8 @@ def _format(path: Path, writing: bool) -> str:
     return "gmsh"
 
 
-def read(path: Path) -> MeshioContent:
-    """Read a mesh and its groups.
+def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
+    """Return a mesh with its groups, the format, and the numbers of cells left out as vertices and as duplicates.
 
     Raises
     ------
@@ -130,61 +115,87 @@ def read(path: Path) -> MeshioContent:
     MeshError
         If the mesh has no cells or a kind of cells that fastcontact does not know.
     """
-    meshio = _library()
     file_format = _format(path, writing=False)
-    if file_format == "abaqus":
-        _abaqus.check_readable(path)
-    with _contained("read", path), bounded(path, file_format):
-        found = meshio.read(path, file_format=file_format)
+    _check_before(path, file_format)
+    found = read_in_process(path, file_format)
+    if "error" in found:
+        raise _refusal("read", path, found["error"])
+    _log("read", path, found["said"])
     try:
         blocks = merged(_blocks(found, NODE_ORDER.get(file_format, {})))
-        n_duplicates = 0
-        if file_format == "gmsh":
-            # Version 2 of that format repeats a cell for each of its groups.
-            united = [without_duplicates(block) for block in blocks if block.kind != VERTEX]
-            blocks = [block for block, _ in united] + [block for block in blocks if block.kind == VERTEX]
-            n_duplicates = sum(count for _, count in united)
-        mesh = build_mesh(found.points, blocks, _point_groups(found), _cell_group_names(found, file_format))
+        n_duplicates = sum(len(block.nodes) for block in blocks)
+        if file_format == "gmsh":  # version 2 of that format repeats a cell for each of its groups
+            blocks = [block if block.kind == VERTEX else without_duplicates(block) for block in blocks]
+        n_duplicates -= sum(len(block.nodes) for block in blocks)
+        mesh = build_mesh(found["points"], blocks, _point_groups(found), _cell_group_names(found, file_format))
     except MeshError as error:
         raise MeshError(f"'{path}': {error}") from None
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         # meshio has taken what stands in the file as it is: arrays of any shape and kind.
         raise FileError(f"the parts of '{path}' do not fit together: check the file, or convert it to .med") from error
     n_vertices = sum(len(block.nodes) for block in blocks if block.kind == VERTEX)
-    return MeshioContent(mesh, file_format, n_vertices, n_duplicates)
+    return mesh, file_format, {"vertex": n_vertices, "duplicate": n_duplicates}
 
 
-def _cell_group_names(found: Any, file_format: str) -> list[str]:
+def _check_before(path: Path, file_format: str) -> None:
+    """Refuse files that lead meshio to other files, or of which it would lose something."""
+    if file_format == "abaqus":
+        abaqus.check_readable(path)
+    elif file_format in HDF5_FORMATS and (file_format != "exodus" or hdf5.is_hdf5(path)):
+        with hdf5.opened(path):
+            pass
+    elif file_format == "xdmf":
+        _check_references(path)
+
+
+def _check_references(path: Path) -> None:
+    """Refuse an XDMF file that refers to files in other folders, or to HDF5 files that do."""
+    try:
+        items = [item for item in ElementTree.parse(path).iter() if item.get("Format") in ("HDF", "Binary")]
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise _refusal("read", path, f"it is no XML: {error}") from error
+    folder = path.resolve().parent
+    for item in items:
+        name = (item.text or "").strip()
+        beside = folder / (name.partition(":")[0] if item.get("Format") == "HDF" else name)
+        if folder not in (beside.resolve().parent, beside.resolve()):
+            raise _refusal("read", path, f"it refers to the file '{beside.resolve()}', which is not beside it")
+        existing_file(beside)
+        if item.get("Format") == "HDF":
+            with hdf5.opened(beside):
+                pass
+
+
+def _cell_group_names(found: Mapping[str, Any], file_format: str) -> list[str]:
     """Return the names of all groups of cells, also of those without any."""
-    names = [name for name in found.cell_sets if not name.startswith("gmsh:")]
-    names += [unquote(key[len(CELL_PREFIX) :]) for key in found.cell_data if key.startswith(CELL_PREFIX)]
+    names = [name for name in found["cell_sets"] if not name.startswith("gmsh:")]
+    names += [unquote(key[len(CELL_PREFIX) :]) for key in found["cell_data"] if key.startswith(CELL_PREFIX)]
     if file_format == "gmsh":
-        names += [name for name, (_, dim) in found.field_data.items() if dim > 0]
+        names += [name for name, (_, dim) in found["field_data"].items() if dim > 0]
     return names
 
 
-def _blocks(found: Any, order: Orders) -> list[Block]:
+def _blocks(found: Mapping[str, Any], order: Orders) -> list[Block]:
     foreign: dict[str, int] = {}
-    for block in found.cells:
-        if block.type not in elements.BY_MESHIO and block.type != VERTEX:
-            foreign[block.type] = foreign.get(block.type, 0) + len(block.data)
+    for kind, count, _ in found["cells"]:
+        if kind not in elements.BY_MESHIO and kind != VERTEX:
+            foreign[kind] = foreign.get(kind, 0) + count
     check_known(foreign, elements.BY_MESHIO)
-    return [_block(found, index, cells, order) for index, cells in enumerate(found.cells)]
+    return [_block(found, index, kind, nodes, order) for index, (kind, _, nodes) in enumerate(found["cells"])]
 
 
-def _block(found: Any, index: int, cells: Any, order: Orders) -> Block:
-    kind = VERTEX if cells.type == VERTEX else elements.BY_MESHIO[cells.type].name
+def _block(found: Mapping[str, Any], index: int, kind: str, nodes: NDArray[Any], order: Orders) -> Block:
+    kind = VERTEX if kind == VERTEX else elements.BY_MESHIO[kind].name
     dim = 0 if kind == VERTEX else elements.get(kind).dim
     groups: dict[str, NDArray[Any]] = {}
-    for key, data in found.cell_data.items():
+    for key, parts in found["cell_data"].items():
         if key in TAGS:
-            _add(groups, _tagged(np.asarray(data[index]), dim, found.field_data))
-        elif key.startswith(CELL_PREFIX):
-            _add(groups, {unquote(key[len(CELL_PREFIX) :]): np.flatnonzero(data[index])})
-    for name, sets in found.cell_sets.items():
+            _add(groups, _tagged(parts[index], dim, found["field_data"]))
+        else:
+            _add(groups, {unquote(key[len(CELL_PREFIX) :]): np.flatnonzero(parts[index])})
+    for name, sets in found["cell_sets"].items():
         if not name.startswith("gmsh:") and index < len(sets):
             _add(groups, {name: np.asarray(sets[index], np.intp).reshape(-1)})
-    nodes = np.asarray(cells.data)
     nodes = nodes[:, order[kind]] if kind in order else nodes
     return Block(kind, nodes, {name: rows for name, rows in groups.items() if len(rows)})
 
@@ -206,14 +217,14 @@ def _tagged(tags: NDArray[Any], dim: int, field_data: Mapping[str, Any]) -> dict
     }
 
 
-def _point_groups(found: Any) -> dict[str, NDArray[Any]]:
+def _point_groups(found: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
     groups: dict[str, NDArray[Any]] = {}
-    for key, data in found.point_data.items():
+    for key, data in found["point_data"].items():
         if key in TAGS:
-            _add(groups, _tagged(np.asarray(data), 0, {}))
-        elif key.startswith(POINT_PREFIX):
+            _add(groups, _tagged(data, 0, {}))
+        else:
             _add(groups, {unquote(key[len(POINT_PREFIX) :]): np.flatnonzero(data)})
-    for name, members in found.point_sets.items():
+    for name, members in found["point_sets"].items():
         _add(groups, {name: np.asarray(members, np.intp).reshape(-1)})
     return groups
 
@@ -226,7 +237,7 @@ def write(path: Path, temporary: Path, mesh: Mesh) -> None:
     FileError
         If meshio cannot write the mesh in this format, or would leave out cells.
     """
-    meshio = _library()
+    meshio = library()
     file_format = _format(path, writing=True)
     if file_format in ("tetgen", "svg"):
         raise FileError(f"'{path}': {file_format} is no mesh format of one file; {OTHER_FORMATS}")
@@ -236,7 +247,7 @@ def write(path: Path, temporary: Path, mesh: Mesh) -> None:
     with _contained("write", path):
         meshio.write(temporary, meshio.Mesh(**parts), file_format=file_format, **options)
     if file_format == "abaqus":
-        _abaqus.append_cell_sets(temporary, mesh)
+        abaqus.append_cell_sets(temporary, mesh)
     if file_format not in COMPLETE_FORMATS:
         _check_complete(path, temporary, file_format, mesh)
 
@@ -296,12 +307,13 @@ def _with_tags(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
             dim, tag = int(dims[members].max()), len(field_data) + 1
             tags[members[dims[members] == dim]] = tag
             field_data[name] = np.array([tag, dim])
-    cut = {
-        name: len(members) - int((tags[members] == field_data[name][0]).sum())
-        for name, members in mesh.cell_groups.items()
-        if name in field_data
-    }
-    _warn_of_cuts({name: count for name, count in cut.items() if count})
+    kept = {name: int((tags[mesh.cell_groups[name]] == tag).sum()) for name, (tag, _) in field_data.items()}
+    cut = {name: len(rows) - kept[name] for name, rows in mesh.cell_groups.items() if len(rows) > kept.get(name, 0)}
+    if cut:
+        _warn(
+            f"Gmsh files of version 2.2 hold one group a cell: {sum(cut.values())} memberships of the groups "
+            f"{', '.join(cut)} are left out; {KEEPS_ALL}"
+        )
     blocks = np.split(tags, list(mesh.offsets.values())[1:])
     cells, blocks = _with_vertices(parts["cells"], blocks, mesh.point_groups, field_data)
     data = {"gmsh:physical": blocks, "gmsh:geometrical": [np.maximum(block, 1) for block in blocks]}
@@ -327,19 +339,10 @@ def _with_vertices(
     return [*cells, (VERTEX, vertices)], [*blocks, vertex_tags]
 
 
-def _warn_of_cuts(cut: Mapping[str, int]) -> None:
-    if cut:
-        _warn(
-            f"Gmsh files of version 2.2 hold one group a cell: {sum(cut.values())} memberships of the groups "
-            f"{', '.join(cut)} are left out; {KEEPS_ALL}"
-        )
-
-
 def _check_complete(path: Path, temporary: Path, file_format: str, mesh: Mesh) -> None:
     """Read back what was written: several of meshio's writers leave out or change cells without an error."""
-    meshio = _library()
     with _contained("read back", path):
-        found = meshio.read(temporary, file_format=file_format)
+        found = library().read(temporary, file_format=file_format)
     wrong = [kind for kind, block in _meshio_cells(mesh, {}) if not np.array_equal(found.get_cells_type(kind), block)]
     if wrong or len(found.points) != mesh.n_points:
         listed = f"the {', '.join(wrong)} cells" if wrong else "the points"

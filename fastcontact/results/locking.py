@@ -1,4 +1,4 @@
-"""Where a file may be written: checks before the work, room on the disk, one writer a path."""
+"""The place of a result file on the disk: room that is reserved, and one writer at a time."""
 
 from __future__ import annotations
 
@@ -12,40 +12,9 @@ from typing import IO, Any
 
 from fastcontact.errors import FileError
 
-PathLike = str | os.PathLike[str]
-
-
-def checked_target(path: PathLike) -> Path:
-    """Return the real path to write to; links are followed, so that the file they name is written.
-
-    Raises
-    ------
-    FileError
-        If the folder is missing, the path is no plain file, or nothing may be written there.
-    """
-    target = Path(os.path.realpath(os.fspath(path)))
-    try:
-        if target.is_dir():
-            raise FileError(f"'{target}' is a folder: name a file in it")
-        if not target.parent.is_dir():
-            raise FileError(f"folder '{target.parent}' does not exist: create it or name another file")
-        if target.exists() and not target.is_file():
-            raise FileError(f"'{target}' is a device or a pipe: name a plain file")
-        if target.exists() and not _may_write(target):
-            raise FileError(f"'{target}' is write-protected: remove the protection or name another file")
-    except OSError as error:
-        raise FileError(f"'{target}' cannot be written ({error.strerror}): name another file") from error
-    if not _may_write(target.parent):
-        raise FileError(f"folder '{target.parent}' is write-protected: name a file in another folder")
-    return target
-
-
-def _may_write(path: Path) -> bool:
-    return os.access(path, os.W_OK, effective_ids=os.access in os.supports_effective_ids)
-
 
 def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
-    """Take `size` bytes from `start` on for an open file, or raise OSError with nothing half written."""
+    """Reserve `size` bytes from `start` on for an open file, or raise OSError before anything is written."""
     if hasattr(os, "posix_fallocate"):
         try:
             os.posix_fallocate(descriptor, start, size)
@@ -58,7 +27,7 @@ def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
 
 
 def left_at(path: Path) -> tuple[int, ...] | None:
-    """Return what tells a file from others at the same path, and from itself once it is changed; None without one."""
+    """Return device, number, size and time of change of the file at a path, by which it is known again; None without one."""
     try:
         found = os.stat(path)
     except OSError:
@@ -67,10 +36,9 @@ def left_at(path: Path) -> tuple[int, ...] | None:
 
 
 class PathLock:
-    """Exclusive right to write one path, held through a file beside it.
+    """Exclusive right to write one path, through a locked file beside it; viewers may lock the result file itself.
 
-    The operating system drops the lock when its process ends, however it ends, so that there are no stale
-    locks. The result file itself is not locked: viewers that lock what they read could not follow a run.
+    The operating system ends the lock with its process, however that ends, so that no lock is left over.
 
     Raises
     ------

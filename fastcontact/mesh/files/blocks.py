@@ -1,4 +1,4 @@
-"""From what mesh files hold (blocks of cells, each with its own groups) to one Mesh."""
+"""One Mesh made of what a mesh file holds: blocks of cells, each with its own groups."""
 
 from __future__ import annotations
 
@@ -24,10 +24,7 @@ Groups = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Cells of one kind: connectivity (n_cells, n_nodes), and the rows of it in each group.
-
-    `kind` is the name of an element, or ``"vertex"`` for cells of one node, which a Mesh has not.
-    """
+    """Cells of one kind, an element or ``"vertex"``: connectivity (n_cells, n_nodes), and the rows of it in each group."""
 
     kind: str
     nodes: NDArray[Any]
@@ -40,10 +37,10 @@ def build_mesh(
     point_groups: Mapping[str, NDArray[Any]],
     names: Iterable[str] = (),
 ) -> Mesh:
-    """Return one Mesh of all blocks.
+    """Return one Mesh of all blocks, with `points` (n_points, 2 or 3) [length].
 
-    Blocks of the same kind are joined, groups of vertex cells become groups of points, `names` without any
-    cell become empty groups, and a flat mesh in 3D coordinates becomes a 2D one.
+    Blocks of the same kind are joined, groups of vertex cells become groups of points, `names` without any cell become
+    empty groups, and a flat mesh in 3D coordinates becomes a 2D one.
 
     Raises
     ------
@@ -59,7 +56,7 @@ def build_mesh(
     vertices = [block for block in joined if block.kind == VERTEX]
     if not solid:
         raise MeshError("the mesh has no cells: nothing can be computed on points alone")
-    cell_groups = {name: np.empty(0, np.intp) for name in names} | _numbered(solid)
+    cell_groups: Groups = {name: np.empty(0, np.intp) for name in names} | _numbered(solid)
     all_point_groups = {name: np.asarray(members, np.intp) for name, members in point_groups.items()}
     for block in vertices:
         for name in _add_vertices(all_point_groups, block, solid):
@@ -90,31 +87,24 @@ def merged(blocks: Iterable[Block]) -> list[Block]:
 def _joined(parts: list[Block]) -> Block:
     if len(parts) == 1:
         return parts[0]
-    groups: dict[str, list[Rows]] = {}
-    start = 0
-    for part in parts:
-        for name, rows in part.groups.items():
-            groups.setdefault(name, []).append(np.asarray(rows, np.intp) + start)
-        start += len(part.nodes)
-    joined = {name: np.concatenate(pieces) for name, pieces in groups.items()}
-    return Block(parts[0].kind, np.concatenate([part.nodes for part in parts]), joined)
+    return Block(parts[0].kind, np.concatenate([part.nodes for part in parts]), _numbered(parts))
 
 
-def without_duplicates(block: Block) -> tuple[Block, int]:
-    """Return the block with cells on the same nodes united (their groups too), and how many were too many."""
+def without_duplicates(block: Block) -> Block:
+    """Return the block with cells on the same nodes united, and their groups, too."""
     if not len(block.nodes):
-        return block, 0
+        return block
     _, first, inverse = np.unique(np.sort(block.nodes, axis=1), axis=0, return_index=True, return_inverse=True)
     if len(first) == len(block.nodes):
-        return block, 0
+        return block
     kept = np.sort(first)
     position = np.searchsorted(kept, first)[inverse.reshape(-1)]
     groups = {name: np.unique(position[rows]) for name, rows in block.groups.items()}
-    return Block(block.kind, block.nodes[kept], groups), len(block.nodes) - len(kept)
+    return Block(block.kind, block.nodes[kept], groups)
 
 
 def _numbered(blocks: list[Block]) -> Groups:
-    """Return the groups as cell numbers through all blocks."""
+    """Return the groups as numbers of cells in the sequence of all blocks."""
     groups: dict[str, list[Rows]] = {}
     start = 0
     for block in blocks:

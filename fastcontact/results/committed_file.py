@@ -1,42 +1,33 @@
-"""A file for HDF5 to write on whose every state on the disk, write by write, is a file that opens.
+"""A file that HDF5 writes to, and that can be opened after every single write.
 
-HDF5 writes the records of its indices in no particular order. A process that is killed between two of them may leave an
-index that leads beyond the end of the file, or that has lost entries on their way from one node to the next, and with
-them steps that were complete. Here writes are held back until HDF5 flushes, and then done in an order in which each of
-them alone is harmless: what lies where nothing was, to which nothing leads yet; the superblock, which knows the end of
-the file; nodes of indices from the root down, so that entries are found in their new node before they vanish from the
-old one; all else; and tables of names last (HDF5 File Format Specification 3.0, sections II.A and III.A).
+HDF5 writes the records of its indices in no particular order. A process that is killed between two writes may leave an index
+that leads beyond the end of the file or has lost entries, and with them steps that were complete. Here writes are kept in
+memory until HDF5 flushes, and then done in an order in which each is harmless: first new places, to which nothing leads yet;
+the superblock with the end of the file; nodes of indices from the root down, so that entries are in their new node before
+they leave the old one; all else; tables of names last (HDF5 File Format Specification 3.0, sections II.A and III.A).
 """
 
 from __future__ import annotations
 
 import bisect
+import contextlib
 import os
+import signal
+import threading
+from collections.abc import Iterator
 from pathlib import Path
+from types import FrameType
 
 # Where HDF5 begins its superblock, the nodes of its indices and its tables of names.
 SUPERBLOCK, NODE, NAMES = b"\x89HDF\r\n\x1a\n", b"TREE", b"SNOD"
 
 
 class CommittedFile:
-    """What `h5py.File` asks of a file that it is given in place of a name; writes wait for `flush`.
+    """An existing HDF5 file, with the methods that `h5py.File` calls; writes wait for `flush`.
 
-    HDF5 cannot be stopped half way by an exception. What goes wrong when it reads or flushes is kept for `check`, and from
-    then on nothing is written any more: the file stays as the last write that went well has left it.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-        An existing HDF5 file.
-
-    Attributes
-    ----------
-    end : int
-        Where the contents end, as HDF5 last told; the file may take more room.
-    ours : bool
-        Whether nobody else has written to the file, as `intact` last saw; if somebody has, nothing more is written.
-    failure : BaseException, optional
-        What went wrong first.
+    HDF5 cannot be stopped half way by an exception. An error while it reads or flushes is kept in `failure`, and from then on
+    nothing is written: the file stays as the last good write has left it. Nor is anything written once `ours` is False,
+    because another program has written to the file. `end` is where the contents end; the file may take more room.
     """
 
     def __init__(self, path: Path) -> None:
@@ -50,7 +41,7 @@ class CommittedFile:
         self._starts, self._ends = [0], [self.end]  # of what has been written, in order and apart
 
     def _contents(self) -> int:
-        """Return where the contents of the file end, whatever room it takes."""
+        """Return where the contents of the file end."""
         head, size = self._head, self._file.seek(0, os.SEEK_END)
         known = head.startswith(SUPERBLOCK) and head[8] == 0 and head[13] == 8  # version 0, addresses of eight bytes
         return min(int.from_bytes(head[40:48], "little"), size) if known else size
@@ -65,7 +56,7 @@ class CommittedFile:
         return self.ours
 
     def check(self) -> None:
-        """Raise what has gone wrong so far, if anything has."""
+        """Raise the first error, if there was one."""
         if self.failure is not None:
             raise self.failure
 
@@ -93,7 +84,7 @@ class CommittedFile:
         return max(os.fstat(self.fileno()).st_size, waiting)
 
     def readinto(self, buffer: memoryview) -> int:
-        """Fill a buffer from the position on, with what waits where something does; zeros beyond the end."""
+        """Fill a buffer from the position on, pending writes included; zeros beyond the end."""
         size, start = len(buffer), self._position
         data = bytearray(size)
         try:
@@ -121,7 +112,7 @@ class CommittedFile:
         return bytes(buffer)
 
     def write(self, data: bytes) -> int:
-        """Take data for the position; later data replace earlier ones."""
+        """Keep data for the position; later data replace earlier ones."""
         data, start = bytes(data), self._position
         end = start + len(data)
         for place in [p for p, old in self._pending.items() if p < end and start < p + len(old)]:
@@ -135,12 +126,12 @@ class CommittedFile:
         return len(data)
 
     def truncate(self, size: int) -> int:
-        """Take note of where the contents end; the file is cut when it is closed."""
+        """Set where the contents end; the file is cut when it is closed."""
         self.end = size
         return size
 
     def flush(self) -> None:
-        """Write what waits, in an order in which every write may be the last one."""
+        """Write all pending data, in an order in which every write may be the last one."""
         try:
             if self.writable:
                 self._commit()
@@ -148,8 +139,8 @@ class CommittedFile:
             self._fail(error)
 
     def _fail(self, error: BaseException) -> None:
-        """Keep an error, the first one of all, without the frames of HDF5's callers, which would keep its objects open."""
-        error = error.with_traceback(None)
+        """Keep the first error, without its frames, which would keep objects of HDF5 open."""
+        error = error.with_traceback(None)  # the later ones, too: they may be the same object
         self.failure = self.failure or error
 
     def _commit(self) -> None:
@@ -162,7 +153,7 @@ class CommittedFile:
         self._pending.clear()
 
     def _turn(self, place: int, data: bytes) -> tuple[int, int, int]:
-        """Return the turn of a write: what is new, superblock, nodes from the root down, all else, names."""
+        """Return by what writes are sorted: new places, superblock, nodes from the root down, all else, names."""
         if not self._overlaps(place, place + len(data)):
             return 0, 0, place
         if place == 0:
@@ -189,11 +180,11 @@ class CommittedFile:
             view = view[self._file.write(view) :]
 
     def close(self) -> None:
-        """Cut the file behind its contents and see it to the disk, against a power failure; once is enough."""
+        """Cut the file behind its contents and wait until it is on the disk; a second call does nothing."""
         if self._file.closed:
             return
         try:
-            if self.failure is not None:  # what HDF5 told last may not have come to the file
+            if self.failure is not None:  # the last end that HDF5 set may not be in the file
                 self._head = self._read_head()
                 self.end = self._contents()
             if self.ours:
@@ -201,3 +192,28 @@ class CommittedFile:
                 os.fsync(self.fileno())
         finally:
             self._file.close()
+
+
+@contextlib.contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Let signals, such as Ctrl-C, wait until the block has ended: an exception in a call back from HDF5 may crash it.
+
+    Python handles signals in its main thread only: in other threads there is nothing to do.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    arrived: list[tuple[int, FrameType | None]] = []
+    handlers = {int(number): signal.getsignal(number) for number in signal.valid_signals()}
+    try:
+        with contextlib.ExitStack() as restored:  # which goes on restoring when something is raised meanwhile
+            for number, handler in handlers.items():
+                if callable(handler):
+                    restored.callback(signal.signal, number, handler)
+                    signal.signal(number, lambda *signal_and_frame: arrived.append(signal_and_frame))
+            yield
+    finally:
+        for which, frame in arrived:
+            handler = handlers[which]
+            assert callable(handler)
+            handler(which, frame)

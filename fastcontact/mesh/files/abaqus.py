@@ -17,10 +17,13 @@ def check_readable(path: Path) -> None:
     Raises
     ------
     FileError
-        If a set is defined in several places, sets of elements are given to some *ELEMENT sections only, or
-        there are several sections of nodes.
+        If the file includes another one, a set is defined in several places, sets of elements are given to some
+        *ELEMENT sections only, or there are several sections of nodes.
     """
-    sections = [_keyword(line) for line in _lines(path) if line.startswith("*") and not line.startswith("**")]
+    lines = _lines(path)
+    if any(line.partition(",")[0].replace("*", "").strip().upper() == "INCLUDE" for line in lines):
+        raise FileError(f"'{path}' includes another file, which is not read: copy its lines in place of *INCLUDE")
+    sections = [_keyword(line) for line in lines if line.startswith("*") and not line.startswith("**")]
     n_node_sections = sum(keyword == "NODE" for keyword, _ in sections)
     if n_node_sections > 1:
         raise FileError(f"'{path}' has {n_node_sections} *NODE sections, of which meshio keeps one: join them")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import FastcontactWarning, FileError
-from fastcontact.mesh.files.hdf5 import values
+from fastcontact.mesh.files.hdf5 import attribute, values
 
 GROUP_NAME_SIZE = 80
 FAMILY_NAME_SIZE = 64
@@ -47,11 +47,11 @@ def decoded(raw: bytes) -> str:
 
 
 def read_families(folder: Any, level: int = 0) -> Families:
-    """Return the group names of each family number, from the levels below an HDF5 group that MED knows."""
+    """Return the group names of each family number, from an HDF5 group and the folders below it that MED has."""
     found: Families = {}
     for entry in folder.values():
         if "NUM" in entry.attrs:
-            found[int(entry.attrs["NUM"])] = _group_names(entry)
+            found[int(attribute(entry, "NUM"))] = _group_names(entry)
         elif hasattr(entry, "values") and level < LEVELS:
             found.update(read_families(entry, level + 1))
     return found
@@ -64,7 +64,7 @@ def _group_names(family: Any) -> tuple[str, ...]:
     # MED 2 stores one string for all names, later versions a row for each: the same bytes, but for a zero.
     count = -(-len(raw) // GROUP_NAME_SIZE)
     if "NBR" in family["GRO"].attrs:
-        count = min(count, int(family["GRO"].attrs["NBR"]))
+        count = min(count, int(attribute(family["GRO"], "NBR")))
     fields = (raw[i * GROUP_NAME_SIZE : (i + 1) * GROUP_NAME_SIZE] for i in range(count))
     return tuple(name for name in map(decoded, fields) if name)
 

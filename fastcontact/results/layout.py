@@ -1,17 +1,35 @@
-"""What stands where in a result file, in the words of VTK (three components, solids only) and in our own."""
+"""What stands where in a result file.
+
+A result file is an HDF5 file with two groups. Viewers read the first, whose layout is that of VTK:
+
+    VTKHDF/Points, Connectivity, Offsets, Types     the mesh: solid cells only, three coordinates
+    VTKHDF/PointData, CellData                      fields; those of all steps follow one another in one data set
+    VTKHDF/Steps                                    load factors, where the fields of each step begin; NSteps, their number
+
+The second holds what VTK has no place for:
+
+    fastcontact/mesh                                points, cells of all dimensions, groups
+    fastcontact/kinematics, case, versions          texts as JSON
+    fastcontact/steps                               a row for each step (STEP_ROW), with the place of its notes
+    fastcontact/contact/0, 1, ...                   for each pair its name, a row for each node and step, a row for each step
+    fastcontact/notes                               JSON, one text after the other: iterations, warnings, how runs ended
+    fastcontact/runs                                a row for each run (RUN_ROW), with the place of its notes
+    fastcontact/restart0, restart1                  packed restart data of the last two steps
+"""
 
 from __future__ import annotations
 
 import unicodedata
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.errors import FileError
 from fastcontact.mesh import elements, topology
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.step import StepResult
+from fastcontact.results.step import ContactResult, StepResult
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.int8]
@@ -61,19 +79,8 @@ def contact_step(dim: int) -> np.dtype[Any]:
     return np.dtype([("first", "<i8"), ("count", "<i8"), *sums])
 
 
-@dataclass(frozen=True, eq=False)
-class SolidCells:
-    """The solid cells as VTK wants them.
-
-    Attributes
-    ----------
-    connectivity : ndarray of int64 (n,)
-        Point numbers of all cells, one after the other.
-    offsets : ndarray of int64 (n_cells + 1,)
-        Where each cell starts in `connectivity`, and its end.
-    types : ndarray of uint8 (n_cells,)
-        VTK cell types.
-    """
+class SolidCells(NamedTuple):
+    """The solid cells in the layout of VTK: all their nodes in sequence, where each begins (and the end), VTK's types."""
 
     connectivity: NDArray[np.int64]
     offsets: NDArray[np.int64]
@@ -83,13 +90,13 @@ class SolidCells:
 def solid_cells(mesh: Mesh) -> SolidCells:
     """Return the solid cells of a mesh in the order of its elements."""
     blocks = mesh.solids
-    sizes = [np.full(len(block), block.shape[1], np.int64) for block in blocks.values()]
-    types = [np.full(len(block), elements.get(name).vtk, np.uint8) for name, block in blocks.items()]
-    nodes = [block.ravel().astype(np.int64) for block in blocks.values()]
+    counts = [len(block) for block in blocks.values()]
+    sizes = np.repeat([block.shape[1] for block in blocks.values()], counts)
+    nodes = [block.ravel() for block in blocks.values()]
     return SolidCells(
-        connectivity=np.concatenate([np.empty(0, np.int64), *nodes]),
-        offsets=np.concatenate([[0], np.cumsum(np.concatenate([np.empty(0, np.int64), *sizes]))]).astype(np.int64),
-        types=np.concatenate([np.empty(0, np.uint8), *types]),
+        connectivity=np.concatenate([np.empty(0, np.int64), *nodes], dtype=np.int64),
+        offsets=np.concatenate([[0], np.cumsum(sizes)], dtype=np.int64, casting="unsafe"),
+        types=np.repeat(np.array([elements.get(name).vtk for name in blocks], np.uint8), counts),
     )
 
 
@@ -167,3 +174,35 @@ def _flags(members: dict[str, NDArray[Any]], count: int) -> dict[str, Flags]:
         flags[name] = np.zeros(count, np.int8)
         flags[name][numbers] = 1
     return flags
+
+
+def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None:
+    """Refuse a step whose arrays do not fit the mesh, or that lacks one of the `cell_fields` that were announced."""
+    n, dim = mesh.n_points, mesh.dim
+    expected = {"displacement": (n, dim), "reaction": (n, dim), "stress": (n, 4 if dim == 2 else 6)}
+    for name, shape in {**expected, "von_mises": (n,), "von_mises_signed": (n,)}.items():
+        found = np.shape(getattr(step, name))
+        if found != shape:
+            raise FileError(f"step {step.index}: {name} has shape {found}, but the mesh of the file needs {shape}")
+    for name, contact in step.contact.items():
+        check_contact(f"step {step.index}, contact '{name}'", contact, mesh)
+    count = sum(map(len, mesh.solids.values()))
+    for name in cell_fields:
+        found = np.shape(step.cell_fields.get(name, ()))
+        if found != (count,):
+            raise FileError(
+                f"step {step.index}: the cell field '{name}' that was announced has shape {found}, but ({count},) is "
+                "needed, a number for each solid cell"
+            )
+
+
+def check_contact(where: str, contact: ContactResult, mesh: Mesh) -> None:
+    """Refuse the state of a pair whose arrays do not fit one another or name points that are not in the mesh."""
+    row = contact_row(mesh.dim)
+    for name in row.names or ():
+        found, shape = np.shape(getattr(contact, name)), (len(contact.points), *row[name].shape)
+        if found != shape:
+            raise FileError(f"{where}: {name} has shape {found}, but {shape} is needed")
+    outside = np.asarray(contact.points)[(contact.points < 0) | (contact.points >= mesh.n_points)]
+    if len(outside):
+        raise FileError(f"{where}: point {outside[0]} is not in the mesh of {mesh.n_points} points")

@@ -1,0 +1,170 @@
+"""Mesh files read by meshio in a process of its own, under limits of memory and computing time.
+
+meshio makes room for whatever a file announces, and several of its readers never end on a file that is cut off. Here this
+ends the child process only, and the file is refused with the reason. Windows has no such limits: there only the time that
+passes is limited. A frozen application, and a program that has Python inside, start no interpreter: they read without limit.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.mesh.files.packing import packed, unpacked
+
+# Limits of the child, each a constant and a part for every byte of the file. meshio 5.3.5 takes up to 0.15 s and 9 MB for a
+# megabyte (permas, vtu).
+SECONDS, SECONDS_PER_BYTE = 5.0, 5e-6
+MEMORY, MEMORY_PER_BYTE = 1 << 31, 64
+# Limit of what the child returns [bytes]: a packed file of a few kilobytes can hold any number of equal points.
+RETURNED, RETURNED_PER_BYTE = 1 << 28, 32
+# Limit of the time that passes, in computing times: a busy machine may need as long.
+WAITING = 10
+
+# Integer cell data that mean groups, in the formats of Gmsh, Medit and others; 0 means no group.
+TAGS = ("gmsh:physical", "medit:ref", "tetgen:ref", "netgen:index", "avsucd:material", "cell_tags")
+# In formats with named arrays a group is an array of 0 and 1, under a prefix and its quoted name.
+CELL_PREFIX, POINT_PREFIX = "cell_group:", "point_group:"
+
+
+def library() -> Any:
+    """Return the package meshio, with the two elements that its table of dimensions lacks and without which it fails."""
+    import meshio
+    from meshio._mesh import topological_dimension  # listed as public by meshio 5.3.5, but only to be found there
+
+    for name in ("pyramid13", "wedge15"):
+        topological_dimension.setdefault(name, 3)
+    return meshio
+
+
+def read_in_process(path: Path, file_format: str) -> dict[str, Any]:
+    """Read a file in a child process.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+    file_format : str
+        meshio's name of the format.
+
+    Returns
+    -------
+    dict
+        What `plain_content` returns, or ``{"error": reason}`` if the child was stopped by one of its limits.
+    """
+    interpreter = Path(sys.executable or "").name.lower()
+    if getattr(sys, "frozen", False) or not ("python" in interpreter or "pypy" in interpreter):
+        return plain_content(path, file_format)
+    size = path.stat().st_size
+    seconds, memory = SECONDS + SECONDS_PER_BYTE * size, MEMORY + MEMORY_PER_BYTE * size
+    limits = f"{seconds:.0f}", str(memory), str(RETURNED + RETURNED_PER_BYTE * size)
+    command = [sys.executable, "-P", "-m", __name__, str(path.resolve()), file_format, *limits]
+    folders = os.pathsep.join(map(os.path.abspath, sys.path))
+    try:
+        done = subprocess.run(
+            command, stdin=subprocess.DEVNULL, capture_output=True, timeout=WAITING * seconds, check=False,
+            cwd=path.resolve().parent, env={**os.environ, "PYTHONPATH": folders, "OPENBLAS_NUM_THREADS": "1"},
+            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return {"error": f"it was not read within {WAITING * seconds:.0f} s"}
+    except OSError as error:
+        return {"error": f"no process can be started: {error.strerror}"}
+    return _answer(done, seconds)
+
+
+def _answer(done: subprocess.CompletedProcess[bytes], seconds: float) -> dict[str, Any]:
+    """Return what the child said, or the reason why it said nothing."""
+    if done.returncode == -getattr(signal, "SIGXCPU", 0):
+        return {"error": f"it was not read within {seconds:.0f} s of computing"}
+    if done.returncode < 0:
+        return {"error": f"the reading process was ended by {signal.Signals(-done.returncode).name}"}
+    try:
+        return dict(unpacked(np.frombuffer(done.stdout, np.uint8)))
+    except (ValueError, LookupError, TypeError):
+        lines = done.stderr.decode("utf-8", "replace").strip().splitlines()
+        return {"error": f"the reading process failed: {lines[-1] if lines else 'no answer'}"}
+
+
+def plain_content(path: Path, file_format: str) -> dict[str, Any]:
+    """Read a file and return what a mesh takes from it as plain data; meshio neither prints nor ends the process.
+
+    Returns
+    -------
+    dict
+        ``points``, an array (n_points, 2 or 3) [length]; ``cells``, a list of kind, number of cells and connectivity
+        (n_cells, n_nodes); ``cell_data`` and ``point_data``, the arrays that mean groups; ``cell_sets``, ``point_sets``,
+        ``field_data``; ``said``, what meshio would have printed. Arrays that hold no numbers are None. If meshio cannot
+        read the file, only ``error``, the reason.
+    """
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            found = library().read(path, file_format=file_format)
+            return {**_plain(found), "said": said.getvalue()}
+    except MemoryError:
+        return {"error": "it announces more than memory can hold"}
+    except (Exception, SystemExit) as error:
+        return {"error": (said.getvalue() if isinstance(error, SystemExit) else str(error)) or type(error).__name__}
+
+
+def _plain(found: Any) -> dict[str, Any]:
+    cell_data = {key: data for key, data in found.cell_data.items() if key in TAGS or key.startswith(CELL_PREFIX)}
+    point_data = {key: data for key, data in found.point_data.items() if key in TAGS or key.startswith(POINT_PREFIX)}
+    return {
+        "points": _numbers(found.points),
+        "cells": [[block.type, len(block.data), _numbers(block.data)] for block in found.cells],
+        "cell_data": {key: [_numbers(part) for part in parts] for key, parts in cell_data.items()},
+        "point_data": {key: _numbers(data) for key, data in point_data.items()},
+        "cell_sets": {name: [_numbers(part) for part in parts] for name, parts in found.cell_sets.items()},
+        "point_sets": {name: _numbers(part) for name, part in found.point_sets.items()},
+        "field_data": {name: _numbers(entry) for name, entry in found.field_data.items()},
+    }
+
+
+def _numbers(values: Any) -> NDArray[Any] | None:
+    """Return an array of numbers, or None where there is none, as for cells with different numbers of nodes."""
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        return None
+    return array if array.dtype.kind in "biuf" else None
+
+
+def _limit(kind: int, value: int) -> None:
+    """Lower a limit of this process as far as the system allows it."""
+    import resource
+
+    hard = resource.getrlimit(kind)[1]
+    with contextlib.suppress(ValueError, OSError):  # macOS reserves more memory than it lets one limit
+        resource.setrlimit(kind, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
+
+
+def main() -> None:
+    """Read the file named on the command line and write the packed result to the standard output."""
+    path, file_format = sys.argv[1:3]
+    seconds, memory, returned = map(int, sys.argv[3:])
+    library()
+    if sys.platform != "win32":
+        import resource
+
+        _limit(resource.RLIMIT_CORE, 0)
+        _limit(resource.RLIMIT_CPU, int(time.process_time()) + 1 + seconds)
+        _limit(resource.RLIMIT_AS, memory)
+    answer = packed(plain_content(Path(path), file_format))
+    if answer.nbytes > returned:
+        answer = packed({"error": "it holds more than a file of its size can mean"})
+    sys.stdout.buffer.write(answer.tobytes())
+
+
+if __name__ == "__main__":
+    main()

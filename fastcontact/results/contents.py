@@ -1,0 +1,263 @@
+"""What is written into a result file: its groups and empty tables at the beginning, then the data of each step.
+
+What a step adds counts only when the number of steps is raised, which the writer does last.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.results import layout
+from fastcontact.results.step import ContactResult, StepResult
+
+# Rows of a growing table that are allocated together.
+ROWS, BYTES = 64, 4096
+
+
+def write_geometry(file: Any, mesh: Mesh, growing: Sequence[str] = ()) -> None:
+    """Write /VTKHDF with the solid cells, the static arrays, and room for the steps and their `growing` cell fields."""
+    root = file.create_group("VTKHDF")
+    root.attrs["Version"] = np.array([2, 0], np.int64)
+    root.attrs["Type"] = np.bytes_("UnstructuredGrid")  # readers want a fixed-length ASCII string
+    cells = layout.solid_cells(mesh)
+    root["NumberOfPoints"] = np.array([mesh.n_points], np.int64)
+    root["NumberOfCells"] = np.array([len(cells.types)], np.int64)
+    root["NumberOfConnectivityIds"] = np.array([len(cells.connectivity)], np.int64)
+    _packed(root, "Points", layout.padded(mesh.points, 3))
+    _packed(root, "Connectivity", cells.connectivity)
+    _packed(root, "Offsets", cells.offsets)
+    _packed(root, "Types", cells.types)
+    point_data, cell_data = root.create_group("PointData"), root.create_group("CellData")
+    for name, width in layout.POINT_FIELDS.items():
+        _growing_field(point_data, name, mesh.n_points, width)
+    point_flags, cell_fields = layout.point_flags(mesh), layout.cell_fields(mesh)
+    for name, values in point_flags.items():
+        _packed(point_data, name, values)
+    for name, values in cell_fields.items():
+        _packed(cell_data, name, values)
+    for name in growing:
+        _growing_field(cell_data, name, len(cells.types), 1)
+    _write_steps_group(root, point_flags, cell_fields, growing)
+
+
+def _write_steps_group(
+    root: Any, static_point: Iterable[str], static_cell: Iterable[str], growing: Iterable[str]
+) -> None:
+    """Write the empty step tables; equal ones are one data set under several names."""
+    steps = root.create_group("Steps")
+    steps.attrs["NSteps"] = np.int64(0)
+    growing_table(steps, "Values", np.float64)
+    growing_table(steps, "NumberOfParts", np.int64)
+    zeros = growing_table(steps, "PartOffsets", np.int64)
+    steps["PointOffsets"] = zeros
+    steps["CellOffsets"] = growing_table(steps, "ConnectivityIdOffsets", np.int64, width=1)
+    point_offsets, cell_offsets = steps.create_group("PointDataOffsets"), steps.create_group("CellDataOffsets")
+    rows = growing_table(point_offsets, "displacement", np.int64)
+    for name in layout.POINT_FIELDS:
+        if name != "displacement":
+            point_offsets[name] = rows
+    for name in static_point:
+        point_offsets[name] = zeros
+    for name in static_cell:
+        cell_offsets[name] = zeros
+    for name in growing:
+        growing_table(cell_offsets, name, np.int64)
+
+
+def write_own(file: Any, mesh: Mesh, kinematics: str, case_text: str) -> None:
+    """Write /fastcontact: the mesh with all its cells and groups, the case, and room for the steps."""
+    own = file.create_group("fastcontact")
+    own.attrs["schema"] = np.int64(layout.SCHEMA)
+    own["kinematics"] = as_json(kinematics)
+    own["case"] = as_json(case_text)
+    own["versions"] = as_json(_versions())
+    stored = own.create_group("mesh")
+    stored.attrs["dim"] = np.int64(mesh.dim)
+    stored["points"] = file["VTKHDF/Points"]
+    stored["elements"] = as_json(list(mesh.cells))
+    blocks = stored.create_group("cells")
+    for name, block in mesh.cells.items():
+        _packed(blocks, name, block)
+    _write_groups(stored, "cell_groups", mesh.cell_groups)
+    _write_groups(stored, "point_groups", mesh.point_groups)
+    topology = layout.xdmf_topology(mesh)
+    if topology is not None:
+        _packed(stored, "xdmf_topology", topology)
+    own.create_group("contact")
+    growing_table(own, "steps", layout.STEP_ROW)
+    growing_table(own, "notes", np.uint8, rows=BYTES)
+    growing_table(own, "runs", layout.RUN_ROW)
+    for number in (0, 1):
+        growing_table(own, layout.restart_table(number), np.uint8, rows=int(np.clip(8 * mesh.n_points, BYTES, 1 << 20)))
+
+
+def _write_groups(parent: Any, name: str, groups: Any) -> None:
+    """Write named groups as their names, their sizes and all their members, one group after the other."""
+    group = parent.create_group(name)
+    group["names"] = as_json(list(groups))
+    group["sizes"] = np.array([len(members) for members in groups.values()], np.int64)
+    _packed(group, "members", np.concatenate([np.empty(0, np.int32), *groups.values()]))
+
+
+@cache
+def _versions() -> dict[str, str]:
+    import h5py
+
+    packages = ("fastcontact", "numpy", "scipy", "numba", "pyamg", "h5py")
+    found = {"python": ".".join(map(str, sys.version_info[:3])), "hdf5": h5py.version.hdf5_version}
+    for package in packages:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            found[package] = metadata.version(package)
+    return found
+
+
+def _packed(parent: Any, name: str, values: NDArray[Any]) -> None:
+    """Write a fixed array, compressed with the one filter that all readers know."""
+    if values.size:
+        parent.create_dataset(name, data=values, compression="gzip", compression_opts=1, chunks=values.shape)
+    else:
+        parent.create_dataset(name, data=values)
+
+
+def _growing_field(parent: Any, name: str, length: int, width: int) -> None:
+    tail = () if width == 1 else (width,)
+    parent.create_dataset(
+        name, shape=(0, *tail), maxshape=(None, *tail), chunks=(max(length, 1), *tail), dtype=np.float64,
+        compression="gzip", compression_opts=1,
+    )  # fmt: skip
+
+
+def growing_table(parent: Any, name: str, dtype: Any, width: int = 0, rows: int = ROWS) -> Any:
+    """Create an empty table; uncompressed, so that growing never moves the rows that are there."""
+    tail = (width,) if width else ()
+    return parent.create_dataset(name, shape=(0, *tail), maxshape=(None, *tail), chunks=(rows, *tail), dtype=dtype)
+
+
+def as_json(value: Any) -> str:
+    """Return `value` as ASCII JSON; arrays become lists, NaN stays NaN."""
+    return json.dumps(value, default=_plain)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    return str(value)
+
+
+def append_fields(file: Any, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
+    """Write point and cell fields as those of step `number`, over what a dead writer may have left of it."""
+    first = number * mesh.n_points
+    data = file["VTKHDF/PointData"]
+    for name, values in layout.point_fields(mesh, step).items():
+        data[name].resize(first + len(values), axis=0)
+        data[name][first:] = values
+    for name in cell_fields:
+        field, values = file["VTKHDF/CellData"][name], step.cell_fields[name]
+        field.resize((number + 1) * len(values), axis=0)
+        field[number * len(values) :] = values
+
+
+def append_tables(
+    file: Any, mesh: Mesh, number: int, step: StepResult, pairs: dict[str, Any], notes: Mapping[str, Any]
+) -> None:
+    """Write contact tables, iterations, warnings and further `notes`; pairs that are new are added to `pairs`, by name."""
+    own = file["fastcontact"]
+    for name in step.contact:
+        if name not in pairs:
+            pairs[name] = _new_pair(own["contact"], name, mesh.dim)
+    for name, pair in pairs.items():
+        _append_contact(pair, number, step.contact.get(name))
+    contact = [[name, contact.formulation] for name, contact in step.contact.items()]
+    text = as_json({**notes, "contact": contact, "iterations": step.iterations, "warnings": list(step.warnings)})
+    row = (step.index, step.load_factor, len(own["notes"]), len(text))
+    _extend(own["notes"], np.frombuffer(text.encode("ascii"), np.uint8))
+    _set_row(own["steps"], number, np.array(row, layout.STEP_ROW))
+
+
+def append_rows(file: Any, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
+    """Write where viewers find the fields of step `number`."""
+    steps = file["VTKHDF/Steps"]
+    rows = {"Values": step.load_factor, "NumberOfParts": 1, "PartOffsets": 0, "CellOffsets": 0}
+    for name, value in {**rows, "PointDataOffsets/displacement": number * mesh.n_points}.items():
+        _set_row(steps[name], number, value)
+    for name in cell_fields:
+        _set_row(steps["CellDataOffsets"][name], number, number * len(file["VTKHDF/Types"]))
+
+
+def append_run(file: Any, n_steps: int, run: Any, flush: Callable[[], None]) -> None:
+    """Write how a run ended after `n_steps` steps: whatever JSON can hold; `flush` sees it to the file."""
+    own, text = file["fastcontact"], as_json(run)
+    row = np.array((n_steps, len(own["notes"]), len(text)), layout.RUN_ROW)
+    _extend(own["notes"], np.frombuffer(text.encode("ascii"), np.uint8))
+    flush()
+    _set_row(own["runs"], len(own["runs"]), row)
+    flush()
+
+
+def set_restart(file: Any, number: int, state: NDArray[np.uint8]) -> None:
+    """Write the packed restart state of step `number`; the table never shrinks: HDF5 would give the room away."""
+    table = file["fastcontact"][layout.restart_table(number)]
+    if len(table) < len(state):
+        table.resize(len(state), axis=0)
+    table[: len(state)] = state
+
+
+def header_size(mesh: Mesh) -> int:
+    """Return an upper bound for what a file without steps takes [bytes]."""
+    n_groups = len(mesh.cell_groups) + len(mesh.point_groups)
+    arrays = [mesh.points, *mesh.cells.values(), *mesh.cell_groups.values(), *mesh.point_groups.values()]
+    return 6 * sum(array.nbytes for array in arrays) + n_groups * (mesh.n_cells + mesh.n_points + BYTES)
+
+
+def step_size(mesh: Mesh, step: StepResult) -> int:
+    """Return an upper bound for what a step takes in the file, but for its restart state [bytes]."""
+    fields = 8 * (sum(layout.POINT_FIELDS.values()) * mesh.n_points + sum(map(np.size, step.cell_fields.values())))
+    row = layout.contact_row(mesh.dim).itemsize
+    contact = sum((len(pair.points) + 2 * ROWS) * row + BYTES for pair in step.contact.values())
+    return int(1.01 * fields) + contact + len(as_json([step.iterations, step.warnings]))
+
+
+def _new_pair(parent: Any, name: str, dim: int) -> Any:
+    pair = parent.create_group(None)  # without a name until it is whole: the program may be interrupted
+    pair["name"] = as_json(name)
+    growing_table(pair, "rows", layout.contact_row(dim))
+    growing_table(pair, "steps", layout.contact_step(dim))
+    parent[str(len(parent))] = pair
+    return pair
+
+
+def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> None:
+    """Append a pair's state; a step without it gets a row of zeros."""
+    row = np.zeros((), pair["steps"].dtype)
+    if contact is not None:
+        table = np.zeros(len(contact.points), pair["rows"].dtype)
+        for name in table.dtype.names or ():
+            table[name] = getattr(contact, name)
+        row["first"], row["count"] = len(pair["rows"]), len(table)
+        row["force"], row["radius"] = contact.force, contact.radius
+        row["dissipation"] = contact.dissipation
+        moved = contact.obstacle_displacement
+        row["obstacle_displacement"] = np.nan if moved is None else moved
+        _extend(pair["rows"], table)
+    _set_row(pair["steps"], number, row)
+
+
+def _extend(table: Any, values: NDArray[Any]) -> None:
+    first = len(table)
+    table.resize(first + len(values), axis=0)
+    table[first:] = values
+
+
+def _set_row(table: Any, number: int, value: Any) -> None:
+    table.resize(number + 1, axis=0)
+    table[number] = value

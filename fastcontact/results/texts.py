@@ -1,0 +1,51 @@
+"""Texts of variable length in a result file, read without HDF5, which never returns from some damaged files.
+
+Such a text stands in a "global heap collection": a head of 16 bytes with the size of the collection, then objects one after
+the other, each with a head of 16 bytes, its number and its size (HDF5 File Format Specification 3.0, section III.E).
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from typing import Any
+
+SIGNATURE = b"GCOL\x01\0\0\0"  # with version and reserved bytes
+HEAD = struct.Struct("<8sQ")  # of a collection: signature, size
+OBJECT = struct.Struct("<H6xQ")  # of an object: number, size; the free room at the end has the number 0
+REFERENCE = struct.Struct("<IQI")  # in a data set: length of the text, place of the collection, number of the object
+
+
+def read_text(dataset: Any, raw: Any) -> str:
+    """Return the text in a data set of one text; `raw` is its open file, with addresses of eight bytes.
+
+    Raises
+    ------
+    ValueError
+        If it is no such data set, or damaged.
+    """
+    import h5py
+
+    kind, start = h5py.check_string_dtype(dataset.dtype), dataset.id.get_offset()
+    if dataset.shape != () or start is None or kind is None or kind.length is not None:
+        raise ValueError(f"'{dataset.name}' is no text")
+    file_size = raw.seek(0, os.SEEK_END)
+    length, place, wanted = _unpacked(REFERENCE, raw, start, file_size)
+    signature, size = _unpacked(HEAD, raw, place, file_size)
+    at, end = place + HEAD.size, min(place + size, file_size)
+    while signature == SIGNATURE and at + OBJECT.size <= end:
+        number, size = _unpacked(OBJECT, raw, at, end)
+        at += OBJECT.size
+        if number == wanted and length <= size and at + length <= end:
+            return raw.read(length).decode("utf-8")
+        if number in (0, wanted):
+            break
+        at += -(-size // 8) * 8
+    raise ValueError(f"its texts are damaged at byte {at}")
+
+
+def _unpacked(kind: struct.Struct, raw: Any, place: int, end: int) -> tuple[Any, ...]:
+    if place + kind.size > end:
+        raise ValueError(f"its texts are damaged: they stand at byte {place} of {end}")
+    raw.seek(place)
+    return kind.unpack(raw.read(kind.size))
