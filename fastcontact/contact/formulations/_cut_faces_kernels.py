@@ -132,6 +132,8 @@ def _common(corners, count, others, n_others, origin, axes, subject, window, spa
 @kernel
 def _meets(low, high, origin, normal, radius, reach):
     """Whether a box may meet the cylinder of a `radius` and of length 2 `reach` around a normal; an empty box does not."""
+    if low[0] > high[0]:
+        return False
     far, along, size = 0.0, 0.0, 0.0
     for d in range(3):
         apart = 0.5 * (low[d] + high[d]) - origin[d]

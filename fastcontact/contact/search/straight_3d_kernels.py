@@ -82,20 +82,22 @@ def on_flat(r, a, b):
     if va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
         t = (d4 - d3) / ((d4 - d3) + (d5 - d6))
         return 1.0 - t, t
+    square = aa * bb - ab * ab
+    if not square > COLLAPSED * aa * bb:
+        return _on_longest_side(r, a, b)
     area = va + vb + vc
     s, t = vb / area, vc / area
-    area = aa * bb - ab * ab
-    if area < NEEDLE * aa * bb:  # rounding errors are large there, and one more step makes them small
+    if square < NEEDLE * aa * bb:  # rounding errors are large there, and one more step makes them small
         v = rest(r, a, b, (0.0, 0.0, 0.0), s, t)
-        s, t = s + (bb * dot(a, v) - ab * dot(b, v)) / area, t + (aa * dot(b, v) - ab * dot(a, v)) / area
-    if area > COLLAPSED * aa * bb and s >= -ON_SIDE and t >= -ON_SIDE and s + t <= 1.0 + ON_SIDE:
+        s, t = s + (bb * dot(a, v) - ab * dot(b, v)) / square, t + (aa * dot(b, v) - ab * dot(a, v)) / square
+    if s >= -ON_SIDE and t >= -ON_SIDE and s + t <= 1.0 + ON_SIDE:
         return s, t
     return _on_longest_side(r, a, b)
 
 
 @kernel
 def _on_longest_side(r, a, b):
-    """Return (s, t) of the closest point of a triangle without area, where the areas are rounding errors."""
+    """Return (s, t) of the closest point of a triangle that is no more than its longest side."""
     c = minus(b, a)
     aa, bb, cc = dot(a, a), dot(b, b), dot(c, c)
     if aa >= bb and aa >= cc:
