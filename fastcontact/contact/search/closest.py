@@ -109,7 +109,7 @@ def _on_faces(points: Array, corners: Array, found: Closest) -> None:
     facets = Facets(corners[numbers], midst, np.empty(corners.shape), np.empty(n), np.empty(n))
     low, high = np.empty((n, 3)), np.empty((n, 3))
     shared(
-        lambda part: facets_3d_kernels.prepare(facets, *part, table.to_terms, table.to_hull, table.weights, low, high),
+        lambda part: facets_3d_kernels.prepare(facets, *part, table.to_terms, table.weights, low, high),
         portions(n),
     )
     tree, domain = build(low, high), Domain(table.nodes, flat_triangles(m), table.sides)

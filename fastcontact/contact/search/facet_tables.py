@@ -1,4 +1,4 @@
-"""Constants of each kind of facet in 3D: sides, polynomial, flat triangles, convex hull, bounds on the curvature.
+"""Constants of each kind of facet in 3D: sides, polynomial, flat triangles, bounds on the curvature.
 
 A facet of m nodes is a polynomial of the first m terms 1, s, t, st, s^2, t^2, s^2 t, s t^2, s^2 t^2 of its reference
 coordinates.
@@ -34,8 +34,6 @@ _FLAT = {
     8: [[0, 4, 7], [4, 1, 5], [5, 2, 6], [6, 3, 7], [4, 5, 7], [5, 6, 7]],
     9: [[0, 4, 8], [0, 8, 7], [4, 1, 8], [1, 5, 8], [5, 2, 8], [2, 6, 8], [6, 3, 8], [3, 7, 8]],
 }
-# From the values of a parabola at its ends and middle to the corners of the polygon that holds it (Bezier).
-_PARABOLA = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.5, -0.5, 2.0]])
 
 
 class Tables(NamedTuple):
@@ -49,8 +47,6 @@ class Tables(NamedTuple):
         Rows (a, b, c) of a s + b t <= c on the facet [-].
     to_terms : ndarray (m, m)
         From nodes to coefficients of the terms [-].
-    to_hull : ndarray (k, m)
-        From nodes to points whose convex hull holds the facet [-].
     weights : ndarray (3, m)
         For each term of unit size the most that it adds to the distance from the flat triangles, to the change of the
         tangents and to the second derivative [-].
@@ -59,7 +55,6 @@ class Tables(NamedTuple):
     nodes: Array
     sides: Array
     to_terms: Array
-    to_hull: Array
     weights: Array
 
 
@@ -78,7 +73,7 @@ def tables(n_nodes: int) -> Tables:
     sides = _TRIANGLE_SIDES if n_nodes in (3, 6) else _SQUARE_SIDES
     to_terms = np.ascontiguousarray(np.linalg.inv(terms(nodes, n_nodes)))
     weights = np.stack([_bend(nodes), _TURN[:n_nodes], _SECOND[:n_nodes]])
-    return Tables(nodes, sides, to_terms, _hull(n_nodes, to_terms), weights)
+    return Tables(nodes, sides, to_terms, weights)
 
 
 def flat_triangles(n_nodes: int) -> NDArray[np.intp]:
@@ -99,18 +94,3 @@ def _bend(nodes: Array) -> Array:
         for flat in flat_triangles(len(nodes))
     ]
     return np.abs(error).max(axis=(0, 1))
-
-
-def _hull(n_nodes: int, to_terms: Array) -> Array:
-    """Return `to_hull`: flat and bilinear facets lie in the hull of their corners, others in that of Bezier points."""
-    if n_nodes <= 4:
-        return np.eye(n_nodes)
-    if n_nodes == 6:
-        hull = np.eye(6)
-        for middle, ends in ((3, (0, 1)), (4, (1, 2)), (5, (2, 0))):
-            hull[middle, list(ends)], hull[middle, middle] = -0.5, 2.0
-        return hull
-    # The values at all nine places of the product of two parabolas, then control points in one direction after the other.
-    places = np.array([[i, j] for i in (-1.0, 1.0, 0.0) for j in (-1.0, 1.0, 0.0)])
-    at_places = terms(places, n_nodes) @ to_terms
-    return np.kron(_PARABOLA, _PARABOLA) @ at_places

@@ -12,7 +12,7 @@ FLAT = 1e-9
 
 
 @kernel
-def prepare(facets, begin, end, to_terms, to_hull, weights, low, high):
+def prepare(facets, begin, end, to_terms, weights, low, high):
     """Fill all but the nodes and the midst of the facets `begin` to `end`.
 
     Parameters
@@ -22,13 +22,11 @@ def prepare(facets, begin, end, to_terms, to_hull, weights, low, high):
     begin, end : int
     to_terms : (m, m)
         From nodes to terms.
-    to_hull : (k, m)
-        From nodes to points whose convex hull holds the facet.
     weights : (3, m)
         For each term of unit size: how far it strays from flat triangles, how much it changes the tangents over the
         domain, and its second derivative, all at most.
     low, high : (n_facets, 3)
-        Boxes, filled in place.
+        Boxes, filled in place: those of the nodes and, around curved sides, as much room as the facet strays at most.
     """
     nodes, midst, terms, bend, convex = facets
     m = nodes.shape[1]
@@ -37,11 +35,13 @@ def prepare(facets, begin, end, to_terms, to_hull, weights, low, high):
             if m <= 4:
                 _fill_straight(nodes, midst, i, d, terms, low, high)
             else:
-                _fill_curved(nodes, midst, i, d, to_terms, to_hull, terms, low, high)
+                _fill_curved(nodes, midst, i, d, to_terms, terms, low, high)
         bend[i], convex[i] = 0.0, np.inf
         if m == 3:
             continue
         stray, turn, second = _curvature(terms, i, weights)
+        for d in range(3 if m > 4 else 0):
+            low[i, d], high[i, d] = low[i, d] - stray, high[i, d] + stray
         extent = high[i, 0] - low[i, 0], high[i, 1] - low[i, 1], high[i, 2] - low[i, 2]
         if stray >= FLAT * max(extent):
             bend[i] = stray
@@ -65,19 +65,15 @@ def _fill_straight(nodes, midst, i, d, terms, low, high):
 
 
 @inlined_kernel
-def _fill_curved(nodes, midst, i, d, to_terms, to_hull, terms, low, high):
-    """Fill the terms and the box of a facet with curved sides, in one coordinate."""
+def _fill_curved(nodes, midst, i, d, to_terms, terms, low, high):
+    """Fill the terms of a facet with curved sides and the box of its nodes, in one coordinate."""
+    low[i, d], high[i, d] = np.inf, -np.inf
     for k in range(to_terms.shape[0]):
         value = 0.0
         for a in range(nodes.shape[1]):
             value += to_terms[k, a] * (nodes[i, a, d] - midst[d])
-        terms[i, k, d] = value
-    low[i, d], high[i, d] = np.inf, -np.inf
-    for k in range(to_hull.shape[0]):
-        value = 0.0
-        for a in range(nodes.shape[1]):
-            value += to_hull[k, a] * (nodes[i, a, d] - midst[d])
-        low[i, d], high[i, d] = min(low[i, d], value), max(high[i, d], value)
+        terms[i, k, d], place = value, nodes[i, k, d] - midst[d]
+        low[i, d], high[i, d] = min(low[i, d], place), max(high[i, d], place)
 
 
 @inlined_kernel

@@ -22,10 +22,10 @@ def domain(m):
 def prepared(corners):
     """Facets (n, m, 3) ready for a search, and their boxes."""
     n, m = corners.shape[:2]
-    _, _, to_terms, to_hull, weights = tables(m)
+    table = tables(m)
     facets = Facets(corners, np.zeros(3), np.empty(corners.shape), np.empty(n), np.empty(n))
     low, high = np.empty((n, 3)), np.empty((n, 3))
-    facets_3d_kernels.prepare(facets, 0, n, to_terms, to_hull, weights, low, high)
+    facets_3d_kernels.prepare(facets, 0, n, table.to_terms, table.weights, low, high)
     return facets, low, high
 
 
