@@ -1,9 +1,9 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """A binary tree of bounding boxes over facets in 2D or 3D: it finds the few facets that are worth a closer look.
 
-Facets are first sorted along a space-filling curve, so that neighbours in the list are neighbours in space. Box 1 is the
-root, the children of box `k` are ``2 k`` and ``2 k + 1``, and the last half of the boxes are those of the facets in their
-order. Their number is rounded up to a power of two by empty boxes, which are infinitely far from every point.
+Facets are first sorted so that neighbours in space follow each other (`tree_order`). Box 1 is the root, the children of box
+k are 2 k and 2 k + 1, and the last half of the boxes are those of the facets in this order. Their number is rounded up to a
+power of two by empty boxes, which are infinitely far from every point.
 """
 
 from typing import NamedTuple
@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from fastcontact._jit.decorators import inlined_kernel, kernel
 
-# The curve passes through 2^BITS cells a direction.
-BITS = 20
 # Room for the boxes that a search has still to open; a squared distance that no facet exceeds.
 DEPTH, FAR = 64, 1e300
 Array = NDArray[np.float64]
@@ -28,16 +26,17 @@ class Tree(NamedTuple):
 
 
 @kernel
-def tree_order(points):
-    """Return the permutation (n,) that sorts points (n, dim) by halving them along the longest side, and again the halves.
+def tree_order(points, together=1):
+    """Return the permutation (n,) that sorts points (n, dim) by halving them along their longest side, and again the halves.
 
-    The left half has a power of two of them: what is below a box of the tree is then one half.
+    The left half has a power of two of them, so that the facets below a box of the tree are one of these parts. Parts of
+    so many points `together` stay in the order given, which is enough to find neighbours one after the other.
     """
     n = points.shape[0]
     sorted_, order, size = points.copy(), np.arange(n), 1
     while size < n:
         size *= 2
-    while size > 1:
+    while size > together:
         for begin in range(0, n, size):
             if begin + size // 2 < n:
                 _halve(sorted_, order, begin, begin + size // 2, min(begin + size, n))
@@ -80,7 +79,7 @@ def _halve(points, order, begin, middle, end):
 
 @kernel
 def build(low, high):
-    """Return the tree over the boxes of facets (n_facets, dim), which are in the order of the curve."""
+    """Return the tree over the boxes of facets (n_facets, dim), sorted by `tree_order`."""
     n, dim = low.shape
     leaves = 1
     while leaves < n:

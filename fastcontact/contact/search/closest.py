@@ -17,6 +17,9 @@ from fastcontact.errors import ContactError
 
 Array = NDArray[np.float64]
 
+# So many points that follow each other in the order of the search need not be sorted among themselves.
+TOGETHER = 16
+
 
 class Closest(NamedTuple):
     """Projections of points on their closest facets.
@@ -88,7 +91,7 @@ def closest_of_kinds(points: Array, kinds: Sequence[Array]) -> Closest:
 
 
 def _on_lines(points: Array, corners: Array, found: Closest) -> None:
-    numbers, order = tree_order(np.ascontiguousarray(corners[:, 0])), tree_order(points)
+    numbers, order = tree_order(corners[:, 0].copy()), tree_order(points, TOGETHER)
     corners = corners[numbers]
     hull = corners
     if corners.shape[1] == 3:  # a parabola lies in the polygon of its ends and this point (Bezier)
@@ -104,7 +107,7 @@ def _on_lines(points: Array, corners: Array, found: Closest) -> None:
 def _on_faces(points: Array, corners: Array, found: Closest) -> None:
     n, m = corners.shape[:2]
     table = tables(m)
-    numbers, order = tree_order(np.ascontiguousarray(corners[:, 0])), tree_order(points)
+    numbers, order = tree_order(corners[:, 0].copy()), tree_order(points, TOGETHER)
     midst = 0.5 * (corners.min(axis=0).min(axis=0) + corners.max(axis=0).max(axis=0))
     facets = Facets(corners[numbers], midst, np.empty(corners.shape), np.empty(n), np.empty(n))
     low, high = np.empty((n, 3)), np.empty((n, 3))

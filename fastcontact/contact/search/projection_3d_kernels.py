@@ -1,9 +1,8 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Closest point of one facet in 3D, flat or curved, wherever it is: descents of the distance from several places.
+"""Closest point of one facet in 3D, flat or curved, near or far: the distance is minimised from several starting places.
 
-A facet of m nodes is the polynomial of the first m terms of 1, s, t, st, s^2, t^2, s^2 t, s t^2, s^2 t^2 in its reference
-coordinates, ``terms`` (n_facets, m, 3): tri3, quad4, tri6, quad8 and quad9 have 3, 4, 6, 8 and 9. Its domain is a polygon
-of ``sides`` (n_sides, 3), rows (a, b, c) for a s + b t <= c.
+A facet is a polynomial with coefficients ``terms`` (n_facets, m, 3) of the terms in `facet_tables`, on a polygon of
+``sides`` (n_sides, 3), rows (a, b, c) for a s + b t <= c.
 """
 
 from typing import NamedTuple

@@ -68,13 +68,13 @@ def closest_facets(points, order, begin, end, corners, numbers, tree, found):
     Parameters
     ----------
     points : (n, 2)
+    order : (n,)
+        Order in which points are taken: neighbours in space after each other.
     begin, end : int
-        Range of the points to project.
+        Range of that order to project.
     corners : (n_facets, n_nodes, 2)
-    low, high : (n_facets, 2)
-        Boxes of the facets.
-    tree : Tree
-        Over these boxes.
+    numbers, tree : (n_facets,), Tree
+        Numbers of these facets, which are in the order of the tree, before they were sorted.
     found : Closest
         Filled in place; facet -1 and distance NaN where a point is not finite.
     """

@@ -21,11 +21,13 @@ def closest_facets(points, order, begin, end, facets, domain, numbers, tree, fou
     Parameters
     ----------
     points : (n, 3)
+    order : (n,)
+        Order in which points are taken: neighbours in space after each other.
     begin, end : int
-        Range of the points to project.
+        Range of that order to project.
     facets, domain : Facets, Domain
-    tree : Tree
-        Over the boxes of the facets.
+    numbers, tree : (n_facets,), Tree
+        Numbers of these facets, which are in the order of the tree, before they were sorted.
     found : Closest
         Filled in place. Where a projection fails, the distance is NaN; where a point is not finite, the facet is -1, too.
     """
@@ -54,7 +56,7 @@ def closest_facets(points, order, begin, end, facets, domain, numbers, tree, fou
             tied = closest >= 0 and (dot(gap, gap) <= same * same or square == best)
             if (numbers[f] < numbers[closest]) if tied else (square < best):
                 closest, best_s, best_t, place, certain, converged = f, s, t, trial, inside, good
-                same = SAME_PLACE * _size(tree, box)
+                same = SAME_PLACE * _size(tree.low, tree.high, box)
             if square < best:
                 best = square
                 reach = ROUNDING * (np.sqrt(best) + same) ** 2
@@ -116,8 +118,6 @@ def _projected(facets, f, domain, point, reach):
 
 
 @inlined_kernel
-def _size(tree, box):
+def _size(low, high, box):
     """Return the longest side of a box."""
-    return max(
-        tree.high[box, 0] - tree.low[box, 0], tree.high[box, 1] - tree.low[box, 1], tree.high[box, 2] - tree.low[box, 2]
-    )
+    return max(high[box, 0] - low[box, 0], high[box, 1] - low[box, 1], high[box, 2] - low[box, 2])

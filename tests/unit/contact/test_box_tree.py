@@ -45,6 +45,8 @@ def test_every_box_is_halved_along_its_longest_side(dim):
         for part in points[order].reshape(-1, size, dim):
             axis = np.argmax(np.ptp(part, axis=0))
             assert part[: size // 2, axis].max() <= part[size // 2 :, axis].min()
+    coarse = tree_order(points, 16).reshape(4, 16)
+    assert np.array_equal(np.sort(coarse, axis=1), np.sort(order.reshape(4, 16), axis=1))
 
 
 @pytest.mark.parametrize("dim", [2, 3])
