@@ -1,9 +1,8 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Where facets face each other in 3D: one polygon clipped by the other in the plane of the first, and integrals there.
+"""Facets that face each other in 3D: one polygon is clipped by the other in the plane of the first, and integrated there.
 
-A facet is a polynomial of its reference coordinates; its ``terms`` (n_terms, 3) are the coefficients of
-1, s, t, st, s^2, t^2, s^2 t, s t^2, s^2 t^2, as many as it has nodes. Its corners make the polygon that is cut, in the
-``axes`` (3, 3) of its plane: two tangents and the unit normal.
+A facet is a polynomial with coefficients ``terms`` (n_terms, 3) of the terms in `contact.search.facet_tables`. Its corners
+make the polygon that is cut, in the ``axes`` (3, 3) of its plane: two tangents and the unit normal.
 """
 
 import numpy as np

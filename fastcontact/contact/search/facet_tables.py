@@ -48,8 +48,7 @@ class Tables(NamedTuple):
     to_terms : ndarray (m, m)
         From nodes to coefficients of the terms [-].
     weights : ndarray (3, m)
-        For each term of unit size the most that it adds to the distance from the flat triangles, to the change of the
-        tangents and to the second derivative [-].
+        Most that each term of unit size adds to distance from the flat triangles, change of tangents, second derivative.
     """
 
     nodes: Array
