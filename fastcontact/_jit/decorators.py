@@ -1,4 +1,4 @@
-"""The one place that says njit: disk cache, safe fast-math subset, threads.
+"""How kernels are compiled: disk cache, safe subset of fast arithmetic, threads.
 
 Kernels compile at their first call, never at import. Where no folder is writable for the cache, they compile
 in every process instead, and one line in the log says so.
@@ -48,7 +48,7 @@ def summing_kernel(function: Callable[..., Any]) -> Any:
 
 
 def inlined_kernel(function: Callable[..., Any]) -> Any:
-    """Like `kernel`, for parts of hot loops: written out where they are called. See `kernels.borrowing` for arrays."""
+    """Like `kernel`, for parts of hot loops: Numba puts the code in the place of each call."""
     return _compile(function, parallel=False, inline="always")
 
 
@@ -56,7 +56,7 @@ def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = 
     options: dict[str, Any] = {"fastmath": fastmath, "parallel": parallel, "nogil": True, "error_model": "numpy"}
     options["inline"] = inline
     try:
-        return cache.kept(numba.njit(cache=True, **options)(function), function)
+        return cache.watch_files(numba.njit(cache=True, **options)(function), function)
     except RuntimeError as error:  # numba: "cannot cache function ...: no locator available for file ..."
         if "cannot cache" not in str(error):
             raise

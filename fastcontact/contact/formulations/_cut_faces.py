@@ -11,9 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.contact.formulations import _cut_faces_kernels, _cut_faces_tree_kernels
+from fastcontact.contact.formulations import _cut_faces_kernels
 from fastcontact.contact.formulations._overlap import Coupling, Overlap
+from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.closest import closest_of_kinds
+from fastcontact.contact.search.facet_tables import tables
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements, quadrature
@@ -23,8 +25,6 @@ Array = NDArray[np.float64]
 FACING = -0.1
 # How far off what faces a facet may be: in distances of the closest primary facet, and radii of the facet itself.
 DISTANCES, RADII = 2.0, 3.0
-# Powers of s and t of the terms of a facet's polynomial, in the order of `kernels.clip3d`.
-POWERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1], [2, 0], [0, 2], [2, 1], [1, 2], [2, 2]])
 # Highest degree in s and t together of what the mapped shape functions of a facet contain.
 DEGREE = {3: 1, 4: 2, 6: 2, 8: 3, 9: 4}
 
@@ -86,17 +86,18 @@ class _Polygons:
 
 
 def _facing(ours: _Polygons, theirs: _Polygons, reach: Array) -> NDArray[np.intp]:
-    """Return the pairs of facets (n, 2) that face each other with a part."""
-    tree = _cut_faces_tree_kernels.build(theirs.low, theirs.high)
+    """Return the pairs of facets (n, 2) that face each other with a part, in ascending order."""
+    numbers = tree_order(theirs.origin)
+    tree = build(theirs.low[numbers], theirs.high[numbers])
     room = 8 * (len(ours.nodes) + len(theirs.nodes))
     while True:
         pairs = np.empty((room, 2), np.intp)
         count = _cut_faces_kernels.facing_pairs(
             ours.nodes, ours.count, ours.origin, ours.axes, ours.radius, reach, theirs.nodes, theirs.count,
-            np.ascontiguousarray(theirs.axes[:, 2]), theirs.low, theirs.high, *tree, FACING, pairs,
+            np.ascontiguousarray(theirs.axes[:, 2]), numbers, tree, FACING, pairs,
         )  # fmt: skip
         if count <= room:
-            return pairs[:count]
+            return pairs[np.lexsort((pairs[:count, 1], pairs[:count, 0]))]
         room = count
 
 
@@ -105,7 +106,7 @@ def _integrated(
 ) -> tuple[Coupling, Array]:
     """Return the coupling of pairs of facets, and the mass of the secondary ones over what they face there."""
     one, other = elements.get(ours.block.element), elements.get(theirs.block.element)
-    to_terms, other_to_terms = terms_of(one), terms_of(other)
+    to_terms, other_to_terms = tables(one.n_nodes).to_terms, tables(other.n_nodes).to_terms
     n, k = ours.block.facets.shape
     mass, integrals = np.empty((n, k, k)), np.empty((len(pairs), k, other.n_nodes))
     degree = DEGREE[one.n_nodes] + max(DEGREE[one.n_nodes], DEGREE[other.n_nodes])
@@ -119,13 +120,6 @@ def _integrated(
         first, second = (side.origin[row] for side, row in zip((ours, theirs), pairs[wrong], strict=True))
         raise ContactError(f"the facets near {first} and {second} are too distorted to be cut: improve the mesh there")
     return Coupling(ours.block, theirs.block, pairs, integrals), mass
-
-
-def terms_of(element: elements.Element) -> Array:
-    """Return the matrix (n_nodes, n_nodes) from nodal values of a facet to the terms of its polynomial."""
-    powers = POWERS[: element.n_nodes]
-    inverse: Array = np.linalg.inv(np.prod(element.nodes[:, None] ** powers[None], axis=2))
-    return np.ascontiguousarray(inverse)
 
 
 def _middle(element: elements.Element) -> Array:

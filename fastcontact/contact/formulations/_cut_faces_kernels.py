@@ -1,14 +1,14 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Where facets face each other in 3D: one polygon clipped by the other in the plane of the first, and integrals there.
+"""Facets that face each other in 3D: one polygon is clipped by the other in the plane of the first, and integrated there.
 
-A facet is a polynomial of its reference coordinates; its ``terms`` (n_terms, 3) are the coefficients of
-1, s, t, st, s^2, t^2, s^2 t, s t^2, s^2 t^2, as many as it has nodes. Its corners make the polygon that is cut, in the
-``axes`` (3, 3) of its plane: two tangents and the unit normal.
+A facet is a polynomial with coefficients ``terms`` (n_terms, 3) of the terms in `contact.search.facet_tables`. Its corners
+make the polygon that is cut, in the ``axes`` (3, 3) of its plane: two tangents and the unit normal.
 """
 
 import numpy as np
 
-from fastcontact._jit.decorators import kernel
+from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact.contact.search.box_tree_kernels import DEPTH
 
 # A polygon of up to 4 corners clipped by one of up to 4 has at most 8.
 MOST = 12
@@ -129,8 +129,10 @@ def _common(corners, count, others, n_others, origin, axes, subject, window, spa
 
 
 @kernel
-def _misses(low, high, origin, normal, radius, reach):
-    """Whether a box lies outside the cylinder of a `radius` and of length 2 `reach` around a normal, at the latest."""
+def _meets(low, high, origin, normal, radius, reach):
+    """Whether a box may meet the cylinder of a `radius` and of length 2 `reach` around a normal; an empty box does not."""
+    if low[0] > high[0]:
+        return False
     far, along, size = 0.0, 0.0, 0.0
     for d in range(3):
         apart = 0.5 * (low[d] + high[d]) - origin[d]
@@ -138,14 +140,13 @@ def _misses(low, high, origin, normal, radius, reach):
         far += apart * apart
         size += 0.25 * (high[d] - low[d]) ** 2
     size = np.sqrt(size)
-    return abs(along) > reach + size or far - along * along > (radius + size) ** 2
+    return abs(along) <= reach + size and far - along * along <= (radius + size) ** 2
 
 
 @kernel
 def facing_pairs(
-    secondary, n_secondary, origin, axes, radius, reach,
-    primary, n_primary, other_normal, low, high, tree_low, tree_high, child, span, order, facing, pairs,
-):  # fmt: skip
+    secondary, n_secondary, origin, axes, radius, reach, primary, n_primary, other_normal, numbers, tree, facing, pairs
+):
     """Find which primary polygons lie above or below each secondary one, and face it.
 
     Parameters
@@ -160,10 +161,8 @@ def facing_pairs(
         Around the centres of the secondary facets; how far off, along the normal, the other side may be.
     other_normal : (n_facets, 3)
         Unit normals of the primary facets.
-    low, high : (n_facets, 3)
-        Boxes of the primary facets.
-    tree_low, tree_high, child, span, order
-        Their tree, see `box_tree`.
+    numbers, tree : (n_facets,), Tree
+        The primary facets in the order of their tree.
     facing : float
         Largest cosine between the normals of facets that face each other, e.g. -0.1.
     pairs : (room, 2)
@@ -175,33 +174,27 @@ def facing_pairs(
         Number of pairs; larger than the room where that did not suffice, and then only the first are filled.
     """
     subject, window, spare = np.empty((MOST, 2)), np.empty((MOST, 2)), np.empty((MOST, 2))
-    stack = np.empty(128, np.int64)
-    found = 0
+    stack, leaves, found = np.empty(DEPTH, np.int64), len(tree.low) // 2, 0
     for s in range(secondary.shape[0]):
         normal = axes[s, 2]
-        stack[0], top = 0, 1
+        stack[0], top = 1, 1
         while top > 0:
             top -= 1
             box = stack[top]
-            if _misses(tree_low[box], tree_high[box], origin[s], normal, radius[s], reach[s]):
+            if not _meets(tree.low[box], tree.high[box], origin[s], normal, radius[s], reach[s]):
                 continue
-            if child[box] >= 0:
-                stack[top], stack[top + 1] = child[box], child[box] + 1
+            if box < leaves:
+                stack[top], stack[top + 1] = 2 * box, 2 * box + 1
                 top += 2
                 continue
-            for k in range(span[box, 0], span[box, 1]):
-                p = order[k]
-                cosine = 0.0
-                for d in range(3):
-                    cosine += normal[d] * other_normal[p, d]
-                if cosine > facing or _misses(low[p], high[p], origin[s], normal, radius[s], reach[s]):
-                    continue
-                if _common(
-                    secondary[s], n_secondary, primary[p], n_primary, origin[s], axes[s], subject, window, spare
-                ):
-                    if found < pairs.shape[0]:
-                        pairs[found, 0], pairs[found, 1] = s, p
-                    found += 1
+            p = numbers[box - leaves]
+            cosine = normal[0] * other_normal[p, 0] + normal[1] * other_normal[p, 1] + normal[2] * other_normal[p, 2]
+            if cosine <= facing and _common(
+                secondary[s], n_secondary, primary[p], n_primary, origin[s], axes[s], subject, window, spare
+            ):
+                if found < pairs.shape[0]:
+                    pairs[found, 0], pairs[found, 1] = s, p
+                found += 1
     return found
 
 
@@ -289,11 +282,29 @@ def _fill_shape(to_terms, terms, shape):
             shape[k] += terms[j, 0] * to_terms[j, k]
 
 
+@inlined_kernel
+def _add_products(area, shape, other_shape, mass, coupling, s, i):
+    """Add products of shape functions at a point to the lower triangle of ``mass[s]`` and to ``coupling[i]``."""
+    for a in range(shape.shape[0]):
+        for b in range(a + 1):
+            mass[s, a, b] += area * shape[a] * shape[b]
+        for b in range(other_shape.shape[0]):
+            coupling[i, a, b] += area * shape[a] * other_shape[b]
+
+
+@kernel
+def _symmetrise(mass):
+    """Copy the lower triangles of matrices (n, m, m) to the upper ones."""
+    for s in range(mass.shape[0]):
+        for a in range(mass.shape[1]):
+            for b in range(a):
+                mass[s, b, a] = mass[s, a, b]
+
+
 @kernel
 def integrate(
     secondary, n_secondary, origin, axes, deformed, reference, to_terms, middle,
-    primary, n_primary, other_deformed, other_to_terms, other_middle,
-    pairs, points, weights, mass, coupling,
+    primary, n_primary, other_deformed, other_to_terms, other_middle, pairs, points, weights, mass, coupling,
 ):  # fmt: skip
     """Integrate products of shape functions over the parts where facets face each other.
 
@@ -301,48 +312,27 @@ def integrate(
     are cut into triangles around their centres: the rule is not exact on mapped facets, and its error then depends on no
     first corner and does not jump where a corner comes or goes as the facets move. Between flat triangles it is exact.
 
-    Parameters
-    ----------
-    secondary, primary, n_secondary, n_primary, origin, axes
-        As for `facing_pairs`.
-    deformed, reference : (n_facets, n_terms, 3)
-        Terms of the secondary facets where they are and where they were.
-    to_terms : (n_terms, n_nodes)
-        From nodal values to terms.
-    middle : (2,)
-        Reference coordinates to start from.
-    other_deformed, other_to_terms, other_middle
-        The same of the primary facets.
-    pairs : (n_pairs, 2)
-        Facets that face each other, ascending in the first.
-    points, weights : (n_q, 2), (n_q,)
-        Rule on the triangle.
-    mass : (n_facets, n_nodes, n_nodes)
-        Filled in place: of the secondary shape functions, over the part that faces the primary side.
-    coupling : (n_pairs, n_nodes, n_other_nodes)
-        Filled in place: secondary times primary shape functions.
+    Planes and polygons are those of `facing_pairs`, `pairs` (n_pairs, 2) its result. `deformed` and `reference`
+    (n_facets, n_terms, 3) are the terms of the secondary facets where they are and where they were, `to_terms`
+    (n_terms, n_nodes) leads to them from nodal values, `middle` (2,) are the reference coordinates to start from; the same
+    with `other` for the primary facets. `points` (n_q, 2) and `weights` (n_q,) are a rule on the triangle. Filled in place:
+    `mass` (n_facets, n_nodes, n_nodes) of the secondary shape functions over the part that faces the primary side, and
+    `coupling` (n_pairs, n_nodes, n_other_nodes), secondary times primary shape functions.
 
-    Returns
-    -------
-    int
-        -1, or the number of a pair with a facet too distorted to be followed.
+    Returns -1, or the number of a pair with a facet too distorted to be followed.
     """
     subject, window, spare = np.empty((MOST, 2)), np.empty((MOST, 2)), np.empty((MOST, 2))
     n, m = to_terms.shape[0], other_to_terms.shape[0]
     terms, other_terms, shape, other_shape = np.empty((n, 3)), np.empty((m, 3)), np.empty(n), np.empty(m)
     flat, other_flat, xi, other_xi = np.empty((n, 2)), np.empty((m, 2)), np.empty(2), np.empty(2)
-    mass[:] = 0.0
-    coupling[:] = 0.0
-    last = -1
+    mass[:], coupling[:] = 0.0, 0.0
+    exact = n == 3 and m == 3
     for i in range(pairs.shape[0]):
         s, p = pairs[i, 0], pairs[i, 1]
-        if s != last:
-            _flatten(deformed[s], origin[s], axes[s], flat)
-            last = s
+        _flatten(deformed[s], origin[s], axes[s], flat)
         _flatten(other_deformed[p], origin[s], axes[s], other_flat)
         count = _common(secondary[s], n_secondary, primary[p], n_primary, origin[s], axes[s], subject, window, spare)
-        xi[0], xi[1], other_xi[0], other_xi[1] = middle[0], middle[1], other_middle[0], other_middle[1]
-        exact = n == 3 and m == 3
+        xi[:], other_xi[:] = middle, other_middle
         ox, oy = (subject[0, 0], subject[0, 1]) if exact else _centroid(subject, count)
         for k in range(1 if exact else 0, count - 1 if exact else count):
             following = (k + 1) % count
@@ -360,13 +350,6 @@ def integrate(
                 _fill_shape(to_terms, terms, shape)
                 _fill_shape(other_to_terms, other_terms, other_shape)
                 area = weights[q] * twice * _stretch(reference[s], terms) / seen
-                for a in range(n):
-                    for b in range(a + 1):
-                        mass[s, a, b] += area * shape[a] * shape[b]
-                    for b in range(m):
-                        coupling[i, a, b] += area * shape[a] * other_shape[b]
-    for s in range(mass.shape[0]):
-        for a in range(n):
-            for b in range(a):
-                mass[s, b, a] = mass[s, a, b]
+                _add_products(area, shape, other_shape, mass, coupling, s, i)
+    _symmetrise(mass)
     return -1

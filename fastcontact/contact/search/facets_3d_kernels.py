@@ -1,12 +1,8 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""What the search wants to know of facets in 3D: polynomials, boxes, how bent they are, where a minimum is the only one.
-
-Polynomials are those of `projection3d`.
-"""
+"""Facets in 3D made ready for a search: polynomials, boxes, and bounds on their curvature (see `projection_3d_kernels`)."""
 
 import numpy as np
 
-from fastcontact._jit.borrowed_arrays import borrowed
 from fastcontact._jit.decorators import inlined_kernel, kernel
 from fastcontact.contact.search.projection_3d_kernels import vector
 from fastcontact.contact.search.straight_3d_kernels import dot, room
@@ -16,49 +12,36 @@ FLAT = 1e-9
 
 
 @kernel
-def bounds(corners):
-    """Return the corners (dim,) of the box around all nodes (n_facets, m, dim)."""
-    dim = corners.shape[2]
-    low, high = np.full(dim, np.inf), np.full(dim, -np.inf)
-    for d in range(dim):
-        least, most = np.inf, -np.inf
-        for f in range(corners.shape[0]):
-            for a in range(corners.shape[1]):
-                least, most = min(least, corners[f, a, d]), max(most, corners[f, a, d])
-        low[d], high[d] = least, most
-    return low, high
-
-
-@kernel
-def prepare(facets, begin, end, to_terms, to_hull, weights, low, high):
-    """Fill what the search wants to know of the facets ``numbers[begin:end]``, in that order.
+def prepare(facets, begin, end, to_terms, weights, low, high):
+    """Fill all but the nodes and the midst of the facets `begin` to `end`.
 
     Parameters
     ----------
     facets : Facets
-        All but the numbers, the nodes and the midst is filled in place.
-    to_terms : (m, m), to_hull : (k, m)
-        From nodes to terms, and to points whose convex hull holds the facet.
+        Filled in place.
+    begin, end : int
+    to_terms : (m, m)
+        From nodes to terms.
     weights : (3, m)
         For each term of unit size: how far it strays from flat triangles, how much it changes the tangents over the
         domain, and its second derivative, all at most.
     low, high : (n_facets, 3)
-        Boxes, filled in place.
+        Boxes, filled in place: those of the nodes and, around curved sides, as much room as the facet strays at most.
     """
-    to_terms, to_hull, weights, low, high = borrowed((to_terms, to_hull, weights, low, high))
-    facets = borrowed(facets)
-    terms, midst, bend, convex, numbers, nodes = facets
+    nodes, midst, terms, bend, convex = facets
     m = nodes.shape[1]
     for i in range(begin, end):
         for d in range(3):
             if m <= 4:
-                _fill_straight(nodes[numbers[i]], midst, i, d, terms, low, high)
+                _fill_straight(nodes, midst, i, d, terms, low, high)
             else:
-                _fill_curved(nodes[numbers[i]], midst, i, d, to_terms, to_hull, terms, low, high)
+                _fill_curved(nodes, midst, i, d, to_terms, terms, low, high)
         bend[i], convex[i] = 0.0, np.inf
         if m == 3:
             continue
         stray, turn, second = _curvature(terms, i, weights)
+        for d in range(3 if m > 4 else 0):
+            low[i, d], high[i, d] = low[i, d] - stray, high[i, d] + stray
         extent = high[i, 0] - low[i, 0], high[i, 1] - low[i, 1], high[i, 2] - low[i, 2]
         if stray >= FLAT * max(extent):
             bend[i] = stray
@@ -70,31 +53,27 @@ def prepare(facets, begin, end, to_terms, to_hull, weights, low, high):
 @inlined_kernel
 def _fill_straight(nodes, midst, i, d, terms, low, high):
     """Fill the terms and the box of a facet of 3 or 4 nodes, in one coordinate."""
-    p, q, r = nodes[0, d] - midst[d], nodes[1, d] - midst[d], nodes[2, d] - midst[d]
+    p, q, r = nodes[i, 0, d] - midst[d], nodes[i, 1, d] - midst[d], nodes[i, 2, d] - midst[d]
     low[i, d], high[i, d] = min(p, q, r), max(p, q, r)
-    if nodes.shape[0] == 3:
+    if nodes.shape[1] == 3:
         terms[i, 0, d], terms[i, 1, d], terms[i, 2, d] = p, q - p, r - p
     else:
-        s = nodes[3, d] - midst[d]
+        s = nodes[i, 3, d] - midst[d]
         terms[i, 0, d], terms[i, 1, d] = 0.25 * ((p + r) + (q + s)), 0.25 * ((q - p) + (r - s))
         terms[i, 2, d], terms[i, 3, d] = 0.25 * ((r - q) + (s - p)), 0.25 * ((p - q) + (r - s))
         low[i, d], high[i, d] = min(low[i, d], s), max(high[i, d], s)
 
 
 @inlined_kernel
-def _fill_curved(nodes, midst, i, d, to_terms, to_hull, terms, low, high):
-    """Fill the terms and the box of a facet with curved sides, in one coordinate."""
+def _fill_curved(nodes, midst, i, d, to_terms, terms, low, high):
+    """Fill the terms of a facet with curved sides and the box of its nodes, in one coordinate."""
+    low[i, d], high[i, d] = np.inf, -np.inf
     for k in range(to_terms.shape[0]):
         value = 0.0
-        for a in range(nodes.shape[0]):
-            value += to_terms[k, a] * (nodes[a, d] - midst[d])
-        terms[i, k, d] = value
-    low[i, d], high[i, d] = np.inf, -np.inf
-    for k in range(to_hull.shape[0]):
-        value = 0.0
-        for a in range(nodes.shape[0]):
-            value += to_hull[k, a] * (nodes[a, d] - midst[d])
-        low[i, d], high[i, d] = min(low[i, d], value), max(high[i, d], value)
+        for a in range(nodes.shape[1]):
+            value += to_terms[k, a] * (nodes[i, a, d] - midst[d])
+        terms[i, k, d], place = value, nodes[i, k, d] - midst[d]
+        low[i, d], high[i, d] = min(low[i, d], place), max(high[i, d], place)
 
 
 @inlined_kernel

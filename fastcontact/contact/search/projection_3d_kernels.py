@@ -1,9 +1,8 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Closest point of one facet in 3D, flat or curved, wherever it is: descents of the distance from several places.
+"""Closest point of one facet in 3D, flat or curved, near or far: the distance is minimised from several starting places.
 
-A facet of m nodes is the polynomial of the first m terms of 1, s, t, st, s^2, t^2, s^2 t, s t^2, s^2 t^2 in its reference
-coordinates, ``terms`` (n_facets, m, 3): tri3, quad4, tri6, quad8 and quad9 have 3, 4, 6, 8 and 9. Its domain is a polygon
-of ``sides`` (n_sides, 3), rows (a, b, c) for a s + b t <= c.
+A facet is a polynomial with coefficients ``terms`` (n_facets, m, 3) of the terms in `facet_tables`, on a polygon of
+``sides`` (n_sides, 3), rows (a, b, c) for a s + b t <= c.
 """
 
 from typing import NamedTuple
@@ -21,21 +20,28 @@ Array = NDArray[np.float64]
 
 
 class Facets(NamedTuple):
-    """Facets as the search wants them, in the order of its tree.
+    """Facets of one kind, seen from a place in their midst: far from the origin, rounding would exceed STEP.
 
-    Polynomials (n_facets, m, 3), seen from their midst (3,): far from it, rounding would be coarser than the steps of a
-    converged projection. How far each strays at most from the flat triangles between its nodes. Up to
-    where a minimum is the only one: with four nodes the bound of `straight3d.room`, with more the square of a distance below
-    which half the squared distance is a convex function on the domain. Their numbers elsewhere, and in that order their nodes
-    (n_facets, m, 3), which few projections ask for: seen from the old origin.
+    Attributes
+    ----------
+    nodes : ndarray (n_facets, m, 3)
+        Seen from the origin [length].
+    midst : ndarray (3,)
+        That place [length].
+    terms : ndarray (n_facets, m, 3)
+        Coefficients of the polynomials [length].
+    bend : ndarray (n_facets,)
+        How far a facet strays at most from the flat triangles between its nodes [length].
+    convex : ndarray (n_facets,)
+        Up to where a minimum of the distance is the only one: with four nodes the bound of `straight_3d_kernels.room`, with
+        more the square of a distance below which half the squared distance is convex on the domain [length^2].
     """
 
-    terms: Array
+    nodes: Array
     midst: Array
+    terms: Array
     bend: Array
     convex: Array
-    numbers: NDArray[np.intp]
-    nodes: Array
 
 
 class Domain(NamedTuple):
@@ -55,7 +61,7 @@ def vector(vectors, f, k):
 @inlined_kernel
 def node(facets, f, k):
     """Return node `k` of facet `f`, seen from the midst."""
-    return minus(vector(facets.nodes, facets.numbers[f], k), (facets.midst[0], facets.midst[1], facets.midst[2]))
+    return minus(vector(facets.nodes, f, k), (facets.midst[0], facets.midst[1], facets.midst[2]))
 
 
 @kernel

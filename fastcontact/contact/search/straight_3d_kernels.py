@@ -1,7 +1,7 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Closest points of facets with straight sides: flat triangles and bilinear quadrangles, in closed form or nearly so.
+"""Closest points of facets with straight sides: flat triangles in closed form, bilinear quadrangles by a few Newton steps.
 
-Vectors are tuples of three numbers: references to arrays would be counted in every call, which took a third of the time.
+Vectors are tuples of three numbers: Numba would count references to arrays in every call.
 """
 
 import numpy as np
@@ -14,6 +14,8 @@ ON_SIDE = 1e-12
 FINAL = 1e-8
 # Tangents with a smaller sine squared between them are parallel.
 PARALLEL = 1e-12
+# Sines squared between the sides of a triangle: below the first, area is lost in rounding; below the other, half its digits.
+COLLAPSED, NEEDLE = 1e-14, 1e-10
 
 
 @kernel
@@ -80,8 +82,30 @@ def on_flat(r, a, b):
     if va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
         t = (d4 - d3) / ((d4 - d3) + (d5 - d6))
         return 1.0 - t, t
+    square = aa * bb - ab * ab
+    if not square > COLLAPSED * aa * bb:
+        return _on_longest_side(r, a, b)
     area = va + vb + vc
-    return vb / area, vc / area
+    s, t = vb / area, vc / area
+    if square < NEEDLE * aa * bb:  # rounding errors are large there, and one more step makes them small
+        v = rest(r, a, b, (0.0, 0.0, 0.0), s, t)
+        s, t = s + (bb * dot(a, v) - ab * dot(b, v)) / square, t + (aa * dot(b, v) - ab * dot(a, v)) / square
+    if s >= -ON_SIDE and t >= -ON_SIDE and s + t <= 1.0 + ON_SIDE:
+        return s, t
+    return _on_longest_side(r, a, b)
+
+
+@kernel
+def _on_longest_side(r, a, b):
+    """Return (s, t) of the closest point of a triangle that is no more than its longest side."""
+    c = minus(b, a)
+    aa, bb, cc = dot(a, a), dot(b, b), dot(c, c)
+    if aa >= bb and aa >= cc:
+        return min(max(dot(a, r) / aa, 0.0), 1.0), 0.0
+    if bb >= cc:
+        return 0.0, min(max(dot(b, r) / bb, 0.0), 1.0)
+    t = min(max(dot(minus(r, a), c) / cc, 0.0), 1.0)
+    return 1.0 - t, t
 
 
 @kernel

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fastcontact.contact.formulations import _cut_faces_kernels
-from fastcontact.contact.formulations import _cut_faces_tree_kernels as tree
-from fastcontact.contact.formulations._cut_faces import terms_of
+from fastcontact.contact.search.box_tree_kernels import build, tree_order
+from fastcontact.contact.search.facet_tables import tables
 from fastcontact.mesh import elements, quadrature
 
 
@@ -22,12 +22,12 @@ def facing(secondary, primary, room=1000, reach=2.0):
     """Pairs of polygons (n, n_corners, 3) that face each other."""
     (origin, axes), (_, other_axes) = planes(secondary), planes(primary)
     radius = np.linalg.norm(secondary - origin[:, None], axis=2).max(axis=1)
-    low, high = primary.min(axis=1), primary.max(axis=1)
+    numbers = tree_order(primary[:, 0].copy())
+    tree = build(primary.min(axis=1)[numbers], primary.max(axis=1)[numbers])
     pairs = np.empty((room, 2), np.intp)
     count = _cut_faces_kernels.facing_pairs(
         secondary, secondary.shape[1], origin, axes, radius, np.full(len(secondary), reach),
-        primary, primary.shape[1], np.ascontiguousarray(other_axes[:, 2]), low, high, *tree.build(low, high),
-        -0.1, pairs,
+        primary, primary.shape[1], np.ascontiguousarray(other_axes[:, 2]), numbers, tree, -0.1, pairs,
     )  # fmt: skip
     return pairs[: min(count, room)], count
 
@@ -38,13 +38,14 @@ def integrated(secondary, primary, kinds, reference=None):
     corners, opposite = secondary[:, : one.n_corners].copy(), primary[:, : other.n_corners].copy()
     pairs, _ = facing(corners, opposite)
     origin, axes = planes(corners)
+    to_terms, other_to_terms = tables(one.n_nodes).to_terms, tables(other.n_nodes).to_terms
     reference = secondary if reference is None else reference
     mass = np.empty((len(secondary), one.n_nodes, one.n_nodes))
     coupling = np.empty((len(pairs), one.n_nodes, other.n_nodes))
     wrong = _cut_faces_kernels.integrate(
-        corners, one.n_corners, origin, axes, terms_of(one) @ secondary, terms_of(one) @ reference, terms_of(one),
-        one.nodes[: one.n_corners].mean(axis=0), opposite, other.n_corners, terms_of(other) @ primary,
-        terms_of(other), other.nodes[: other.n_corners].mean(axis=0), pairs, *quadrature.triangle(8), mass, coupling,
+        corners, one.n_corners, origin, axes, to_terms @ secondary, to_terms @ reference, to_terms,
+        one.nodes[: one.n_corners].mean(axis=0), opposite, other.n_corners, other_to_terms @ primary,
+        other_to_terms, other.nodes[: other.n_corners].mean(axis=0), pairs, *quadrature.triangle(8), mass, coupling,
     )  # fmt: skip
     assert wrong == -1
     return pairs, mass, coupling

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
 from fastcontact.contact.obstacles import MeshedSurface
-from fastcontact.contact.search.closest import flat_triangles
+from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import block, box, quarter_disc, sphere_octant
 from fastcontact.mesh.mesh import Mesh

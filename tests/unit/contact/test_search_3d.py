@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from fastcontact import ContactError
 from fastcontact._jit import decorators
-from fastcontact.contact.formulations import _cut_faces_tree_kernels
-from fastcontact.contact.search.closest import _tables, _terms, closest, closest_of_kinds, flat_triangles
+from fastcontact.contact.search.closest import closest, closest_of_kinds
+from fastcontact.contact.search.facet_tables import flat_triangles, tables, terms
 from fastcontact.mesh import elements
 
 KINDS = ("tri3", "tri6", "quad4", "quad8", "quad9")
@@ -161,17 +161,13 @@ def test_several_kinds_are_one_surface():
 @pytest.mark.parametrize("name", KINDS)
 def test_the_tables_are_those_of_the_elements(name):
     element = elements.get(name)
-    nodes, sides, to_terms, hull, (bend, turn, second) = _tables(element.n_nodes)
+    nodes, sides, to_terms, (bend, turn, second) = tables(element.n_nodes)
     assert np.array_equal(nodes, element.nodes)
     xi = grid(name, 31)
-    assert np.abs(_terms(xi, element.n_nodes) @ to_terms - element.shape(xi)).max() < 1e-14
+    assert np.abs(terms(xi, element.n_nodes) @ to_terms - element.shape(xi)).max() < 1e-14
     assert (xi @ sides[:, :2].T <= sides[:, 2] + 1e-14).all()
-    # Facets lie in the box of their hull, and no farther than their bend from the flat triangles between their nodes.
+    # Facets lie no farther than their bend from the flat triangles between their nodes.
     corners = np.random.default_rng(2).normal(size=(50, element.n_nodes, 3))
-    on = np.einsum("qk,nkd->nqd", element.shape(xi), corners)
-    box = hull @ corners
-    assert (on.min(axis=1) >= box.min(axis=1) - 1e-12).all()
-    assert (on.max(axis=1) <= box.max(axis=1) + 1e-12).all()
     allowed = np.linalg.norm(to_terms @ corners, axis=2) @ bend
     weights = np.array([[1, 1, 1], [2, 1, 0], [0, 1, 2], [3, 1, 2]]) / np.array([[3], [3], [3], [6]])
     for flat in flat_triangles(element.n_nodes):
@@ -179,12 +175,12 @@ def test_the_tables_are_those_of_the_elements(name):
         assert (np.linalg.norm(curved - weights @ corners[:, flat], axis=2) <= allowed[:, None] + 1e-12).all()
     # Tangents at two places of the domain, one of them (0, 0), and second derivatives, by differences.
     places, step = xi * (1 - 2e-4) + 1e-4 * nodes.mean(axis=0), 1e-4
-    terms = lambda s, t: _terms(places + step * np.array([s, t]), element.n_nodes)  # noqa: E731
-    slopes = np.stack([terms(1, 0) - terms(-1, 0), terms(0, 1) - terms(0, -1)], axis=-1) / (2 * step)
+    at = lambda s, t: terms(places + step * np.array([s, t]), element.n_nodes)  # noqa: E731
+    slopes = np.stack([at(1, 0) - at(-1, 0), at(0, 1) - at(0, -1)], axis=-1) / (2 * step)
     start = np.eye(element.n_nodes)[:, [1, 2]]
     assert (np.linalg.norm(slopes - start, axis=2).max(axis=0)[3:] <= turn[3:] + 1e-7).all()
-    both = (terms(1, 1) - terms(1, -1) - terms(-1, 1) + terms(-1, -1)) / (4 * step**2)
-    twice = [(terms(s, t) - 2 * terms(0, 0) + terms(-s, -t)) / step**2 for s, t in ((1, 0), (0, 1))]
+    both = (at(1, 1) - at(1, -1) - at(-1, 1) + at(-1, -1)) / (4 * step**2)
+    twice = [(at(s, t) - 2 * at(0, 0) + at(-s, -t)) / step**2 for s, t in ((1, 0), (0, 1))]
     hessians = np.stack([twice[0], both, both, twice[1]], axis=-1).reshape(*both.shape, 2, 2)
     assert (np.linalg.norm(hessians, ord=2, axis=(2, 3)).max(axis=0)[3:] <= second[3:] + 1e-5).all()
     areas = [np.linalg.det(nodes[flat[1:]] - nodes[flat[0]]) / 2 for flat in flat_triangles(element.n_nodes)]
@@ -266,25 +262,6 @@ def test_threads_do_not_change_a_bit(name, monkeypatch):
     for field in ("facet", "xi", "normal", "overhang", "position", "distance"):
         assert np.array_equal(getattr(found[0], field), getattr(found[1], field))
         assert np.array_equal(getattr(found[0], field), getattr(found[2], field))
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_a_tree_holds_every_facet_once_and_its_boxes_hold_theirs(dim):
-    rng = np.random.default_rng(4)
-    low = np.round(rng.uniform(0, 3, (203, dim)))  # many equal centres
-    high = low + rng.integers(0, 3, (203, dim))
-    box_low, box_high, child, span, order = _cut_faces_tree_kernels.build(low, high)
-    assert np.array_equal(np.sort(order), np.arange(203))
-    for box in range(len(child)):
-        mine = order[span[box, 0] : span[box, 1]]
-        assert np.array_equal(box_low[box], low[mine].min(axis=0))
-        assert np.array_equal(box_high[box], high[mine].max(axis=0))
-        if child[box] < 0:
-            assert len(mine) <= _cut_faces_tree_kernels.LEAF
-        else:
-            halves = span[child[box] : child[box] + 2]
-            assert halves.ravel().tolist() == [span[box, 0], halves[0, 1], halves[0, 1], span[box, 1]]
-            assert abs(np.diff(halves, axis=1).ravel() @ [1, -1]) <= 1
 
 
 def test_what_cannot_be_projected_is_told():

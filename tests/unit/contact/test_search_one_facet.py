@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from fastcontact.contact.search import facets_3d_kernels, straight_3d_kernels
 from fastcontact.contact.search import projection_3d_kernels as projection3d
-from fastcontact.contact.search.closest import _tables, flat_triangles
+from fastcontact.contact.search.facet_tables import flat_triangles, tables
 from fastcontact.contact.search.projection_3d_kernels import Domain, Facets
 from fastcontact.mesh import elements
 
@@ -15,23 +15,23 @@ OF_SIZE = {3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8", 9: "quad9"}
 
 
 def domain(m):
-    nodes, sides = _tables(m)[:2]
+    nodes, sides = tables(m)[:2]
     return Domain(nodes, flat_triangles(m), sides)
 
 
 def prepared(corners):
-    """Facets (n, m, 3) as the search wants them, in their order."""
+    """Facets (n, m, 3) ready for a search, and their boxes."""
     n, m = corners.shape[:2]
-    _, _, to_terms, to_hull, weights = _tables(m)
-    facets = Facets(np.empty(corners.shape), np.zeros(3), np.empty(n), np.empty(n), np.arange(n), corners)
+    table = tables(m)
+    facets = Facets(corners, np.zeros(3), np.empty(corners.shape), np.empty(n), np.empty(n))
     low, high = np.empty((n, 3)), np.empty((n, 3))
-    facets_3d_kernels.prepare(facets, 0, n, to_terms, to_hull, weights, low, high)
+    facets_3d_kernels.prepare(facets, 0, n, table.to_terms, table.weights, low, high)
     return facets, low, high
 
 
 def bent(m, seed, bend):
     rng = np.random.default_rng(seed)
-    nodes = _tables(m)[0]
+    nodes = tables(m)[0]
     return np.column_stack([nodes * rng.uniform(0.3, 2, 2), np.zeros(m)])[None] + bend * rng.normal(size=(1, m, 3)), rng
 
 
@@ -159,6 +159,10 @@ def test_a_bilinear_facet_out_of_reach_is_told_at_once():
 
 @settings(max_examples=300, deadline=None)
 @given(seed=st.integers(0, 10**6), shape=st.sampled_from([1.0, 1e-3, 1e-6, 0.0]), far=st.sampled_from([1e-3, 1.0, 1e6]))
+@example(seed=5564, shape=0.0, far=1.0)
+@example(seed=10, shape=0.0, far=1e-3)
+@example(seed=106, shape=0.0, far=1e-3)
+@example(seed=308, shape=1e-6, far=1e-3)
 def test_flat_triangles_in_closed_form(seed, shape, far):
     rng = np.random.default_rng(seed)
     corners = rng.normal(size=(3, 3)) * [1, shape, shape]
@@ -177,9 +181,6 @@ def test_flat_triangles_in_closed_form(seed, shape, far):
     best = min(sides)
     if min(*within, 1 - within.sum()) > 0:
         best = min(best, np.linalg.norm(corners[0] + within @ [a, b] - point))
-    if shape == 0.0:  # collapsed, which the search refuses for want of a normal
-        assert found >= best * (1 - 1e-9)
-        return
     assert found == pytest.approx(best, rel=1e-9, abs=1e-9 * np.abs(corners).max())
 
 

@@ -1,0 +1,115 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""A binary tree of bounding boxes over facets in 2D or 3D: it finds the few facets that are worth a closer look.
+
+Facets are first sorted so that neighbours in space follow each other (`tree_order`). Box 1 is the root, the children of box
+k are 2 k and 2 k + 1, and the last half of the boxes are those of the facets in this order. Their number is rounded up to a
+power of two by empty boxes, which are infinitely far from every point.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact._jit.decorators import inlined_kernel, kernel
+
+# Room for the boxes that a search has still to open; a squared distance that no facet exceeds.
+DEPTH, FAR = 64, 1e300
+Array = NDArray[np.float64]
+
+
+class Tree(NamedTuple):
+    """Corners of the boxes, low and high (2 n_leaves, dim) each [length]."""
+
+    low: Array
+    high: Array
+
+
+@kernel
+def tree_order(points, together=1):
+    """Return the permutation (n,) that sorts points (n, dim) by halving them along their longest side, and again the halves.
+
+    The left half has a power of two of them, so that the facets below a box of the tree are one of these parts. Parts of
+    so many points `together` stay in the order given, which is enough to find neighbours one after the other.
+    """
+    n = points.shape[0]
+    sorted_, order, size = points.copy(), np.arange(n), 1
+    while size < n:
+        size *= 2
+    while size > together:
+        for begin in range(0, n, size):
+            if begin + size // 2 < n:
+                _halve(sorted_, order, begin, begin + size // 2, min(begin + size, n))
+        size //= 2
+    return order
+
+
+@kernel
+def _halve(points, order, begin, middle, end):
+    """Permute rows `begin` to `end` so that none before `middle` exceeds one after in one coordinate (Hoare, 1961)."""
+    axis, longest = 0, -1.0
+    for d in range(points.shape[1]):
+        low, high = np.inf, -np.inf
+        for k in range(begin, end):
+            low, high = min(low, points[k, d]), max(high, points[k, d])
+        if high - low > longest:
+            axis, longest = d, high - low
+    first, last = begin, end - 1
+    while first < last:
+        pivot = points[(first + last) // 2, axis]
+        i, j = first, last
+        while i <= j:
+            while points[i, axis] < pivot:
+                i += 1
+            while points[j, axis] > pivot:
+                j -= 1
+            if i <= j:
+                order[i], order[j] = order[j], order[i]
+                for d in range(points.shape[1]):
+                    points[i, d], points[j, d] = points[j, d], points[i, d]
+                i += 1
+                j -= 1
+        if middle <= j:
+            last = j
+        elif middle >= i:
+            first = i
+        else:
+            return
+
+
+@kernel
+def build(low, high):
+    """Return the tree over the boxes of facets (n_facets, dim), sorted by `tree_order`."""
+    n, dim = low.shape
+    leaves = 1
+    while leaves < n:
+        leaves *= 2
+    tree = Tree(np.full((2 * leaves, dim), np.inf), np.full((2 * leaves, dim), -np.inf))
+    tree.low[leaves : leaves + n], tree.high[leaves : leaves + n] = low, high
+    for box in range(leaves - 1, 0, -1):
+        for d in range(dim):
+            tree.low[box, d] = min(tree.low[2 * box, d], tree.low[2 * box + 1, d])
+            tree.high[box, d] = max(tree.high[2 * box, d], tree.high[2 * box + 1, d])
+    return tree
+
+
+@inlined_kernel
+def square_to_box(tree, box, point):
+    """Return the squared distance from a point, a tuple, to a box; 0 inside [length^2]."""
+    square = 0.0
+    for d in range(len(point)):
+        out = max(tree.low[box, d] - point[d], point[d] - tree.high[box, d], 0.0)
+        square += out * out
+    return square
+
+
+@inlined_kernel
+def open_box(tree, box, point, stack, squares, top):
+    """Put the children of a box on a stack of boxes and squared distances, the nearer on top; return its new height."""
+    near, far = 2 * box, 2 * box + 1
+    to_near, to_far = square_to_box(tree, near, point), square_to_box(tree, far, point)
+    if to_far < to_near:
+        near, far, to_near, to_far = far, near, to_far, to_near
+    stack[top], squares[top] = far, to_far
+    stack[top + 1], squares[top + 1] = near, to_near
+    return top + 2

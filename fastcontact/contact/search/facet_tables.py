@@ -1,0 +1,95 @@
+"""Constants of each kind of facet in 3D: sides, polynomial, flat triangles, bounds on the curvature.
+
+A facet of m nodes is a polynomial of the first m terms 1, s, t, st, s^2, t^2, s^2 t, s t^2, s^2 t^2 of its reference
+coordinates.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import ContactError
+from fastcontact.mesh import elements
+
+Array = NDArray[np.float64]
+
+_NAMES = {3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8", 9: "quad9"}
+_TRIANGLE_SIDES = np.array([[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [1.0, 1.0, 1.0]])
+_SQUARE_SIDES = np.array([[-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, -1.0, 1.0], [0.0, 1.0, 1.0]])
+# Powers of s and t in the terms.
+_POWERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1], [2, 0], [0, 2], [2, 1], [1, 2], [2, 2]])
+# The largest change of the gradient of each term from that at (0, 0), and the largest second derivative (its spectral
+# norm), for s and t up to 1.
+_TURN = np.sqrt([0, 0, 0, 2, 4, 4, 5, 5, 8])
+_SECOND = np.array([0, 0, 0, 1, 2, 2, 1 + 5**0.5, 1 + 5**0.5, 6])
+# Flat triangles between the nodes, by number of nodes.
+_FLAT = {
+    3: [[0, 1, 2]],
+    4: [[0, 1, 2], [0, 2, 3]],
+    6: [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
+    8: [[0, 4, 7], [4, 1, 5], [5, 2, 6], [6, 3, 7], [4, 5, 7], [5, 6, 7]],
+    9: [[0, 4, 8], [0, 8, 7], [4, 1, 8], [1, 5, 8], [5, 2, 8], [2, 6, 8], [6, 3, 8], [3, 7, 8]],
+}
+
+
+class Tables(NamedTuple):
+    """Constants of facets of m nodes.
+
+    Attributes
+    ----------
+    nodes : ndarray (m, 2)
+        Reference coordinates [-].
+    sides : ndarray (n_sides, 3)
+        Rows (a, b, c) of a s + b t <= c on the facet [-].
+    to_terms : ndarray (m, m)
+        From nodes to coefficients of the terms [-].
+    weights : ndarray (3, m)
+        Most that each term of unit size adds to distance from the flat triangles, change of tangents, second derivative.
+    """
+
+    nodes: Array
+    sides: Array
+    to_terms: Array
+    weights: Array
+
+
+@cache
+def tables(n_nodes: int) -> Tables:
+    """Return the constants of facets of `n_nodes` nodes.
+
+    Raises
+    ------
+    ContactError
+        If there are no such facets.
+    """
+    if n_nodes not in _NAMES:
+        raise ContactError(f"there are no facets of {n_nodes} nodes in three dimensions: known are {sorted(_NAMES)}")
+    nodes = elements.get(_NAMES[n_nodes]).nodes
+    sides = _TRIANGLE_SIDES if n_nodes in (3, 6) else _SQUARE_SIDES
+    to_terms = np.ascontiguousarray(np.linalg.inv(terms(nodes, n_nodes)))
+    weights = np.stack([_bend(nodes), _TURN[:n_nodes], _SECOND[:n_nodes]])
+    return Tables(nodes, sides, to_terms, weights)
+
+
+def flat_triangles(n_nodes: int) -> NDArray[np.intp]:
+    """Return the flat triangles (n, 3) between the nodes of a facet in 3D, normals as those of the facet."""
+    return np.array(_FLAT[n_nodes])
+
+
+def terms(places: Array, n_nodes: int) -> Array:
+    """Return the terms (n, n_nodes) of a facet's polynomial at reference coordinates (n, 2) [-]."""
+    return np.prod(places[:, None] ** _POWERS[None, :n_nodes], axis=2)
+
+
+def _bend(nodes: Array) -> Array:
+    """Return, for each term of the polynomial, the largest error of its interpolation on the flat triangles."""
+    weights = np.array([[i, j, 20 - i - j] for i in range(21) for j in range(21 - i)]) / 20.0
+    error = [
+        weights @ terms(nodes[flat], len(nodes)) - terms(weights @ nodes[flat], len(nodes))
+        for flat in flat_triangles(len(nodes))
+    ]
+    return np.abs(error).max(axis=(0, 1))

@@ -1,0 +1,74 @@
+"""The tree of boxes: every facet is in it once, and boxes hold what is below them."""
+
+import numpy as np
+import pytest
+
+from fastcontact._jit.decorators import kernel
+from fastcontact.contact.search.box_tree_kernels import build, open_box, square_to_box, tree_order
+
+
+@kernel
+def opened(tree, box, point, stack, squares):
+    return open_box(tree, box, point, stack, squares, 0)
+
+
+@kernel
+def square(tree, box, point):
+    return square_to_box(tree, box, point)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("n", [0, 1, 7, 8, 9, 203])
+def test_boxes_hold_the_two_below_them_and_the_facets_come_last(dim, n):
+    rng = np.random.default_rng(n)
+    low = np.round(rng.uniform(0, 3, (n, dim)))
+    high = low + rng.integers(0, 3, (n, dim))
+    tree = build(low, high)
+    leaves = len(tree.low) // 2
+    assert leaves >= n
+    assert np.array_equal(tree.low[leaves : leaves + n], low)
+    assert np.array_equal(tree.high[leaves : leaves + n], high)
+    assert (tree.low[leaves + n :] == np.inf).all()
+    assert (tree.high[leaves + n :] == -np.inf).all()
+    for box in range(1, leaves):
+        assert np.array_equal(tree.low[box], tree.low[2 * box : 2 * box + 2].min(axis=0))
+        assert np.array_equal(tree.high[box], tree.high[2 * box : 2 * box + 2].max(axis=0))
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_every_box_is_halved_along_its_longest_side(dim):
+    points = np.random.default_rng(4).uniform(0, 1, (64, dim)) * ([1.0, 0.8, 0.6][:dim])
+    points[:20] = points[5]  # many equal ones
+    order = tree_order(points)
+    assert np.array_equal(np.sort(order), np.arange(64))
+    for size in (64, 32, 16, 8, 4, 2):
+        for part in points[order].reshape(-1, size, dim):
+            axis = np.argmax(np.ptp(part, axis=0))
+            assert part[: size // 2, axis].max() <= part[size // 2 :, axis].min()
+    coarse = tree_order(points, 16).reshape(4, 16)
+    assert np.array_equal(np.sort(coarse, axis=1), np.sort(order.reshape(4, 16), axis=1))
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_order_is_a_permutation_whatever_the_points(dim):
+    points = np.random.default_rng(1).normal(size=(1001, dim))
+    points[::7] = points[0]
+    points[5], points[6], points[11] = np.nan, np.inf, -1e300
+    assert np.array_equal(np.sort(tree_order(points)), np.arange(1001))
+    assert len(tree_order(points[:0])) == 0
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_nearer_of_two_boxes_comes_on_top(dim):
+    low = np.random.default_rng(dim).uniform(-1, 1, (5, dim))
+    tree = build(low, low + 0.3)
+    stack, squares = np.empty(4, np.int64), np.empty(4)
+    for point in np.random.default_rng(9).uniform(-1, 1, (40, dim)):
+        away = np.maximum(np.maximum(tree.low - point, point - tree.high), 0.0)
+        away = (away * away).sum(axis=1)
+        for box in range(1, 8):
+            assert square(tree, box, tuple(point)) == pytest.approx(away[box], rel=1e-14)
+            assert opened(tree, box, tuple(point), stack, squares) == 2
+            assert sorted(stack[:2]) == [2 * box, 2 * box + 1]
+            assert squares[:2] == pytest.approx(away[stack[:2]], rel=1e-14)
+            assert squares[1] <= squares[0]
