@@ -50,7 +50,7 @@ class Loaded(Protocol):
         """
         ...
 
-    def reduce(self, R: csr_array) -> tuple[Array, Array]:
+    def flexibility(self, R: csr_array) -> tuple[Array, Array]:
         """Return ``R K^-1 f`` (m,) and the compliance ``R K^-1 R.T`` (m, m) of rows R (m, n)."""
         ...
 

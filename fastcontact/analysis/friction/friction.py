@@ -197,7 +197,7 @@ def _among(
     rows = np.flatnonzero(chosen)
     k, m = len(tangents), len(gap0)
     R = csr_array(vstack([matrix[rows] for matrix in (B, *tangents)], format="csr"))
-    free, F = loaded.reduce(R)
+    free, F = loaded.flexibility(R)
     Q = aligning(own_compliance(F, 3)) if k == 2 else None
     still = np.flatnonzero(idle(own_compliance(F if Q is None else np.asarray(Q @ (Q @ F).T), 1 + k))) + len(rows)
     if compliance is not None and len(rows):

@@ -37,7 +37,7 @@ class LoadedInverse:
         multiplier = balanced(_symmetric(B @ moved.T), c - B @ self._free, C)
         return self._free + multiplier @ moved, multiplier
 
-    def reduce(self, R: csr_array) -> tuple[Array, Array]:
+    def flexibility(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
         return R @ self._free, _symmetric(R @ (R @ self._inverse).T)
 

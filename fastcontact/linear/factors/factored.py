@@ -168,7 +168,7 @@ class LoadedFactor:
         multiplier = multipliers(self._solver.compliance, B, c - B @ self._free, C)
         return self.near(B.T @ multiplier, guess), multiplier
 
-    def reduce(self, R: csr_array) -> tuple[Array, Array]:
+    def flexibility(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
         return R @ self._free, reduced(self._solver.compliance, R)
 

@@ -162,7 +162,7 @@ class _Iterated:
         forces = f - (springs @ u if springs is not None else 0.0)
         return u, self._solver.multiplier(elimination, u, forces)
 
-    def reduce(self, R: csr_array) -> tuple[Array, Array]:
+    def flexibility(self, R: csr_array) -> tuple[Array, Array]:
         return R @ self._unloaded(), reduced(self._solver.compliance, R)
 
     def near(self, force: Array, elsewhere: Array | None) -> Array:
@@ -200,8 +200,8 @@ class _Loaded:
     def solve(self, *args: Any, **options: Any) -> tuple[Array, Array]:
         return self._found(lambda loaded: loaded.solve(*args, **options))
 
-    def reduce(self, R: csr_array) -> tuple[Array, Array]:
-        return self._found(lambda loaded: loaded.reduce(R))
+    def flexibility(self, R: csr_array) -> tuple[Array, Array]:
+        return self._found(lambda loaded: loaded.flexibility(R))
 
     def near(self, force: Array, elsewhere: Array | None) -> Array:
         return self._found(lambda loaded: loaded.near(force, elsewhere))
