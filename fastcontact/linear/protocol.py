@@ -54,7 +54,7 @@ class Loaded(Protocol):
         """Return ``R K^-1 f`` (m,) and the compliance ``R K^-1 R.T`` (m, m) of rows R (m, n)."""
         ...
 
-    def near(self, force: Array, elsewhere: Array | None) -> Array:
+    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         """Return ``K^-1 (f + force)`` (n,) at all unknowns that equations may involve.
 
         Solvers for which other unknowns cost extra leave those as they are in `elsewhere` (n,), where that is given.
@@ -63,7 +63,7 @@ class Loaded(Protocol):
         ...
 
     def everywhere(self, force: Array, u: Array | None = None) -> Array:
-        """Return ``K^-1 (f + force)`` (n,); `u` is what `near` or `solve` found for it."""
+        """Return ``K^-1 (f + force)`` (n,); `u` is what `involved_solution` or `solve` found for it."""
         ...
 
     def condensed(self) -> Loaded | None:

@@ -220,7 +220,7 @@ def _among(
     y, relative = found.y, found.gaps
     if Q is not None:
         y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)
-    u = loaded.near(R.T @ y.ravel(), elsewhere)
+    u = loaded.involved_solution(R.T @ y.ravel(), elsewhere)
     full, gaps = np.zeros((1 + k, m)), np.vstack([gap0 + B @ u, *(own + T @ u for own, T in zip(slip0, tangents))])
     full[:, rows], gaps[:, rows] = y, relative
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)

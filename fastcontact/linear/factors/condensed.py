@@ -41,13 +41,13 @@ class LoadedInverse:
         """See `Loaded`."""
         return R @ self._free, _symmetric(R @ (R @ self._inverse).T)
 
-    def near(self, force: Array, elsewhere: Array | None) -> Array:
+    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         """See `Loaded`."""
         return np.asarray(self._free + self._inverse @ force)
 
     def everywhere(self, force: Array, u: Array | None = None) -> Array:
         """See `Loaded`."""
-        return self.near(force, None)
+        return self.involved_solution(force, None)
 
     def condensed(self) -> LoadedInverse:
         """See `Loaded`."""

@@ -166,13 +166,13 @@ class LoadedFactor:
         if B.shape[0] == 0:
             return self._free, np.empty(0)
         multiplier = multipliers(self._solver.compliance, B, c - B @ self._free, C)
-        return self.near(B.T @ multiplier, guess), multiplier
+        return self.involved_solution(B.T @ multiplier, guess), multiplier
 
     def flexibility(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
         return R @ self._free, reduced(self._solver.compliance, R)
 
-    def near(self, force: Array, elsewhere: Array | None) -> Array:
+    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         """See `Loaded`."""
         moved = self._moved(force) if elsewhere is not None else None
         if elsewhere is None or moved is None:

@@ -165,11 +165,11 @@ class _Iterated:
     def flexibility(self, R: csr_array) -> tuple[Array, Array]:
         return R @ self._unloaded(), reduced(self._solver.compliance, R)
 
-    def near(self, force: Array, elsewhere: Array | None) -> Array:
+    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         return self._solver.solution(self._f + force, None, None) if force.any() else self._unloaded()
 
     def everywhere(self, force: Array, u: Array | None = None) -> Array:
-        return self.near(force, None) if u is None else u
+        return self.involved_solution(force, None) if u is None else u
 
     def condensed(self) -> None:
         return None
@@ -203,8 +203,8 @@ class _Loaded:
     def flexibility(self, R: csr_array) -> tuple[Array, Array]:
         return self._found(lambda loaded: loaded.flexibility(R))
 
-    def near(self, force: Array, elsewhere: Array | None) -> Array:
-        return self._found(lambda loaded: loaded.near(force, elsewhere))
+    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
+        return self._found(lambda loaded: loaded.involved_solution(force, elsewhere))
 
     def everywhere(self, force: Array, u: Array | None = None) -> Array:
         return self._found(lambda loaded: loaded.everywhere(force, u))

@@ -111,7 +111,7 @@ def test_contact_takes_its_compliance_and_all_displacements_from_the_factors(nam
     f = np.random.default_rng(4).normal(size=K.shape[0])
     loaded, u = solver.load(f), exact @ (f + force)
     before, elsewhere = solver.counters.iterations, np.full(K.shape[0], 17.0)
-    near = loaded.near(force, elsewhere)
+    near = loaded.involved_solution(force, elsewhere)
     assert solver.counters.iterations == before
     np.testing.assert_allclose(near[top], u[top], atol=1e-12 * np.abs(u).max())
     np.testing.assert_array_equal(np.delete(near, top), 17.0)
@@ -135,7 +135,7 @@ def test_without_contact_there_is_nothing_to_condense_to(name):
 def test_forces_elsewhere_cost_a_solution():
     K, _, solver = prepared()
     force = np.random.default_rng(4).normal(size=K.shape[0])
-    u = solver.load(np.zeros(K.shape[0])).near(force, np.zeros(K.shape[0]))
+    u = solver.load(np.zeros(K.shape[0])).involved_solution(force, np.zeros(K.shape[0]))
     np.testing.assert_allclose(K @ u, force, atol=1e-12)
 
 
