@@ -150,10 +150,10 @@ class Analysis:
         before = self.solver.counters.iterations
         self.expected = 0.0  # displacement, for the first step under forces only
         if self.pairs and self.external.any() and not (self.u.any() or lift.any()):
-            self.expected = largest(loaded.everywhere(np.zeros(len(lift))))
+            self.expected = largest(loaded.full_solution(np.zeros(len(lift))))
         if self.pairs and self.model.springs:
             # Weak springs alone would let bodies move far; contact takes that back, but not its round-off.
-            alone = largest(loaded.everywhere(np.zeros(len(lift))))
+            alone = largest(loaded.full_solution(np.zeros(len(lift))))
             self.round_off = max(self.round_off, 16 * np.finfo(float).eps * alone)
         history: list[dict[str, Any]] = []
         if self.pairs:
@@ -297,7 +297,7 @@ class Analysis:
         """Let all points follow the contact forces (n_dofs,), where so far those near the contact did."""
         if self.floating is not None and self.settled is not None:
             lift = lift + self.floating.rigid(self.settled.position)
-        self.u = self.system.displacement(loaded.everywhere(self.system.reduced(force), state.u), lift)
+        self.u = self.system.displacement(loaded.full_solution(self.system.reduced(force), state.u), lift)
 
     def _smoother(self) -> str:
         """Return the advice for pairs that may flip between the facets at a node."""

@@ -62,7 +62,7 @@ class Loaded(Protocol):
         """
         ...
 
-    def everywhere(self, force: Array, u: Array | None = None) -> Array:
+    def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """Return ``K^-1 (f + force)`` (n,); `u` is what `involved_solution` or `solve` found for it."""
         ...
 

@@ -45,7 +45,7 @@ class LoadedInverse:
         """See `Loaded`."""
         return np.asarray(self._free + self._inverse @ force)
 
-    def everywhere(self, force: Array, u: Array | None = None) -> Array:
+    def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """See `Loaded`."""
         return self.involved_solution(force, None)
 

@@ -176,12 +176,12 @@ class LoadedFactor:
         """See `Loaded`."""
         moved = self._moved(force) if elsewhere is not None else None
         if elsewhere is None or moved is None:
-            return self.everywhere(force)
+            return self.full_solution(force)
         u, last = elsewhere.copy(), self._solver.last
         u[last] = self._free[last] + moved
         return u
 
-    def everywhere(self, force: Array, u: Array | None = None) -> Array:
+    def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """See `Loaded`."""
         moved = self._moved(force)
         if moved is None:

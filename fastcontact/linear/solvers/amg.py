@@ -168,7 +168,7 @@ class _Iterated:
     def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         return self._solver.solution(self._f + force, None, None) if force.any() else self._unloaded()
 
-    def everywhere(self, force: Array, u: Array | None = None) -> Array:
+    def full_solution(self, force: Array, u: Array | None = None) -> Array:
         return self.involved_solution(force, None) if u is None else u
 
     def condensed(self) -> None:
@@ -206,8 +206,8 @@ class _Loaded:
     def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         return self._found(lambda loaded: loaded.involved_solution(force, elsewhere))
 
-    def everywhere(self, force: Array, u: Array | None = None) -> Array:
-        return self._found(lambda loaded: loaded.everywhere(force, u))
+    def full_solution(self, force: Array, u: Array | None = None) -> Array:
+        return self._found(lambda loaded: loaded.full_solution(force, u))
 
     def condensed(self) -> None:
         return None

@@ -129,4 +129,4 @@ def test_the_condensed_problem_is_that_of_all_unknowns():
     everywhere = np.zeros(n)
     everywhere[solver.last] = force
     np.testing.assert_allclose(near, loaded.involved_solution(everywhere, None)[solver.last], atol=1e-10 * np.abs(near).max())
-    np.testing.assert_array_equal(condensed.everywhere(force), near)
+    np.testing.assert_array_equal(condensed.full_solution(force), near)

@@ -314,7 +314,7 @@ def test_units_do_not_change_the_iterations():
     counts, solutions = [], []
     for scale in (1.0, 1e-25, 1e30):
         solver, f, _ = prepared(scale=scale)
-        solutions.append(solver.load(f).everywhere(np.zeros(len(f))))
+        solutions.append(solver.load(f).full_solution(np.zeros(len(f))))
         counts.append(solver.counters.iterations)
     assert counts[0] == counts[1] == counts[2]
     assert solutions[1] == pytest.approx(solutions[0], rel=1e-6, abs=1e-9 * np.abs(solutions[0]).max())
@@ -323,7 +323,7 @@ def test_units_do_not_change_the_iterations():
 def test_both_precisions_agree_and_single_takes_half_the_memory():
     (single, f, _), (double, _, _) = prepared(), prepared("double")
     zero = np.zeros(len(f))
-    u, v = single.load(f).everywhere(zero), double.load(f).everywhere(zero)
+    u, v = single.load(f).full_solution(zero), double.load(f).full_solution(zero)
     assert np.abs(u - v).max() < 1e-8 * np.abs(v).max()
     assert abs(single.counters.iterations - double.counters.iterations) <= 1
     assert single.hierarchy.nbytes < 0.62 * double.hierarchy.nbytes
@@ -366,7 +366,7 @@ def test_a_bound_that_is_too_low_is_noticed_and_raised(caplog):
     solver.hierarchy._free_bounds = [level.bound for level in solver.hierarchy.levels]
     solver.hierarchy.set_bounds()
     with caplog.at_level(logging.INFO, logger="fastcontact"):
-        u = solver.load(f).everywhere(np.zeros(len(f)))
+        u = solver.load(f).full_solution(np.zeros(len(f)))
     K = problem((12, 11, 10))[0]
     assert np.abs(K @ u - f).max() < 1e-8 * np.abs(f).max()
 

@@ -115,7 +115,7 @@ def test_contact_takes_its_compliance_and_all_displacements_from_the_factors(nam
     assert solver.counters.iterations == before
     np.testing.assert_allclose(near[top], u[top], atol=1e-12 * np.abs(u).max())
     np.testing.assert_array_equal(np.delete(near, top), 17.0)
-    np.testing.assert_allclose(loaded.everywhere(force, near), u, atol=1e-12 * np.abs(u).max())
+    np.testing.assert_allclose(loaded.full_solution(force, near), u, atol=1e-12 * np.abs(u).max())
     assert solver.counters.iterations == before + 1
 
 
@@ -129,7 +129,7 @@ def test_without_contact_there_is_nothing_to_condense_to(name):
     f = np.random.default_rng(3).normal(size=K.shape[0])
     assert not solver.condenses
     assert solver.load(f).condensed() is None
-    np.testing.assert_allclose(K @ solver.load(f).everywhere(np.zeros(len(f))), f, atol=1e-12)
+    np.testing.assert_allclose(K @ solver.load(f).full_solution(np.zeros(len(f))), f, atol=1e-12)
 
 
 def test_forces_elsewhere_cost_a_solution():
