@@ -94,15 +94,14 @@ class Drag:
 
 
 @runtime_checkable
-class Oblique(Loaded, Protocol):
+class LoadedNonsymmetric(Loaded, Protocol):
     """Also solves where multipliers act through other rows than those of the equations."""
 
     def diagonal(self) -> Array:
         """Return the diagonal (n,) of the matrix."""
         ...
 
-    def oblique(
-        self, B: csr_array, c: Array, groups: NDArray[np.intp], guess: Array, tolerance: float,
+    def solve_nonsymmetric(        self, B: csr_array, c: Array, groups: NDArray[np.intp], guess: Array, tolerance: float,
         drag: Drag | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """Return (u, multiplier) with ``B u = c`` and ``K u + S u = f + push + through.T multiplier``, see `Drag`.

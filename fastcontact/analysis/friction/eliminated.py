@@ -1,7 +1,7 @@
 """Coulomb friction for solvers that eliminate constraints: no compliance is formed.
 
 A step of Newton's method holds closed gaps and sticking slips as equations. A sliding constraint drags with ``mu n`` along
-its direction d: its multiplier acts through the rows ``B + mu d T``, see `linear.Oblique`. In three dimensions t follows
+its direction d: its multiplier acts through the rows ``B + mu d T``, see `linear.LoadedNonsymmetric`. In three dimensions t follows
 the slip as that turns, which is a spring across d: ``t = mu n d - stiffness (s - (d s) d)``.
 """
 
@@ -16,7 +16,7 @@ from scipy.sparse import csr_array, diags_array, vstack
 from fastcontact.analysis.friction.cone_newton import EXACT, Forces, Law, newton
 from fastcontact.analysis.friction.slip_directions import aligning, idle
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.protocol import Drag, Oblique
+from fastcontact.linear.protocol import Drag, LoadedNonsymmetric
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -28,14 +28,14 @@ ENOUGH = 10.0
 
 
 def solve(
-    loaded: Oblique, rows: tuple[csr_array, ...], free: Array, mu: Array, usable: Mask, *, closed: Mask,
+    loaded: LoadedNonsymmetric, rows: tuple[csr_array, ...], free: Array, mu: Array, usable: Mask, *, closed: Mask,
     held: Mask | None, forces: Array | None, u: Array, tolerance: float, patience: int | None = None,
 ) -> tuple[Array, Forces] | None:  # fmt: skip
     """Return displacement and forces, or None where the method fails.
 
     Parameters
     ----------
-    loaded : Oblique
+    loaded : LoadedNonsymmetric
     rows : tuple of csr_array (m, n)
         Normal rows, then those along each of k tangents.
     free : ndarray (1 + k, m)
@@ -86,7 +86,7 @@ class Eliminated:
     """
 
     def __init__(
-        self, loaded: Oblique, rows: tuple[csr_array, ...], free: Array, mu: Array, usable: Mask, held: Mask | None,
+        self, loaded: LoadedNonsymmetric, rows: tuple[csr_array, ...], free: Array, mu: Array, usable: Mask, held: Mask | None,
         u: Array, tolerance: float,
     ) -> None:  # fmt: skip
         self._loaded, self._usable, self._tolerance = loaded, usable, tolerance
@@ -145,7 +145,7 @@ class Eliminated:
         c = -np.concatenate([free[at] for free, at in zip(self._free, equations, strict=True)])
         sliding = self._sliding(y, gaps, np.flatnonzero(closed & ~sticking & (self.law.mu > 0.0)))
         drag = self._drag(B, shut, sliding) if len(sliding.at) else None
-        u, multiplier = self._loaded.oblique(B, c, np.concatenate(equations), self.u, self._tolerance, drag)
+        u, multiplier = self._loaded.solve_nonsymmetric(B, c, np.concatenate(equations), self.u, self._tolerance, drag)
         new, first = np.zeros_like(y), 0
         for own, at in zip(new, equations, strict=True):
             own[at] = multiplier[first : first + len(at)]

@@ -20,7 +20,7 @@ from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction.slip_directions import aligning, idle, own_compliance
 from fastcontact.contact.constraints import Compliance
-from fastcontact.linear.protocol import Loaded, Oblique
+from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
 if TYPE_CHECKING:
     from fastcontact.analysis.friction import coulomb
@@ -141,7 +141,7 @@ def solve(
         Newton iterations after which an unsettled state will do, for solvers that eliminate constraints.
     """
     forces = None if guess is None else guess.forces_along(directions, len(gap0))
-    if isinstance(loaded, Oblique) and compliance is None and softness is None and loose is None:
+    if isinstance(loaded, LoadedNonsymmetric) and compliance is None and softness is None and loose is None:
         found = _eliminated(
             loaded, (B, *tangents), np.vstack([gap0, slip0]), friction, usable, closed, held, forces, elsewhere, tolerance,
             patience,
@@ -166,7 +166,7 @@ def solve(
 
 
 def _eliminated(
-    loaded: Oblique, rows: tuple[csr_array, ...], free: Array, friction: Array, usable: Mask, closed: Mask,
+    loaded: LoadedNonsymmetric, rows: tuple[csr_array, ...], free: Array, friction: Array, usable: Mask, closed: Mask,
     held: Mask | None, forces: Array | None, elsewhere: Array | None, tolerance: float,
     patience: int | None,
 ) -> FrictionalEquilibrium | None:  # fmt: skip

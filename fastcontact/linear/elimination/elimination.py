@@ -57,7 +57,7 @@ class Elimination:
     _inverse: csr_array  # of the pivots' columns of the rows that multipliers act through
 
     @property
-    def oblique(self) -> bool:
+    def nonsymmetric(self) -> bool:
         """Whether multipliers act through other rows than those of the equations."""
         return self.push is not self.tie
 

@@ -157,8 +157,7 @@ class Multigrid:
                 self._begin(f, elimination)
         return cg.x.copy()
 
-    def oblique(
-        self, f: Array, elimination: Elimination, springs: csr_array | None, guess: Array, tolerance: float
+    def solve_nonsymmetric(        self, f: Array, elimination: Elimination, springs: csr_array | None, guess: Array, tolerance: float
     ) -> Array:
         """Solve under equations whose multipliers act through other rows; see `_oblique`."""
         if self._residuals is None:

@@ -148,8 +148,7 @@ class _Iterated:
         multiplier = multipliers(solver.compliance, B, c - B @ self._unloaded(), C)
         return solver.solution(self._f + B.T @ multiplier, None, guess), multiplier
 
-    def oblique(
-        self, B: csr_array, c: Array, groups: NDArray[np.intp], guess: Array, tolerance: float,
+    def solve_nonsymmetric(        self, B: csr_array, c: Array, groups: NDArray[np.intp], guess: Array, tolerance: float,
         drag: Drag | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         if drag is None:
@@ -158,7 +157,7 @@ class _Iterated:
             return u, self._solver.multiplier(elimination, u, self._f)
         elimination, springs = eliminate(B, c, drag.through, groups), drag.springs
         f = self._f if drag.push is None else self._f + drag.push
-        u = self._solver.oblique(f, elimination, springs, guess, tolerance)
+        u = self._solver.nonsymmetric_solution(f, elimination, springs, guess, tolerance)
         forces = f - (springs @ u if springs is not None else 0.0)
         return u, self._solver.multiplier(elimination, u, forces)
 
@@ -182,7 +181,7 @@ class _Iterated:
 
 
 class _Loaded:
-    """See `linear._solver.Oblique`: by multigrid, and by factors from where that stalls."""
+    """See `linear._solver.LoadedNonsymmetric`: by multigrid, and by factors from where that stalls."""
 
     def __init__(self, solver: Amg, f: Array) -> None:
         self._solver, self._f = solver, np.ascontiguousarray(f, float)
@@ -192,10 +191,10 @@ class _Loaded:
     def diagonal(self) -> Array:
         return self._solver.diagonal()
 
-    def oblique(self, *args: Any, **options: Any) -> tuple[Array, Array]:
+    def solve_nonsymmetric(self, *args: Any, **options: Any) -> tuple[Array, Array]:
         if self._solver.instead is not None:
             raise ConvergenceError("factors give the compliance of friction")
-        return self._iterated.oblique(*args, **options)
+        return self._iterated.solve_nonsymmetric(*args, **options)
 
     def solve(self, *args: Any, **options: Any) -> tuple[Array, Array]:
         return self._found(lambda loaded: loaded.solve(*args, **options))

@@ -131,7 +131,7 @@ def test_oblique_equations_with_springs_against_a_dense_solution():
     through, c = csr_array(normal + 0.3 * first), 1e-3 * rng.normal(size=4)
     springs = csr_array(50.0 * second.T @ second)
     push = -0.2 * np.asarray(second.T @ np.ones(4))
-    u, multiplier = solver.load(f).oblique(
+    u, multiplier = solver.load(f).solve_nonsymmetric(
         normal, c, np.arange(4), np.zeros(n), 1e-12, linear.Drag(through, springs, push)
     )
     out = analysis.system.matrix @ u + springs @ u - f - push - through.T @ multiplier
@@ -149,7 +149,7 @@ def test_an_iteration_that_does_not_end_is_told(monkeypatch):
     drag = linear.Drag(csr_array(2.0 * rows))
     f = np.where(analysis.system.free, 1.0, 0.0)
     with pytest.raises(ConvergenceError, match=r"conjugate residuals stand at .* times the tolerance"):
-        analysis.solver.load(f).oblique(rows, np.zeros(1), np.zeros(1, np.int64), np.zeros(n), 1e-12, drag)
+        analysis.solver.load(f).solve_nonsymmetric(rows, np.zeros(1), np.zeros(1, np.int64), np.zeros(n), 1e-12, drag)
 
 
 def stuck(monkeypatch, limit=None):
@@ -186,7 +186,7 @@ def test_nothing_is_eliminated_once_factors_have_taken_over():
     analysis.solver.give_up(solver.StallError("stalled"))
     none = csr_array((0, n))
     with pytest.raises(ConvergenceError, match="factors give the compliance of friction"):
-        analysis.solver.load(np.zeros(n)).oblique(none, np.empty(0), np.empty(0, np.int64), np.zeros(n), 1e-10)
+        analysis.solver.load(np.zeros(n)).solve_nonsymmetric(none, np.empty(0), np.empty(0, np.int64), np.zeros(n), 1e-10)
     assert "gave up" in repr(analysis.solver)
 
 

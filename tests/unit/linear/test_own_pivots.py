@@ -57,5 +57,5 @@ def test_forces_move_along_the_rows_that_multipliers_act_through():
     multiplier = tied.multiplier(forces)
     np.testing.assert_allclose(moved, r - through.T @ multiplier, atol=1e-12)
     assert np.abs(moved[tied.pivots]).max() < 1e-12
-    assert tied.oblique
-    assert not eliminate(B, np.zeros(B.shape[0]), groups=label).oblique
+    assert tied.nonsymmetric
+    assert not eliminate(B, np.zeros(B.shape[0]), groups=label).nonsymmetric
