@@ -75,7 +75,7 @@ class Loaded(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Drag:
+class FrictionTerms:
     """Forces that friction adds to those of equations.
 
     Attributes
@@ -102,9 +102,9 @@ class LoadedNonsymmetric(Loaded, Protocol):
         ...
 
     def solve_nonsymmetric(        self, B: csr_array, c: Array, groups: NDArray[np.intp], guess: Array, tolerance: float,
-        drag: Drag | None = None,
+        drag: FrictionTerms | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """Return (u, multiplier) with ``B u = c`` and ``K u + S u = f + push + through.T multiplier``, see `Drag`.
+        """Return (u, multiplier) with ``B u = c`` and ``K u + S u = f + push + through.T multiplier``, see `FrictionTerms`.
 
         Equations of one of the `groups` (m,) may share unknowns. The iteration starts from `guess` (n,) and ends at a
         relative residual of `tolerance`, or of the solver's own where that is larger.

@@ -16,7 +16,7 @@ from scipy.sparse import csr_array, diags_array, vstack
 from fastcontact.analysis.friction.cone_newton import EXACT, Forces, Law, newton
 from fastcontact.analysis.friction.slip_directions import aligning, idle
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.protocol import Drag, LoadedNonsymmetric
+from fastcontact.linear.protocol import FrictionTerms, LoadedNonsymmetric
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -165,7 +165,7 @@ class Eliminated:
         spring = np.minimum(turning / np.maximum(1.0 - turning, 1e-300), STIFFEST) * self._unit[at] ** 2
         return _Sliding(at, pull, _Springs(across, csr_array(rows), spring, (across * self._free[1:, at]).sum(axis=0)))
 
-    def _drag(self, B: csr_array, shut: NDArray[np.intp], sliding: _Sliding) -> Drag:
+    def _drag(self, B: csr_array, shut: NDArray[np.intp], sliding: _Sliding) -> FrictionTerms:
         """Return what sliding adds to equations B whose first rows are the gaps of `shut`."""
         pull = np.zeros((len(self._rows) - 1, len(self._usable)))
         pull[:, sliding.at] = sliding.pull
@@ -174,10 +174,10 @@ class Eliminated:
             through = through + diags_array(part[shut]) @ T[shut]
         through = csr_array(vstack([through, B[len(shut) :]], format="csr"))
         if sliding.springs is None:
-            return Drag(through)
+            return FrictionTerms(through)
         springs = sliding.springs
         weighted = springs.rows.T @ diags_array(springs.stiffness)
-        return Drag(through, csr_array(weighted @ springs.rows), -(weighted @ springs.free))
+        return FrictionTerms(through, csr_array(weighted @ springs.rows), -(weighted @ springs.free))
 
 
 @dataclass(frozen=True, eq=False)

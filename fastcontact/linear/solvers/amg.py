@@ -19,7 +19,7 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.linear.compliance import multipliers, reduced
 from fastcontact.linear.elimination.elimination import Elimination, RepeatedError, eliminate
 from fastcontact.linear.multigrid.solver import Multigrid, StallError
-from fastcontact.linear.protocol import Drag, Loaded, Monitor, Product
+from fastcontact.linear.protocol import FrictionTerms, Loaded, Monitor, Product
 
 if TYPE_CHECKING:
     from fastcontact.linear.solvers.direct import Direct
@@ -149,14 +149,14 @@ class _Iterated:
         return solver.solution(self._f + B.T @ multiplier, None, guess), multiplier
 
     def solve_nonsymmetric(        self, B: csr_array, c: Array, groups: NDArray[np.intp], guess: Array, tolerance: float,
-        drag: Drag | None = None,
+        drag: FrictionTerms | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         if drag is None:
             elimination = eliminate(B, c, groups=groups) if B.shape[0] else None
             u = self._solver.solution(self._f, elimination, guess, tolerance=tolerance)
             return u, self._solver.multiplier(elimination, u, self._f)
-        elimination, springs = eliminate(B, c, drag.through, groups), drag.springs
-        f = self._f if drag.push is None else self._f + drag.push
+        elimination, springs = eliminate(B, c, drag.rows, groups), drag.springs
+        f = self._f if drag.forces is None else self._f + drag.forces
         u = self._solver.nonsymmetric_solution(f, elimination, springs, guess, tolerance)
         forces = f - (springs @ u if springs is not None else 0.0)
         return u, self._solver.multiplier(elimination, u, forces)

@@ -132,7 +132,7 @@ def test_oblique_equations_with_springs_against_a_dense_solution():
     springs = csr_array(50.0 * second.T @ second)
     push = -0.2 * np.asarray(second.T @ np.ones(4))
     u, multiplier = solver.load(f).solve_nonsymmetric(
-        normal, c, np.arange(4), np.zeros(n), 1e-12, linear.Drag(through, springs, push)
+        normal, c, np.arange(4), np.zeros(n), 1e-12, linear.FrictionTerms(through, springs, push)
     )
     out = analysis.system.matrix @ u + springs @ u - f - push - through.T @ multiplier
     assert np.abs(normal @ u - c).max() < 1e-12
@@ -146,7 +146,7 @@ def test_an_iteration_that_does_not_end_is_told(monkeypatch):
     analysis = Analysis(rubbing(), "amg", 1e-12, Criteria())
     n = analysis.model.n_dofs
     rows = csr_array((np.ones(2), ([0, 0], np.flatnonzero(analysis.system.free)[[0, 40]])), shape=(1, n))
-    drag = linear.Drag(csr_array(2.0 * rows))
+    drag = linear.FrictionTerms(csr_array(2.0 * rows))
     f = np.where(analysis.system.free, 1.0, 0.0)
     with pytest.raises(ConvergenceError, match=r"conjugate residuals stand at .* times the tolerance"):
         analysis.solver.load(f).solve_nonsymmetric(rows, np.zeros(1), np.zeros(1, np.int64), np.zeros(n), 1e-12, drag)
