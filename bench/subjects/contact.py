@@ -70,8 +70,8 @@ def matrix_of(analysis):
 
 def prepared(analysis, solver, matrix):
     modes = analysis.system.unknowns_of(near_nullspace(analysis.model))
-    own = matrix is not analysis.system.matrix
-    solver.prepare(matrix, modes, analysis.system.involved(analysis.surface_dofs), own)
+    release = matrix is not analysis.system.matrix
+    solver.prepare(matrix, modes, analysis.system.involved(analysis.surface_dofs), release)
     return solver
 
 

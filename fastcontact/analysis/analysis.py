@@ -87,7 +87,7 @@ class Analysis:
         modes = driven.near_nullspace(near_nullspace(model))
         if self.floating is not None:
             involved = np.union1d(involved, self.floating.dofs)
-        kept = self.solver.prepare(matrix, self.system.unknowns_of(modes), involved, own=True)
+        kept = self.solver.prepare(matrix, self.system.unknowns_of(modes), involved, release=True)
         if matrix is self.system.matrix:
             self.system.keep(kept)
         self.scope = self._scope(involved)

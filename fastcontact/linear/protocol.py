@@ -146,11 +146,11 @@ class LinearSolver(Protocol):
         ...
 
     def prepare(
-        self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, own: bool = False
+        self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, release: bool = False
     ) -> bsr_array | Product:
         """Take the symmetric positive definite matrix K (n, n) and displacements (n, n_modes) that cost it little.
 
-        `involved` are the unknowns that equations may involve, a hint. A solver that may `own` K may take the room of its
+        `involved` are the unknowns that equations may involve, a hint. A solver that may `release` K may take the room of its
         numbers; K is then no matrix any more, and what is returned takes its place. Otherwise that is K.
         """
         ...

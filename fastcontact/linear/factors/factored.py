@@ -76,7 +76,7 @@ class FactorSolver:
         return None
 
     def prepare(
-        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, own: bool = False
+        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
     ) -> bsr_array:
         """Factorise K, and leave it as it is; see `LinearSolver.prepare`.
 

@@ -76,23 +76,23 @@ class Given:
     shape, blocksize : (int, int)
     """
 
-    def __init__(self, K: bsr_array, precision: str, own: bool = False) -> None:
+    def __init__(self, K: bsr_array, precision: str, release: bool = False) -> None:
         self.shape, self.blocksize = K.shape, K.blocksize
-        self._take(K, precision, own)
+        self._take(K, precision, release)
 
-    def _take(self, K: bsr_array, precision: str, own: bool) -> None:
+    def _take(self, K: bsr_array, precision: str, release: bool) -> None:
         indptr, indices, size = K.indptr, K.indices, (0,) * K.blocksize[0]
         if precision == "double":
             self.unit = 1.0
             self.scaled = Matrix(indptr, indices, K.data.reshape(-1), size, size)
             return
         self.unit = float(0.5 ** np.round(np.log2(K.diagonal().max())))
-        first, second = _in_halves(K, self.unit, own)
+        first, second = _in_halves(K, self.unit, release)
         self.scaled = Matrix(indptr, indices, first, size, size, second)
 
     def change(self, precision: str) -> None:
         """Keep the numbers for a cycle in another precision."""
-        self._take(self.restored(), precision, own=True)
+        self._take(self.restored(), precision, release=True)
 
     def restored(self) -> bsr_array:
         """Return K as it was given, but for round-off."""
@@ -139,12 +139,12 @@ class Given:
         return float(out.max(initial=0.0)) / self.unit
 
 
-def _in_halves(K: bsr_array, unit: float, own: bool) -> tuple[Values, Values]:
+def _in_halves(K: bsr_array, unit: float, release: bool) -> tuple[Values, Values]:
     """Return the halves of ``unit K``, the second one in the room of K's numbers where it may be."""
     numbers: Array = K.data.reshape(-1)
     n, first = len(numbers), np.empty(len(numbers), np.float32)
     owner = _owner(K.data)
-    if not (own and owner.flags.owndata and owner.flags.c_contiguous and owner.nbytes == numbers.nbytes):
+    if not (release and owner.flags.owndata and owner.flags.c_contiguous and owner.nbytes == numbers.nbytes):
         second = np.empty(n, np.float32)
         split_matrix_kernels.split(unit, numbers, first, second)
         return first, second

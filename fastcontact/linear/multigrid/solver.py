@@ -68,10 +68,10 @@ class Multigrid:
         """Memory of the hierarchy and the work space, without K [bytes]."""
         return self.hierarchy.nbytes + self._cg.nbytes + (self._residuals.nbytes if self._residuals is not None else 0)
 
-    def build(self, K: bsr_array, rigid_modes: Array, own: bool = False) -> None:
-        """Build the hierarchy of K (n, n), whose room it may `own`; `rigid_modes` (n, k) cost it little."""
+    def build(self, K: bsr_array, rigid_modes: Array, release: bool = False) -> None:
+        """Build the hierarchy of K (n, n), whose room it may `release`; `rigid_modes` (n, k) cost it little."""
         n = K.shape[0]
-        self.K = Given(K, self.precision, own)
+        self.K = Given(K, self.precision, release)
         self._modes = rigid_modes.astype(np.float32)  # if they are needed again: single precision is enough
         self._cg = ConjugateGradients(n)
         self._residuals: ConjugateResiduals | None = None

@@ -63,12 +63,12 @@ class Amg(Multigrid):
         return self.instead is None
 
     def prepare(
-        self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, own: bool = False
+        self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, release: bool = False
     ) -> bsr_array | Product:
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
-        self.build(K, rigid_modes, own)
+        self.build(K, rigid_modes, release)
         self._involved, self.instead, self.gave_up = involved, None, ""
-        return self.K if own else K
+        return self.K if release else K
 
     def load(self, f: Array) -> Loaded:
         """Return the prepared matrix with right-hand side `f`."""

@@ -51,13 +51,13 @@ def test_the_second_half_may_take_the_place_of_the_numbers():
     np.testing.assert_array_equal(second, expected)
 
 
-@pytest.mark.parametrize("own", [False, True])
+@pytest.mark.parametrize("release", [False, True])
 @pytest.mark.parametrize("precision", ["single", "double"])
 @pytest.mark.parametrize(("n", "size"), [(7, 1), (40, 2), (30, 3), (1100, 3)])
-def test_products_are_those_of_the_matrix(n, size, precision, own):
+def test_products_are_those_of_the_matrix(n, size, precision, release):
     K = matrix(n, size, scale=3e7)
     dense, rng = K.toarray(), np.random.default_rng(3)
-    given = Given(K.copy(), precision, own)
+    given = Given(K.copy(), precision, release)
     u, f = rng.normal(size=(2, n * size))
     size_of_rows = np.abs(dense) @ np.abs(u)
     np.testing.assert_array_less(np.abs(given @ u - dense @ u), EXACT * size_of_rows)
@@ -87,7 +87,7 @@ def test_a_matrix_that_is_owned_gives_its_room_away():
     K = matrix(50, 3)
     K = bsr_array((K.data.copy(), K.indices, K.indptr), shape=K.shape)
     n = K.data.size
-    given = Given(K, "single", own=True)
+    given = Given(K, "single", release=True)
     assert K.nnz == 0
     assert not (K @ np.ones(150)).any()
     owner = given.scaled.rest
@@ -101,7 +101,7 @@ def test_a_matrix_that_is_owned_gives_its_room_away():
 def test_numbers_that_somebody_else_holds_stay_where_they_are():
     K = matrix(50, 3)
     dense, held = K.toarray(), K.data
-    given = Given(K, "single", own=True)
+    given = Given(K, "single", release=True)
     np.testing.assert_allclose(given.restored().toarray(), dense, rtol=EXACT)
     owner = held if held.base is None else held.base
     assert owner.nbytes == 8 * given.scaled.data.size  # no memory was taken from under it
