@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fastcontact.linear.compliance import balanced
+from fastcontact.linear.flexibility import balanced
 from fastcontact.linear.protocol import Monitor
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array
 
 from fastcontact.linear.cholesky.symmetric import SymmetricFactors
-from fastcontact.linear.compliance import ComplianceCache, multipliers, reduced
+from fastcontact.linear.flexibility import FlexibilityColumns, multipliers, reduced
 from fastcontact.linear.factors.condensed import LoadedInverse
 from fastcontact.linear.factors.known_loads import KnownLoads
 from fastcontact.linear.protocol import Counters, Monitor
@@ -93,11 +93,11 @@ class FactorSolver:
             self._factorise(K.tocsc())
             self.error = MARGIN * self._error(K)
         self.counters.setups += 1
-        self.compliance = ComplianceCache(self.n, self._solution)
+        self.columns = FlexibilityColumns(self.n, self._solution)
         self.known_loads = KnownLoads()
         if self._symmetric is not None and involved is not None and len(involved):
             self.last, self._inverse = involved, self._symmetric.last_inverse()
-            self.compliance.give(self.last, self._inverse)
+            self.columns.give(self.last, self._inverse)
         return K
 
     def _error(self, K: bsr_array) -> float:
@@ -129,11 +129,11 @@ class FactorSolver:
 
     def memory(self) -> dict[str, Any]:
         """See `LinearSolver.memory`: columns of ``K^-1`` asked for, and right-hand sides that others are made of."""
-        return {"asked": list(self.compliance.asked), "loads": self.known_loads.memory()}
+        return {"asked": list(self.columns.asked), "loads": self.known_loads.memory()}
 
     def remember(self, memory: dict[str, Any]) -> None:
         """See `LinearSolver.remember`."""
-        self.compliance.ask_again(memory["asked"])
+        self.columns.ask_again(memory["asked"])
         self.known_loads.remember(memory["loads"], self.n, self._solution)
 
     def response(self, force: Array) -> Array:
@@ -165,12 +165,12 @@ class LoadedFactor:
         """See `Loaded`."""
         if B.shape[0] == 0:
             return self._free, np.empty(0)
-        multiplier = multipliers(self._solver.compliance, B, c - B @ self._free, C)
+        multiplier = multipliers(self._solver.columns, B, c - B @ self._free, C)
         return self.involved_solution(B.T @ multiplier, guess), multiplier
 
     def flexibility(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
-        return R @ self._free, reduced(self._solver.compliance, R)
+        return R @ self._free, reduced(self._solver.columns, R)
 
     def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         """See `Loaded`."""

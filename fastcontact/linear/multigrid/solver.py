@@ -15,7 +15,7 @@ from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._jit.decorators import check_threads
 from fastcontact.errors import ConvergenceError, ModelError
-from fastcontact.linear.compliance import ComplianceCache
+from fastcontact.linear.flexibility import FlexibilityColumns
 from fastcontact.linear.elimination import nonsymmetric
 from fastcontact.linear.elimination.constrained_matrix import Ties
 from fastcontact.linear.elimination.elimination import Elimination
@@ -78,7 +78,7 @@ class Multigrid:
         self._diagonal: Array | None = None
         self._solved: Array | None = None  # the right-hand side that iterate and residual belong to
         self._build(rigid_modes)
-        self.compliance = ComplianceCache(n, self._solve_many)
+        self.columns = FlexibilityColumns(n, self._solve_many)
 
     def _build(self, rigid_modes: Array) -> None:
         check_threads()

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.compliance import multipliers, reduced
+from fastcontact.linear.flexibility import multipliers, reduced
 from fastcontact.linear.elimination.elimination import Elimination, RepeatedError, eliminate
 from fastcontact.linear.multigrid.solver import Multigrid, StallError
 from fastcontact.linear.protocol import FrictionTerms, Loaded, Monitor, Product
@@ -81,7 +81,7 @@ class Amg(Multigrid):
             rows = self._tied_as.tie
             arrays = (self._tied_as.pivots, rows.indptr, rows.indices, rows.data)
             tied = dict(zip(("pivots", "indptr", "indices", "data"), arrays, strict=True))
-        kept = {"precision": self.precision, "bounds": self.hierarchy.bounds, "asked": list(self.compliance.asked)}
+        kept = {"precision": self.precision, "bounds": self.hierarchy.bounds, "asked": list(self.columns.asked)}
         instead = None if self.instead is None else {"why": self.gave_up, **self.instead.memory()}
         return {**kept, "tied": tied, "instead": instead}
 
@@ -92,7 +92,7 @@ class Amg(Multigrid):
             return
         if memory["precision"] != self.precision:
             self.build_in(memory["precision"])
-        self.compliance.ask_again(memory["asked"])
+        self.columns.ask_again(memory["asked"])
         self.tie(memory["tied"] and _tied_again(memory["tied"], self.hierarchy.n))
         self.hierarchy.bounds = memory["bounds"]
 
@@ -145,7 +145,7 @@ class _Iterated:
             else:
                 u = solver.solution(self._f, elimination, guess, monitor, tolerance)
                 return u, solver.multiplier(elimination, u, self._f)
-        multiplier = multipliers(solver.compliance, B, c - B @ self._unloaded(), C)
+        multiplier = multipliers(solver.columns, B, c - B @ self._unloaded(), C)
         return solver.solution(self._f + B.T @ multiplier, None, guess), multiplier
 
     def solve_nonsymmetric(        self, B: csr_array, c: Array, groups: NDArray[np.intp], guess: Array, tolerance: float,
@@ -162,7 +162,7 @@ class _Iterated:
         return u, self._solver.multiplier(elimination, u, forces)
 
     def flexibility(self, R: csr_array) -> tuple[Array, Array]:
-        return R @ self._unloaded(), reduced(self._solver.compliance, R)
+        return R @ self._unloaded(), reduced(self._solver.columns, R)
 
     def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         return self._solver.solution(self._f + force, None, None) if force.any() else self._unloaded()

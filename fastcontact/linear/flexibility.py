@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 CHUNK = 32
 
 
-class ComplianceCache:
+class FlexibilityColumns:
     """Rows and columns of ``K^-1`` for the degrees of freedom asked for so far.
 
     Parameters
@@ -92,13 +92,13 @@ class ComplianceCache:
         self._values = grown
 
 
-def reduced(cache: ComplianceCache, R: csr_array) -> Array:
+def reduced(cache: FlexibilityColumns, R: csr_array) -> Array:
     """Return ``R K^-1 R.T`` (m, m)."""
     flexibility = cache.condensed(R)
     return 0.5 * (flexibility + flexibility.T)
 
 
-def multipliers(cache: ComplianceCache, B: csr_array, wanted: Array, C: Array | None) -> Array:
+def multipliers(cache: FlexibilityColumns, B: csr_array, wanted: Array, C: Array | None) -> Array:
     """Return the multipliers (m,) with ``(B K^-1 B.T + C) multiplier = wanted``; C (m, m) may be None."""
     return balanced(reduced(cache, B), wanted, C)
 
