@@ -67,7 +67,7 @@ class System:
     supported : ndarray of bool (n,)
         Displacement components that are prescribed.
     relations : sequence of Relation
-    loose : ndarray of bool (n,), optional
+    without_stiffness : ndarray of bool (n,), optional
         Components without stiffness that are free all the same, since something else holds them: none by default.
 
     Attributes
@@ -85,13 +85,14 @@ class System:
     """
 
     def __init__(
-        self, K: bsr_array, supported: Mask, relations: Sequence[Relation] = (), loose: Mask | None = None
+        self, K: bsr_array, supported: Mask, relations: Sequence[Relation] = (), without_stiffness: Mask | None = None
     ) -> None:
         R = stacked_rows(relations, K.shape[0])
         related = np.zeros(K.shape[0], bool)
         related[R.indices] = True
-        loose = np.zeros(K.shape[0], bool) if loose is None else loose
-        self.fixed: Mask = supported | (np.asarray(K.diagonal() == 0.0) & ~related & ~loose)
+        if without_stiffness is None:
+            without_stiffness = np.zeros(K.shape[0], bool)
+        self.fixed: Mask = supported | (np.asarray(K.diagonal() == 0.0) & ~related & ~without_stiffness)
         self.held: Mask = self.fixed | related
         self._constraints = ConstrainedMotion(self.fixed, relations)
         self.T = self._constraints.T if relations else None
@@ -103,7 +104,7 @@ class System:
             self.K = Stiffness((K,))
             condensed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
             condensed.sort_indices()
-            self.free &= (condensed.diagonal() > 0) | loose  # not points that relations tie to nothing but each other
+            self.free &= (condensed.diagonal() > 0) | without_stiffness  # not points that relations tie to nothing but each other
             self.matrix = supports_apart(condensed, ~self.free)[0]
         self._no_unknowns = np.flatnonzero(~self.free)
 
