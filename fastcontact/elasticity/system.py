@@ -19,7 +19,7 @@ from fastcontact._jit.norms_kernels import largest
 from fastcontact.elasticity import system_kernels
 from fastcontact.elasticity.relations import Elimination, Relation, eliminate, stacked_rows
 from fastcontact.errors import ModelError
-from fastcontact.linear.multigrid.cycle_kernels import row_sums
+from fastcontact.linear.multigrid.matrix import block_matrix
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -50,11 +50,7 @@ class Stiffness:
 def _largest_row_sum(K: Any, u: Array) -> float:
     if isinstance(K, csr_array):
         return float((abs(K) @ np.abs(u)).max(initial=0.0))
-    if not isinstance(K, bsr_array):
-        return float(K.largest_row_sum(u))
-    out = np.empty(K.shape[0])
-    row_sums(K.indptr, K.indices, (K.data.reshape(-1),), u, (0,) * K.blocksize[0], out)
-    return float(out.max(initial=0.0))
+    return float((block_matrix(K) if isinstance(K, bsr_array) else K).largest_row_sum(u))
 
 
 class System:
@@ -102,10 +98,11 @@ class System:
             self.matrix = self.K.parts[0]
         else:
             self.K = Stiffness((K,))
-            condensed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
-            condensed.sort_indices()
-            self.free &= (condensed.diagonal() > 0) | without_stiffness  # not points that relations tie to nothing but each other
-            self.matrix = supports_apart(condensed, ~self.free)[0]
+            transformed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
+            transformed.sort_indices()
+            # Not points that relations couple to nothing but each other.
+            self.free &= (transformed.diagonal() > 0) | without_stiffness
+            self.matrix = supports_apart(transformed, ~self.free)[0]
         self._no_unknowns = np.flatnonzero(~self.free)
 
     def keep(self, matrix: Any) -> None:

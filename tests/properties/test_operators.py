@@ -85,11 +85,11 @@ def test_the_multigrid_cycle_is_symmetric_and_positive(recipe, tied, seed):
         chosen = np.random.default_rng(seed).random(B.shape[0]) < 0.6
         assume(chosen.any() and np.linalg.matrix_rank(B[chosen].toarray()) == chosen.sum())
         elimination = eliminate(csr_array(B[chosen]), np.zeros(chosen.sum()))
-        amg.tie(elimination)
+        amg.constrain(elimination)
     basis = np.eye(n)
     if elimination is not None:
         for column in basis.T:
-            elimination.condense(column)
+            elimination.move_forces(column)
     for raised in range(RAISES + 1):
         product = basis.T @ applied(amg, basis)
         size = np.abs(product).max()

@@ -1,8 +1,8 @@
 """Coulomb friction for solvers that eliminate constraints: no compliance is formed.
 
 A step of Newton's method holds closed gaps and sticking slips as equations. A sliding constraint drags with ``mu n`` along
-its direction d: its multiplier acts through the rows ``B + mu d T``, see `linear.LoadedNonsymmetric`. In three dimensions t follows
-the slip as that turns, which is a spring across d: ``t = mu n d - stiffness (s - (d s) d)``.
+its direction d: its multiplier acts through the rows ``B + mu d T``, see `linear.protocol`. In three dimensions t follows the
+slip as that turns, which is a spring across d: ``t = mu n d - stiffness (s - (d s) d)``.
 """
 
 from __future__ import annotations
@@ -86,8 +86,8 @@ class Eliminated:
     """
 
     def __init__(
-        self, loaded: LoadedNonsymmetric, rows: tuple[csr_array, ...], free: Array, mu: Array, usable: Mask, held: Mask | None,
-        u: Array, tolerance: float,
+        self, loaded: LoadedNonsymmetric, rows: tuple[csr_array, ...], free: Array, mu: Array, usable: Mask,
+        held: Mask | None, u: Array, tolerance: float,
     ) -> None:  # fmt: skip
         self._loaded, self._usable, self._tolerance = loaded, usable, tolerance
         k, m = len(rows) - 1, len(mu)

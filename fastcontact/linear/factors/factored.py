@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array
 
 from fastcontact.linear.cholesky.symmetric import SymmetricFactors
-from fastcontact.linear.flexibility import FlexibilityColumns, multipliers, reduced
 from fastcontact.linear.factors.condensed import LoadedInverse
 from fastcontact.linear.factors.known_loads import KnownLoads
+from fastcontact.linear.flexibility import FlexibilityColumns, multipliers, reduced
 from fastcontact.linear.protocol import Counters, Monitor
 
 Array = NDArray[np.float64]

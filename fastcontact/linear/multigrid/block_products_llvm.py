@@ -1,4 +1,8 @@
-"""What Numba is told to write for `block_products`: each function here runs while a kernel is compiled, none in it."""
+"""The compiler's instructions for `block_products`: functions that write LLVM code while Numba compiles a kernel.
+
+Each public function here stands for the function of the same name in `block_products`. It is called with the Numba types of
+the arguments and returns the signature and a function that writes the code. None of this runs when the kernel runs.
+"""
 
 from __future__ import annotations
 
@@ -44,21 +48,17 @@ def _row(absolute: bool, indices: Any, numbers: Any, x: Any, rows: Any, cols: An
     return sums(indices, numbers, x, types.intp, types.intp, rows, cols), code
 
 
-def add_product(
-    _context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, rows: Any, inner: Any, cols: Any
-) -> Any:
+def add_product(_context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, sizes: Any) -> Any:
     """Return the types of `block_products.add_product`, and what writes it."""
-    return _added(lambda r, t, _m, k: r * k + t, to, left, right, rows, inner, cols)
+    return _added(lambda r, t, _m, k: r * k + t, to, left, right, sizes)
 
 
-def add_transposed(
-    _context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, rows: Any, inner: Any, cols: Any
-) -> Any:
+def add_transposed(_context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, sizes: Any) -> Any:
     """Return the types of `block_products.add_transposed`, and what writes it."""
-    return _added(lambda r, t, m, _k: t * m + r, to, left, right, rows, inner, cols)
+    return _added(lambda r, t, m, _k: t * m + r, to, left, right, sizes)
 
 
-def _added(place: Callable[[int, int, int, int], int], to: Any, left: Any, right: Any, *sizes: Any) -> Any:
+def _added(place: Callable[[int, int, int, int], int], to: Any, left: Any, right: Any, sizes: Any) -> Any:
     """Return the types of a product that is added, and what writes it, given where the left factor has (row, inner)."""
     from numba.core import types
 
@@ -79,7 +79,7 @@ def _added(place: Callable[[int, int, int, int], int], to: Any, left: Any, right
                 builder.store(total, write.where(out, args[1], r * n + piece.column, piece.width), align=8)
         return context.get_dummy_value()
 
-    return types.none(to, types.intp, left, types.intp, right, types.intp, *sizes), code
+    return types.none(to, types.intp, left, types.intp, right, types.intp, sizes), code
 
 
 class _Writer:
@@ -107,7 +107,7 @@ class _Writer:
         return self.builder.bitcast(place, self.kind(start.type.pointee, width).as_pointer())
 
     def numbers(self, starts: list[Any], at: Any, column: int, width: int) -> Any:
-        """Return a vector of what begins at `starts`, the halves of each number added."""
+        """Return a vector of what begins at `starts`, the high and low parts of each number added."""
         from llvmlite import ir
 
         parts = [

@@ -128,5 +128,7 @@ def test_the_condensed_problem_is_that_of_all_unknowns():
     near = condensed.involved_solution(force, None)
     everywhere = np.zeros(n)
     everywhere[solver.last] = force
-    np.testing.assert_allclose(near, loaded.involved_solution(everywhere, None)[solver.last], atol=1e-10 * np.abs(near).max())
+    np.testing.assert_allclose(
+        near, loaded.involved_solution(everywhere, None)[solver.last], atol=1e-10 * np.abs(near).max()
+    )
     np.testing.assert_array_equal(condensed.full_solution(force), near)
