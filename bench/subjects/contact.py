@@ -162,9 +162,9 @@ def by_cholmod(matrix):
     """Order and factors in CHOLMOD's own order, without turning SciPy's matrix into one of its own."""
     from kvxopt import cholmod
 
-    from fastcontact.linear.solvers.cholmod import _matrix
+    from fastcontact.linear.solvers.cholmod import lower_triangle
 
-    A = _matrix(matrix)
+    A = lower_triangle(matrix)
 
     def factors():
         factor = cholmod.symbolic(A)

@@ -1,8 +1,8 @@
 """What a linear solver is: the methods that every solver has, and the counters it keeps.
 
 Shapes: n unknowns, m equations among them. ``K`` is a stiffness [force / length], ``u`` a displacement [length], ``f`` a
-force [force]. Equations ``B u + C multiplier = c`` have rows B (m, n) [-] and right-hand sides c (m,) [length]; their multipliers
-(m,) are forces [force], their compliance C (m, m) is a length per force.
+force [force]. Equations ``B u + C multiplier = c`` have rows B (m, n) [-] and right-hand sides c (m,) [length]; their
+multipliers (m,) are forces [force], their compliance C (m, m) is a length per force.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 Neighbouring nodes are gathered into aggregates, each of which moves like a rigid body at first. One step of block Jacobi
 smooths these motions (Vanek, Mandel and Brezina, 1996), and the coarse matrix is the Galerkin product. The smoother is the
-Chebyshev iteration for the upper part of the spectrum of ``D^-1 A``, D the diagonal blocks (Adams, Brezina, Hu and Tuminaro, 2003):
-unlike Gauss-Seidel it gives the same bits for any number of threads.
+Chebyshev iteration for the upper part of the spectrum of ``D^-1 A``, D the diagonal blocks (Adams, Brezina, Hu and Tuminaro,
+2003): unlike Gauss-Seidel it gives the same bits for any number of threads.
 
 Two functions are pyamg's: `standard_aggregation` gathers the nodes and `fit_candidates` makes an orthonormal basis of the
 rigid motions of each aggregate. Everything else is ours. `linear.solvers.pyamg` is pyamg's own multigrid, to compare with.

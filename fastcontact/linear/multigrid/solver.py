@@ -140,8 +140,8 @@ class Multigrid:
         while cg.norm > enough:
             if made >= MAX_ITERATIONS or raised > RAISES:
                 raise StallError(self._stuck(cg.norm / scale, made))
-            watched = monitor is not None and made and made % WATCH_EVERY == 0
-            if watched and monitor(cg.x, self.multiplier(elimination, cg.x, f), cg.norm / scale):
+            watch = monitor if made and made % WATCH_EVERY == 0 else None
+            if watch is not None and watch(cg.x, self.multiplier(elimination, cg.x, f), cg.norm / scale):
                 break
             if cg.step(self._multiply, self.precondition):
                 made += 1

@@ -18,10 +18,9 @@ from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
-from fastcontact.linear.elimination.pivot_order import RepeatedError
-from fastcontact.linear.flexibility import multipliers, reduced
+from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.multigrid.solver import Multigrid, StallError
-from fastcontact.linear.protocol import FrictionTerms, Loaded, Monitor, Product
+from fastcontact.linear.protocol import FrictionTerms, Loaded, Product
 from fastcontact.linear.solvers.direct import Direct
 
 log = logging.getLogger("fastcontact")
@@ -138,38 +137,17 @@ def _or_by_factors(method: Callable[..., Any]) -> Callable[..., Any]:
     return found
 
 
-class _Loaded:
+class _Loaded(LoadedIteration):
     """See `linear.protocol.LoadedNonsymmetric`."""
 
-    def __init__(self, solver: Amg, f: Array) -> None:
-        self._solver, self._f = solver, np.ascontiguousarray(f, float)
+    solve = _or_by_factors(LoadedIteration.solve)
+    flexibility = _or_by_factors(LoadedIteration.flexibility)
+    involved_solution = _or_by_factors(LoadedIteration.involved_solution)
+    full_solution = _or_by_factors(LoadedIteration.full_solution)
 
     @functools.cached_property
     def _factored(self) -> Loaded:
-        assert self._solver.instead is not None
         return self._solver.instead.load(self._f)
-
-    @functools.cached_property
-    def _free(self) -> Array:
-        """Displacement (n,) without contact forces."""
-        return self._solver.solution(self._f, None, None)
-
-    @_or_by_factors
-    def solve(
-        self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
-        monitor: Monitor | None = None, tolerance: float | None = None,
-    ) -> tuple[Array, Array]:  # fmt: skip
-        solver = self._solver
-        if C is None or not B.shape[0]:
-            try:
-                elimination = eliminate(B, c) if B.shape[0] else None
-            except RepeatedError as repeated:
-                log.info("%s: their compliance is formed", repeated)
-            else:
-                u = solver.solution(self._f, elimination, guess, monitor, tolerance)
-                return u, solver.multiplier(elimination, u, self._f)
-        multiplier = multipliers(solver.columns, B, c - B @ self._free, C)
-        return solver.solution(self._f + B.T @ multiplier, None, guess), multiplier
 
     def diagonal(self) -> Array:
         return self._solver.diagonal()
@@ -189,21 +167,6 @@ class _Loaded:
         f = f if friction.forces is None else f + friction.forces
         u = solver.nonsymmetric_solution(f, elimination, springs, guess, tolerance)
         return u, solver.multiplier(elimination, u, f - (springs @ u if springs is not None else 0.0))
-
-    @_or_by_factors
-    def flexibility(self, R: csr_array) -> tuple[Array, Array]:
-        return R @ self._free, reduced(self._solver.columns, R)
-
-    @_or_by_factors
-    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
-        return self._solver.solution(self._f + force, None, None) if force.any() else self._free
-
-    @_or_by_factors
-    def full_solution(self, force: Array, u: Array | None = None) -> Array:
-        return self.involved_solution(force, None) if u is None else u
-
-    def condensed(self) -> None:
-        return None
 
 
 SOLVER = Amg
