@@ -38,11 +38,6 @@ class Elimination:
     force_weights: csr_array
     inverse: csr_array
 
-    @property
-    def nonsymmetric(self) -> bool:
-        """Whether multipliers act through other rows than those of the equations."""
-        return self.force_weights is not self.weights
-
     def multiplier(self, forces: Array) -> Array:
         """Return the multiplier (m,) with ``B.T multiplier = forces`` at the pivots; forces = (K u - f)[pivots]."""
         return np.asarray(self.inverse.T @ forces)

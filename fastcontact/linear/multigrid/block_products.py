@@ -46,14 +46,6 @@ def row_times_plain(
     return tuple(np.einsum("kmn,kn->m", blocks, x.reshape(-1, n)[indices[begin:end]]))
 
 
-def row_sizes_plain(
-    indices: Any, numbers: tuple[Any, ...], x: Any, begin: int, end: int, rows: tuple[int, ...], cols: tuple[int, ...]
-) -> tuple[Any, ...]:
-    """Return the product of absolute values, ``|A| |x|`` of one block row; see `row_times_plain`."""
-    positive = tuple(np.abs(part) for part in numbers)
-    return row_times_plain(indices, positive, np.abs(x), begin, end, rows, cols)
-
-
 def add_product_plain(
     to: Any, at: int, left: tuple[Any, ...], first: int, right: Any, second: int, sizes: Sizes
 ) -> None:
@@ -90,6 +82,5 @@ def _kernel(written: Any, plain: Any) -> Any:
 
 
 row_times = _kernel(block_products_llvm.row_times, row_times_plain)
-row_sizes = _kernel(block_products_llvm.row_sizes, row_sizes_plain)
 add_product = _kernel(block_products_llvm.add_product, add_product_plain)
 add_transposed = _kernel(block_products_llvm.add_transposed, add_transposed_plain)

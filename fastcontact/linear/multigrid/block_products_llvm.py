@@ -23,22 +23,12 @@ class Piece(NamedTuple):
 
 def row_times(_context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end: Any, rows: Any, cols: Any) -> Any:
     """Return the types of `block_products.row_times`, and what writes it."""
-    return _row(False, indices, numbers, x, rows, cols)
-
-
-def row_sizes(_context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end: Any, rows: Any, cols: Any) -> Any:
-    """Return the types of `block_products.row_sizes`, and what writes it."""
-    return _row(True, indices, numbers, x, rows, cols)
-
-
-def _row(absolute: bool, indices: Any, numbers: Any, x: Any, rows: Any, cols: Any) -> Any:
-    """Return the types of the product of a row, of absolute numbers or not, and what writes it."""
     from numba.core import types
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         from numba.core import cgutils
 
-        row = _Row(context, builder, signature, args, absolute)
+        row = _Row(context, builder, signature, args)
         step = args[3].type(1)
         with cgutils.for_range_slice(builder, args[3], args[4], step, args[3].type, inc=True) as (k, _):
             row.add_block(k)
@@ -161,11 +151,10 @@ class _Row(_Writer):
     the one behind, so that nothing is read beside the block.
     """
 
-    def __init__(self, context: Any, builder: Any, signature: Any, args: Any, absolute: bool) -> None:
+    def __init__(self, context: Any, builder: Any, signature: Any, args: Any) -> None:
         from numba.core import cgutils
 
         super().__init__(context, builder, signature.args[2].dtype)
-        self.absolute = absolute
         self.offset = args[3].type
         self.m, self.n = len(signature.args[5]), len(signature.args[6])
         self.indices, self.x = (self.start(signature.args[k], args[k]) for k in (0, 2))
@@ -191,11 +180,7 @@ class _Row(_Writer):
             last = self.shifted and r == m - 1
             for piece, total, x in zip(self.pieces, self.totals[r], behind if last else meets, strict=True):
                 numbers = self.numbers(self.data, at, r * n + piece.column - last, piece.width)
-                if self.absolute:
-                    change = self._positive(builder.fmul(numbers, x), piece.width)
-                    builder.store(builder.fadd(builder.load(total), change), total)
-                else:
-                    builder.store(self.plus(builder.load(total), numbers, x), total)
+                builder.store(self.plus(builder.load(total), numbers, x), total)
 
     def sums(self) -> list[Any]:
         """Return the sum of every row of the blocks."""
@@ -214,11 +199,6 @@ class _Row(_Writer):
         for lane in lanes[1:]:
             found = self.builder.fadd(found, lane)
         return found
-
-    def _positive(self, vector: Any, width: int) -> Any:
-        """Return a vector without signs."""
-        negative = self.builder.fcmp_ordered("<", vector, self.zeros(width))
-        return self.builder.select(negative, self.builder.fneg(vector), vector)
 
     def _three(self, j: Any) -> list[Any]:
         """Return three numbers of x and any fourth, without a look beyond them."""

@@ -12,7 +12,7 @@ import numpy as np
 from numba import prange
 
 from fastcontact._jit.decorators import kernel, parallel_kernel
-from fastcontact.linear.multigrid.block_products import row_sizes, row_times
+from fastcontact.linear.multigrid.block_products import row_times
 
 # Block rows that one thread takes at a time, and up to how many rows waking another thread costs more than it saves.
 CHUNK = 256
@@ -57,20 +57,17 @@ def multiply(indptr, indices, numbers, x, factor, share, z, y, rows, cols):
         _multiply(c * CHUNK, min(n, (c + 1) * CHUNK), indptr, indices, numbers, x, factor, share, z, y, rows, cols)
 
 
-@kernel
-def _row_sums(low, high, indptr, indices, numbers, x, rows, out):
-    for i in range(low, high):
-        sums = row_sizes(indices, numbers, x, indptr[i], indptr[i + 1], rows, rows)
-        for r in range(len(rows)):
-            out[len(rows) * i + r] = sums[r]
-
-
 @parallel_kernel
-def row_sums(indptr, indices, numbers, x, rows, out):
-    """Fill `out` (n,) with ``|A| |x|``: the size of the numbers that cancel each other in ``A x``."""
-    n = indptr.shape[0] - 1
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        _row_sums(c * CHUNK, min(n, (c + 1) * CHUNK), indptr, indices, numbers, x, rows, out)
+def row_sums(indptr, indices, data, x, size, out):
+    """Fill `out` (n,) with ``|A| |x|``, blocks size x size: the size of the numbers that cancel each other in ``A x``."""
+    for i in prange(indptr.shape[0] - 1):
+        for a in range(size):
+            s = 0.0
+            for k in range(indptr[i], indptr[i + 1]):
+                at, j = (k * size + a) * size, indices[k] * size
+                for b in range(size):
+                    s += abs(data[at + b] * x[j + b])
+            out[i * size + a] = s
 
 
 @kernel

@@ -77,7 +77,7 @@ class BlockMatrix:
     def largest_row_sum(self, u: Array) -> float:
         """Return the largest entry of ``|A| |u|`` of a square matrix, from its high part."""
         out = np.empty(len(u))
-        cycle_kernels.row_sums(self.indptr, self.indices, (self.data,), u, self.rows, out)
+        cycle_kernels.row_sums(self.indptr, self.indices, self.data, u, len(self.rows), out)
         return float(out.max(initial=0.0))
 
     def to_scipy(self) -> bsr_array:

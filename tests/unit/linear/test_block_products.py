@@ -15,11 +15,6 @@ def row_times(indices, numbers, x, begin, end, rows, cols):
 
 
 @kernel
-def row_sizes(indices, numbers, x, begin, end, rows, cols):
-    return block_products.row_sizes(indices, numbers, x, begin, end, rows, cols)
-
-
-@kernel
 def add_product(to, at, left, first, right, second, sizes):
     block_products.add_product(to, at, left, first, right, second, sizes)
 
@@ -57,18 +52,6 @@ def test_a_row_times_a_vector(m, n, precision, split):
             found, np.einsum("kmn,kn->m", blocks, x.astype(float).reshape(9, n)[indices[begin:end]]),
             rtol=0, atol=np.finfo(precision).eps * size,
         )  # fmt: skip
-
-
-@pytest.mark.parametrize(("kind", "precision"), [(np.float32, np.float64), (np.float64, np.float64)])
-@pytest.mark.parametrize(("m", "n"), SIZES)
-def test_sizes_of_a_row_times_a_vector(m, n, kind, precision):
-    rng = np.random.default_rng(m + 10 * n)
-    indices, x = rng.permutation(9).astype(np.int32), rng.normal(size=9 * n).astype(precision)
-    numbers = (rng.normal(size=9 * m * n).astype(kind),)
-    given = (indices, numbers, x, 2, 8, (0,) * m, (0,) * n)
-    np.testing.assert_allclose(row_sizes(*given), block_products.row_sizes_plain(*given), rtol=1e-14)
-    blocks, meets = np.abs(numbers[0].astype(float)).reshape(9, m, n)[2:8], np.abs(x).reshape(9, n)[indices[2:8]]
-    np.testing.assert_allclose(row_sizes(*given), np.einsum("kmn,kn->m", blocks, meets), rtol=1e-12)
 
 
 @pytest.mark.parametrize("split", [False, True])
