@@ -201,9 +201,8 @@ class Multigrid:
         made = 0
         while iteration.norm > enough:
             if made >= MAX_NONSYMMETRIC or not iteration.step(multiply, self.precondition):
-                raise ConvergenceError(
-                    f"conjugate residuals stand at {iteration.norm / enough:.1e} times the tolerance"
-                )
+                left = iteration.norm / enough
+                raise ConvergenceError(f"conjugate residuals stand at {left:.1e} times the tolerance")
             made += 1
             self.counters.iterations += 1
         return iteration.x.copy()

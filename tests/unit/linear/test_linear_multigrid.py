@@ -21,6 +21,7 @@ from fastcontact.linear.multigrid.constrained_hierarchy import ConstrainedHierar
 from fastcontact.linear.multigrid.hierarchy import Hierarchy, chebyshev, largest_eigenvalue, product
 from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.solvers.amg import Amg
+from fastcontact.linear.solvers.pyamg import Pyamg
 
 
 def problem(divisions=(7, 6, 5)):
@@ -280,6 +281,19 @@ def prepared(precision="single", scale=1.0, divisions=(12, 11, 10)):
     solver = Amg(1e-10, precision)
     solver.prepare(bsr_array((scale * K.data, K.indices, K.indptr), shape=K.shape), modes)
     return solver, scale * f, fixed
+
+
+@pytest.mark.parametrize("equations", [0, 6])
+def test_pyamg_finds_the_same_and_takes_as_many_iterations(equations):
+    solver, f, fixed = prepared()
+    K, modes, _, _ = problem((12, 11, 10))
+    oracle = Pyamg(1e-10)
+    oracle.prepare(K, modes)
+    B, c = contact_rows(fixed, 6)[:equations], np.full(equations, 1e-3)
+    (u, multiplier), (v, expected) = (each.load(f).solve(B, c) for each in (solver, oracle))
+    assert np.abs(u - v).max() < 1e-8 * np.abs(v).max()
+    assert np.abs(multiplier - expected).max(initial=0.0) < 1e-7 * np.abs(K @ v).max()
+    assert solver.counters.iterations <= oracle.counters.iterations + 3
 
 
 def test_bits_do_not_depend_on_the_number_of_threads():
