@@ -57,34 +57,16 @@ def chosen(B: csr_array, groups: Indices | None = None) -> tuple[Indices, csr_ar
     RepeatedError
         If equations repeat each other.
     """
-    m = B.shape[0]
-    entries = _own(B)
-    if entries is not None:
-        inverse = csr_array(diags_array(1.0 / B.data[entries], format="csr")) if m else csr_array((0, 0))
-        return B.indices[entries].astype(np.intp), inverse
+    if not B.shape[0]:
+        return np.empty(0, np.intp), csr_array((0, 0))
+    if (found := layered(B, layers=1)) is not None:
+        return found
     if groups is not None and (pivots := of_groups(B, groups)) is not None:
         return pivots, block_inverse(csr_array(B[:, pivots]))
     if (found := layered(B)) is not None:
         return found
     pivots = assigned(B)
     return pivots, block_inverse(csr_array(B[:, pivots]))
-
-
-def _own(B: csr_array) -> Indices | None:
-    """Return, for each row, the entry of its largest unknown that no other row has; None where a row has none."""
-    m = B.shape[0]
-    if not m:
-        return np.empty(0, np.intp)
-    if not np.diff(B.indptr).all():
-        return None
-    size = np.abs(B.data)
-    count = np.bincount(B.indices, minlength=B.shape[1])
-    row = np.repeat(np.arange(m), np.diff(B.indptr))
-    own = np.where(count[B.indices] == 1, size, 0.0)
-    order = np.lexsort((-np.arange(len(own)), own, row))
-    best = order[B.indptr[1:] - 1]
-    largest = np.maximum.reduceat(size, B.indptr[:-1])
-    return best if (own[best] >= SMALLEST * largest).all() else None
 
 
 def of_groups(B: csr_array, groups: Indices) -> Indices | None:
@@ -94,8 +76,8 @@ def of_groups(B: csr_array, groups: Indices) -> Indices | None:
     return None if failed else pivots
 
 
-def layered(B: csr_array, smallest: float = SMALLEST) -> tuple[Indices, csr_array] | None:
-    """Return pivots and inverse, see `chosen`, of equations in layers; None where no such order exists.
+def layered(B: csr_array, smallest: float = SMALLEST, layers: int = MOST_LAYERS) -> tuple[Indices, csr_array] | None:
+    """Return pivots and inverse, see `chosen`, of equations in so many layers at most; None where no such order exists.
 
     Such are the weighted gaps of quadratic facets with dual multipliers: no other mid node has the unknowns of a mid node,
     and without the mid nodes the same holds for corners. The columns of the pivots then make a triangular matrix, and
@@ -108,7 +90,7 @@ def layered(B: csr_array, smallest: float = SMALLEST) -> tuple[Indices, csr_arra
     strong = size >= smallest * largest[row]
     pivots, layer = np.full(m, -1, np.intp), np.full(m, -1)
     left = np.ones(m, bool)
-    for number in range(MOST_LAYERS):
+    for number in range(layers):
         among = left[row]
         count = np.bincount(B.indices[among], minlength=n)
         own = np.flatnonzero(among & strong & (count[B.indices] == 1))

@@ -6,14 +6,13 @@ products near the pivots change. The changes are stored beside the matrices of t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array, diags_array
 
-from fastcontact.linear.elimination import elimination_kernels
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import constrained_hierarchy_kernels as kernels
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
@@ -26,24 +25,6 @@ Indices = NDArray[np.int32]
 Nodes = NDArray[np.intp]
 # Sum of the weights with which a pivot may follow others before the spectrum of the finest level is estimated again.
 WEIGHT = 4.0
-
-
-@dataclass(eq=False)
-class EliminatedRows:
-    """Pivots (m,) and the weights of what they follow in compressed rows, in the precision of the cycle."""
-
-    pivots: Nodes
-    indptr: Indices
-    indices: Indices
-    weights: Values
-
-    def complete(self, x: Values) -> None:
-        """Set the pivots of `x` (n,)."""
-        elimination_kernels.complete(self.pivots, self.indptr, self.indices, self.weights, x)
-
-    def move_forces(self, r: Values) -> None:
-        """Move the forces `r` (n,) at the pivots to the other unknowns."""
-        elimination_kernels.move_forces(self.pivots, self.indptr, self.indices, self.weights, r)
 
 
 @dataclass(eq=False)
@@ -95,7 +76,8 @@ class ConstrainedHierarchy:
         levels = self.hierarchy.levels
         top, W = levels[0], elimination.weights
         kind = top.b.dtype
-        top.eliminated = EliminatedRows(elimination.pivots, W.indptr, W.indices, W.data.astype(kind))
+        rounded = W.astype(kind)
+        top.eliminated = replace(elimination, weights=rounded, force_weights=rounded)
         self._change_diagonal(top, elimination)
         if top.P is None:
             self.hierarchy.coarse.set(_coarse_change(self.hierarchy.coarse.matrix, elimination))

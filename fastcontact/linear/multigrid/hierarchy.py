@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 from scipy.sparse import csr_matrix
 
+from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
 from fastcontact.linear.multigrid.coarse import Coarse
 from fastcontact.linear.multigrid.matrix import BlockMatrix
@@ -50,8 +51,8 @@ class Level:
         Upper bound of the eigenvalues of ``D^-1 A``.
     P, R : BlockMatrix or None
         Prolongator and its transpose; None on the coarsest level.
-    eliminated : EliminatedRows or None
-        Unknowns that follow others, on the finest level; see `constrained_hierarchy`.
+    eliminated : Elimination or None
+        Equations, on the finest level: weights in the precision of the cycle, the same for forces.
     change : MatrixChange or None
         What eliminated equations add to the matrix, on coarser levels.
     b, x, r, d : ndarray (n,)
@@ -64,7 +65,7 @@ class Level:
     bound: float
     P: BlockMatrix | None = None
     R: BlockMatrix | None = None
-    eliminated: Any = None
+    eliminated: Elimination | None = None
     change: Any = None
     b: Values = field(init=False)
     x: Values = field(init=False)

@@ -139,7 +139,10 @@ class Multigrid:
         made = raised = 0
         while cg.norm > enough:
             if made >= MAX_ITERATIONS or raised > RAISES:
-                raise StallError(self._stuck(cg.norm / scale, made))
+                raise StallError(
+                    f"conjugate gradients stand at a relative residual of {cg.norm / scale:.1e} after {made} iterations, "
+                    f"above {self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
+                )
             watch = monitor if made and made % WATCH_EVERY == 0 else None
             if watch is not None and watch(cg.x, self.multiplier(elimination, cg.x, f), cg.norm / scale):
                 break
@@ -223,12 +226,6 @@ class Multigrid:
         self.build_in("double")
         self.constrain(equations)
 
-    def _stuck(self, left: float, made: int) -> str:
-        return (
-            f"conjugate gradients stand at a relative residual of {left:.1e} after {made} iterations, above "
-            f"{self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
-        )
-
     def _begin(self, f: Array, elimination: Elimination | None) -> None:
         """Make the iterate obey the equations and compute its residual."""
         cg = self._cg
@@ -243,7 +240,7 @@ class Multigrid:
         """Make the iterate obey other equations: its residual changes near the pivots only."""
         cg = self._cg
         if old is not None:
-            old.restore_forces(cg.r, -self._forces(old, cg.x, f))
+            old.restore_forces(cg.r, -self.K.forces_at(old.pivots, cg.x, f))
         if new is not None:
             before = cg.x[new.pivots]
             new.complete(cg.x, new.offset)
@@ -251,10 +248,6 @@ class Multigrid:
             self.K.add_forces_of(new.pivots, moved, cg.r)
             new.move_forces(cg.r)
         cg.start()
-
-    def _forces(self, elimination: Elimination, u: Array, f: Array) -> Array:
-        """Return ``(K u - f)[pivots]``."""
-        return self.K.forces_at(elimination.pivots, u, f)
 
     def _scale(self, f: Array, elimination: Elimination | None) -> float:
         """Return the size of the right-hand side, forces that impose the equations included."""
@@ -283,7 +276,7 @@ class Multigrid:
         """Return the multipliers (m,) of the equations at `u`."""
         if elimination is None:
             return np.empty(0)
-        return elimination.multiplier(self._forces(elimination, u, f))
+        return elimination.multiplier(self.K.forces_at(elimination.pivots, u, f))
 
 
 def _alike(new: Elimination | None, old: Elimination | None) -> bool:
