@@ -166,8 +166,8 @@ class LinearSolver(Protocol):
         involved : ndarray of int (k,), optional
             The unknowns that equations may involve, a hint.
         release : bool
-            Whether a solver that stores a copy of K empties K's arrays, to save their memory. What is returned then
-            multiplies in the place of K.
+            Whether a solver that stores K's numbers in its own way may take over their memory and leave K empty. What is
+            returned then multiplies in the place of K.
 
         Returns
         -------

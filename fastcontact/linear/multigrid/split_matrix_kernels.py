@@ -20,7 +20,7 @@ def entry(numbers, k):
 
 @kernel
 def split(factor, numbers, high, low):
-    """Fill the parts (n,) of ``factor numbers``."""
+    """Fill the parts (n,) of ``factor numbers``; `low` may be in the place of the beginning of `numbers`."""
     for k in range(numbers.shape[0]):
         number = factor * numbers[k]
         high[k] = number
