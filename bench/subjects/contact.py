@@ -71,8 +71,8 @@ def matrix_of(problem):
 
 def prepared(problem, solver, matrix):
     modes = problem.system.unknowns_of(near_nullspace(problem.model))
-    own = matrix is not problem.system.matrix
-    solver.prepare(matrix, modes, problem.system.involved(problem.contact_dofs), own)
+    release = matrix is not problem.system.matrix
+    solver.prepare(matrix, modes, problem.system.involved(problem.contact_dofs), release)
     return solver
 
 
@@ -165,9 +165,9 @@ def by_cholmod(matrix):
     """Order and factors in CHOLMOD's own order, without turning SciPy's matrix into one of its own."""
     from kvxopt import cholmod
 
-    from fastcontact.linear.solvers.cholmod import _matrix
+    from fastcontact.linear.solvers.cholmod import lower_triangle
 
-    A = _matrix(matrix)
+    A = lower_triangle(matrix)
 
     def factors():
         factor = cholmod.symbolic(A)

@@ -1,4 +1,4 @@
-"""One linear solution of a cube of hex8 with its preparation: direct against multigrid (see bench/linear.py too)."""
+"""One linear solution of a cube of hex8 with its preparation: direct, pyamg and our multigrid (see bench/linear.py too)."""
 
 import numpy as np
 
@@ -27,9 +27,8 @@ def works(size):
         return solver.load(right)
 
     return model.n_dofs, {
-        "direct": lambda: solved(solution("direct"), lift),
-        "amg": lambda: solved(solution("amg"), lift),
-    }
+        name: lambda name=name: solved(solution(name), lift) for name in ("direct", "pyamg", "amg")
+    }  # fmt: skip
 
 
 def solved(loaded, lift):

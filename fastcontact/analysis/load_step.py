@@ -81,10 +81,10 @@ def predict(problem: Problem, state: State, load: StepLoad, loaded: Loaded) -> t
     round_off, largest_work, expected = state.gap_round_off, state.largest_work, 0.0
     zero = np.zeros(len(load.lift))
     if problem.pairs and load.force.any() and not (state.u.any() or load.lift.any()):
-        expected = largest(loaded.everywhere(zero))
+        expected = largest(loaded.full_solution(zero))
     if problem.pairs and problem.model.springs:
         # Weak springs alone would let bodies move far; contact takes that back, but not its round-off.
-        alone = largest(loaded.everywhere(zero))
+        alone = largest(loaded.full_solution(zero))
         round_off = max(round_off, 16 * np.finfo(float).eps * alone)
     if problem.bodies is not None:
         work = generalised(problem.bodies.motions, load.force)
@@ -116,7 +116,7 @@ def displace(
     contact_force, rigid = settled.force, settled.iterate.rigid
     if problem.bodies is not None and rigid is not None:
         lift = lift + problem.bodies.rigid(rigid.position)
-    v = loaded.everywhere(system.reduced(contact_force), settled.solution.u)
+    v = loaded.full_solution(system.reduced(contact_force), settled.solution.u)
     return system.displacement(v, lift), contact_force
 
 

@@ -37,7 +37,7 @@ def solve(
     ramp : Ramp, optional
         By default 20 equal steps.
     linear_solver : str
-        ``"direct"``, ``"cholmod"``, ``"pardiso"``, ``"amg"`` or ``"auto"``; see `linear.make`.
+        ``"direct"``, ``"cholmod"``, ``"amg"``, ``"pyamg"`` or ``"auto"``; see `linear.choice.make`.
     linear_tolerance : float
         Relative residual of iterative linear solvers.
     linear_precision : {"single", "double"}, optional

@@ -35,7 +35,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--json", metavar="FILE", help="write a summary of the last step and the iterations, or why the run failed"
     )
     parser.add_argument("--plot", metavar="PNG", help="plot the contact pressure of the last step against theory")
-    parser.add_argument("--linear", metavar="SOLVER", help="linear solver: auto, direct or amg (default: the case's)")
+    parser.add_argument("--linear", metavar="SOLVER", help="auto, direct, amg, cholmod or pyamg (default: the case's)")
     parser.add_argument("--estimate-error", action="store_true", help="estimate the error of every cell, into the file")
     parser.add_argument("--threads", type=int, metavar="N", help="threads of parallel kernels")
 

@@ -1,8 +1,8 @@
 """The linear system of a model: from all displacements u to the unknowns v of the linear solver and back.
 
-``u = T v + t``: T is the identity but for the displacements that relations express by others, t holds the prescribed
-ones. The matrix for the solver is ``T.T K T`` with the rows and columns of everything that is no unknown cleared but
-for their diagonal, so that it keeps the size and blocks of K.
+``u = T v + t``: T is the identity except for the displacements that relations express by others, t holds the prescribed
+displacements. The matrix for the solver is ``T.T K T``. It keeps the size and blocks of K: in the rows and columns of
+everything that is no unknown only the diagonal is left.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fastcontact._jit.norms_kernels import largest
 from fastcontact.elasticity import system_kernels
 from fastcontact.elasticity.relations import Elimination, Relation, eliminate, stacked_rows
 from fastcontact.errors import ModelError
-from fastcontact.linear.multigrid.cycle_kernels import row_sums
+from fastcontact.linear.multigrid.matrix import block_matrix
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -29,9 +29,9 @@ CONFLICT = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Stiffness:
-    """A stiffness matrix as the sum of `parts` (n, n): that of the linear solver, and what supports took out of it.
+    """A stiffness matrix as the sum of `parts` (n, n) [force / length].
 
-    Two matrices that differ in the rows and columns of supports alone need not be kept both.
+    Without relations: the matrix of the linear solver, and the rows and columns of supports that were taken out of it.
     """
 
     parts: tuple[Any, ...]
@@ -50,11 +50,7 @@ class Stiffness:
 def _largest_row_sum(K: Any, u: Array) -> float:
     if isinstance(K, csr_array):
         return float((abs(K) @ np.abs(u)).max(initial=0.0))
-    if not isinstance(K, bsr_array):
-        return float(K.largest_row_sum(u))
-    out = np.empty(K.shape[0])
-    row_sums(K.indptr, K.indices, (K.data.reshape(-1),), u, (0,) * K.blocksize[0], out)
-    return float(out.max(initial=0.0))
+    return float((block_matrix(K) if isinstance(K, bsr_array) else K).largest_row_sum(u))
 
 
 class System:
@@ -67,32 +63,33 @@ class System:
     supported : ndarray of bool (n,)
         Displacement components that are prescribed.
     relations : sequence of Relation
-    loose : ndarray of bool (n,), optional
-        Components without stiffness that are free all the same, since something else holds them: none by default.
+    without_stiffness : ndarray of bool (n,), optional
+        Components that are free although they have no stiffness, such as those of rigid obstacles: none by default.
 
     Attributes
     ----------
     K : Stiffness
-        All of it.
-    matrix : bsr_array (n, n)
-        For the linear solver.
+        With the rows and columns of supports.
+    matrix : bsr_array (n, n), or what the linear solver made of it
+        For the linear solver [force / length].
     fixed : ndarray of bool (n,)
         Supported components, and those of points without stiffness or relation, which stay at zero.
     free : ndarray of bool (n,)
         The unknowns.
-    held : ndarray of bool (n,)
-        Components that a support or a relation may exert a force on.
+    T : csr_array (n, n) or None
+        See the module; None without relations.
     """
 
     def __init__(
-        self, K: bsr_array, supported: Mask, relations: Sequence[Relation] = (), loose: Mask | None = None
+        self, K: bsr_array, supported: Mask, relations: Sequence[Relation] = (), without_stiffness: Mask | None = None
     ) -> None:
         R = stacked_rows(relations, K.shape[0])
         related = np.zeros(K.shape[0], bool)
         related[R.indices] = True
-        loose = np.zeros(K.shape[0], bool) if loose is None else loose
-        self.fixed: Mask = supported | (np.asarray(K.diagonal() == 0.0) & ~related & ~loose)
-        self.held: Mask = self.fixed | related
+        if without_stiffness is None:
+            without_stiffness = np.zeros(K.shape[0], bool)
+        self.fixed: Mask = supported | (np.asarray(K.diagonal() == 0.0) & ~related & ~without_stiffness)
+        self._reacting: Mask = self.fixed | related  # supports and relations may exert forces here
         self._constraints = ConstrainedMotion(self.fixed, relations)
         self.T = self._constraints.T if relations else None
         self.free: Mask = self._constraints.free
@@ -101,20 +98,21 @@ class System:
             self.matrix = self.K.parts[0]
         else:
             self.K = Stiffness((K,))
-            condensed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
-            condensed.sort_indices()
-            self.free &= (condensed.diagonal() > 0) | loose  # not points that relations tie to nothing but each other
-            self.matrix = supports_apart(condensed, ~self.free)[0]
+            transformed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
+            transformed.sort_indices()
+            # Not points that relations couple to nothing but each other.
+            self.free &= (transformed.diagonal() > 0) | without_stiffness
+            self.matrix = supports_apart(transformed, ~self.free)[0]
         self._no_unknowns = np.flatnonzero(~self.free)
 
     def keep(self, matrix: Any) -> None:
-        """Take what the linear solver made of `matrix`, whose room it may have taken, in its place: ``matrix @ v``."""
+        """Replace `matrix` by what the linear solver returned for it, see `LinearSolver.prepare`."""
         if self.K.parts[0] is self.matrix:
             self.K = Stiffness((matrix, *self.K.parts[1:]))
         self.matrix = matrix
 
     def lift(self, prescribed: Array, values: Array) -> Array:
-        """Return t for the prescribed displacements (n,) and the right-hand sides (m,) of the relations.
+        """Return t (n,) for prescribed displacements (n,) and right-hand sides (m,) of the relations [length].
 
         Raises
         ------
@@ -128,12 +126,12 @@ class System:
         return self._constraints.values(multiplier)
 
     def right(self, f: Array, t: Array) -> Array:
-        """Return the right-hand side (n,) of the solver for the forces `f` (n,) on all displacements."""
+        """Return the right-hand side (n,) of the solver for forces `f` (n,) on all displacements [force]."""
         # Without relations t moves supports alone, and those act on unknowns through what was taken out of the matrix.
         return self.reduced(f - (self.K.parts[1] if self.T is None else self.K) @ t)
 
     def reduced(self, force: Array) -> Array:
-        """Return the forces (n,) on the unknowns that `force` (n,) on all displacements amounts to."""
+        """Return the forces (n,) on the unknowns that do the same work as `force` (n,) on all displacements."""
         return self._of_unknowns(force.copy() if self.T is None else self.T.T @ force)
 
     def _of_unknowns(self, values: Array) -> Array:
@@ -142,7 +140,7 @@ class System:
         return values
 
     def rows(self, rows: csr_array, offset: Array, t: Array) -> tuple[csr_array, Array]:
-        """Return ``rows @ u + offset`` as rows and offset for the unknowns v."""
+        """Return ``rows @ u + offset``, rows (m, n) and offset (m,), as rows and offset for the unknowns v."""
         offset = offset + rows @ t
         rows = rows.copy() if self.T is None else csr_array(rows @ self.T)
         rows.data[~self.free[rows.indices]] = 0.0
@@ -150,7 +148,7 @@ class System:
         return rows, offset
 
     def displacement(self, v: Array, t: Array) -> Array:
-        """Return all displacements (n,)."""
+        """Return all displacements u (n,) [length]."""
         return (v if self.T is None else self.T @ v) + t
 
     def unknowns(self, u: Array, t: Array | float = 0.0) -> Array:
@@ -168,15 +166,15 @@ class System:
         return dofs[self.free[dofs]].astype(np.intp)
 
     def balance(self, out: Array) -> tuple[Array, float]:
-        """Return the forces (n,) of supports and relations, and the largest force that nothing holds.
+        """Return the forces (n,) of supports and relations, and the largest force on an unknown, the residual.
 
-        `out` (n,) is the internal minus all other forces.
+        `out` (n,) is the internal minus all other forces [force].
         """
-        return np.where(self.held, out, 0.0), largest(self.reduced(out))
+        return np.where(self._reacting, out, 0.0), largest(self.reduced(out))
 
 
 class ConstrainedMotion:
-    """What supports and relations leave of the displacements, ``u = T v + t``; without stiffness.
+    """The displacements that supports and relations allow, ``u = T v + t``.
 
     Parameters
     ----------
@@ -189,9 +187,9 @@ class ConstrainedMotion:
         self.free: Mask = ~fixed
         if not relations:
             return
-        self._tie: Elimination = eliminate(stacked_rows(relations, len(fixed)), fixed)
-        self.free[self._tie.pivots] = False
-        self.T = csr_array(self._tie.T @ diags_array(self.free.astype(float)))
+        self._elimination: Elimination = eliminate(stacked_rows(relations, len(fixed)), fixed)
+        self.free[self._elimination.pivots] = False
+        self.T = csr_array(self._elimination.T @ diags_array(self.free.astype(float)))
         self.T.eliminate_zeros()
 
     def values(self, multiplier: Sequence[float]) -> Array:
@@ -208,15 +206,15 @@ class ConstrainedMotion:
         if not self.relations:
             return known
         given = np.concatenate([known, values])
-        off = np.abs(self._tie.conditions @ given)
-        scale = np.abs(self._tie.conditions) @ np.abs(given)
+        off = np.abs(self._elimination.conditions @ given)
+        scale = np.abs(self._elimination.conditions) @ np.abs(given)
         wrong = np.flatnonzero(off > CONFLICT * scale)
         if len(wrong):
             raise ModelError(
-                f"{self._name(int(self._tie.origin[wrong[0]]))} contradicts the supports or relations before it by "
+                f"{self._name(int(self._elimination.origin[wrong[0]]))} contradicts the supports or relations before it by "
                 f"{off[wrong[0]]:.3g}: remove one of them"
             )
-        lift: Array = self._tie.T @ known + self._tie.S @ values
+        lift: Array = self._elimination.T @ known + self._elimination.S @ values
         return lift
 
     def _name(self, row: int) -> str:

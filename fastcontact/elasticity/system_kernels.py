@@ -5,23 +5,23 @@ from fastcontact._jit.decorators import kernel
 
 
 @kernel
-def _near(i, indptr, indices, held):
+def _near(i, indptr, indices, supported_nodes):
     """Return whether block row i or one of its columns has a support."""
-    if held[i]:
+    if supported_nodes[i]:
         return True
     for k in range(indptr[i], indptr[i + 1]):
-        if held[indices[k]]:
+        if supported_nodes[indices[k]]:
             return True
     return False
 
 
 @kernel
-def take_out(indptr, indices, data, supported, held, kept, start, columns, taken):
+def take_out(indptr, indices, data, supported, supported_nodes, kept, start, columns, taken):
     """Move rows and columns of supports from `data` to (start, columns, taken), compressed rows of single numbers.
 
     Parameters
     ----------
-    supported : ndarray of bool (n_rows, size), held : ndarray of bool (n_rows,)
+    supported : ndarray of bool (n_rows, size), supported_nodes : ndarray of bool (n_rows,)
         Which components have a support, and which nodes have one.
     kept : (n,)
         What stays on the diagonal.
@@ -33,7 +33,7 @@ def take_out(indptr, indices, data, supported, held, kept, start, columns, taken
     size, at, count_only = data.shape[1], 0, taken.shape[0] == 0
     start[0] = 0
     for i in range(indptr.shape[0] - 1):
-        near = _near(i, indptr, indices, held)
+        near = _near(i, indptr, indices, supported_nodes)
         for a in range(size):
             row = size * i + a
             for k in range(indptr[i] if near else indptr[i + 1], indptr[i + 1]):

@@ -1,4 +1,4 @@
-"""Linear solvers by name, and the one that suits a problem; a new file in `solvers` is a new solver."""
+"""Linear solvers by name, and the choice of one by the size of a problem; a new file in `solvers` is a new solver."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import pkgutil
 
 from fastcontact.errors import ModelError, unknown
 from fastcontact.linear import solvers
-from fastcontact.linear.protocol import Counters, Drag, LinearSolver, Loaded, Oblique
+from fastcontact.linear.protocol import Counters, FrictionTerms, LinearSolver, Loaded, LoadedNonsymmetric
 
 log = logging.getLogger("fastcontact")
 # Solvers that need a package which is not among the dependencies, and the extra that brings it.
-OPTIONAL = {"cholmod": ("kvxopt", "cholmod"), "pardiso": ("pypardiso", "mkl")}
+OPTIONAL = {"cholmod": ("kvxopt", "cholmod")}
 KNOWN = tuple(name for _, name, _ in pkgutil.iter_modules(solvers.__path__))
 SOLVERS = tuple(name for name in KNOWN if name not in OPTIONAL or importlib.util.find_spec(OPTIONAL[name][0]))
 # Above these sizes a multigrid solution is cheaper than a factorisation (measured, see bench/README.md). The second where
@@ -30,8 +30,8 @@ def make(
     Parameters
     ----------
     name : str
-        ``"direct"`` (always there), ``"cholmod"`` or ``"pardiso"`` (direct too, where their packages are
-        installed), ``"amg"`` or ``"auto"``: direct for 2D and small 3D problems, multigrid beyond. Multigrid needs
+        ``"direct"``; ``"cholmod"``, direct too, where its package is installed; ``"amg"``, multigrid; ``"pyamg"``, slow,
+        to compare with; or ``"auto"``: direct for 2D and small 3D problems, multigrid beyond. Multigrid needs
         more iterations where parts are thin or materials nearly incompressible.
     dim, n_dofs : int
         Dimension and number of unknowns, for ``"auto"``.
@@ -71,4 +71,4 @@ def chosen(dim: int, n_dofs: int, columns: bool = False) -> tuple[str, str]:
     return "amg", f"for {n_dofs} unknowns in {dim}D a factorisation is dearer than multigrid (beyond {limit})"
 
 
-__all__ = ["SOLVERS", "Counters", "Drag", "LinearSolver", "Loaded", "Oblique", "make"]
+__all__ = ["SOLVERS", "Counters", "FrictionTerms", "LinearSolver", "Loaded", "LoadedNonsymmetric", "make"]

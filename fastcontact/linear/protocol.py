@@ -1,4 +1,9 @@
-"""What a linear solver is, and the counters it keeps."""
+"""What a linear solver is: the methods that every solver has, and the counters it keeps.
+
+Shapes: n unknowns, m equations among them. ``K`` is a stiffness [force / length], ``u`` a displacement [length], ``f`` a
+force [force]. Equations ``B u + C multiplier = c`` have rows B (m, n) [-] and right-hand sides c (m,) [length]; their
+multipliers (m,) are forces [force], their compliance C (m, m) is a length per force.
+"""
 
 from __future__ import annotations
 
@@ -11,19 +16,19 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
 Array = NDArray[np.float64]
-# Looks at an unfinished solution (u, multiplier, relative residual); True ends it there.
+# Called with an unfinished solution (u, multiplier, relative residual); where it returns True, the solver stops there.
 Monitor = Callable[[Array, Array, float], bool]
 
 
 class Product(Protocol):
-    """What a solver that owns a matrix K (n, n) returns in its place."""
+    """What a solver that has copied a matrix K (n, n) returns in its place."""
 
     def __matmul__(self, u: Array) -> Array:
-        """Return ``K u`` (n,)."""
+        """Return ``K u``, shape (n,) [force]."""
         ...
 
     def largest_row_sum(self, u: Array) -> float:
-        """Return the largest entry of ``|K| |u|``."""
+        """Return the largest entry of ``|K| |u|`` [force]."""
         ...
 
 
@@ -36,7 +41,7 @@ class Counters:
 
 
 class Loaded(Protocol):
-    """A prepared matrix with a right-hand side."""
+    """A prepared matrix with a right-hand side f (n,)."""
 
     def solve(
         self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
@@ -44,76 +49,77 @@ class Loaded(Protocol):
     ) -> tuple[Array, Array]:  # fmt: skip
         """Return (u, multiplier) with ``K u = f + B.T multiplier`` and ``B u + C multiplier = c``.
 
-        B (m, n) has full row rank where C (m, m), symmetric and positive semidefinite, is None or singular. Solvers that
-        iterate show the state to `monitor` from time to time and return it, unfinished, where that says True; they stop
-        at a relative residual of `tolerance` where that is given and above their own.
+        B has full row rank where C, symmetric and positive semidefinite, is None or singular. Solvers that iterate start
+        from `guess` (n,), call `monitor` from time to time and return the unfinished solution where that returns True;
+        they stop at a relative residual of `tolerance` where that is given and above their own.
         """
         ...
 
-    def reduce(self, R: csr_array) -> tuple[Array, Array]:
-        """Return ``R K^-1 f`` (m,) and the compliance ``R K^-1 R.T`` (m, m) of rows R (m, n)."""
+    def flexibility(self, R: csr_array) -> tuple[Array, Array]:
+        """Return ``R K^-1 f``, shape (m,) [length], and ``R K^-1 R.T``, shape (m, m) [length / force], of rows R (m, n)."""
         ...
 
-    def near(self, force: Array, elsewhere: Array | None) -> Array:
-        """Return ``K^-1 (f + force)`` (n,) at all unknowns that equations may involve.
+    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
+        """Return ``K^-1 (f + force)``, shape (n,), right at the `involved` unknowns of `LinearSolver.prepare`.
 
-        Solvers for which other unknowns cost extra leave those as they are in `elsewhere` (n,), where that is given.
+        Solvers for which the other unknowns cost extra leave those as they are in `elsewhere` (n,), where that is given.
         `solve` does the same with its `guess`.
         """
         ...
 
-    def everywhere(self, force: Array, u: Array | None = None) -> Array:
-        """Return ``K^-1 (f + force)`` (n,); `u` is what `near` or `solve` found for it."""
+    def full_solution(self, force: Array, u: Array | None = None) -> Array:
+        """Return ``K^-1 (f + force)``, shape (n,); `u` (n,) is what `involved_solution` or `solve` returned for it."""
         ...
 
     def condensed(self) -> Loaded | None:
-        """Return the same problem for the unknowns that equations may involve alone, where the solver condenses to those.
+        """Return the problem of the `involved` unknowns alone, K condensed to them; None from solvers that do not condense.
 
-        They are the unknowns `involved` of `LinearSolver.prepare`, in their order, in all vectors and columns.
+        All its vectors and columns are those unknowns, in their order.
         """
         ...
 
 
 @dataclass(frozen=True, eq=False)
-class Drag:
-    """Forces that friction adds to those of equations.
+class FrictionTerms:
+    """Forces that sliding friction adds to those of equations.
 
     Attributes
     ----------
-    through : csr_array (m, n)
-        Rows that multipliers act through in place of those of the equations.
+    rows : csr_array (m, n)
+        Rows that multipliers act through in place of those of the equations [-].
     springs : csr_array (n, n), optional
-        S, symmetric and positive semidefinite.
-    push : ndarray (n,), optional
-        Further forces.
+        S, symmetric and positive semidefinite [force / length].
+    forces : ndarray (n,), optional
+        Further forces [force].
     """
 
-    through: csr_array
+    rows: csr_array
     springs: csr_array | None = None
-    push: Array | None = None
+    forces: Array | None = None
 
 
 @runtime_checkable
-class Oblique(Loaded, Protocol):
-    """Also solves where multipliers act through other rows than those of the equations."""
+class LoadedNonsymmetric(Loaded, Protocol):
+    """Also solves where multipliers act through other rows than those of the equations: sliding friction."""
 
     def diagonal(self) -> Array:
-        """Return the diagonal (n,) of the matrix."""
+        """Return the diagonal (n,) of K [force / length]."""
         ...
 
-    def oblique(
+    def solve_nonsymmetric(
         self, B: csr_array, c: Array, groups: NDArray[np.intp], guess: Array, tolerance: float,
-        drag: Drag | None = None,
+        friction: FrictionTerms | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """Return (u, multiplier) with ``B u = c`` and ``K u + S u = f + push + through.T multiplier``, see `Drag`.
+        """Return (u, multiplier) with ``B u = c`` and ``K u + S u = f + forces + rows.T multiplier``.
 
-        Equations of one of the `groups` (m,) may share unknowns. The iteration starts from `guess` (n,) and ends at a
-        relative residual of `tolerance`, or of the solver's own where that is larger.
+        S, forces and rows are those of `friction`; without it they are zero and B. Equations of one of the `groups` (m,),
+        numbers such as those of nodes, may share unknowns. The iteration starts from `guess` (n,) and ends at a relative
+        residual of `tolerance`, or of the solver's own where that is larger.
 
         Raises
         ------
         ConvergenceError
-            If equations repeat each other, seen through either rows, or the iteration does not end.
+            If equations repeat each other, in B or in rows, or the iteration does not end.
         """
         ...
 
@@ -124,15 +130,15 @@ class LinearSolver(Protocol):
     Attributes
     ----------
     tolerance : float
-        Relative accuracy of the solutions.
+        Relative accuracy of the solutions [-].
     condenses : bool
-        Whether, as prepared, the solver knows the compliance of the unknowns that equations may involve.
+        Whether, as prepared, the solver has K condensed to the `involved` unknowns.
     counters : Counters
     error : float
         By how much solutions for nearly the same right-hand side may differ, in units of their largest component, however
-        small `tolerance` is.
+        small `tolerance` is [-].
     gave_up : str
-        Why another way of solving took over; empty where none did.
+        Why another way of solving replaced this one; empty where none did.
     """
 
     tolerance: float
@@ -147,17 +153,31 @@ class LinearSolver(Protocol):
         ...
 
     def prepare(
-        self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, own: bool = False
+        self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, release: bool = False
     ) -> bsr_array | Product:
-        """Take the symmetric positive definite matrix K (n, n) and displacements (n, n_modes) that cost it little.
+        """Do what is done once for a matrix: factorise it, or build a hierarchy.
 
-        `involved` are the unknowns that equations may involve, a hint. A solver that may `own` K may take the room of its
-        numbers; K is then no matrix any more, and what is returned takes its place. Otherwise that is K.
+        Parameters
+        ----------
+        K : bsr_array (n, n)
+            Symmetric and positive definite [force / length].
+        rigid_modes : ndarray (n, n_modes)
+            Displacements that cost little energy [length].
+        involved : ndarray of int (k,), optional
+            The unknowns that equations may involve, a hint.
+        release : bool
+            Whether a solver that stores K's numbers in its own way may take over their memory and leave K empty. What is
+            returned then multiplies in the place of K.
+
+        Returns
+        -------
+        bsr_array or Product
+            K, or what takes its place.
         """
         ...
 
     def load(self, f: Array) -> Loaded:
-        """Take the right-hand side f (n,)."""
+        """Take the right-hand side f (n,) [force]."""
         ...
 
     def snapshot(self) -> Any:

@@ -23,7 +23,7 @@ from fastcontact.cli._outputs import check_outputs
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import _cut_faces
 from fastcontact.elasticity.system import System
-from fastcontact.linear.elimination import elimination
+from fastcontact.linear.elimination import pivot_order
 from fastcontact.linear.multigrid import solver
 from fastcontact.linear.solvers import amg
 from fastcontact.linear.solvers.direct import Direct
@@ -38,7 +38,7 @@ from fastcontact.studies.render import figure
 from fastcontact.studies.settings import Combination, settings
 from fastcontact.studies.sweep import parameter_sweep
 
-REPEATED = re.escape(str(elimination.RepeatedError()))
+REPEATED = re.escape(str(pivot_order.RepeatedError()))
 
 
 def refusing(number):
@@ -183,18 +183,18 @@ def unreadable(folder, patch):
 
 
 def repeated_equations(patch):
-    patch.setattr(elimination, "DENSE_UP_TO", 0)
-    elimination._matched(csr_array(np.array([[1.0, 0.0], [2.0, 0.0]])))
+    patch.setattr(pivot_order, "DENSE_UP_TO", 0)
+    pivot_order.assigned(csr_array(np.array([[1.0, 0.0], [2.0, 0.0]])))
 
 
 CALLS = [
     ("values of points beyond the mesh", profile_beyond_the_mesh, fc.errors.FileError, r"profile 'P' names point 9 of 4: write the file anew"),
     ("parts of a file that do not fit", parts_that_do_not_fit, fc.errors.FileError, r"the parts of '.*a\.vtk' do not fit together: check the file, or convert it to \.med"),
     ("a result that may not be read", unreadable, fc.errors.FileError, r"a\.vtkhdf' may not be read: ask its owner for the permission"),
-    ("equations on the same unknown", repeated_equations, elimination.RepeatedError, REPEATED),
-    ("equations that are equal", lambda: elimination._block_inverse(csr_array(np.ones((2, 2)))), elimination.RepeatedError, REPEATED),
-    ("more equations than unknowns", lambda: elimination._matched(csr_array(np.ones((2, 1)))), elimination.RepeatedError, REPEATED),
-    ("equations that are nearly equal", lambda: elimination._block_inverse(csr_array([[1.0, 1.0], [1.0, 1.0 + 1e-14]])), elimination.RepeatedError, REPEATED),
+    ("equations on the same unknown", repeated_equations, pivot_order.RepeatedError, REPEATED),
+    ("equations that are equal", lambda: pivot_order.block_inverse(csr_array(np.ones((2, 2)))), pivot_order.RepeatedError, REPEATED),
+    ("more equations than unknowns", lambda: pivot_order.assigned(csr_array(np.ones((2, 1)))), pivot_order.RepeatedError, REPEATED),
+    ("equations that are nearly equal", lambda: pivot_order.block_inverse(csr_array([[1.0, 1.0], [1.0, 1.0 + 1e-14]])), pivot_order.RepeatedError, REPEATED),
     ("forces out of balance", out_of_balance, fc.ConvergenceError, r"step 1: the out-of-balance force 1e\+09 stays above .* \(1e-06 of the largest force\): use the direct solver or a smaller tolerance"),
     ("springs that stay stretched", not_slack, fc.ConvergenceError, r"contact does not hold .*: after \d+ positions tried, a force of .* is still missing for equilibrium under a load of 10\. Add a support, or use more load steps"),
     ("benchmarks without checkout", no_checkout, fc.errors.FastcontactError, r"the benchmarks need the source checkout, and there is no '.*': install it with pip install -e"),

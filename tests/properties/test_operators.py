@@ -56,7 +56,7 @@ def test_compliance_is_symmetric_and_positive(recipe, solver):
     # Solvers take over the matrix that they are given.
     expected = B @ np.linalg.solve(K.toarray(), B.toarray().T)
     made.prepare(K, modes)
-    _, C = made.load(np.zeros(K.shape[0])).reduce(B)
+    _, C = made.load(np.zeros(K.shape[0])).flexibility(B)
     size = np.abs(C).max()
     assert np.abs(C - C.T).max() <= SOLVED * size
     assert np.abs(C - expected).max() <= SOLVED * size
@@ -86,11 +86,11 @@ def test_the_multigrid_cycle_is_symmetric_and_positive(recipe, tied, seed):
         chosen = np.random.default_rng(seed).random(B.shape[0]) < 0.6
         assume(chosen.any() and np.linalg.matrix_rank(B[chosen].toarray()) == chosen.sum())
         elimination = eliminate(csr_array(B[chosen]), np.zeros(chosen.sum()))
-        amg.tie(elimination)
+        amg.constrain(elimination)
     basis = np.eye(n)
     if elimination is not None:
         for column in basis.T:
-            elimination.condense(column)
+            elimination.move_forces(column)
     for raised in range(RAISES + 1):
         product = basis.T @ applied(amg, basis)
         size = np.abs(product).max()

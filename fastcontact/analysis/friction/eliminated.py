@@ -1,7 +1,7 @@
 """Coulomb friction for solvers that eliminate constraints: no compliance is formed.
 
 A step of Newton's method holds closed gaps and sticking slips as equations. A sliding constraint drags with ``mu n`` along
-its direction d: its multiplier acts through the rows ``B + mu d T``, see `linear.Oblique`. In three dimensions t follows
+its direction d: its multiplier acts through the rows ``B + mu d T``, see `linear.protocol`. In three dimensions t follows
 the slip as that turns, which is a spring across d: ``t = mu n d - stiffness (s - (d s) d)``.
 """
 
@@ -18,7 +18,7 @@ from fastcontact.analysis.friction.slip_directions import aligning, idle
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.protocol import Drag, Oblique
+from fastcontact.linear.protocol import FrictionTerms, LoadedNonsymmetric
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -30,13 +30,18 @@ ENOUGH = 10.0
 
 
 def solve(
-    loaded: Oblique, constraints: Constraints, closed: Mask, accuracy: Accuracy, u: Array, forces: Array | None
+    loaded: LoadedNonsymmetric,
+    constraints: Constraints,
+    closed: Mask,
+    accuracy: Accuracy,
+    u: Array,
+    forces: Array | None,
 ) -> tuple[Array, Forces] | None:
     """Return displacement and forces, or None where the method fails.
 
     Parameters
     ----------
-    loaded : Oblique
+    loaded : LoadedNonsymmetric
     constraints : Constraints
         See `friction.solve`; without compliance.
     closed : ndarray of bool (m,)
@@ -81,7 +86,7 @@ class Eliminated:
         Forces that it led to, scaled.
     """
 
-    def __init__(self, loaded: Oblique, constraints: Constraints, u: Array, tolerance: float) -> None:
+    def __init__(self, loaded: LoadedNonsymmetric, constraints: Constraints, u: Array, tolerance: float) -> None:
         usable, mu = constraints.usable, constraints.coefficients
         rows, free = (constraints.B, *constraints.tangents), constraints.gaps_at_rest()
         self._loaded, self._usable, self._tolerance = loaded, usable, tolerance
@@ -141,7 +146,7 @@ class Eliminated:
         c = -np.concatenate([free[at] for free, at in zip(self._free, equations, strict=True)])
         sliding = self._sliding(y, gaps, np.flatnonzero(closed & ~sticking & (self.law.mu > 0.0)))
         drag = self._drag(B, shut, sliding) if len(sliding.at) else None
-        u, multiplier = self._loaded.oblique(B, c, np.concatenate(equations), self.u, self._tolerance, drag)
+        u, multiplier = self._loaded.solve_nonsymmetric(B, c, np.concatenate(equations), self.u, self._tolerance, drag)
         new, first = np.zeros_like(y), 0
         for own, at in zip(new, equations, strict=True):
             own[at] = multiplier[first : first + len(at)]
@@ -161,7 +166,7 @@ class Eliminated:
         spring = np.minimum(turning / np.maximum(1.0 - turning, 1e-300), STIFFEST) * self._unit[at] ** 2
         return _Sliding(at, pull, _Springs(across, csr_array(rows), spring, (across * self._free[1:, at]).sum(axis=0)))
 
-    def _drag(self, B: csr_array, shut: NDArray[np.intp], sliding: _Sliding) -> Drag:
+    def _drag(self, B: csr_array, shut: NDArray[np.intp], sliding: _Sliding) -> FrictionTerms:
         """Return what sliding adds to equations B whose first rows are the gaps of `shut`."""
         pull = np.zeros((len(self._rows) - 1, len(self._usable)))
         pull[:, sliding.at] = sliding.pull
@@ -170,10 +175,10 @@ class Eliminated:
             through = through + diags_array(part[shut]) @ T[shut]
         through = csr_array(vstack([through, B[len(shut) :]], format="csr"))
         if sliding.springs is None:
-            return Drag(through)
+            return FrictionTerms(through)
         springs = sliding.springs
         weighted = springs.rows.T @ diags_array(springs.stiffness)
-        return Drag(through, csr_array(weighted @ springs.rows), -(weighted @ springs.free))
+        return FrictionTerms(through, csr_array(weighted @ springs.rows), -(weighted @ springs.free))
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from scipy.sparse import csr_array, vstack
 from fastcontact.analysis.friction.slip_directions import aligning, idle, own_compliance
 from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium
 from fastcontact.contact.constraints import Constraints
-from fastcontact.linear.protocol import Loaded, Oblique
+from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
 if TYPE_CHECKING:
     from fastcontact.analysis.friction import coulomb
@@ -50,13 +50,13 @@ def solve(
         Constraints to start from as closed and sticking.
     accuracy : Accuracy
     u : ndarray (n,)
-        Unknowns that stay where no constraint acts, see `Loaded.near`; iterative solvers start from them [length].
+        Unknowns that stay where no constraint acts, see `Loaded.involved_solution`; iterative solvers start there [length].
     guess : FrictionalEquilibrium, optional
         A solution with nearly the same forces; one of other constraints is passed over.
     """
     forces = None if guess is None else guess.forces_along(constraints.directions, len(constraints))
     of_their_own = (constraints.compliance, constraints.softness, constraints.low_rank_compliance)
-    if isinstance(loaded, Oblique) and all(part is None for part in of_their_own):
+    if isinstance(loaded, LoadedNonsymmetric) and all(part is None for part in of_their_own):
         found = _eliminated(loaded, constraints, closed, accuracy, u, forces)
         if found is not None:
             return found
@@ -77,7 +77,12 @@ def solve(
 
 
 def _eliminated(
-    loaded: Oblique, constraints: Constraints, closed: Mask, accuracy: Accuracy, u: Array, forces: Array | None
+    loaded: LoadedNonsymmetric,
+    constraints: Constraints,
+    closed: Mask,
+    accuracy: Accuracy,
+    u: Array,
+    forces: Array | None,
 ) -> FrictionalEquilibrium | None:
     """Solve without the flexibility of the constraints, see `eliminated`; None where that fails."""
     from fastcontact.analysis.friction import eliminated
@@ -102,7 +107,7 @@ def _among(
     k, m = len(constraints.tangents), len(constraints)
     R = csr_array(vstack([matrix[rows] for matrix in (constraints.B, *constraints.tangents)], format="csr"))
     at_rest = constraints.gaps_at_rest()
-    free, F = loaded.reduce(R)
+    free, F = loaded.flexibility(R)
     Q = aligning(own_compliance(F, 3)) if k == 2 else None
     still = np.flatnonzero(idle(own_compliance(F if Q is None else np.asarray(Q @ (Q @ F).T), 1 + k))) + len(rows)
     _add_compliance(F, constraints, rows)
@@ -119,7 +124,7 @@ def _among(
     y, relative = found.y, found.gaps
     if Q is not None:
         y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)
-    u = loaded.near(R.T @ y.ravel(), u)
+    u = loaded.involved_solution(R.T @ y.ravel(), u)
     full, gaps = np.zeros((1 + k, m)), at_rest + np.stack([own @ u for own in (constraints.B, *constraints.tangents)])
     full[:, rows], gaps[:, rows] = y, relative
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)

@@ -1,4 +1,4 @@
-"""Cholesky factors with the contact unknowns last: what they look like first, then their numbers."""
+"""Cholesky factors with the contact unknowns last: first the order of elimination, then the pattern, then the numbers."""
 
 from __future__ import annotations
 
@@ -6,15 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, csc_array
+from scipy.sparse import bsr_array, csc_array, eye_array
+from scipy.sparse.linalg import spilu
 
 from fastcontact._jit.parallel import on_one_blas_thread
+from fastcontact.errors import ModelError
 from fastcontact.linear.cholesky import elimination_tree_kernels, factorisation_kernels
-from fastcontact.linear.cholesky.ordering import fill_reducing, reordered
-from fastcontact.linear.cholesky.singular import indefinite, singular
-from fastcontact.linear.cholesky.symmetric import Shape, SymmetricFactors
+from fastcontact.linear.cholesky.symmetric_factors import LowerTriangle, SymmetricFactors
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 # Zeros that supernodes may take in so that there are fewer of them, as shares of their entries, by their width.
 WIDTHS, SHARES = np.array([4, 16, 48]), np.array([0.8, 0.5, 0.1, 0.05])
@@ -22,9 +21,41 @@ WIDTHS, SHARES = np.array([4, 16, 48]), np.array([0.8, 0.5, 0.1, 0.05])
 ROUND_OFF = 1e-10
 
 
+def singular() -> ModelError:
+    """Return the error for a matrix with a pivot of zero."""
+    return ModelError("the stiffness matrix is singular: support the rigid-body motions of every body")
+
+
+def fill_reducing(K: bsr_array, last: Indices) -> Indices:
+    """Return the unknowns (n,) in an order of elimination that keeps factors small, those in `last` (m,) at the end.
+
+    The order is that of the points, by minimum degree on the pattern of K (Liu, 1985). SciPy offers it only as a part of
+    SuperLU's factorisations; an incomplete one that drops every entry costs little more than the order itself.
+    """
+    size = K.blocksize[0]
+    n = K.shape[0] // size
+    pattern = csc_array((np.ones(len(K.indices)), K.indices, K.indptr), shape=(n, n))
+    # A dominant diagonal, so that nothing is pivoted; one column at a time, since nearly nothing is computed.
+    pattern = csc_array(pattern + 2.0 * n * eye_array(n))
+    found = spilu(
+        pattern, drop_tol=1.0, fill_factor=1.0, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1,
+        options={"SymmetricMode": True},
+    )  # fmt: skip
+    order = (np.argsort(found.perm_c)[:, None] * size + np.arange(size)).ravel()
+    late = np.zeros(len(order), bool)
+    late[last] = True
+    return np.concatenate([order[~late[order]], order[late[order]]])
+
+
+def reordered(K: bsr_array, order: Indices) -> csc_array:
+    """Return the symmetric matrix K (n, n) with its unknowns in the given order (n,)."""
+    rows = K.tocsr()[order][:, order]
+    return csc_array((rows.data, rows.indices, rows.indptr), shape=K.shape)  # its rows are its columns
+
+
 @on_one_blas_thread
 def factors(K: bsr_array, last: Indices) -> SymmetricFactors:
-    """Return the factors of the symmetric matrix K (n, n) with the unknowns `last` (m,) last.
+    """Return the factors of the symmetric matrix K (n, n) [force / length] with the unknowns `last` (m,) last.
 
     Raises
     ------
@@ -36,8 +67,8 @@ def factors(K: bsr_array, last: Indices) -> SymmetricFactors:
     A = reordered(K, order)
     late = np.zeros(n, bool)
     late[last] = True
-    tree = _tree(A)
-    nodes = _supernodes(A, tree, late[order[tree.order]])
+    tree = elimination_tree(A)
+    nodes = supernodes(A, tree, late[order[tree.order]])
     width, below = np.diff(nodes.first), np.diff(nodes.begin)
     start = np.concatenate([[0], np.cumsum(np.repeat(nodes.first[1:] + below, width) - np.arange(n))])
     values, d = np.empty(start[-1]), np.empty(n)
@@ -46,14 +77,16 @@ def factors(K: bsr_array, last: Indices) -> SymmetricFactors:
         A.indptr, A.indices, A.data, tree.order, tree.place, tree.parent, *nodes, sizes, start, values, d
     )
     if bad >= 0:
-        raise singular() if abs(d[bad]) <= ROUND_OFF * A.diagonal()[tree.order[bad]] else indefinite()
+        if abs(d[bad]) <= ROUND_OFF * A.diagonal()[tree.order[bad]]:
+            raise singular()
+        raise ModelError("the stiffness matrix is not positive definite: check the material and the cells")
     place = np.empty(n, np.intp)
     place[order[tree.order]] = np.arange(n)
-    return SymmetricFactors(Shape(start, values, *nodes), d, place, last)
+    return SymmetricFactors(LowerTriangle(start, values, *nodes), d, place, last)
 
 
-class _Tree(NamedTuple):
-    """Elimination tree: its order, the inverse of that, and parents and entries of columns in this order."""
+class Tree(NamedTuple):
+    """Elimination tree: its order, the inverse of that, and parents and entries of columns in this order, all (n,)."""
 
     order: NDArray[np.int32]
     place: NDArray[np.int32]
@@ -61,15 +94,16 @@ class _Tree(NamedTuple):
     entries: NDArray[np.int32]
 
 
-class _Supernodes(NamedTuple):
-    """First columns, where the rows below begin, and these; see `kernels.triangular`."""
+class Supernodes(NamedTuple):
+    """First columns, where the rows below begin, and these; see `triangular_kernels`."""
 
     first: NDArray[np.int64]
     begin: NDArray[np.int64]
     rows: NDArray[np.int32]
 
 
-def _tree(A: csc_array) -> _Tree:
+def elimination_tree(A: csc_array) -> Tree:
+    """Return the elimination tree of a symmetric matrix (n, n)."""
     n = A.shape[0]
     parent, order, count, place = (np.empty(n, np.intc) for _ in range(4))
     elimination_tree_kernels.parents(A.indptr, A.indices, parent)
@@ -77,15 +111,15 @@ def _tree(A: csc_array) -> _Tree:
     elimination_tree_kernels.counts(A.indptr, A.indices, parent, order, count)
     place[order] = np.arange(n, dtype=np.intc)
     above = parent[order]
-    return _Tree(order, place, np.where(above < 0, np.intc(-1), place[above]), count[order])
+    return Tree(order, place, np.where(above < 0, np.intc(-1), place[above]), count[order])
 
 
-def _supernodes(A: csc_array, tree: _Tree, late: NDArray[np.bool_]) -> _Supernodes:
-    """Return the supernodes, none of which has both columns that are `late` (n,) and others."""
+def supernodes(A: csc_array, tree: Tree, late: NDArray[np.bool_]) -> Supernodes:
+    """Return the supernodes of A (n, n), none of which has both columns that are `late` (n,) and others."""
     n = A.shape[0]
     first, below = np.empty(n + 1, np.int64), np.empty(n + 1, np.int64)
     count = elimination_tree_kernels.supernodes(tree.parent, tree.entries, late, WIDTHS, SHARES, first, below)
     first, begin = first[: count + 1].copy(), np.concatenate([[0], np.cumsum(below[:count])])
     rows = np.empty(begin[-1], np.intc)
     elimination_tree_kernels.rows_below(A.indptr, A.indices, tree.order, tree.place, tree.parent, first, begin, rows)
-    return _Supernodes(first, begin, rows)
+    return Supernodes(first, begin, rows)

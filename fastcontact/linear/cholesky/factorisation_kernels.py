@@ -54,13 +54,13 @@ def factorise(
     ----------
     start, rows, values
         The matrix by columns, both triangles, numbered as it was; everything else is numbered as in
-        `elimination_tree.postordered`.
+        `elimination_tree_kernels.postordered`.
     order, place : ndarray of int (n,)
         The column that is eliminated at a time, and when each is.
     parent : ndarray of int (n,)
         Elimination tree.
     first, begin, below
-        Supernodes and the rows below them, as in `triangular`.
+        Supernodes and the rows below them, as in `triangular_kernels`.
     sizes : (int, int)
         See `room`.
     begins : ndarray of int (n + 1,)
@@ -80,45 +80,61 @@ def factorise(
     one, other, product = np.empty(PANEL * widest), np.empty(PANEL * widest), np.empty(ROWS * widest)
     top = used = 0
     for s in range(count):
-        low, high = first[s], first[s + 1]
-        width, size = high - low, high - low + begin[s + 1] - begin[s]
+        low, high, rest = first[s], first[s + 1], below[begin[s] : begin[s + 1]]
+        size = high - low + len(rest)
         F = front[: size * size].reshape(size, size)
-        for i in range(size):
-            F[i, i:] = 0.0
-        for k in range(width):
-            local[low + k] = k
-        for k in range(begin[s], begin[s + 1]):
-            local[below[k]] = width + k - begin[s]
-        for j in range(low, high):
-            for k in range(start[order[j]], start[order[j] + 1]):
-                i = place[rows[k]]
-                if i >= j:
-                    F[j - low, local[i]] = values[k]
+        _gather(start, rows, values, order, place, low, high, rest, local, F)
         while top > 0 and low <= parent[first[left[top - 1] + 1] - 1] < high:
             top -= 1
-            child = left[top]
-            m = begin[child + 1] - begin[child]
+            child = below[begin[left[top]] : begin[left[top] + 1]]
+            m = len(child)
             used -= m * m
-            _add(waiting[used : used + m * m].reshape(m, m), below[begin[child] : begin[child + 1]], local, F)
-        bad = _eliminated(F, width, one, other, product)
+            _add(waiting[used : used + m * m].reshape(m, m), child, local, F)
+        bad = _eliminated(F, high - low, one, other, product)
         if bad >= 0:
             d[low + bad] = F[bad, bad]
             return low + bad
-        for j in range(width):
-            d[low + j] = F[j, j]
-            at = begins[low + j]
-            L[at] = 1.0
-            for k in range(j + 1, size):
-                L[at + k - j] = F[j, k]
-        m = size - width
+        m = len(rest)
+        _store(F, low, high - low, begins, L, d, waiting[used : used + m * m].reshape(m, m))
         if m:
-            rest = waiting[used : used + m * m].reshape(m, m)
-            for i in range(m):
-                rest[i, i:] = F[width + i, width + i :]
             left[top] = s
             top += 1
             used += m * m
     return -1
+
+
+@kernel
+def _gather(
+    start: Indices, rows: Indices, values: Array, order: Indices, place: Indices, low: int, high: int, rest: Indices,
+    local: Offsets, F: Array,
+) -> None:  # fmt: skip
+    """Fill a front with the columns `low` to ``high - 1`` of the matrix, and `local` with the places of its rows."""
+    width = high - low
+    for i in range(len(F)):
+        F[i, i:] = 0.0
+    for k in range(width):
+        local[low + k] = k
+    for k in range(len(rest)):
+        local[rest[k]] = width + k
+    for j in range(low, high):
+        for k in range(start[order[j]], start[order[j] + 1]):
+            i = place[rows[k]]
+            if i >= j:
+                F[j - low, local[i]] = values[k]
+
+
+@kernel
+def _store(F: Array, low: int, width: int, begins: Offsets, L: Array, d: Array, rest: Array) -> None:
+    """Move the eliminated columns of a front to L and `d`, and what is left to `rest` (m, m)."""
+    size = len(F)
+    for j in range(width):
+        d[low + j] = F[j, j]
+        at = begins[low + j]
+        L[at] = 1.0
+        for k in range(j + 1, size):
+            L[at + k - j] = F[j, k]
+    for i in range(size - width):
+        rest[i, i:] = F[width + i, width + i :]
 
 
 @kernel

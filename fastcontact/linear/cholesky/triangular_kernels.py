@@ -19,56 +19,10 @@ Offsets = NDArray[np.int64]
 
 
 @kernel
-def supernodes(start: Offsets, rows: Offsets, first: Offsets, begin: Offsets) -> int:
-    """Find the supernodes of L with row numbers `rows` (nnz,), sorted; return how many.
-
-    `first` and `begin` (n + 1,) are filled; the rows that they share are moved to the front of `rows`.
-    """
-    n = len(start) - 1
-    count, kept = 0, 0
-    begin[0] = 0
-    for j in range(n):
-        if j == 0 or not _continues(start, rows, j):
-            first[count] = j
-            count += 1
-        if j == n - 1 or not _continues(start, rows, j + 1):
-            # No column after this one is part of its supernode; what moves is moved to places that were read before.
-            for k in range(start[j] + 1, start[j + 1]):
-                rows[kept] = rows[k]
-                kept += 1
-            begin[count] = kept
-    first[count] = n
-    return count
-
-
-@kernel
-def _continues(start: Offsets, rows: Offsets, j: int) -> bool:
-    """Return whether column j has the rows of column j - 1 without the first."""
-    before, now = start[j - 1] + 1, start[j]
-    length = start[j + 1] - now
-    if start[j] - before != length:
-        return False
-    for k in range(length):
-        if rows[before + k] != rows[now + k]:
-            return False
-    return True
-
-
-@kernel
-def unit_diagonal(start: Offsets, values: Array, d: Array) -> None:
-    """Turn the factor L of ``L L.T``, the diagonal first in every column, into that of ``L D L.T``; fill d (n,)."""
-    for j in range(len(d)):
-        pivot = values[start[j]]
-        d[j] = pivot * pivot
-        for k in range(start[j], start[j + 1]):
-            values[k] /= pivot
-
-
-@kernel
 def block(
     start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Indices, wanted: Offsets, out: Array
 ) -> None:
-    """Fill `out` (m, m), zero before, with the rows and columns of L that `wanted` (n,) numbers; -1 stands for the others."""
+    """Fill `out` (m, m), zero before, with the rows and columns of L that `wanted` (n,) numbers; it is -1 for the others."""
     for s in range(len(first) - 1):
         high = first[s + 1]
         for j in range(first[s], high):

@@ -1,1 +1,1 @@
-"""Linear equations eliminated from the unknowns of multigrid, one unknown for each equation."""
+"""Linear equations among unknowns, eliminated: which unknown each equation eliminates, and what that does to vectors."""

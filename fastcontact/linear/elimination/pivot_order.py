@@ -1,30 +1,87 @@
-"""Equations that fall away layer by layer, each with an unknown that none of the rest has.
+"""Which unknown each equation eliminates, and the inverse of the columns of these pivots.
 
-Such are the weighted gaps of quadratic facets with dual multipliers: those of mid nodes have their node for themselves,
-those of corners once the mid nodes are gone. The columns of the pivots then make a triangular matrix, and its inverse is
-a short sum of sparse products.
+Four ways, the first that succeeds: every equation has an unknown that no other equation has; groups of equations, such as
+those of a node, have unknowns that no other group has; layers of equations, each with an unknown that no later layer has;
+the assignment of unknowns to equations with the largest product of entries (Duff and Koster, 2001).
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, diags_array
+from scipy.linalg import qr
+from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse.csgraph import connected_components, min_weight_full_bipartite_matching
+
+from fastcontact.errors import ConvergenceError
+from fastcontact.linear.elimination import pivot_order_kernels
 
 Indices = NDArray[np.intp]
-# More layers than this are no short sum.
-MOST = 4
+# An unknown is taken as pivot where its entry is at least this part of the largest one of the equation.
+SMALLEST = 0.25
+# Equations whose inverse is larger, in units of their entries, repeat each other but for round-off.
+SINGULAR = 1e12
+# Up to so many equations, pivots are assigned by a dense factorisation.
+DENSE_UP_TO = 400
+# With more layers than this the sum of products costs more than it saves.
+MOST_LAYERS = 4
 
 
-def peeled(B: csr_array, smallest: float) -> tuple[Indices, csr_array] | None:
-    """Return the pivot (m,) of every equation and the inverse (m, m) of their columns; None where no such order exists.
+class RepeatedError(ConvergenceError):
+    """Equations repeat each other."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "active contact constraints repeat each other, so that an iterative solver cannot eliminate them: leave out one "
+            "of two contacts on the same nodes, or use the direct solver"
+        )
+
+
+def chosen(B: csr_array, groups: Indices | None = None) -> tuple[Indices, csr_array]:
+    """Return the pivot of every equation and the inverse of their columns, ``B[:, pivots]^-1``.
 
     Parameters
     ----------
     B : csr_array (m, n)
         Equations, in canonical format, without stored zeros.
-    smallest : float
-        A pivot is at least this part of the largest entry of its equation.
+    groups : ndarray of int (m,), optional
+        Number of the group of each equation, such as a node.
+
+    Returns
+    -------
+    pivots : ndarray of int (m,)
+    inverse : csr_array (m, m)
+
+    Raises
+    ------
+    RepeatedError
+        If equations repeat each other.
+    """
+    if not B.shape[0]:
+        return np.empty(0, np.intp), csr_array((0, 0))
+    if (found := layered(B, layers=1)) is not None:
+        return found
+    if groups is not None and (pivots := of_groups(B, groups)) is not None:
+        return pivots, block_inverse(csr_array(B[:, pivots]))
+    if (found := layered(B)) is not None:
+        return found
+    pivots = assigned(B)
+    return pivots, block_inverse(csr_array(B[:, pivots]))
+
+
+def of_groups(B: csr_array, groups: Indices) -> Indices | None:
+    """Return the unknown (m,) of each row among those of its group alone; None where there are too few."""
+    pivots, (present, group) = np.empty(B.shape[0], np.intp), np.unique(groups, return_inverse=True)
+    failed = pivot_order_kernels.choose(B.indptr, B.indices, B.data, group, len(present), B.shape[1], SMALLEST, pivots)
+    return None if failed else pivots
+
+
+def layered(B: csr_array, smallest: float = SMALLEST, layers: int = MOST_LAYERS) -> tuple[Indices, csr_array] | None:
+    """Return pivots and inverse, see `chosen`, of equations in so many layers at most; None where no such order exists.
+
+    Such are the weighted gaps of quadratic facets with dual multipliers: no other mid node has the unknowns of a mid node,
+    and without the mid nodes the same holds for corners. The columns of the pivots then make a triangular matrix, and
+    its inverse is a short sum of sparse products. Pivots are at least `smallest` of the largest entry of their equation.
     """
     m, n = B.shape
     size, row = np.abs(B.data), np.repeat(np.arange(m), np.diff(B.indptr))
@@ -33,7 +90,7 @@ def peeled(B: csr_array, smallest: float) -> tuple[Indices, csr_array] | None:
     strong = size >= smallest * largest[row]
     pivots, layer = np.full(m, -1, np.intp), np.full(m, -1)
     left = np.ones(m, bool)
-    for number in range(MOST):
+    for number in range(layers):
         among = left[row]
         count = np.bincount(B.indices[among], minlength=n)
         own = np.flatnonzero(among & strong & (count[B.indices] == 1))
@@ -44,11 +101,11 @@ def peeled(B: csr_array, smallest: float) -> tuple[Indices, csr_array] | None:
         pivots[rows], layer[rows] = B.indices[own[first]], number
         left[rows] = False
         if not left.any():
-            return pivots, _inverse(csr_array(B[:, pivots]), int(layer.max()))
+            return pivots, _layered_inverse(csr_array(B[:, pivots]), int(layer.max()))
     return None
 
 
-def _inverse(P: csr_array, depth: int) -> csr_array:
+def _layered_inverse(P: csr_array, depth: int) -> csr_array:
     """Return the inverse of a matrix that couples every row to deeper layers only: a finite Neumann series."""
     diagonal = diags_array(1.0 / P.diagonal(), format="csr")
     beyond = csr_array(P - diags_array(P.diagonal(), format="csr"))
@@ -58,3 +115,49 @@ def _inverse(P: csr_array, depth: int) -> csr_array:
         term = csr_array(-(diagonal @ beyond @ term))
         total = csr_array(total + term)
     return total
+
+
+def assigned(B: csr_array) -> Indices:
+    """Return the unknown assigned to each row, so that the matrix to invert is as well conditioned as possible."""
+    if B.shape[0] <= DENSE_UP_TO:
+        columns = np.unique(B.indices)
+        if len(columns) < B.shape[0]:
+            raise RepeatedError()
+        *_, order = qr(B[:, columns].toarray(), mode="r", pivoting=True)
+        return np.asarray(columns[order[: B.shape[0]]], np.intp)
+    largest = np.abs(B.data).max()
+    cost = csr_array((1.0 + np.log(largest) - np.log(np.abs(B.data)), B.indices, B.indptr), shape=B.shape)
+    try:
+        row, pivots = min_weight_full_bipartite_matching(cost)
+    except ValueError:
+        raise RepeatedError() from None
+    return np.asarray(pivots[np.argsort(row)], np.intp)
+
+
+def block_inverse(A: csr_array) -> csr_array:
+    """Return the inverse of a sparse matrix (m, m) of small independent blocks, one block after the other.
+
+    Raises
+    ------
+    RepeatedError
+        If a block is singular.
+    """
+    count, label = connected_components(A, directed=False)
+    order = np.argsort(label, kind="stable")
+    ends = np.cumsum(np.bincount(label, minlength=count))
+    columns = csc_array(A)
+    rows, cols, values = [], [], []
+    for first, end in zip(np.r_[0, ends[:-1]], ends, strict=True):
+        members = order[first:end]
+        block = columns[:, members].tocsr()[members].toarray()
+        try:
+            inverse = np.linalg.inv(block)
+        except np.linalg.LinAlgError:
+            raise RepeatedError() from None
+        if not np.abs(block).max() * np.abs(inverse).max() < SINGULAR:
+            raise RepeatedError()
+        rows.append(np.repeat(members, len(members)))
+        cols.append(np.tile(members, len(members)))
+        values.append(inverse.ravel())
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(cols)))
+    return csr_array(entries, shape=A.shape)

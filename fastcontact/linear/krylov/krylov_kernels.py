@@ -34,20 +34,15 @@ def _total(sums):
 
 
 @parallel_kernel
-def _dots(a, b, sums):
+def dot(a, b, sums):
+    """Return the dot product of `a` and `b` (n,); `sums` (ceil(n / CHUNK),) is work space."""
     n = a.shape[0]
     if sums.shape[0] <= ALONE:
         for c in range(sums.shape[0]):
             sums[c] = _dot(a, b, c * CHUNK, min(n, (c + 1) * CHUNK))
-        return
-    for c in prange(sums.shape[0]):
-        sums[c] = _dot(a, b, c * CHUNK, min(n, (c + 1) * CHUNK))
-
-
-@kernel
-def dot(a, b, sums):
-    """Return the dot product of `a` and `b` (n,); `sums` (ceil(n / CHUNK),) is work space."""
-    _dots(a, b, sums)
+    else:
+        for c in prange(sums.shape[0]):
+            sums[c] = _dot(a, b, c * CHUNK, min(n, (c + 1) * CHUNK))
     return _total(sums)
 
 
@@ -60,20 +55,15 @@ def _advance_part(alpha, p, q, x, r, low, high):
 
 
 @parallel_kernel
-def _advance(alpha, p, q, x, r, sums):
+def advance(alpha, p, q, x, r, sums):
+    """Step ``x += alpha p``, ``r -= alpha q`` and return the square of the norm of r."""
     n = x.shape[0]
     if sums.shape[0] <= ALONE:
         for c in range(sums.shape[0]):
             sums[c] = _advance_part(alpha, p, q, x, r, c * CHUNK, min(n, (c + 1) * CHUNK))
-        return
-    for c in prange(sums.shape[0]):
-        sums[c] = _advance_part(alpha, p, q, x, r, c * CHUNK, min(n, (c + 1) * CHUNK))
-
-
-@kernel
-def advance(alpha, p, q, x, r, sums):
-    """Step ``x += alpha p``, ``r -= alpha q`` and return the square of the norm of r."""
-    _advance(alpha, p, q, x, r, sums)
+    else:
+        for c in prange(sums.shape[0]):
+            sums[c] = _advance_part(alpha, p, q, x, r, c * CHUNK, min(n, (c + 1) * CHUNK))
     return _total(sums)
 
 

@@ -1,4 +1,8 @@
-"""What Numba is told to write for `block_products`: each function here runs while a kernel is compiled, none in it."""
+"""The compiler's instructions for `block_products`: functions that write LLVM code while Numba compiles a kernel.
+
+Each public function here stands for the function of the same name in `block_products`. It is called with the Numba types of
+the arguments and returns the signature and a function that writes the code. None of this runs when the kernel runs.
+"""
 
 from __future__ import annotations
 
@@ -19,22 +23,12 @@ class Piece(NamedTuple):
 
 def row_times(_context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end: Any, rows: Any, cols: Any) -> Any:
     """Return the types of `block_products.row_times`, and what writes it."""
-    return _row(False, indices, numbers, x, rows, cols)
-
-
-def row_sizes(_context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end: Any, rows: Any, cols: Any) -> Any:
-    """Return the types of `block_products.row_sizes`, and what writes it."""
-    return _row(True, indices, numbers, x, rows, cols)
-
-
-def _row(absolute: bool, indices: Any, numbers: Any, x: Any, rows: Any, cols: Any) -> Any:
-    """Return the types of the product of a row, of absolute numbers or not, and what writes it."""
     from numba.core import types
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         from numba.core import cgutils
 
-        row = _Row(context, builder, signature, args, absolute)
+        row = _Row(context, builder, signature, args)
         step = args[3].type(1)
         with cgutils.for_range_slice(builder, args[3], args[4], step, args[3].type, inc=True) as (k, _):
             row.add_block(k)
@@ -44,21 +38,17 @@ def _row(absolute: bool, indices: Any, numbers: Any, x: Any, rows: Any, cols: An
     return sums(indices, numbers, x, types.intp, types.intp, rows, cols), code
 
 
-def add_product(
-    _context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, rows: Any, inner: Any, cols: Any
-) -> Any:
+def add_product(_context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, sizes: Any) -> Any:
     """Return the types of `block_products.add_product`, and what writes it."""
-    return _added(lambda r, t, _m, k: r * k + t, to, left, right, rows, inner, cols)
+    return _added(lambda r, t, _m, k: r * k + t, to, left, right, sizes)
 
 
-def add_transposed(
-    _context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, rows: Any, inner: Any, cols: Any
-) -> Any:
+def add_transposed(_context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, sizes: Any) -> Any:
     """Return the types of `block_products.add_transposed`, and what writes it."""
-    return _added(lambda r, t, m, _k: t * m + r, to, left, right, rows, inner, cols)
+    return _added(lambda r, t, m, _k: t * m + r, to, left, right, sizes)
 
 
-def _added(place: Callable[[int, int, int, int], int], to: Any, left: Any, right: Any, *sizes: Any) -> Any:
+def _added(place: Callable[[int, int, int, int], int], to: Any, left: Any, right: Any, sizes: Any) -> Any:
     """Return the types of a product that is added, and what writes it, given where the left factor has (row, inner)."""
     from numba.core import types
 
@@ -79,7 +69,7 @@ def _added(place: Callable[[int, int, int, int], int], to: Any, left: Any, right
                 builder.store(total, write.where(out, args[1], r * n + piece.column, piece.width), align=8)
         return context.get_dummy_value()
 
-    return types.none(to, types.intp, left, types.intp, right, types.intp, *sizes), code
+    return types.none(to, types.intp, left, types.intp, right, types.intp, sizes), code
 
 
 class _Writer:
@@ -107,7 +97,7 @@ class _Writer:
         return self.builder.bitcast(place, self.kind(start.type.pointee, width).as_pointer())
 
     def numbers(self, starts: list[Any], at: Any, column: int, width: int) -> Any:
-        """Return a vector of what begins at `starts`, the halves of each number added."""
+        """Return a vector of what begins at `starts`, the high and low parts of each number added."""
         from llvmlite import ir
 
         parts = [
@@ -161,11 +151,10 @@ class _Row(_Writer):
     the one behind, so that nothing is read beside the block.
     """
 
-    def __init__(self, context: Any, builder: Any, signature: Any, args: Any, absolute: bool) -> None:
+    def __init__(self, context: Any, builder: Any, signature: Any, args: Any) -> None:
         from numba.core import cgutils
 
         super().__init__(context, builder, signature.args[2].dtype)
-        self.absolute = absolute
         self.offset = args[3].type
         self.m, self.n = len(signature.args[5]), len(signature.args[6])
         self.indices, self.x = (self.start(signature.args[k], args[k]) for k in (0, 2))
@@ -191,11 +180,7 @@ class _Row(_Writer):
             last = self.shifted and r == m - 1
             for piece, total, x in zip(self.pieces, self.totals[r], behind if last else meets, strict=True):
                 numbers = self.numbers(self.data, at, r * n + piece.column - last, piece.width)
-                if self.absolute:
-                    change = self._positive(builder.fmul(numbers, x), piece.width)
-                    builder.store(builder.fadd(builder.load(total), change), total)
-                else:
-                    builder.store(self.plus(builder.load(total), numbers, x), total)
+                builder.store(self.plus(builder.load(total), numbers, x), total)
 
     def sums(self) -> list[Any]:
         """Return the sum of every row of the blocks."""
@@ -214,11 +199,6 @@ class _Row(_Writer):
         for lane in lanes[1:]:
             found = self.builder.fadd(found, lane)
         return found
-
-    def _positive(self, vector: Any, width: int) -> Any:
-        """Return a vector without signs."""
-        negative = self.builder.fcmp_ordered("<", vector, self.zeros(width))
-        return self.builder.select(negative, self.builder.fneg(vector), vector)
 
     def _three(self, j: Any) -> list[Any]:
         """Return three numbers of x and any fourth, without a look beyond them."""

@@ -1,9 +1,9 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Products with block matrices, smoothing steps and the tied rows of the multigrid cycle.
+"""Products with block matrices, smoothing steps and dense factors for the multigrid cycle.
 
-A block matrix comes as ``indptr`` (n_rows + 1,), ``indices`` (n_blocks,) and ``data`` (n_blocks * m * n,), its blocks
-one after the other, row by row. The block size comes as two tuples of zeros, ``rows`` of length m and ``cols`` of
-length n: lengths of tuples are known to the compiler. Views of blocks inside the loops would cost four times as much.
+A block matrix comes as ``indptr`` (n_rows + 1,), ``indices`` (n_blocks,) and ``data`` (n_blocks * m * n,), see
+`matrix.BlockMatrix`. The block size comes as two tuples of zeros, ``rows`` of length m and ``cols`` of length n: lengths of
+tuples are known to the compiler. Views of blocks inside the loops would cost four times as much.
 
 Every row is summed by one thread in a fixed order, so results are the same for any number of threads.
 """
@@ -12,7 +12,7 @@ import numpy as np
 from numba import prange
 
 from fastcontact._jit.decorators import kernel, parallel_kernel
-from fastcontact.linear.multigrid.block_products import row_sizes, row_times
+from fastcontact.linear.multigrid.block_products import row_times
 
 # Block rows that one thread takes at a time, and up to how many rows waking another thread costs more than it saves.
 CHUNK = 256
@@ -47,7 +47,7 @@ def _multiply(low, high, indptr, indices, numbers, x, factor, share, z, y, rows,
 def multiply(indptr, indices, numbers, x, factor, share, z, y, rows, cols):
     """Fill `y` (n_rows * m,) with ``share z + factor A x``; z and y may be the same array.
 
-    The `numbers` of A come as a tuple, whole or in halves: see `halves`.
+    The `numbers` of A come as a tuple, split or not: see `split_matrix_kernels`.
     """
     n = indptr.shape[0] - 1
     if n <= ALONE:
@@ -57,52 +57,32 @@ def multiply(indptr, indices, numbers, x, factor, share, z, y, rows, cols):
         _multiply(c * CHUNK, min(n, (c + 1) * CHUNK), indptr, indices, numbers, x, factor, share, z, y, rows, cols)
 
 
-@kernel
-def _row_sums(low, high, indptr, indices, numbers, x, rows, out):
-    for i in range(low, high):
-        sums = row_sizes(indices, numbers, x, indptr[i], indptr[i + 1], rows, rows)
-        for r in range(len(rows)):
-            out[len(rows) * i + r] = sums[r]
-
-
 @parallel_kernel
-def row_sums(indptr, indices, numbers, x, rows, out):
-    """Fill `out` (n,) with ``|A| |x|``: the size of the numbers that cancel each other in ``A x``."""
-    n = indptr.shape[0] - 1
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        _row_sums(c * CHUNK, min(n, (c + 1) * CHUNK), indptr, indices, numbers, x, rows, out)
+def row_sums(indptr, indices, data, x, size, out):
+    """Fill `out` (n,) with ``|A| |x|``, blocks size x size: the size of the numbers that cancel each other in ``A x``."""
+    for i in prange(indptr.shape[0] - 1):
+        for a in range(size):
+            s = 0.0
+            for k in range(indptr[i], indptr[i + 1]):
+                at, j = (k * size + a) * size, indices[k] * size
+                for b in range(size):
+                    s += abs(data[at + b] * x[j + b])
+            out[i * size + a] = s
 
 
 @kernel
-def _relax(low, high, inverse, r, first, second, d, x, rows):
+def _relax(low, high, inverse, r, first, second, d, x, rows, begin):
     m = len(rows)
     for i in range(low, high):
         for a in range(m):
             step = second * _dot(inverse, (m * i + a) * m, r, m * i, rows)
             if first != 0.0:
                 step += first * d[m * i + a]
-                x[m * i + a] += step
-            else:
+            d[m * i + a] = step
+            if begin:
                 x[m * i + a] = step
-            d[m * i + a] = step
-
-
-@kernel
-def _relax_on(low, high, inverse, r, second, d, x, rows):
-    m = len(rows)
-    for i in range(low, high):
-        for a in range(m):
-            step = second * _dot(inverse, (m * i + a) * m, r, m * i, rows)
-            d[m * i + a] = step
-            x[m * i + a] += step
-
-
-@kernel
-def _relax_rows(low, high, inverse, r, first, second, d, x, rows, begin):
-    if first == 0.0 and not begin:
-        _relax_on(low, high, inverse, r, second, d, x, rows)
-    else:
-        _relax(low, high, inverse, r, first, second, d, x, rows)
+            else:
+                x[m * i + a] += step
 
 
 @parallel_kernel
@@ -114,10 +94,10 @@ def relax(inverse, r, first, second, d, x, rows, begin):
     """
     n = r.shape[0] // len(rows)
     if n <= ALONE:
-        _relax_rows(0, n, inverse, r, first, second, d, x, rows, begin)
+        _relax(0, n, inverse, r, first, second, d, x, rows, begin)
         return
     for c in prange((n + CHUNK - 1) // CHUNK):
-        _relax_rows(c * CHUNK, min(n, (c + 1) * CHUNK), inverse, r, first, second, d, x, rows, begin)
+        _relax(c * CHUNK, min(n, (c + 1) * CHUNK), inverse, r, first, second, d, x, rows, begin)
 
 
 @kernel
@@ -183,35 +163,6 @@ def subtract_rows(numbers, indptr, indices, data, x, y, size):
                 for b in range(size):
                     s += data[at + b] * x[j + b]
             y[numbers[i] * size + a] -= s
-
-
-@kernel
-def complete(pivots, indptr, indices, data, x):
-    """Set ``x[pivots] = tie x`` for sparse rows `tie` that do not involve pivots."""
-    for p in range(pivots.shape[0]):
-        s = x[0] * 0
-        for k in range(indptr[p], indptr[p + 1]):
-            s += data[k] * x[indices[k]]
-        x[pivots[p]] = s
-
-
-@kernel
-def condense(pivots, indptr, indices, data, r):
-    """Move the forces at the pivots to what they are tied to: ``r += tie.T r[pivots]``, ``r[pivots] = 0``."""
-    for p in range(pivots.shape[0]):
-        force = r[pivots[p]]
-        r[pivots[p]] = 0
-        for k in range(indptr[p], indptr[p + 1]):
-            r[indices[k]] += data[k] * force
-
-
-@kernel
-def release(pivots, indptr, indices, data, forces, r):
-    """Undo `condense`, given the `forces` (m,) that were at the pivots."""
-    for p in range(pivots.shape[0]):
-        r[pivots[p]] = forces[p]
-        for k in range(indptr[p], indptr[p + 1]):
-            r[indices[k]] -= data[k] * forces[p]
 
 
 @kernel

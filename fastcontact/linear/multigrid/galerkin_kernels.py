@@ -1,8 +1,8 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Set-up of a multigrid hierarchy: the graph of a matrix, smoothed prolongators and Galerkin products.
 
-Block matrices as in `multigrid`, block sizes as tuples of zeros too; numbers that are needed exactly as in `halves`. Rows
-are computed one by one in a fixed order.
+Block matrices come as arrays, see `matrix.BlockMatrix`, block sizes m and n as tuples of zeros, `rows` and `cols`; numbers
+that may be split as a tuple, see `split_matrix_kernels`. Rows are computed one by one in a fixed order.
 """
 
 import numpy as np
@@ -135,7 +135,7 @@ def _smooth_row(
         at = 0
         while found[at] != aggregate[j]:
             at += 1
-        add_product(sums, at * m * n, data, k * m * m, tentative, j * m * n, rows, rows, cols)
+        add_product(sums, at * m * n, data, k * m * m, tentative, j * m * n, (rows, rows, cols))
     for at in range(count):
         base = (start[i] + at) * m * n
         columns[start[i] + at] = found[at]
@@ -165,22 +165,9 @@ def smooth_prolongator(indptr, indices, data, inverse, aggregate, tentative, ome
         sums = np.empty((widest + 1) * m * len(cols))
         for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
             _smooth_row(
-                i,
-                indptr,
-                indices,
-                data,
-                inverse,
-                aggregate,
-                tentative,
-                omega,
-                start,
-                columns,
-                out,
-                found,
-                sums,
-                rows,
+                i, indptr, indices, data, inverse, aggregate, tentative, omega, start, columns, out, found, sums, rows,
                 cols,
-            )
+            )  # fmt: skip
     return columns
 
 
@@ -222,26 +209,9 @@ def count_galerkin(indptr, indices, start, columns, tstart, torigin, count, near
 
 @kernel
 def _galerkin_row(
-    row,
-    near,
-    n_near,
-    place,
-    products,
-    indptr,
-    indices,
-    data,
-    start,
-    columns,
-    P,
-    tstart,
-    torigin,
-    tslot,
-    low,
-    places,
-    out,
-    rows,
-    cols,
-):
+    row, near, n_near, place, products, indptr, indices, data, start, columns, P, tstart, torigin, tslot, low, places,
+    out, rows, cols,
+):  # fmt: skip
     """Sum one row: first ``Z = A P_I`` for the fine nodes near it, then ``P.T Z``, transposed: A is symmetric."""
     m, n = len(rows), len(cols)
     for e in range(n_near):
@@ -251,12 +221,12 @@ def _galerkin_row(
     for e in range(tstart[row], tstart[row + 1]):
         i, own = torigin[e], tslot[e] * m * n
         for k in range(indptr[i], indptr[i + 1]):  # A_ji = A_ij.T
-            add_transposed(products, place[indices[k]] * m * n, data, k * m * m, P, own, rows, rows, cols)
+            add_transposed(products, place[indices[k]] * m * n, data, k * m * m, P, own, (rows, rows, cols))
     for e in range(n_near):
         j, base = near[e], e * m * n
         for k in range(start[j], start[j + 1]):
             block = (low + places[columns[k]]) * n * n
-            add_transposed(out, block, (products,), base, P, k * m * n, cols, rows, cols)
+            add_transposed(out, block, (products,), base, P, k * m * n, (cols, rows, cols))
 
 
 @parallel_kernel
@@ -283,23 +253,6 @@ def galerkin(
                 places[found[e]] = e
                 out_columns[low[row] + e] = found[e]
             _galerkin_row(
-                row,
-                near,
-                n_near,
-                place,
-                products,
-                indptr,
-                indices,
-                data,
-                start,
-                columns,
-                P,
-                tstart,
-                torigin,
-                tslot,
-                low[row],
-                places,
-                out,
-                rows,
-                cols,
-            )
+                row, near, n_near, place, products, indptr, indices, data, start, columns, P, tstart, torigin, tslot,
+                low[row], places, out, rows, cols,
+            )  # fmt: skip

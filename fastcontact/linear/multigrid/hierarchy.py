@@ -1,9 +1,12 @@
 """A multigrid hierarchy of smoothed aggregation and its V-cycle, on compiled block kernels.
 
-Unknowns of neighbouring nodes are gathered into aggregates (pyamg's), which move like rigid bodies at first; one step of
-block Jacobi smooths these motions (Vanek, Mandel and Brezina, 1996), and the coarse matrix is the Galerkin product.
-The smoother is the Chebyshev iteration for the upper part of the spectrum of ``D^-1 A``, D the diagonal blocks
-(Adams, Brezina, Hu and Tuminaro, 2003): other than Gauss-Seidel it is the same for any number of threads.
+Neighbouring nodes are gathered into aggregates, each of which moves like a rigid body at first. One step of block Jacobi
+smooths these motions (Vanek, Mandel and Brezina, 1996), and the coarse matrix is the Galerkin product. The smoother is the
+Chebyshev iteration for the upper part of the spectrum of ``D^-1 A``, D the diagonal blocks (Adams, Brezina, Hu and Tuminaro,
+2003): unlike Gauss-Seidel it gives the same bits for any number of threads.
+
+Two functions are pyamg's: `standard_aggregation` gathers the nodes and `fit_candidates` makes an orthonormal basis of the
+rigid motions of each aggregate. Everything else is ours. `linear.solvers.pyamg` is pyamg's own multigrid, to compare with.
 """
 
 from __future__ import annotations
@@ -14,11 +17,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
-from scipy.sparse import bsr_array, csr_matrix
+from scipy.sparse import csr_matrix
 
+from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
 from fastcontact.linear.multigrid.coarse import Coarse
-from fastcontact.linear.multigrid.matrix import Matrix
+from fastcontact.linear.multigrid.matrix import BlockMatrix
 
 Array = NDArray[np.float64]
 Values = NDArray[Any]
@@ -40,28 +44,28 @@ class Level:
 
     Attributes
     ----------
-    A : Matrix
+    A : BlockMatrix
     diagonal, inverse : ndarray (n_nodes * size * size,)
         Diagonal blocks, and their inverses as the smoother takes them.
     bound : float
         Upper bound of the eigenvalues of ``D^-1 A``.
-    P, R : Matrix or None
+    P, R : BlockMatrix or None
         Prolongator and its transpose; None on the coarsest level.
-    tie : TiedRows or None
-        Unknowns that follow others, on the finest level.
-    change : Change or None
-        What ties add to the matrix, on coarser levels.
+    eliminated : Elimination or None
+        Equations, on the finest level: weights in the precision of the cycle, the same for forces.
+    change : MatrixChange or None
+        What eliminated equations add to the matrix, on coarser levels.
     b, x, r, d : ndarray (n,)
         Right-hand side, iterate, residual and step of the cycle.
     """
 
-    A: Matrix
+    A: BlockMatrix
     diagonal: Values
     inverse: Values
     bound: float
-    P: Matrix | None = None
-    R: Matrix | None = None
-    tie: Any = None
+    P: BlockMatrix | None = None
+    R: BlockMatrix | None = None
+    eliminated: Elimination | None = None
     change: Any = None
     b: Values = field(init=False)
     x: Values = field(init=False)
@@ -78,21 +82,21 @@ class Level:
         return len(self.b)
 
     def relax(self, r: Values, first: float, second: float, begin: bool = False) -> None:
-        """Make a Chebyshev step: see `kernels.multigrid.relax`."""
+        """Make a Chebyshev step: see `cycle_kernels.relax`."""
         kind = r.dtype.type
         cycle_kernels.relax(self.inverse, r, kind(first), kind(second), self.d, self.x, self.A.rows, begin)
-        if self.tie is not None:
-            self.tie.complete(self.x)
+        if self.eliminated is not None:
+            self.eliminated.complete(self.x)
 
     def residual(self) -> None:
         """Fill `r` with ``b - A x``."""
         self.subtract_product(self.x, self.b, self.r)
 
     def subtract_product(self, x: Values, b: Values, r: Values) -> None:
-        """Fill `r` with ``b - A x``, ties included."""
+        """Fill `r` with ``b - A x``, eliminated equations included."""
         self.A.combine(-1.0, x, 1.0, b, r)
-        if self.tie is not None:
-            self.tie.condense(r)
+        if self.eliminated is not None:
+            self.eliminated.move_forces(r)
         elif self.change is not None:
             self.change.subtract(x, r)
 
@@ -100,8 +104,8 @@ class Level:
         """Add the correction of the next coarser level."""
         assert self.P is not None
         self.P.combine(1.0, coarse, 1.0, self.x, self.x)
-        if self.tie is not None:
-            self.tie.complete(self.x)
+        if self.eliminated is not None:
+            self.eliminated.complete(self.x)
 
     @property
     def nbytes(self) -> int:
@@ -127,13 +131,13 @@ class Hierarchy:
 
     Parameters
     ----------
-    A : Matrix
+    A : BlockMatrix
         Square blocks. Its `data` are in the precision of the cycle; the set-up is done in double precision.
     modes : ndarray (n, n_modes)
         Displacements that cost little energy: zero at supported unknowns.
     """
 
-    def __init__(self, A: Matrix, modes: Array) -> None:
+    def __init__(self, A: BlockMatrix, modes: Array) -> None:
         self.dtype: DTypeLike = A.data.dtype
         self.n = (len(A.indptr) - 1) * len(A.rows)
         self.levels: list[Level] = []
@@ -144,13 +148,13 @@ class Hierarchy:
             if coarser is None:
                 break
             level.P, level.R, A, modes = coarser
-        self.coarse = Coarse(_scipy(A))
+        self.coarse = Coarse(A.to_scipy().tocsc())
         self._free_bounds = [level.bound for level in self.levels]
         self.set_bounds()
 
-    def _level(self, A: Matrix) -> Level:
+    def _level(self, A: BlockMatrix) -> Level:
         size = len(A.rows)
-        own = Matrix(A.indptr, A.indices, A.data.astype(self.dtype, copy=False), A.rows, A.cols)
+        own = BlockMatrix(A.indptr, A.indices, A.data.astype(self.dtype, copy=False), A.rows, A.cols)
         diagonal = galerkin_kernels.diagonal_blocks(A.indptr, A.indices, own.data, size)
         inverse = np.empty_like(diagonal)
         cycle_kernels.invert_blocks(diagonal, size, inverse)
@@ -158,7 +162,9 @@ class Hierarchy:
         level.bound = SAFETY * largest_eigenvalue(level)
         return level
 
-    def _coarsened(self, A: Matrix, level: Level, modes: Array) -> tuple[Matrix, Matrix, Matrix, Array] | None:
+    def _coarsened(
+        self, A: BlockMatrix, level: Level, modes: Array
+    ) -> tuple[BlockMatrix, BlockMatrix, BlockMatrix, Array] | None:
         """Return the prolongator, its transpose, the coarse matrix and its modes; None where aggregates do not help."""
         from pyamg.aggregation.aggregate import standard_aggregation
         from pyamg.aggregation.tentative import fit_candidates
@@ -186,9 +192,9 @@ class Hierarchy:
         )  # fmt: skip
         del tentative, T
         index = galerkin_kernels.transposed(indptr, columns, n_coarse)
-        P = Matrix(indptr, columns, blocks, A.rows, cols)
+        P = BlockMatrix(indptr, columns, blocks, A.rows, cols)
         coarse = product(A, P, index)
-        R = Matrix(index[0], index[1], np.empty_like(P.data), cols, A.rows)
+        R = BlockMatrix(index[0], index[1], np.empty_like(P.data), cols, A.rows)
         galerkin_kernels.transpose_blocks(index[2], P.data, R.data, A.rows, cols)
         return P, R, coarse, coarse_modes
 
@@ -223,11 +229,10 @@ class Hierarchy:
 
     def set_bounds(self, anew: Sequence[int] = ()) -> None:
         """Set the bounds of the smoothers to those of K, but for levels `anew`, where they are estimated again."""
-        for number, level in enumerate(self.levels):
-            level.bound = self._free_bounds[number]
-            if number in anew:
-                level.bound = max(level.bound, SAFETY * largest_eigenvalue(level))
-        self._factors = [chebyshev(level.bound, DEGREE) for level in self.levels]
+        self.bounds = [
+            max(bound, SAFETY * largest_eigenvalue(level)) if number in anew else bound
+            for number, (level, bound) in enumerate(zip(self.levels, self._free_bounds, strict=True))
+        ]
 
     def cycle(self, number: int = 0) -> None:
         """Improve by one V-cycle: from ``levels[number].b`` to ``levels[number].x``, starting at zero."""
@@ -250,8 +255,8 @@ class Hierarchy:
             level.relax(level.r, *factor)
 
 
-def product(A: Matrix, P: Matrix, index: tuple[Indices, Indices, Indices]) -> Matrix:
-    """Return ``P.T A P`` for a symmetric A; `index` from `galerkin.transposed`."""
+def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Indices, Indices, Indices]) -> BlockMatrix:
+    """Return ``P.T A P`` for a symmetric A; `index` from `galerkin_kernels.transposed`."""
     n_coarse = len(index[0]) - 1
     count, near = np.zeros(n_coarse, np.int32), np.zeros(n_coarse, np.int32)
     galerkin_kernels.count_galerkin(A.indptr, A.indices, P.indptr, P.indices, index[0], index[1], count, near)
@@ -262,7 +267,7 @@ def product(A: Matrix, P: Matrix, index: tuple[Indices, Indices, Indices]) -> Ma
         A.indptr, A.indices, A.exact, P.indptr, P.indices, P.data, *index, indptr, int(near.max(initial=0)),
         columns, out, P.rows, P.cols,
     )  # fmt: skip
-    return Matrix(indptr, columns, out, P.cols, P.cols)
+    return BlockMatrix(indptr, columns, out, P.cols, P.cols)
 
 
 def largest_eigenvalue(level: Level) -> float:
@@ -273,15 +278,15 @@ def largest_eigenvalue(level: Level) -> float:
     r = np.random.default_rng(0).normal(size=level.n).astype(level.b.dtype)
     z, q, p = np.empty_like(r), np.empty_like(r), np.zeros_like(r)
     scratch, zero = np.empty_like(r), np.zeros_like(r)
-    if level.tie is not None:
-        level.tie.condense(r)
+    if level.eliminated is not None:
+        level.eliminated.move_forces(r)
     diagonal, beside = [], []
     old_alpha, beta, rz = 1.0, 0.0, 0.0
     kind = r.dtype.type
     for step in range(min(LANCZOS_STEPS, level.n)):
         cycle_kernels.relax(level.inverse, r, kind(0), kind(1), scratch, z, level.A.rows, True)
-        if level.tie is not None:
-            level.tie.complete(z)
+        if level.eliminated is not None:
+            level.eliminated.complete(z)
         new = float(r @ z)
         if not new > 1e-12 * abs(rz):
             break
@@ -297,11 +302,3 @@ def largest_eigenvalue(level: Level) -> float:
         old_alpha = alpha
     T = np.diag(diagonal) + np.diag(beside[1:], 1) + np.diag(beside[1:], -1)
     return float(np.linalg.eigvalsh(T).max()) if diagonal else 1.0
-
-
-def _scipy(A: Matrix) -> Any:
-    """Return a matrix as SciPy's compressed columns."""
-    size = len(A.rows)
-    n = (len(A.indptr) - 1) * size
-    data = np.sum([part.astype(float) for part in A.exact], axis=0)
-    return bsr_array((data.reshape(-1, size, size), A.indices, A.indptr), shape=(n, n)).tocsc()

@@ -1,4 +1,9 @@
-"""Block matrices of multigrid, and the one that is solved with: in double precision, or in two halves of single precision."""
+"""Block matrices of multigrid, and the stiffness that is solved with: one store of its numbers for two precisions.
+
+The multigrid cycle reads K in single precision, the iteration around it in double precision. Each number of K is therefore
+stored as two numbers in single precision, a high and a low part (see `split_matrix_kernels`): the cycle reads the high part,
+exact products add both. That takes 8 bytes a number in place of 12.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 
-from fastcontact.linear.elimination import constrained_matrix_kernels
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels, split_matrix_kernels
 
 Array = NDArray[np.float64]
@@ -19,10 +23,21 @@ Indices = NDArray[np.int32]
 
 
 @dataclass(eq=False)
-class Matrix:
-    """A block matrix, flat: see `kernels.multigrid`.
+class BlockMatrix:
+    """A sparse matrix of dense blocks, row by row.
 
-    With a `rest`, what `data` in single precision misses, it is exact: see `kernels.halves`.
+    Attributes
+    ----------
+    indptr : ndarray (n_rows + 1,)
+        Where the blocks of each block row begin.
+    indices : ndarray (n_blocks,)
+        Block column of each block.
+    data : ndarray (n_blocks * len(rows) * len(cols),)
+        The blocks, one after the other, in single or double precision.
+    rows, cols : tuple of zeros
+        Their lengths are the size of a block: compiled kernels know the length of a tuple.
+    low : ndarray, optional
+        Low parts, in single precision, where `data` are the high parts of a split matrix.
     """
 
     indptr: Indices
@@ -30,16 +45,16 @@ class Matrix:
     data: Values
     rows: tuple[int, ...]
     cols: tuple[int, ...]
-    rest: Values | None = None
+    low: Values | None = None
 
     @property
     def exact(self) -> tuple[Values, ...]:
-        """The numbers as kernels take them that need them all."""
-        return (self.data,) if self.rest is None else (self.data, self.rest)
+        """The numbers as kernels take them that need them all: (data,) or (high part, low part)."""
+        return (self.data,) if self.low is None else (self.data, self.low)
 
     @property
     def nbytes(self) -> int:
-        """Memory without the rest [bytes]."""
+        """Memory without the low part [bytes]."""
         return self.indptr.nbytes + self.indices.nbytes + self.data.nbytes
 
     def multiply(self, x: Values, y: Values) -> None:
@@ -54,55 +69,75 @@ class Matrix:
             self.indptr, self.indices, numbers, x, kind(factor), kind(share), z, y, self.rows, self.cols
         )  # fmt: skip
 
+    def diagonal_blocks(self) -> Array:
+        """Return the diagonal blocks (n_rows, size, size) of a square matrix, in double precision."""
+        size = len(self.rows)
+        parts = [galerkin_kernels.diagonal_blocks(self.indptr, self.indices, part, size) for part in self.exact]
+        return np.sum([part.astype(float) for part in parts], axis=0).reshape(-1, size, size)
 
-class Given:
-    """The matrix K that is solved with: products in double precision, whatever the precision of the cycle.
+    def largest_row_sum(self, u: Array) -> float:
+        """Return the largest entry of ``|A| |u|`` of a square matrix, from its high part."""
+        out = np.empty(len(u))
+        cycle_kernels.row_sums(self.indptr, self.indices, self.data, u, len(self.rows), out)
+        return float(out.max(initial=0.0))
+
+    def to_scipy(self) -> bsr_array:
+        """Return a square matrix as SciPy's, in double precision."""
+        size = len(self.rows)
+        data = np.sum([part.astype(float) for part in self.exact], axis=0).reshape(-1, size, size)
+        return bsr_array((data, self.indices, self.indptr), shape=2 * ((len(self.indptr) - 1) * size,))
+
+
+def block_matrix(K: bsr_array) -> BlockMatrix:
+    """Return a matrix of square blocks that shares the arrays of K."""
+    size = (0,) * K.blocksize[0]
+    return BlockMatrix(K.indptr, K.indices, K.data.reshape(-1), size, size)
+
+
+class ScaledMatrix:
+    """A power of two times the stiffness K; its products are those of K, in double precision.
 
     Parameters
     ----------
     K : bsr_array (n, n)
-        Square blocks.
+        Square blocks [force / length].
     precision : {"single", "double"}
-        Numbers for a cycle in single precision are kept in halves.
-    own : bool
-        Whether the room of K's numbers may be taken; K is then no matrix any more, but this is: ``given @ u``.
+        Of the multigrid cycle. For "single", numbers are split into a high and a low part.
+    release : bool
+        Whether the low parts may overwrite K's numbers, so that K and its parts never need memory at the same time: a
+        tenth of the peak with a million unknowns. K is empty afterwards.
 
     Attributes
     ----------
-    scaled : Matrix
+    scaled : BlockMatrix
         ``unit K``. Numbers of any unit system fit single precision when the largest stiffness is about one.
     unit : float
         A power of two, which changes no digit.
     shape, blocksize : (int, int)
     """
 
-    def __init__(self, K: bsr_array, precision: str, own: bool = False) -> None:
+    def __init__(self, K: bsr_array, precision: str, release: bool = False) -> None:
         self.shape, self.blocksize = K.shape, K.blocksize
-        self._take(K, precision, own)
+        self._store(K, precision, release)
 
-    def _take(self, K: bsr_array, precision: str, own: bool) -> None:
-        indptr, indices, size = K.indptr, K.indices, (0,) * K.blocksize[0]
-        if precision == "double":
-            self.unit = 1.0
-            self.scaled = Matrix(indptr, indices, K.data.reshape(-1), size, size)
-            return
-        self.unit = float(0.5 ** np.round(np.log2(K.diagonal().max())))
-        first, second = _in_halves(K, self.unit, own)
-        self.scaled = Matrix(indptr, indices, first, size, size, second)
+    def _store(self, K: bsr_array, precision: str, release: bool) -> None:
+        self.unit, self.scaled = 1.0, block_matrix(K)
+        if precision == "single":
+            self.unit = float(0.5 ** np.round(np.log2(K.diagonal().max())))
+            self.scaled.data, self.scaled.low = _split(K, self.unit, release)
 
     def change(self, precision: str) -> None:
-        """Keep the numbers for a cycle in another precision."""
-        self._take(self.restored(), precision, own=True)
+        """Store the numbers for a cycle in another precision."""
+        self._store(self.restored(), precision, release=True)
 
     def restored(self) -> bsr_array:
         """Return K as it was given, but for round-off."""
-        A, size = self.scaled, self.blocksize[0]
-        data = np.empty(len(A.data))
-        split_matrix_kernels.join(1.0 / self.unit, A.exact, data)
-        return bsr_array((data.reshape(-1, size, size), A.indices, A.indptr), shape=self.shape)
+        K = self.scaled.to_scipy()
+        K.data /= self.unit
+        return K
 
     def combine(self, factor: float, x: Array, share: float, z: Array, y: Array) -> None:
-        """Fill `y` with ``share z + factor K x``."""
+        """Fill `y` (n,) with ``share z + factor K x``."""
         self.scaled.combine(factor / self.unit, x, share, z, y)
 
     def __matmul__(self, u: Array) -> Array:
@@ -111,54 +146,38 @@ class Given:
         return out
 
     def forces_at(self, dofs: NDArray[np.intp], u: Array, f: Array) -> Array:
-        """Return ``(K u - f)[dofs]``."""
+        """Return ``(K u - f)[dofs]``, shape (m,) [force]."""
         A, out = self.scaled, np.empty(len(dofs))
-        constrained_matrix_kernels.forces_at(
-            dofs, A.indptr, A.indices, A.exact, 1.0 / self.unit, len(A.rows), u, f, out
-        )
+        split_matrix_kernels.forces_at(dofs, A.indptr, A.indices, A.exact, 1.0 / self.unit, len(A.rows), u, f, out)
         return out
 
     def add_forces_of(self, dofs: NDArray[np.intp], values: Array, out: Array) -> None:
-        """Add ``K[:, dofs] values`` to `out` (n,)."""
+        """Add ``K[:, dofs] values`` to `out` (n,) [force]."""
         A = self.scaled
-        constrained_matrix_kernels.forces_of(
-            dofs, values, A.indptr, A.indices, A.exact, 1.0 / self.unit, len(A.rows), out
-        )
+        split_matrix_kernels.forces_of(dofs, values, A.indptr, A.indices, A.exact, 1.0 / self.unit, len(A.rows), out)
 
     def diagonal(self) -> Array:
-        """Return the diagonal (n,)."""
-        A, size = self.scaled, self.blocksize[0]
-        parts = [galerkin_kernels.diagonal_blocks(A.indptr, A.indices, part, size).astype(float) for part in A.exact]
-        blocks = np.sum(parts, axis=0).reshape(-1, size, size)
-        return blocks[:, range(size), range(size)].ravel() / self.unit
+        """Return the diagonal (n,) [force / length]."""
+        size = range(self.blocksize[0])
+        return self.scaled.diagonal_blocks()[:, size, size].ravel() / self.unit
 
     def largest_row_sum(self, u: Array) -> float:
-        """Return the largest entry of ``|K| |u|``."""
-        A, out = self.scaled, np.empty(len(u))
-        cycle_kernels.row_sums(A.indptr, A.indices, (A.data,), u, A.rows, out)
-        return float(out.max(initial=0.0)) / self.unit
+        """Return the largest entry of ``|K| |u|`` [force]."""
+        return self.scaled.largest_row_sum(u) / self.unit
 
 
-def _in_halves(K: bsr_array, unit: float, own: bool) -> tuple[Values, Values]:
-    """Return the halves of ``unit K``, the second one in the room of K's numbers where it may be."""
-    numbers: Array = K.data.reshape(-1)
-    n, first = len(numbers), np.empty(len(numbers), np.float32)
-    owner = _owner(K.data)
-    if not (own and owner.flags.owndata and owner.flags.c_contiguous and owner.nbytes == numbers.nbytes):
-        second = np.empty(n, np.float32)
-        split_matrix_kernels.split(unit, numbers, first, second)
-        return first, second
-    # K has no numbers now, so that nobody reads what is no number.
+def _split(K: bsr_array, unit: float, release: bool) -> tuple[Values, Values]:
+    """Return the high and low parts of ``unit K``; see `ScaledMatrix` for `release`."""
+    n, numbers, owner = K.data.size, K.data.reshape(-1), K.data if K.data.base is None else K.data.base
+    high = np.empty(n, np.float32)
+    if not (release and owner.size == n and owner.flags.owndata and owner.flags.c_contiguous):
+        low = np.empty(n, np.float32)
+        split_matrix_kernels.split(unit, numbers, high, low)
+        return high, low
+    # Every number is read before a low part overwrites it. K must have no numbers then: these are none any more.
+    split_matrix_kernels.split(unit, numbers, high, numbers.view(np.float32)[:n])
     K.indptr, K.indices, K.data = np.zeros_like(K.indptr), K.indices[:0], np.empty((0, *K.blocksize))
-    split_matrix_kernels.split(unit, numbers, first, numbers.view(np.float32)[:n])
     del numbers
-    with contextlib.suppress(ValueError):  # where somebody else holds it, all of it stays
+    with contextlib.suppress(ValueError):  # another array uses the memory, all of which stays then
         owner.resize(((n + 1) // 2,))
-    return first, owner.reshape(-1).view(np.float32)[:n]
-
-
-def _owner(array: Values) -> Values:
-    """Return the array that has the memory of an array."""
-    while isinstance(array.base, np.ndarray):
-        array = array.base
-    return array
+    return high, owner.reshape(-1).view(np.float32)[:n]

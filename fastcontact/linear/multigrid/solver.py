@@ -1,8 +1,8 @@
 """Conjugate gradients preconditioned by multigrid, with the rigid-body modes as near-nullspace.
 
 Aggregates and prolongators are those of K and serve the whole analysis. Equations ``B u = c`` are eliminated: the
-iterates obey them, forces at the eliminated unknowns are moved to what these follow, and the hierarchy is changed
-where it is near them.
+iterates obey them, forces at the eliminated unknowns, the pivots, are moved to the other unknowns, and the hierarchy is
+changed near the pivots.
 """
 
 from __future__ import annotations
@@ -15,25 +15,23 @@ from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._jit.decorators import check_threads
 from fastcontact.errors import ConvergenceError, ModelError
-from fastcontact.linear.compliance import ComplianceCache
-from fastcontact.linear.elimination import nonsymmetric
-from fastcontact.linear.elimination.constrained_matrix import Ties
 from fastcontact.linear.elimination.elimination import Elimination
+from fastcontact.linear.flexibility import FlexibilityColumns
 from fastcontact.linear.krylov import krylov_kernels
-from fastcontact.linear.krylov.gcr import ConjugateResiduals
-from fastcontact.linear.krylov.pcg import ConjugateGradients
+from fastcontact.linear.krylov.iterations import ConjugateGradients, ConjugateResiduals
+from fastcontact.linear.multigrid.constrained_hierarchy import ConstrainedHierarchy
 from fastcontact.linear.multigrid.hierarchy import Hierarchy
-from fastcontact.linear.multigrid.matrix import Given
+from fastcontact.linear.multigrid.matrix import ScaledMatrix
 from fastcontact.linear.protocol import Counters, Monitor
 
 log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
-MAX_ITERATIONS = 1000
-# Iterations between two looks of a monitor.
+MAX_ITERATIONS, MAX_NONSYMMETRIC = 1000, 300
+# Iterations between two calls of a monitor.
 WATCH_EVERY = 2
-# Weights of ties that differ by less than this share a hierarchy.
+# Equations with the same pivots whose weights differ by less than this share a hierarchy.
 ALIKE = 0.02
-# Where the smoother is found to amplify something, its bound of the spectrum is raised by this factor, so many times.
+# Where the smoother amplifies something, its bound of the spectrum is raised by this factor, so many times.
 RAISE, RAISES = 1.3, 4
 
 
@@ -68,49 +66,50 @@ class Multigrid:
         """Memory of the hierarchy and the work space, without K [bytes]."""
         return self.hierarchy.nbytes + self._cg.nbytes + (self._residuals.nbytes if self._residuals is not None else 0)
 
-    def build(self, K: bsr_array, rigid_modes: Array, own: bool = False) -> None:
-        """Build the hierarchy of K (n, n), whose room it may `own`; `rigid_modes` (n, k) cost it little."""
+    def build(self, K: bsr_array, rigid_modes: Array, release: bool = False) -> None:
+        """Build the hierarchy of K (n, n); see `LinearSolver.prepare`."""
         n = K.shape[0]
-        self.K = Given(K, self.precision, own)
+        self.K = ScaledMatrix(K, self.precision, release)
         self._modes = rigid_modes.astype(np.float32)  # if they are needed again: single precision is enough
         self._cg = ConjugateGradients(n)
         self._residuals: ConjugateResiduals | None = None
         self._diagonal: Array | None = None
         self._solved: Array | None = None  # the right-hand side that iterate and residual belong to
         self._build(rigid_modes)
-        self.compliance = ComplianceCache(n, self._solve_many)
+        self.columns = FlexibilityColumns(n, self._solve_many)
 
     def _build(self, rigid_modes: Array) -> None:
         check_threads()
         self.hierarchy = Hierarchy(self.K.scaled, rigid_modes)
-        self._ties = Ties(self.hierarchy, self.K.scaled)
-        self._tied: Elimination | None = None  # the equations that hold, and those that the hierarchy was tied for
-        self._tied_as: Elimination | None = None
+        self._constrained = ConstrainedHierarchy(self.hierarchy, self.K.scaled)
+        self._equations: Elimination | None = (
+            None  # the equations that hold, and those that the hierarchy was changed for
+        )
+        self._hierarchy_equations: Elimination | None = None
         self.counters.setups += 1
 
     def build_in(self, precision: str) -> None:
         """Build the hierarchy again, in another precision."""
         self.precision = precision
-        for old in ("_ties", "hierarchy"):  # two hierarchies at a time need not be remembered
-            self.__dict__.pop(old, None)
+        del self._constrained, self.hierarchy  # so that there are not two hierarchies at a time
         self.K.change(precision)
         self._build(self._modes.astype(float))
 
     def _solve_many(self, F: Array) -> Array:
         return np.column_stack([self.solution(np.ascontiguousarray(f), None, None) for f in F.T])
 
-    def tie(self, elimination: Elimination | None) -> None:
+    def constrain(self, elimination: Elimination | None) -> None:
         """Change the hierarchy to that of the eliminated matrix.
 
         A hierarchy for the same pivots that follow others with nearly the same weights is kept: it preconditions as
         well, since only the unknowns beside the pivots count.
         """
         check_threads()  # every solution begins here, also that of a child forked after the hierarchy was built
-        if elimination is not self._tied:
-            if not _alike(elimination, self._tied_as):
-                self._ties.tie(elimination)
-                self._tied_as = elimination
-            self._tied = elimination
+        if elimination is not self._equations:
+            if not _alike(elimination, self._hierarchy_equations):
+                self._constrained.constrain(elimination)
+                self._hierarchy_equations = elimination
+            self._equations = elimination
 
     def solution(
         self, f: Array, elimination: Elimination | None, guess: Array | None, monitor: Monitor | None = None,
@@ -123,13 +122,13 @@ class Multigrid:
         ConvergenceError
             If the residual does not fall below the tolerance.
         """
-        cg, old = self._cg, self._tied
+        cg, old = self._cg, self._equations
         scale = self._scale(f, elimination)
         if scale == 0.0:  # nothing moves anything
             self._solved = None
             return np.zeros_like(f)
         goes_on = guess is not None and f is self._solved and np.array_equal(guess, cg.x)
-        self.tie(elimination)
+        self.constrain(elimination)
         if goes_on:
             self._go_on(f, old, elimination)
         else:
@@ -140,13 +139,12 @@ class Multigrid:
         made = raised = 0
         while cg.norm > enough:
             if made >= MAX_ITERATIONS or raised > RAISES:
-                raise StallError(self._stuck(cg.norm / scale, made))
-            if (
-                made
-                and monitor is not None
-                and made % WATCH_EVERY == 0
-                and self._stopped(monitor, f, elimination, cg.norm / scale)
-            ):
+                raise StallError(
+                    f"conjugate gradients stand at a relative residual of {cg.norm / scale:.1e} after {made} iterations, "
+                    f"above {self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
+                )
+            watch = monitor if made and made % WATCH_EVERY == 0 else None
+            if watch is not None and watch(cg.x, self.multiplier(elimination, cg.x, f), cg.norm / scale):
                 break
             if cg.step(self._multiply, self.precondition):
                 made += 1
@@ -157,19 +155,64 @@ class Multigrid:
                 self._begin(f, elimination)
         return cg.x.copy()
 
-    def oblique(
+    def nonsymmetric_solution(
         self, f: Array, elimination: Elimination, springs: csr_array | None, guess: Array, tolerance: float
     ) -> Array:
-        """Solve under equations whose multipliers act through other rows; see `_oblique`."""
+        """Solve ``K u + S u = f + F.T multiplier`` and ``B u = c``, F the rows that multipliers act through.
+
+        A sliding contact keeps its gap closed, but the force that does so also acts sideways. Unknowns are eliminated
+        as they are without friction, forces move along the rows F; the reduced matrix is not symmetric. The hierarchy
+        of the equations alone preconditions it.
+
+        Parameters
+        ----------
+        f : ndarray (n,)
+            [force]
+        elimination : Elimination
+        springs : csr_array (n, n) or None
+            S, symmetric and positive semidefinite [force / length].
+        guess : ndarray (n,)
+            [length]
+        tolerance : float
+            Relative residual, where larger than the solver's own.
+
+        Raises
+        ------
+        ConvergenceError
+            If the residual does not fall below the tolerance.
+        """
         if self._residuals is None:
             self._residuals = ConjugateResiduals(len(f))
         self._solved = None
+        iteration = self._residuals
         enough = max(self.tolerance, tolerance) * self._scale(f, elimination)
-        return nonsymmetric.solve(self, self._residuals, f, elimination, springs, guess, enough)
+        self.constrain(elimination)
+
+        def multiply(p: Array, q: Array) -> None:
+            self.K.combine(1.0, p, 0.0, q, q)
+            if springs is not None:
+                q += springs @ p
+            elimination.move_forces(q)
+
+        iteration.x[:] = guess
+        elimination.complete(iteration.x, elimination.offset)
+        self.K.combine(-1.0, iteration.x, 1.0, f, iteration.r)
+        if springs is not None:
+            iteration.r -= springs @ iteration.x
+        elimination.move_forces(iteration.r)
+        iteration.start()
+        made = 0
+        while iteration.norm > enough:
+            if made >= MAX_NONSYMMETRIC or not iteration.step(multiply, self.precondition):
+                left = iteration.norm / enough
+                raise ConvergenceError(f"conjugate residuals stand at {left:.1e} times the tolerance")
+            made += 1
+            self.counters.iterations += 1
+        return iteration.x.copy()
 
     def diagonal(self) -> Array:
         """Return the diagonal (n,) of K."""
-        if self._diagonal is None:  # friction asks for it in every pairing, other contact never
+        if self._diagonal is None:  # needed in every pairing with friction, never without
             self._diagonal = self.K.diagonal()
         return self._diagonal
 
@@ -179,56 +222,46 @@ class Multigrid:
             self.hierarchy.raise_bounds(RAISE)
             return
         log.info("multigrid: single precision is not enough for this matrix, the cycle goes on in double precision")
-        tied = self._tied
+        equations = self._equations
         self.build_in("double")
-        self.tie(tied)
-
-    def _stuck(self, left: float, made: int) -> str:
-        return (
-            f"conjugate gradients stand at a relative residual of {left:.1e} after {made} iterations, above "
-            f"{self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
-        )
+        self.constrain(equations)
 
     def _begin(self, f: Array, elimination: Elimination | None) -> None:
         """Make the iterate obey the equations and compute its residual."""
         cg = self._cg
         if elimination is not None:
-            elimination.complete(cg.x, elimination.t)
+            elimination.complete(cg.x, elimination.offset)
         self.K.combine(-1.0, cg.x, 1.0, f, cg.r)
         if elimination is not None:
-            elimination.condense(cg.r)
+            elimination.move_forces(cg.r)
         cg.start()
 
     def _go_on(self, f: Array, old: Elimination | None, new: Elimination | None) -> None:
-        """Let the iterate obey other equations: its residual changes near the pivots only."""
+        """Make the iterate obey other equations: its residual changes near the pivots only."""
         cg = self._cg
         if old is not None:
-            old.release(cg.r, -self._forces(old, cg.x, f))
+            old.restore_forces(cg.r, -self.K.forces_at(old.pivots, cg.x, f))
         if new is not None:
             before = cg.x[new.pivots]
-            new.complete(cg.x, new.t)
+            new.complete(cg.x, new.offset)
             moved = before - cg.x[new.pivots]
             self.K.add_forces_of(new.pivots, moved, cg.r)
-            new.condense(cg.r)
+            new.move_forces(cg.r)
         cg.start()
-
-    def _forces(self, elimination: Elimination, u: Array, f: Array) -> Array:
-        """Return ``(K u - f)[pivots]``."""
-        return self.K.forces_at(elimination.pivots, u, f)
 
     def _scale(self, f: Array, elimination: Elimination | None) -> float:
         """Return the size of the right-hand side, forces that impose the equations included."""
         square = self._cg.dot(f, f)
-        if elimination is not None and elimination.t.any():
+        if elimination is not None and elimination.offset.any():
             forces = np.zeros(len(f))
-            self.K.add_forces_of(elimination.pivots, elimination.t, forces)
+            self.K.add_forces_of(elimination.pivots, elimination.offset, forces)
             square += self._cg.dot(forces, forces)
         return float(np.sqrt(square))
 
     def _multiply(self, p: Array, q: Array) -> None:
         self.K.combine(1.0, p, 0.0, q, q)
-        if self._tied is not None:
-            self._tied.condense(q)
+        if self._equations is not None:
+            self._equations.move_forces(q)
 
     def precondition(self, r: Array, norm: float, z: Array) -> None:
         """Fill z (n,) with one cycle for r (n,), of 2-norm `norm`; it obeys the equations that hold."""
@@ -236,21 +269,18 @@ class Multigrid:
         krylov_kernels.scaled(1.0 / norm, r, top.b)
         self.hierarchy.cycle()
         krylov_kernels.scaled(norm * self.K.unit, top.x, z)
-        if self._tied is not None:
-            self._tied.complete(z)
-
-    def _stopped(self, monitor: Monitor, f: Array, elimination: Elimination | None, error: float) -> bool:
-        return monitor(self._cg.x, self.multiplier(elimination, self._cg.x, f), error)
+        if self._equations is not None:
+            self._equations.complete(z)
 
     def multiplier(self, elimination: Elimination | None, u: Array, f: Array) -> Array:
         """Return the multipliers (m,) of the equations at `u`."""
         if elimination is None:
             return np.empty(0)
-        return elimination.multiplier(self._forces(elimination, u, f))
+        return elimination.multiplier(self.K.forces_at(elimination.pivots, u, f))
 
 
 def _alike(new: Elimination | None, old: Elimination | None) -> bool:
     """Return whether two eliminations have the same pivots and nearly the same weights."""
     if new is None or old is None or not np.array_equal(new.pivots, old.pivots):
         return new is old
-    return bool(np.abs((new.tie - old.tie).data).max(initial=0.0) <= ALIKE)
+    return bool(np.abs((new.weights - old.weights).data).max(initial=0.0) <= ALIKE)

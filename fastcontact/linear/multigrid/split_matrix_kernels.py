@@ -1,8 +1,8 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Numbers in two halves: the nearest number in single precision, and in single precision what it misses.
+"""Numbers split into a high part, the nearest number in single precision, and a low part, what that misses.
 
-Together both have 48 bits. They take the room of numbers in double precision, and the first half can be used alone where
-single precision is enough. Kernels take them as a tuple (first, second), or (numbers,) where they are whole.
+Together both parts have 48 of the 53 bits of double precision. Kernels take numbers as a tuple: (high, low) where they are
+split, (numbers,) where they are not.
 """
 
 import numpy as np
@@ -12,23 +12,38 @@ from fastcontact._jit.decorators import inlined_kernel, kernel
 
 @inlined_kernel
 def entry(numbers, k):
-    """Return a number in double precision, whole or in halves."""
+    """Return number `k` in double precision, split or not."""
     if len(numbers) == 2:
         return np.float64(numbers[0][k]) + np.float64(numbers[-1][k])
     return np.float64(numbers[0][k])
 
 
 @kernel
-def split(factor, numbers, first, second):
-    """Fill the halves of ``factor numbers``; `second` may be in the place of the beginning of `numbers`."""
+def split(factor, numbers, high, low):
+    """Fill the parts (n,) of ``factor numbers``; `low` may be in the place of the beginning of `numbers`."""
     for k in range(numbers.shape[0]):
         number = factor * numbers[k]
-        first[k] = number
-        second[k] = number - np.float64(first[k])
+        high[k] = number
+        low[k] = number - np.float64(high[k])
 
 
 @kernel
-def join(factor, numbers, out):
-    """Fill `out` with ``factor numbers``."""
-    for k in range(out.shape[0]):
-        out[k] = factor * entry(numbers, k)
+def forces_at(dofs, indptr, indices, K, factor, size, u, f, out):
+    """Fill `out` (m,) with ``(factor K u - f)[dofs]``; the numbers of the block matrix K come as a tuple."""
+    for p in range(dofs.shape[0]):
+        i, a = dofs[p] // size, dofs[p] % size
+        s = 0.0
+        for k in range(indptr[i], indptr[i + 1]):
+            for b in range(size):
+                s += entry(K, (k * size + a) * size + b) * u[indices[k] * size + b]
+        out[p] = factor * s - f[dofs[p]]
+
+
+@kernel
+def forces_of(dofs, values, indptr, indices, K, factor, size, out):
+    """Add ``factor K[:, dofs] values`` for a symmetric K to `out` (n,)."""
+    for p in range(dofs.shape[0]):
+        i, a = dofs[p] // size, dofs[p] % size
+        for k in range(indptr[i], indptr[i + 1]):
+            for b in range(size):
+                out[indices[k] * size + b] += factor * entry(K, (k * size + a) * size + b) * values[p]

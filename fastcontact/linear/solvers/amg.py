@@ -1,32 +1,31 @@
-"""Multigrid, and what takes over where it does not converge.
+"""Multigrid as a linear solver, and the factorisation that replaces it where it does not converge.
 
-Equations ``B u = c`` are eliminated, see `_multigrid`. Those with a compliance of their own cannot be: they go through the
-compliance of their degrees of freedom, one solution each, kept for the whole analysis. Where the iteration stalls, on thin
-or nearly incompressible parts, factors take over for the rest of the analysis, if the matrix is not too large.
+Equations ``B u = c`` are eliminated, see `multigrid.solver`. Those with a compliance of their own cannot be: they go through
+columns of K^-1, one solution each, kept for the whole analysis. Where the iteration stalls, on thin or nearly incompressible
+parts, a factorisation replaces it for the rest of the analysis, if the matrix is not too large.
 """
 
 from __future__ import annotations
 
+import functools
 import logging
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.compliance import multipliers, reduced
-from fastcontact.linear.elimination.elimination import Elimination, RepeatedError, eliminate
+from fastcontact.linear.elimination.elimination import Elimination, eliminate
+from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.multigrid.solver import Multigrid, StallError
-from fastcontact.linear.protocol import Drag, Loaded, Monitor, Product
-
-if TYPE_CHECKING:
-    from fastcontact.linear.solvers.direct import Direct
+from fastcontact.linear.protocol import FrictionTerms, Loaded, Product
+from fastcontact.linear.solvers.direct import Direct
 
 log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
-# Unknowns up to which factors take over, by the number of components of a displacement.
+# Unknowns up to which a factorisation replaces multigrid, by the number of components of a displacement.
 FACTORS_UP_TO = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
 
 
@@ -36,7 +35,7 @@ class Amg(Multigrid):
     Attributes
     ----------
     instead : Direct or None
-        What took over.
+        The factorisation that replaced multigrid.
     gave_up : str
         Why.
     """
@@ -59,19 +58,19 @@ class Amg(Multigrid):
 
     @property
     def iterative(self) -> bool:
-        """See `LinearSolver`; not any more once factors have taken over."""
+        """See `LinearSolver`; False once a factorisation has replaced multigrid."""
         return self.instead is None
 
     def prepare(
-        self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, own: bool = False
+        self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, release: bool = False
     ) -> bsr_array | Product:
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
-        self.build(K, rigid_modes, own)
+        self.build(K, rigid_modes, release)
         self._involved, self.instead, self.gave_up = involved, None, ""
-        return self.K if own else K
+        return self.K if release else K
 
     def load(self, f: Array) -> Loaded:
-        """Return the prepared matrix with right-hand side `f`."""
+        """Return the prepared matrix with right-hand side `f` (n,)."""
         return _Loaded(self, f)
 
     def snapshot(self) -> Any:
@@ -82,25 +81,25 @@ class Amg(Multigrid):
         """See `LinearSolver.put_back`."""
 
     def memory(self) -> dict[str, Any]:
-        """See `LinearSolver.memory`: what the hierarchy is tied for, how it was strengthened, columns of ``K^-1``."""
+        """See `LinearSolver.memory`: equations and bounds of the hierarchy, columns of K^-1. Result files hold these keys."""
         tied = None
-        if self._tied_as is not None:
-            rows = self._tied_as.tie
-            arrays = (self._tied_as.pivots, rows.indptr, rows.indices, rows.data)
+        if self._hierarchy_equations is not None:
+            rows = self._hierarchy_equations.weights
+            arrays = (self._hierarchy_equations.pivots, rows.indptr, rows.indices, rows.data)
             tied = dict(zip(("pivots", "indptr", "indices", "data"), arrays, strict=True))
-        kept = {"precision": self.precision, "bounds": self.hierarchy.bounds, "asked": list(self.compliance.asked)}
+        kept = {"precision": self.precision, "bounds": self.hierarchy.bounds, "asked": list(self.columns.asked)}
         instead = None if self.instead is None else {"why": self.gave_up, **self.instead.memory()}
         return {**kept, "tied": tied, "instead": instead}
 
     def remember(self, memory: dict[str, Any]) -> None:
         """See `LinearSolver.remember`."""
         if memory.get("instead"):
-            self._take_factors(memory["instead"]["why"]).remember(memory["instead"])
+            self._factorise(memory["instead"]["why"]).remember(memory["instead"])
             return
         if memory["precision"] != self.precision:
             self.build_in(memory["precision"])
-        self.compliance.ask_again(memory["asked"])
-        self.tie(memory["tied"] and _tied_again(memory["tied"], self.hierarchy.n))
+        self.columns.ask_again(memory["asked"])
+        self.constrain(memory["tied"] and _elimination(memory["tied"], self.hierarchy.n))
         self.hierarchy.bounds = memory["bounds"]
 
     def give_up(self, stalled: StallError) -> None:
@@ -113,11 +112,9 @@ class Amg(Multigrid):
         """
         if self.K.shape[0] > FACTORS_UP_TO[self.K.blocksize[0]]:
             raise stalled
-        self._take_factors(f"multigrid gave up and factors took over, which cost more time and memory: {stalled}")
+        self._factorise(f"multigrid gave up and factors took over, which cost more time and memory: {stalled}")
 
-    def _take_factors(self, why: str) -> Direct:
-        from fastcontact.linear.solvers.direct import Direct
-
+    def _factorise(self, why: str) -> Direct:
         log.warning("%s", why)
         self.gave_up, self.instead = why, Direct()
         self.instead.counters = self.counters
@@ -125,111 +122,58 @@ class Amg(Multigrid):
         return self.instead
 
 
-def _tied_again(tied: dict[str, Any], n: int) -> Elimination:
-    """Return the elimination that a hierarchy was tied for; right-hand side and multipliers are of no more use."""
+def _elimination(tied: dict[str, Any], n: int) -> Elimination:
+    """Return the elimination of `Amg.memory`; its offsets and multipliers are not needed any more."""
     m = len(tied["pivots"])
     rows = csr_array((tied["data"], tied["indices"], tied["indptr"]), shape=(m, n))
     return Elimination(tied["pivots"], rows, np.zeros(m), rows, csr_array((m, m)))
 
 
-class _Iterated:
-    """The matrix with a right-hand side, solved by multigrid."""
+def _or_by_factors(method: Callable[..., Any]) -> Callable[..., Any]:
+    """Let the method of a factorisation replace that of multigrid from where the iteration stalls."""
 
-    def __init__(self, solver: Amg, f: Array) -> None:
-        self._solver, self._f = solver, f
-        self._free: Array | None = None
-
-    def solve(
-        self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
-        monitor: Monitor | None = None, tolerance: float | None = None,
-    ) -> tuple[Array, Array]:  # fmt: skip
-        solver = self._solver
-        if C is None or not B.shape[0]:
+    @functools.wraps(method)
+    def found(self: _Loaded, *args: Any, **options: Any) -> Any:
+        if self._solver.instead is None:
             try:
-                elimination = eliminate(B, c) if B.shape[0] else None
-            except RepeatedError as repeated:
-                log.info("%s: their compliance is formed", repeated)
-            else:
-                u = solver.solution(self._f, elimination, guess, monitor, tolerance)
-                return u, solver.multiplier(elimination, u, self._f)
-        multiplier = multipliers(solver.compliance, B, c - B @ self._unloaded(), C)
-        return solver.solution(self._f + B.T @ multiplier, None, guess), multiplier
+                return method(self, *args, **options)
+            except StallError as stalled:
+                self._solver.give_up(stalled)
+        return getattr(self._factored, method.__name__)(*args, **options)
 
-    def oblique(
-        self, B: csr_array, c: Array, groups: NDArray[np.intp], guess: Array, tolerance: float,
-        drag: Drag | None = None,
-    ) -> tuple[Array, Array]:  # fmt: skip
-        if drag is None:
-            elimination = eliminate(B, c, groups=groups) if B.shape[0] else None
-            u = self._solver.solution(self._f, elimination, guess, tolerance=tolerance)
-            return u, self._solver.multiplier(elimination, u, self._f)
-        elimination, springs = eliminate(B, c, drag.through, groups), drag.springs
-        f = self._f if drag.push is None else self._f + drag.push
-        u = self._solver.oblique(f, elimination, springs, guess, tolerance)
-        forces = f - (springs @ u if springs is not None else 0.0)
-        return u, self._solver.multiplier(elimination, u, forces)
-
-    def reduce(self, R: csr_array) -> tuple[Array, Array]:
-        return R @ self._unloaded(), reduced(self._solver.compliance, R)
-
-    def near(self, force: Array, elsewhere: Array | None) -> Array:
-        return self._solver.solution(self._f + force, None, None) if force.any() else self._unloaded()
-
-    def everywhere(self, force: Array, u: Array | None = None) -> Array:
-        return self.near(force, None) if u is None else u
-
-    def condensed(self) -> None:
-        return None
-
-    def _unloaded(self) -> Array:
-        """Return the displacement without contact forces."""
-        if self._free is None:
-            self._free = self._solver.solution(self._f, None, None)
-        return self._free
+    return found
 
 
-class _Loaded:
-    """See `linear._solver.Oblique`: by multigrid, and by factors from where that stalls."""
+class _Loaded(LoadedIteration):
+    """See `linear.protocol.LoadedNonsymmetric`."""
 
-    def __init__(self, solver: Amg, f: Array) -> None:
-        self._solver, self._f = solver, np.ascontiguousarray(f, float)
-        self._iterated = _Iterated(solver, self._f)
-        self._factored: Loaded | None = None
+    solve = _or_by_factors(LoadedIteration.solve)
+    flexibility = _or_by_factors(LoadedIteration.flexibility)
+    involved_solution = _or_by_factors(LoadedIteration.involved_solution)
+    full_solution = _or_by_factors(LoadedIteration.full_solution)
+
+    @functools.cached_property
+    def _factored(self) -> Loaded:
+        return self._solver.instead.load(self._f)
 
     def diagonal(self) -> Array:
         return self._solver.diagonal()
 
-    def oblique(self, *args: Any, **options: Any) -> tuple[Array, Array]:
-        if self._solver.instead is not None:
+    def solve_nonsymmetric(
+        self, B: csr_array, c: Array, groups: NDArray[np.intp], guess: Array, tolerance: float,
+        friction: FrictionTerms | None = None,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        solver, f = self._solver, self._f
+        if solver.instead is not None:
             raise ConvergenceError("factors give the compliance of friction")
-        return self._iterated.oblique(*args, **options)
-
-    def solve(self, *args: Any, **options: Any) -> tuple[Array, Array]:
-        return self._found(lambda loaded: loaded.solve(*args, **options))
-
-    def reduce(self, R: csr_array) -> tuple[Array, Array]:
-        return self._found(lambda loaded: loaded.reduce(R))
-
-    def near(self, force: Array, elsewhere: Array | None) -> Array:
-        return self._found(lambda loaded: loaded.near(force, elsewhere))
-
-    def everywhere(self, force: Array, u: Array | None = None) -> Array:
-        return self._found(lambda loaded: loaded.everywhere(force, u))
-
-    def condensed(self) -> None:
-        return None
-
-    def _found(self, by: Callable[[Loaded], Any]) -> Any:
-        """Return what a call gives; where multigrid stalls, what factors give."""
-        if self._solver.instead is None:
-            try:
-                return by(self._iterated)
-            except StallError as stalled:
-                self._solver.give_up(stalled)
-        if self._factored is None:
-            assert self._solver.instead is not None
-            self._factored = self._solver.instead.load(self._f)
-        return by(self._factored)
+        if friction is None:
+            elimination = eliminate(B, c, groups=groups) if B.shape[0] else None
+            u = solver.solution(f, elimination, guess, tolerance=tolerance)
+            return u, solver.multiplier(elimination, u, f)
+        elimination, springs = eliminate(B, c, friction.rows, groups), friction.springs
+        f = f if friction.forces is None else f + friction.forces
+        u = solver.nonsymmetric_solution(f, elimination, springs, guess, tolerance)
+        return u, solver.multiplier(elimination, u, f - (springs @ u if springs is not None else 0.0))
 
 
 SOLVER = Amg

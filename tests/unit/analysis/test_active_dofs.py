@@ -118,11 +118,13 @@ def test_the_condensed_problem_is_that_of_all_unknowns():
     free, none = condensed.solve(own[:0], c[:0])
     np.testing.assert_array_equal(free, loaded.solve(B[:0], c[:0])[0][solver.last])
     assert not len(none)
-    for found, expected in zip(condensed.reduce(own), loaded.reduce(B), strict=True):
+    for found, expected in zip(condensed.flexibility(own), loaded.flexibility(B), strict=True):
         np.testing.assert_allclose(found, expected, atol=1e-10 * np.abs(expected).max())
     force = rng.normal(size=k)
-    near = condensed.near(force, None)
+    near = condensed.involved_solution(force, None)
     everywhere = np.zeros(n)
     everywhere[solver.last] = force
-    np.testing.assert_allclose(near, loaded.near(everywhere, None)[solver.last], atol=1e-10 * np.abs(near).max())
-    np.testing.assert_array_equal(condensed.everywhere(force), near)
+    np.testing.assert_allclose(
+        near, loaded.involved_solution(everywhere, None)[solver.last], atol=1e-10 * np.abs(near).max()
+    )
+    np.testing.assert_array_equal(condensed.full_solution(force), near)

@@ -1,4 +1,4 @@
-"""Friction on eliminated constraints: pivots in groups, oblique multipliers, the iteration, and what all of it gives."""
+"""Friction on eliminated constraints: pivots in groups, multipliers through other rows, the iteration, and results."""
 
 import numpy as np
 import pytest
@@ -10,9 +10,9 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.friction import eliminated
 from fastcontact.contact.configuration import Configuration
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.krylov.gcr import KEPT, ConjugateResiduals
+from fastcontact.linear.krylov.iterations import KEPT, ConjugateResiduals
 from fastcontact.linear.multigrid import solver
-from fastcontact.linear.protocol import Drag
+from fastcontact.linear.protocol import FrictionTerms
 from fastcontact.linear.solvers import amg
 
 BOTH = {"secondary": "CONT_SPHERE", "primary": "CONT_BLOCK"}
@@ -71,7 +71,7 @@ def test_elimination_and_compliance_agree_and_no_column_is_asked_for(formulation
         )
         slid += int((b.active & ~b.sticking).sum())
     assert slid > 5
-    assert analysis.solver.compliance.asked == []
+    assert analysis.solver.columns.asked == []
 
 
 def test_what_fails_on_eliminated_constraints_is_solved_on_their_compliance(monkeypatch, caplog):
@@ -119,7 +119,7 @@ def test_conjugate_residuals_solve_what_is_not_symmetric_and_never_grow(n):
     assert not iteration.step(multiply, precondition)  # nowhere to go
 
 
-def test_oblique_equations_with_springs_against_a_dense_solution():
+def test_nonsymmetric_equations_with_springs_against_a_dense_solution():
     analysis = Stepping(rubbing(), "amg", 1e-12, Criteria())
     solver, n = analysis.solver, analysis.model.n_dofs
     rng = np.random.default_rng(5)
@@ -132,23 +132,24 @@ def test_oblique_equations_with_springs_against_a_dense_solution():
     through, c = csr_array(normal + 0.3 * first), 1e-3 * rng.normal(size=4)
     springs = csr_array(50.0 * second.T @ second)
     push = -0.2 * np.asarray(second.T @ np.ones(4))
-    u, multiplier = solver.load(f).oblique(normal, c, np.arange(4), np.zeros(n), 1e-12, Drag(through, springs, push))
+    u, multiplier = solver.load(f).solve_nonsymmetric(
+        normal, c, np.arange(4), np.zeros(n), 1e-12, FrictionTerms(through, springs, push)
+    )
     out = analysis.system.matrix @ u + springs @ u - f - push - through.T @ multiplier
     assert np.abs(normal @ u - c).max() < 1e-12
     assert np.abs(out).max() < 1e-8 * np.abs(f).max()
 
 
 def test_an_iteration_that_does_not_end_is_told(monkeypatch):
-    from fastcontact.linear.elimination import nonsymmetric
 
-    monkeypatch.setattr(nonsymmetric, "MAX_ITERATIONS", 1)
+    monkeypatch.setattr(solver, "MAX_NONSYMMETRIC", 1)
     analysis = Stepping(rubbing(), "amg", 1e-12, Criteria())
     n = analysis.model.n_dofs
     rows = csr_array((np.ones(2), ([0, 0], np.flatnonzero(analysis.system.free)[[0, 40]])), shape=(1, n))
-    drag = Drag(csr_array(2.0 * rows))
+    drag = FrictionTerms(csr_array(2.0 * rows))
     f = np.where(analysis.system.free, 1.0, 0.0)
     with pytest.raises(ConvergenceError, match=r"conjugate residuals stand at .* times the tolerance"):
-        analysis.solver.load(f).oblique(rows, np.zeros(1), np.zeros(1, np.int64), np.zeros(n), 1e-12, drag)
+        analysis.solver.load(f).solve_nonsymmetric(rows, np.zeros(1), np.zeros(1, np.int64), np.zeros(n), 1e-12, drag)
 
 
 def stuck(monkeypatch, limit=None):
@@ -185,7 +186,9 @@ def test_nothing_is_eliminated_once_factors_have_taken_over():
     analysis.solver.give_up(solver.StallError("stalled"))
     none = csr_array((0, n))
     with pytest.raises(ConvergenceError, match="factors give the compliance of friction"):
-        analysis.solver.load(np.zeros(n)).oblique(none, np.empty(0), np.empty(0, np.int64), np.zeros(n), 1e-10)
+        analysis.solver.load(np.zeros(n)).solve_nonsymmetric(
+            none, np.empty(0), np.empty(0, np.int64), np.zeros(n), 1e-10
+        )
     assert "gave up" in repr(analysis.solver)
 
 

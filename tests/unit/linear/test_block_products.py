@@ -15,18 +15,13 @@ def row_times(indices, numbers, x, begin, end, rows, cols):
 
 
 @kernel
-def row_sizes(indices, numbers, x, begin, end, rows, cols):
-    return block_products.row_sizes(indices, numbers, x, begin, end, rows, cols)
+def add_product(to, at, left, first, right, second, sizes):
+    block_products.add_product(to, at, left, first, right, second, sizes)
 
 
 @kernel
-def add_product(to, at, left, first, right, second, rows, inner, cols):
-    block_products.add_product(to, at, left, first, right, second, rows, inner, cols)
-
-
-@kernel
-def add_transposed(to, at, left, first, right, second, rows, inner, cols):
-    block_products.add_transposed(to, at, left, first, right, second, rows, inner, cols)
+def add_transposed(to, at, left, first, right, second, sizes):
+    block_products.add_transposed(to, at, left, first, right, second, sizes)
 
 
 def surrounded(numbers, low, high):
@@ -36,19 +31,19 @@ def surrounded(numbers, low, high):
     return found
 
 
-@pytest.mark.parametrize(("precision", "halves"), [(np.float32, False), (np.float64, False), (np.float64, True)])
+@pytest.mark.parametrize(("precision", "split"), [(np.float32, False), (np.float64, False), (np.float64, True)])
 @pytest.mark.parametrize(("m", "n"), SIZES)
-def test_a_row_times_a_vector(m, n, precision, halves):
+def test_a_row_times_a_vector(m, n, precision, split):
     rng = np.random.default_rng(m + 10 * n)
     indices, x = rng.permutation(9).astype(np.int32), rng.normal(size=9 * n).astype(precision)
-    kind = np.float32 if halves else precision
-    numbers = tuple(rng.normal(size=9 * m * n).astype(kind) for _ in range(1 + halves))
+    kind = np.float32 if split else precision
+    numbers = tuple(rng.normal(size=9 * m * n).astype(kind) for _ in range(1 + split))
     size = np.abs(np.asarray(numbers)).max() * np.abs(x).max() * 9 * n
     for begin, end in ((0, 9), (0, 1), (8, 9), (3, 7), (4, 4)):
         given = tuple(surrounded(part, begin * m * n, end * m * n) for part in numbers)
         met = np.where(np.isin(np.repeat(np.arange(9), n), indices[begin:end]), x, np.nan).astype(precision)
         found = row_times(indices, given, met, begin, end, (0,) * m, (0,) * n)
-        expected = block_products.row_times_one_by_one(indices, given, met, begin, end, (0,) * m, (0,) * n)
+        expected = block_products.row_times_plain(indices, given, met, begin, end, (0,) * m, (0,) * n)
         assert len(found) == m
         np.testing.assert_allclose(found, expected, rtol=0, atol=np.finfo(precision).eps * size)
         exact = [part.astype(float).reshape(9, m, n) for part in numbers]
@@ -59,38 +54,26 @@ def test_a_row_times_a_vector(m, n, precision, halves):
         )  # fmt: skip
 
 
-@pytest.mark.parametrize(("kind", "precision"), [(np.float32, np.float64), (np.float64, np.float64)])
-@pytest.mark.parametrize(("m", "n"), SIZES)
-def test_sizes_of_a_row_times_a_vector(m, n, kind, precision):
-    rng = np.random.default_rng(m + 10 * n)
-    indices, x = rng.permutation(9).astype(np.int32), rng.normal(size=9 * n).astype(precision)
-    numbers = (rng.normal(size=9 * m * n).astype(kind),)
-    given = (indices, numbers, x, 2, 8, (0,) * m, (0,) * n)
-    np.testing.assert_allclose(row_sizes(*given), block_products.row_sizes_one_by_one(*given), rtol=1e-14)
-    blocks, meets = np.abs(numbers[0].astype(float)).reshape(9, m, n)[2:8], np.abs(x).reshape(9, n)[indices[2:8]]
-    np.testing.assert_allclose(row_sizes(*given), np.einsum("kmn,kn->m", blocks, meets), rtol=1e-12)
-
-
-@pytest.mark.parametrize("halves", [False, True])
+@pytest.mark.parametrize("split", [False, True])
 @pytest.mark.parametrize("precision", [np.float32, np.float64])
 @pytest.mark.parametrize(("m", "n"), SIZES)
 @pytest.mark.parametrize("k", [1, 2, 3, 6])
-def test_products_that_are_added(m, k, n, precision, halves):
+def test_products_that_are_added(m, k, n, precision, split):
     rng = np.random.default_rng(m + 10 * n + 100 * k)
     sizes = (0,) * m, (0,) * k, (0,) * n
-    left = tuple(rng.normal(size=5 + m * k).astype(np.float32 if halves else np.float64) for _ in range(1 + halves))
+    left = tuple(rng.normal(size=5 + m * k).astype(np.float32 if split else np.float64) for _ in range(1 + split))
     right, to = rng.normal(size=7 + k * n).astype(precision), rng.normal(size=4 + m * n)
     left = tuple(surrounded(part, 3, 3 + m * k) for part in left)
     right = surrounded(right, 2, 2 + k * n)
     exact = np.sum([part[3 : 3 + m * k].astype(float) for part in left], axis=0)
     B = right[2 : 2 + k * n].reshape(k, n).astype(float)
     for compiled, plain, A in (
-        (add_product, block_products.add_product_one_by_one, exact.reshape(m, k)),
-        (add_transposed, block_products.add_transposed_one_by_one, exact.reshape(k, m).T),
+        (add_product, block_products.add_product_plain, exact.reshape(m, k)),
+        (add_transposed, block_products.add_transposed_plain, exact.reshape(k, m).T),
     ):
         found, expected = to.copy(), to.copy()
-        compiled(found, 1, left, 3, right, 2, *sizes)
-        plain(expected, 1, left, 3, right, 2, *sizes)
+        compiled(found, 1, left, 3, right, 2, sizes)
+        plain(expected, 1, left, 3, right, 2, sizes)
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14 * k)
         np.testing.assert_array_equal(found[[0, *range(1 + m * n, 4 + m * n)]], to[[0, *range(1 + m * n, 4 + m * n)]])
         np.testing.assert_allclose(found[1 : 1 + m * n], to[1 : 1 + m * n] + (A @ B).ravel(), rtol=0, atol=1e-14 * k)

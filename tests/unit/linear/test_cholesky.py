@@ -82,8 +82,8 @@ def test_supernodes_hold_every_entry_and_no_more_zeros_than_asked(A, rule, monke
     n, late = A.shape[0], np.arange(A.shape[0]) > 0.7 * A.shape[0]
     monkeypatch.setattr(factorisation, "WIDTHS", rule[0])
     monkeypatch.setattr(factorisation, "SHARES", rule[1])
-    found = factorisation._tree(A)
-    first, begin, rows = factorisation._supernodes(A, found, late[found.order])
+    found = factorisation.elimination_tree(A)
+    first, begin, rows = factorisation.supernodes(A, found, late[found.order])
     L = filled(A[found.order][:, found.order])
     shown = np.zeros((n, n), bool)
     for s in range(len(first) - 1):

@@ -1,4 +1,4 @@
-"""Multigrid against NumPy and SciPy: kernels, set-up, ties; bits, bytes and allocations."""
+"""Multigrid against NumPy and SciPy: kernels, set-up, equations; bits, bytes and allocations."""
 
 import logging
 import tracemalloc
@@ -12,15 +12,16 @@ import fastcontact as fc
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.elasticity.system import supports_apart
 from fastcontact.errors import ModelError
-from fastcontact.linear.elimination.constrained_matrix import Ties
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.krylov import krylov_kernels
-from fastcontact.linear.krylov.pcg import ConjugateGradients
+from fastcontact.linear.krylov.iterations import ConjugateGradients
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
 from fastcontact.linear.multigrid.coarse import Coarse
+from fastcontact.linear.multigrid.constrained_hierarchy import ConstrainedHierarchy
 from fastcontact.linear.multigrid.hierarchy import Hierarchy, chebyshev, largest_eigenvalue, product
-from fastcontact.linear.multigrid.matrix import Matrix
+from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.solvers.amg import Amg
+from fastcontact.linear.solvers.pyamg import Pyamg
 
 
 def problem(divisions=(7, 6, 5)):
@@ -36,7 +37,7 @@ def problem(divisions=(7, 6, 5)):
 
 def matrix_of(K):
     size = K.blocksize
-    return Matrix(K.indptr, K.indices, K.data.reshape(-1), (0,) * size[0], (0,) * size[1])
+    return BlockMatrix(K.indptr, K.indices, K.data.reshape(-1), (0,) * size[0], (0,) * size[1])
 
 
 def scipy_of(A):
@@ -186,7 +187,7 @@ def test_the_spectrum_is_bounded_and_chebyshev_stays_small_on_its_upper_part():
         assert np.abs(error).max() == pytest.approx(np.abs(error[-1]), rel=1e-6)
 
 
-def tied(B, n):
+def eliminated(B, n):
     """Return T of an elimination as a matrix."""
     elimination = eliminate(B, np.zeros(B.shape[0]))
     keep = np.ones(n)
@@ -194,11 +195,11 @@ def tied(B, n):
     spread = csr_array(
         (np.ones(B.shape[0]), (elimination.pivots, np.arange(B.shape[0]))), shape=(n, B.shape[0])
     )  # fmt: skip
-    return elimination, diags_array(keep).tocsr() + spread @ elimination.tie
+    return elimination, diags_array(keep).tocsr() + spread @ elimination.weights
 
 
 def contact_rows(fixed, count=6):
-    """Return rows that tie single unknowns to four others, like those of nodes facing quadrangles."""
+    """Return rows on single unknowns and four others, like those of nodes facing quadrangles."""
     rng = np.random.default_rng(4)
     free = rng.permutation(np.flatnonzero(~fixed))
     B = np.zeros((count, len(fixed)))
@@ -208,14 +209,14 @@ def contact_rows(fixed, count=6):
     return csr_array(B)
 
 
-def test_ties_change_the_levels_to_those_of_the_eliminated_matrix_and_back():
+def test_equations_change_the_levels_to_those_of_the_eliminated_matrix_and_back():
     K, modes, _, fixed = problem((9, 8, 8))
     hierarchy = Hierarchy(matrix_of(K), modes)
-    ties = Ties(hierarchy, matrix_of(K))
-    elimination, T = tied(contact_rows(fixed), len(fixed))
+    constrained = ConstrainedHierarchy(hierarchy, matrix_of(K))
+    elimination, T = eliminated(contact_rows(fixed), len(fixed))
     before = [level.inverse.copy() for level in hierarchy.levels]
     bounds = [level.bound for level in hierarchy.levels]
-    ties.tie(elimination)
+    constrained.constrain(elimination)
     A, top = (T.T @ K @ T).tocsr(), hierarchy.levels[0]
     blocks = np.stack([A[3 * i : 3 * i + 3, 3 * i : 3 * i + 3].toarray() for i in range(len(fixed) // 3)])
     expected = np.linalg.pinv(blocks, rcond=1e-10, hermitian=True)
@@ -235,7 +236,7 @@ def test_ties_change_the_levels_to_those_of_the_eliminated_matrix_and_back():
             level.subtract_product(x, np.zeros(level.n), r)
             assert np.abs(r + A @ x).max() < 1e-11 * np.abs(A @ x).max()
             W = scipy_of(level.P)
-    ties.tie(None)
+    constrained.constrain(None)
     assert all(np.array_equal(level.inverse, old) for level, old in zip(hierarchy.levels, before, strict=True))
     assert [level.bound for level in hierarchy.levels] == bounds
 
@@ -250,7 +251,7 @@ def test_eliminated_equations_hold_for_any_unknowns(coupled):
     elimination = eliminate(kept, c)
     assert np.array_equal(kept.toarray(), B)  # untouched
     u = rng.normal(size=20)
-    elimination.complete(u, elimination.t)
+    elimination.complete(u, elimination.offset)
     assert B @ u == pytest.approx(c, abs=1e-12)
     multiplier = rng.normal(size=5)
     assert elimination.multiplier((B.T @ multiplier)[elimination.pivots]) == pytest.approx(multiplier)
@@ -258,10 +259,10 @@ def test_eliminated_equations_hold_for_any_unknowns(coupled):
     force, motion = rng.normal(size=20), rng.normal(size=20)
     elimination.complete(motion)
     work = force @ motion
-    elimination.condense(force)
+    elimination.move_forces(force)
     assert force @ motion == pytest.approx(work)
     assert not force[elimination.pivots].any()
-    assert not np.isin(elimination.pivots, elimination.tie.indices).any()
+    assert not np.isin(elimination.pivots, elimination.weights.indices).any()
     if not coupled:
         assert elimination.pivots.tolist() == [0, 1, 2, 3, 4]
 
@@ -271,7 +272,7 @@ def test_many_coupled_equations_are_assigned_unknowns():
     B = csr_array((rng.random((450, 900)) < 0.01) * rng.normal(size=(450, 900)) + np.eye(450, 900, 3))
     elimination = eliminate(B, np.ones(450))
     u = rng.normal(size=900)
-    elimination.complete(u, elimination.t)
+    elimination.complete(u, elimination.offset)
     assert np.abs(B @ u - 1.0).max() < 1e-8 * np.abs(u).max()
 
 
@@ -280,6 +281,19 @@ def prepared(precision="single", scale=1.0, divisions=(12, 11, 10)):
     solver = Amg(1e-10, precision)
     solver.prepare(bsr_array((scale * K.data, K.indices, K.indptr), shape=K.shape), modes)
     return solver, scale * f, fixed
+
+
+@pytest.mark.parametrize("equations", [0, 6])
+def test_pyamg_finds_the_same_and_takes_as_many_iterations(equations):
+    solver, f, fixed = prepared()
+    K, modes, _, _ = problem((12, 11, 10))
+    oracle = Pyamg(1e-10)
+    oracle.prepare(K, modes)
+    B, c = contact_rows(fixed, 6)[:equations], np.full(equations, 1e-3)
+    (u, multiplier), (v, expected) = (each.load(f).solve(B, c) for each in (solver, oracle))
+    assert np.abs(u - v).max() < 1e-8 * np.abs(v).max()
+    assert np.abs(multiplier - expected).max(initial=0.0) < 1e-7 * np.abs(K @ v).max()
+    assert solver.counters.iterations <= oracle.counters.iterations + 3
 
 
 def test_bits_do_not_depend_on_the_number_of_threads():
@@ -314,7 +328,7 @@ def test_units_do_not_change_the_iterations():
     counts, solutions = [], []
     for scale in (1.0, 1e-25, 1e30):
         solver, f, _ = prepared(scale=scale)
-        solutions.append(solver.load(f).everywhere(np.zeros(len(f))))
+        solutions.append(solver.load(f).full_solution(np.zeros(len(f))))
         counts.append(solver.counters.iterations)
     assert counts[0] == counts[1] == counts[2]
     assert solutions[1] == pytest.approx(solutions[0], rel=1e-6, abs=1e-9 * np.abs(solutions[0]).max())
@@ -323,7 +337,7 @@ def test_units_do_not_change_the_iterations():
 def test_both_precisions_agree_and_single_takes_half_the_memory():
     (single, f, _), (double, _, _) = prepared(), prepared("double")
     zero = np.zeros(len(f))
-    u, v = single.load(f).everywhere(zero), double.load(f).everywhere(zero)
+    u, v = single.load(f).full_solution(zero), double.load(f).full_solution(zero)
     assert np.abs(u - v).max() < 1e-8 * np.abs(v).max()
     assert abs(single.counters.iterations - double.counters.iterations) <= 1
     assert single.hierarchy.nbytes < 0.62 * double.hierarchy.nbytes
@@ -366,7 +380,7 @@ def test_a_bound_that_is_too_low_is_noticed_and_raised(caplog):
     solver.hierarchy._free_bounds = [level.bound for level in solver.hierarchy.levels]
     solver.hierarchy.set_bounds()
     with caplog.at_level(logging.INFO, logger="fastcontact"):
-        u = solver.load(f).everywhere(np.zeros(len(f)))
+        u = solver.load(f).full_solution(np.zeros(len(f)))
     K = problem((12, 11, 10))[0]
     assert np.abs(K @ u - f).max() < 1e-8 * np.abs(f).max()
 

@@ -12,7 +12,7 @@ from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.elasticity.system import supports_apart
 from fastcontact.linear import choice as linear
 from fastcontact.linear.cholesky import triangular_kernels
-from fastcontact.linear.cholesky.ordering import fill_reducing, reordered
+from fastcontact.linear.cholesky.factorisation import fill_reducing, reordered
 from fastcontact.linear.factors.known_loads import KnownLoads
 
 FACTORED = ["direct", "cholmod"]
@@ -45,14 +45,22 @@ def lower(n, density, seed):
     return csc_array(L)
 
 
+def by_supernodes(L):
+    """Return L as the kernels take it: rows below that neighbouring columns share, once."""
+    below = [L.indices[L.indptr[j] + 1 : L.indptr[j + 1]].tolist() for j in range(L.shape[0])]
+    first = [j for j in range(len(below)) if j == 0 or below[j - 1] != [j, *below[j]]]
+    ends = [*first[1:], len(below)]
+    rows = [below[end - 1] for end in ends]
+    begin = np.concatenate([[0], np.cumsum([len(part) for part in rows])])
+    return L.indptr, L.data, np.array([*first, len(below)]), begin, np.concatenate(rows).astype(np.intc)
+
+
 @pytest.mark.parametrize(("n", "density"), [(1, 0.0), (7, 0.0), (40, 0.05), (60, 0.3), (30, 1.0)])
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_triangular_kernels_are_those_of_numpy(n, density, seed):
     L = lower(n, density, seed)
     dense, b = L.toarray(), np.random.default_rng(seed).normal(size=n)
-    first, begin, rows = np.empty(n + 1, np.int64), np.empty(n + 1, np.int64), L.indices.copy()
-    count = triangular_kernels.supernodes(L.indptr, rows, first, begin)
-    shape = L.indptr, L.data, first[: count + 1], begin[: count + 1], rows[: begin[count]]
+    shape = by_supernodes(L)
     x = b.copy()
     triangular_kernels.forward(*shape, x)
     np.testing.assert_allclose(dense @ x, b, atol=1e-13)
@@ -65,13 +73,6 @@ def test_triangular_kernels_are_those_of_numpy(n, density, seed):
     triangular_kernels.backward(*shape, given, x)
     np.testing.assert_array_equal(x[given], b[given])
     np.testing.assert_allclose((dense.T @ x)[~given], b[~given], atol=1e-13)
-
-
-def test_columns_with_the_same_rows_share_them():
-    L = lower(30, 1.0, 0)
-    first, begin = np.empty(31, np.int64), np.empty(31, np.int64)
-    assert triangular_kernels.supernodes(L.indptr, L.indices.copy(), first, begin) == 1
-    assert begin[1] == 0
 
 
 def test_the_order_keeps_factors_as_small_as_superlu_does():
@@ -105,17 +106,17 @@ def test_solutions_are_those_of_dense_algebra(name, last, shape):
 def test_contact_takes_its_compliance_and_all_displacements_from_the_factors(name):
     K, top, solver = prepared(name)
     exact = np.linalg.inv(K.toarray())
-    np.testing.assert_allclose(solver.compliance.of(top), exact[np.ix_(top, top)], atol=1e-13 * np.abs(exact).max())
+    np.testing.assert_allclose(solver.columns.of(top), exact[np.ix_(top, top)], atol=1e-13 * np.abs(exact).max())
     force = np.zeros(K.shape[0])
     force[top[5:9]] = [1.0, -2.0, 0.5, 3.0]
     f = np.random.default_rng(4).normal(size=K.shape[0])
     loaded, u = solver.load(f), exact @ (f + force)
     before, elsewhere = solver.counters.iterations, np.full(K.shape[0], 17.0)
-    near = loaded.near(force, elsewhere)
+    near = loaded.involved_solution(force, elsewhere)
     assert solver.counters.iterations == before
     np.testing.assert_allclose(near[top], u[top], atol=1e-12 * np.abs(u).max())
     np.testing.assert_array_equal(np.delete(near, top), 17.0)
-    np.testing.assert_allclose(loaded.everywhere(force, near), u, atol=1e-12 * np.abs(u).max())
+    np.testing.assert_allclose(loaded.full_solution(force, near), u, atol=1e-12 * np.abs(u).max())
     assert solver.counters.iterations == before + 1
 
 
@@ -129,13 +130,13 @@ def test_without_contact_there_is_nothing_to_condense_to(name):
     f = np.random.default_rng(3).normal(size=K.shape[0])
     assert not solver.condenses
     assert solver.load(f).condensed() is None
-    np.testing.assert_allclose(K @ solver.load(f).everywhere(np.zeros(len(f))), f, atol=1e-12)
+    np.testing.assert_allclose(K @ solver.load(f).full_solution(np.zeros(len(f))), f, atol=1e-12)
 
 
 def test_forces_elsewhere_cost_a_solution():
     K, _, solver = prepared()
     force = np.random.default_rng(4).normal(size=K.shape[0])
-    u = solver.load(np.zeros(K.shape[0])).near(force, np.zeros(K.shape[0]))
+    u = solver.load(np.zeros(K.shape[0])).involved_solution(force, np.zeros(K.shape[0]))
     np.testing.assert_allclose(K @ u, force, atol=1e-12)
 
 
@@ -184,10 +185,8 @@ def test_a_symmetric_matrix_is_reordered_by_rows_and_columns():
 
 def test_forward_substitution_passes_over_supernodes_without_load():
     L = lower(40, 0.05, 3)
-    first, begin, rows = np.empty(41, np.int64), np.empty(41, np.int64), L.indices.copy()
-    count = triangular_kernels.supernodes(L.indptr, rows, first, begin)
     for at in range(40):
         x = np.zeros(40)
         x[at] = 2.0
-        triangular_kernels.forward(L.indptr, L.data, first[: count + 1], begin[: count + 1], rows[: begin[count]], x)
+        triangular_kernels.forward(*by_supernodes(L), x)
         np.testing.assert_allclose(L.toarray() @ x, 2.0 * np.eye(40)[at], atol=1e-13)

@@ -1,4 +1,4 @@
-"""The matrix that multigrid solves with: its numbers in two halves, in the room they had, multiply as they did."""
+"""The matrix that multigrid solves with: its numbers split into two parts multiply as they did."""
 
 import sys
 
@@ -11,9 +11,9 @@ import fastcontact as fc
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.linear import choice as linear
 from fastcontact.linear.multigrid import split_matrix_kernels
-from fastcontact.linear.multigrid.matrix import Given
+from fastcontact.linear.multigrid.matrix import ScaledMatrix
 
-EXACT = 2.0**-47  # of halves, in units of the largest number of a row
+EXACT = 2.0**-47  # of split numbers, in units of the largest number of a row
 
 
 def matrix(n, size, scale=1.0, seed=0):
@@ -30,34 +30,22 @@ def matrix(n, size, scale=1.0, seed=0):
     return bsr_array(bsr_array(scale * full, blocksize=(size, size)))
 
 
-def test_halves_are_the_nearest_number_and_the_rest():
+def test_the_parts_are_the_nearest_number_and_the_rest():
     numbers = np.random.default_rng(1).normal(size=1001) * 10.0 ** np.random.default_rng(2).uniform(-12, 3, 1001)
-    first, second = np.empty((2, 1001), np.float32)
-    split_matrix_kernels.split(0.25, numbers, first, second)
-    np.testing.assert_array_equal(first, (0.25 * numbers).astype(np.float32))
-    np.testing.assert_array_equal(second, (0.25 * numbers - first).astype(np.float32))
-    joined = np.empty(1001)
-    split_matrix_kernels.join(4.0, (first, second), joined)
-    np.testing.assert_allclose(joined, numbers, rtol=2.0**-48)
-    split_matrix_kernels.join(1.0, (numbers,), joined)
-    np.testing.assert_array_equal(joined, numbers)
+    high, low = np.empty((2, 1001), np.float32)
+    split_matrix_kernels.split(0.25, numbers, high, low)
+    np.testing.assert_array_equal(high, (0.25 * numbers).astype(np.float32))
+    np.testing.assert_array_equal(low, (0.25 * numbers - high).astype(np.float32))
+    np.testing.assert_allclose(4.0 * (high.astype(float) + low), numbers, rtol=2.0**-48)
 
 
-def test_the_second_half_may_take_the_place_of_the_numbers():
-    numbers = np.random.default_rng(1).normal(size=999)
-    expected, first, second = np.empty(999, np.float32), np.empty(999, np.float32), numbers.view(np.float32)[:999]
-    split_matrix_kernels.split(1.0, numbers.copy(), first, expected)
-    split_matrix_kernels.split(1.0, numbers, first, second)
-    np.testing.assert_array_equal(second, expected)
-
-
-@pytest.mark.parametrize("own", [False, True])
+@pytest.mark.parametrize("release", [False, True])
 @pytest.mark.parametrize("precision", ["single", "double"])
 @pytest.mark.parametrize(("n", "size"), [(7, 1), (40, 2), (30, 3), (1100, 3)])
-def test_products_are_those_of_the_matrix(n, size, precision, own):
+def test_products_are_those_of_the_matrix(n, size, precision, release):
     K = matrix(n, size, scale=3e7)
     dense, rng = K.toarray(), np.random.default_rng(3)
-    given = Given(K.copy(), precision, own)
+    given = ScaledMatrix(K.copy(), precision, release)
     u, f = rng.normal(size=(2, n * size))
     size_of_rows = np.abs(dense) @ np.abs(u)
     np.testing.assert_array_less(np.abs(given @ u - dense @ u), EXACT * size_of_rows)
@@ -83,35 +71,44 @@ def test_products_are_those_of_the_matrix(n, size, precision, own):
     np.testing.assert_allclose(given.restored().toarray(), dense, rtol=2 * EXACT)
 
 
-def test_a_matrix_that_is_owned_gives_its_room_away():
+def test_low_parts_may_take_the_place_of_the_numbers():
+    numbers = np.random.default_rng(1).normal(size=999)
+    expected, high, low = np.empty(999, np.float32), np.empty(999, np.float32), numbers.view(np.float32)[:999]
+    split_matrix_kernels.split(1.0, numbers.copy(), high, expected)
+    split_matrix_kernels.split(1.0, numbers, high, low)
+    np.testing.assert_array_equal(low, expected)
+
+
+def test_a_matrix_that_is_released_gives_its_memory_away():
     K = matrix(50, 3)
     K = bsr_array((K.data.copy(), K.indices, K.indptr), shape=K.shape)
-    n = K.data.size
-    given = Given(K, "single", own=True)
+    n, dense = K.data.size, K.toarray()
+    given = ScaledMatrix(K, "single", release=True)
     assert K.nnz == 0
     assert not (K @ np.ones(150)).any()
-    owner = given.scaled.rest
+    owner = given.scaled.low
     while isinstance(owner.base, np.ndarray):
         owner = owner.base
     if sys.gettrace() is None:  # what measures coverage holds arrays, too
         assert owner.nbytes <= 4 * n + 8
     assert given.scaled.data.nbytes == 4 * n
+    np.testing.assert_allclose(given.restored().toarray(), dense, rtol=EXACT)
 
 
 def test_numbers_that_somebody_else_holds_stay_where_they_are():
     K = matrix(50, 3)
     dense, held = K.toarray(), K.data
-    given = Given(K, "single", own=True)
+    given = ScaledMatrix(K, "single", release=True)
     np.testing.assert_allclose(given.restored().toarray(), dense, rtol=EXACT)
     owner = held if held.base is None else held.base
     assert owner.nbytes == 8 * given.scaled.data.size  # no memory was taken from under it
 
 
-def test_an_analysis_knows_the_stiffness_that_its_solver_owns(forma04):
+def test_an_analysis_has_the_stiffness_that_its_solver_stores(forma04):
     model = forma04(fc.generate.half_spheres("tri3", size=6.0))
     one, other = (Stepping(model, name, 1e-10, Criteria()) for name in ("direct", "amg"))
     assert isinstance(one.system.matrix, bsr_array)
-    assert isinstance(other.system.matrix, Given)
+    assert isinstance(other.system.matrix, ScaledMatrix)
     u = np.random.default_rng(0).normal(size=model.n_dofs)
     expected = one.K @ u
     assert np.abs(other.K @ u - expected).max() < 1e-13 * one.K.largest_row_sum(u)
@@ -123,10 +120,10 @@ def test_columns_may_be_numbered_in_any_integers():
     wide = bsr_array((K.data, K.indices, K.indptr), shape=K.shape)
     wide.indices, wide.indptr = K.indices.astype(np.int64), K.indptr.astype(np.int64)
     u = np.random.default_rng(0).normal(size=120)
-    np.testing.assert_array_equal(Given(wide, "single") @ u, Given(K, "single") @ u)
+    np.testing.assert_array_equal(ScaledMatrix(wide, "single") @ u, ScaledMatrix(K, "single") @ u)
 
 
-def test_a_solver_leaves_a_matrix_that_it_does_not_own():
+def test_a_solver_leaves_a_matrix_that_is_not_released():
     K = matrix(60, 2)
     before = K.toarray()
     solver = linear.make("amg", dim=2, n_dofs=120, tolerance=1e-10)

@@ -1,4 +1,4 @@
-"""Constraints on a few unknowns whose part of ``K^-1`` is known: nothing as long as a displacement is touched."""
+"""K condensed to the contact unknowns: solutions by a dense inverse, without the other unknowns."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fastcontact.linear.compliance import balanced
+from fastcontact.linear.flexibility import balanced, symmetric
 from fastcontact.linear.protocol import Monitor
 
 Array = NDArray[np.float64]
 
 
-class LoadedInverse:
-    """See `linear.protocol.Loaded`; all its vectors are those of the few unknowns.
+class CondensedProblem:
+    """See `linear.protocol.Loaded`; all its vectors are those of the k contact unknowns.
 
     Parameters
     ----------
     inverse : ndarray (k, k)
-        Rows and columns of ``K^-1``, symmetric.
+        Rows and columns of ``K^-1``, symmetric [length / force].
     free : ndarray (k,)
-        Displacement without constraints.
+        Displacement without equations [length].
     """
 
     def __init__(self, inverse: Array, free: Array) -> None:
@@ -34,25 +34,21 @@ class LoadedInverse:
         if B.shape[0] == 0:
             return self._free, np.empty(0)
         moved = B @ self._inverse
-        multiplier = balanced(_symmetric(B @ moved.T), c - B @ self._free, C)
+        multiplier = balanced(symmetric(B @ moved.T), c - B @ self._free, C)
         return self._free + multiplier @ moved, multiplier
 
-    def reduce(self, R: csr_array) -> tuple[Array, Array]:
+    def flexibility(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
-        return R @ self._free, _symmetric(R @ (R @ self._inverse).T)
+        return R @ self._free, symmetric(R @ (R @ self._inverse).T)
 
-    def near(self, force: Array, elsewhere: Array | None) -> Array:
+    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         """See `Loaded`."""
         return np.asarray(self._free + self._inverse @ force)
 
-    def everywhere(self, force: Array, u: Array | None = None) -> Array:
+    def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """See `Loaded`."""
-        return self.near(force, None)
+        return self.involved_solution(force, None)
 
-    def condensed(self) -> LoadedInverse:
+    def condensed(self) -> CondensedProblem:
         """See `Loaded`."""
         return self
-
-
-def _symmetric(flexibility: Array) -> Array:
-    return 0.5 * (flexibility + flexibility.T)

@@ -1,4 +1,4 @@
-"""Constraints through their compliance: ``(B K^-1 B.T + C) multiplier = c - B K^-1 f``.
+"""Equations through the flexibility of the structure: ``(B K^-1 B.T + C) multiplier = c - B K^-1 f``.
 
 Only the degrees of freedom that appear in B matter. Their part of ``K^-1`` is computed when they first appear and
 kept, so further active sets and pairings cost a small dense solution and one solution with K each.
@@ -15,10 +15,12 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve, lstsq
 from scipy.sparse import csr_array
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+# Right-hand sides at a time: whole columns of K^-1 are long, and only short parts of them are kept.
 CHUNK = 32
 
 
-class ComplianceCache:
+class FlexibilityColumns:
     """Rows and columns of ``K^-1`` for the degrees of freedom asked for so far.
 
     Parameters
@@ -26,7 +28,7 @@ class ComplianceCache:
     n : int
         Size of K.
     solve_many : method
-        Of the solver that keeps this cache; maps right-hand sides (n, k) to solutions (n, k).
+        Of the solver that keeps these columns; maps right-hand sides (n, k) [force] to solutions (n, k) [length].
 
     Attributes
     ----------
@@ -36,53 +38,52 @@ class ComplianceCache:
     """
 
     def __init__(self, n: int, solve_many: Callable[[Array], Array]) -> None:
-        # Not held: solver and cache would keep each other, and factors, the largest thing there is, alive.
+        # A weak reference: solver and columns would keep each other, and the factors, the largest thing there is, alive.
         self._solve_many = weakref.WeakMethod(solve_many)
         self._place = np.full(n, -1, np.intp)
         self._dofs = np.empty(0, np.intp)
         self._values = np.empty((0, 0))
-        self.asked: list[NDArray[np.intp]] = []
+        self.asked: list[Indices] = []
 
-    def give(self, dofs: NDArray[np.intp], values: Array) -> None:
+    def give(self, dofs: Indices, values: Array) -> None:
         """Take rows and columns `dofs` (k,) of ``K^-1``, known by other means; only while nothing is kept yet."""
         self._dofs, self._values = dofs, values
         self._place[dofs] = np.arange(len(dofs))
 
-    def of(self, dofs: NDArray[np.intp]) -> Array:
-        """Return ``K^-1`` at the rows and columns `dofs` (k,), shape (k, k)."""
+    def of(self, dofs: Indices) -> Array:
+        """Return ``K^-1`` at the rows and columns `dofs` (k,), shape (k, k) [length / force]."""
         place = self._places(dofs)
         return self._values[np.ix_(place, place)]
 
-    def condensed(self, R: csr_array) -> Array:
-        """Return ``R K^-1 R.T`` (m, m) for sparse rows R (m, n)."""
+    def of_rows(self, R: csr_array) -> Array:
+        """Return ``R K^-1 R.T`` (m, m) [length / force] for sparse rows R (m, n)."""
         used = R.data != 0.0
         place = self._places(R.indices[used])
         starts = np.concatenate([[0], np.cumsum(used)])[R.indptr]
         rows = csr_array((R.data[used], place, starts), shape=(R.shape[0], len(self._dofs)))
         return np.asarray(rows @ (rows @ self._values).T)
 
-    def ask_again(self, asked: Iterable[NDArray[np.intp]]) -> None:
-        """Solve for what another cache of this matrix was asked for, in its order; see `asked`."""
+    def ask_again(self, asked: Iterable[Indices]) -> None:
+        """Solve for what the columns of another solver were asked for, in its order; see `asked`."""
         for dofs in asked:
             self._places(dofs)
 
-    def _places(self, dofs: NDArray[np.integer]) -> NDArray[np.intp]:
+    def _places(self, dofs: NDArray[np.integer]) -> Indices:
         """Return where `dofs` (k,), which may repeat, stand among those kept; solve for those that are new."""
         new = np.unique(dofs[self._place[dofs] < 0]).astype(np.intp)
         if len(new):
             self._extend(new)
         return self._place[dofs]
 
-    def _extend(self, new: NDArray[np.intp]) -> None:
+    def _extend(self, new: Indices) -> None:
         old = len(self._dofs)
         self.asked.append(new)
         self._dofs = np.concatenate([self._dofs, new])
         self._place[new] = np.arange(old, len(self._dofs))
         solve_many = self._solve_many()
-        assert solve_many is not None, "the cache outlived its solver"
+        assert solve_many is not None, "the columns outlived their solver"
         grown = np.empty((len(self._dofs), len(self._dofs)))
         grown[:old, :old] = self._values
-        # A few right-hand sides at a time: whole columns of K^-1 are long, and only short parts of them are kept.
         for first in range(0, len(new), CHUNK):
             chunk = new[first : first + CHUNK]
             unit = np.zeros((len(self._place), len(chunk)))
@@ -92,15 +93,19 @@ class ComplianceCache:
         self._values = grown
 
 
-def reduced(cache: ComplianceCache, R: csr_array) -> Array:
-    """Return ``R K^-1 R.T`` (m, m)."""
-    flexibility = cache.condensed(R)
+def symmetric(flexibility: Array) -> Array:
+    """Return the symmetric part of a matrix (m, m)."""
     return 0.5 * (flexibility + flexibility.T)
 
 
-def multipliers(cache: ComplianceCache, B: csr_array, wanted: Array, C: Array | None) -> Array:
-    """Return the multipliers (m,) with ``(B K^-1 B.T + C) multiplier = wanted``; C (m, m) may be None."""
-    return balanced(reduced(cache, B), wanted, C)
+def reduced(columns: FlexibilityColumns, R: csr_array) -> Array:
+    """Return ``R K^-1 R.T`` (m, m) [length / force]."""
+    return symmetric(columns.of_rows(R))
+
+
+def multipliers(columns: FlexibilityColumns, B: csr_array, wanted: Array, C: Array | None) -> Array:
+    """Return the multipliers (m,) [force] with ``(B K^-1 B.T + C) multiplier = wanted`` (m,) [length]; C may be None."""
+    return balanced(reduced(columns, B), wanted, C)
 
 
 def balanced(flexibility: Array, wanted: Array, C: Array | None) -> Array:
@@ -109,5 +114,5 @@ def balanced(flexibility: Array, wanted: Array, C: Array | None) -> Array:
         flexibility += C
     try:
         return cho_solve(cho_factor(flexibility), wanted)
-    except LinAlgError:  # rows that repeat each other: any of their multipliers does, the smallest is taken
+    except LinAlgError:  # rows that repeat each other: of their multipliers the smallest are taken
         return lstsq(flexibility, wanted)[0]

@@ -1,4 +1,4 @@
-"""Factors ``P K P.T = L D L.T`` of a symmetric positive definite matrix, and what contact takes from them."""
+"""Factors ``P K P.T = L D L.T`` of a symmetric positive definite matrix: solutions, and K condensed to the last unknowns."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
-class Shape(NamedTuple):
-    """L (n, n) by columns, row numbers once for all columns of a supernode; see `kernels.triangular`."""
+class LowerTriangle(NamedTuple):
+    """L (n, n) by columns, row numbers once for all columns of a supernode; see `triangular_kernels`."""
 
     start: NDArray[np.int64]
     values: Array
@@ -30,7 +30,7 @@ class SymmetricFactors:
 
     Parameters
     ----------
-    L : Shape
+    L : LowerTriangle
         Lower triangular (n, n) with a unit diagonal.
     d : ndarray (n,)
         Diagonal of D.
@@ -40,7 +40,7 @@ class SymmetricFactors:
         Unknowns that are eliminated after all others: no column of theirs in L has a row of another one.
     """
 
-    def __init__(self, L: Shape, d: Array, place: Indices, last: Indices) -> None:
+    def __init__(self, L: LowerTriangle, d: Array, place: Indices, last: Indices) -> None:
         self.n = len(d)
         self.nnz = len(L.values)
         self._L, self._d, self._place, self._last = L, d, place, last
@@ -53,7 +53,7 @@ class SymmetricFactors:
         return sum(array.nbytes for array in (*self._L, self._d, self._place, self._given))
 
     def solve(self, F: Array) -> Array:
-        """Return ``K^-1 F`` for right-hand sides (n,) or (n, k)."""
+        """Return ``K^-1 F`` for right-hand sides (n,) or (n, k) [force]."""
         nothing = np.zeros(self.n, bool)
         X = np.empty((self.n, *F.shape[1:]))
         X[self._place] = F
@@ -66,7 +66,7 @@ class SymmetricFactors:
 
     @on_one_blas_thread
     def last_inverse(self) -> Array:
-        """Return the rows and columns `last` of ``K^-1``, in the order of `last`."""
+        """Return the rows and columns `last` of ``K^-1``, shape (m, m) [length / force], in the order of `last`."""
         at = np.sort(self._place[self._last])
         wanted, trailing = np.full(self.n, -1), np.zeros((len(at), len(at)))
         wanted[at] = np.arange(len(at))
@@ -77,7 +77,7 @@ class SymmetricFactors:
         return np.ascontiguousarray(inverse[np.ix_(order, order)])
 
     def extended(self, u: Array) -> Array:
-        """Return the displacement (n,) under forces on the unknowns `last` alone, which move by u (m,)."""
+        """Return the displacement (n,) [length] under forces on the unknowns `last` alone, which move by u (m,)."""
         x = np.zeros(self.n)
         x[self._place[self._last]] = u
         triangular_kernels.backward(*self._L, self._given, x)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from fastcontact.linear.elimination import elimination_kernels
+from fastcontact.linear.elimination import pivot_order_kernels
 from fastcontact.linear.elimination.elimination import eliminate
 
 
@@ -23,7 +23,7 @@ def grouped(rng, n=60, groups=6):
 def test_pivots_of_groups_are_their_own_and_well_conditioned(seed):
     B, label = grouped(np.random.default_rng(seed))
     pivots = np.empty(len(label), np.int64)
-    assert elimination_kernels.choose(B.indptr, B.indices, B.data, label, 6, B.shape[1], 0.25, pivots) == 0
+    assert pivot_order_kernels.choose(B.indptr, B.indices, B.data, label, 6, B.shape[1], 0.25, pivots) == 0
     assert len(set(pivots)) == len(pivots)
     taken = np.abs(B[:, pivots].toarray()) > 0
     assert not taken[label[:, None] != label[None]].any()
@@ -39,9 +39,9 @@ def test_pivots_of_groups_are_their_own_and_well_conditioned(seed):
 
 def test_groups_without_unknowns_of_their_own_are_told():
     B = csr_array(np.ones((2, 3)))
-    assert elimination_kernels.choose(B.indptr, B.indices, B.data, np.arange(2), 2, 3, 0.25, np.empty(2, np.int64)) == 1
+    assert pivot_order_kernels.choose(B.indptr, B.indices, B.data, np.arange(2), 2, 3, 0.25, np.empty(2, np.int64)) == 1
     same_group = np.zeros(2, np.int64)  # two equal equations
-    assert elimination_kernels.choose(B.indptr, B.indices, B.data, same_group, 1, 3, 0.25, np.empty(2, np.int64)) == 1
+    assert pivot_order_kernels.choose(B.indptr, B.indices, B.data, same_group, 1, 3, 0.25, np.empty(2, np.int64)) == 1
 
 
 def test_forces_move_along_the_rows_that_multipliers_act_through():
@@ -50,12 +50,13 @@ def test_forces_move_along_the_rows_that_multipliers_act_through():
     through = csr_array(B + 0.2 * csr_array(np.where(B.toarray() != 0, rng.normal(size=B.shape), 0.0)))
     tied = eliminate(B, rng.normal(size=B.shape[0]), through, label)
     x, r = rng.normal(size=(2, B.shape[1]))
-    tied.complete(x, tied.t)
+    tied.complete(x, tied.offset)
     forces = r[tied.pivots].copy()
     moved = r.copy()
-    tied.condense(moved)
+    tied.move_forces(moved)
     multiplier = tied.multiplier(forces)
     np.testing.assert_allclose(moved, r - through.T @ multiplier, atol=1e-12)
     assert np.abs(moved[tied.pivots]).max() < 1e-12
-    assert tied.oblique
-    assert not eliminate(B, np.zeros(B.shape[0]), groups=label).oblique
+    assert np.abs((tied.force_weights - tied.weights).data).max() > 0.01
+    symmetric = eliminate(B, np.zeros(B.shape[0]), groups=label)
+    assert symmetric.force_weights is symmetric.weights

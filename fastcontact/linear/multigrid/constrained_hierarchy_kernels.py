@@ -1,12 +1,12 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""What changes in a multigrid hierarchy when unknowns are tied to others: only rows near the ties.
+"""What changes in the matrices of a multigrid hierarchy when unknowns are eliminated: only rows near the pivots.
 
-Pivots p follow ``u_p = tie_p u``. On the finest level this is done by `multigrid.complete` and `multigrid.condense`. The
-next coarser matrix changes from ``P.T K P`` to ``W.T K W`` with ``W = P + E``, where E has rows for the pivots only,
-``E_p = tie_p P - P_p``; with ``H = K[pivots] P + K[pivots, pivots] E / 2`` the change is ``E.T H + H.T E``.
+Pivots p follow ``u_p = W_p u``, W in compressed rows (wstart, wcolumns, weights). The prolongator P becomes P + E, where E
+has rows for the pivots only, ``E_p = W_p P - P_p``, and the next coarser matrix changes from ``P.T K P`` to
+``(P + E).T K (P + E)``. With ``H = K[pivots] P + K[pivots, pivots] E / 2`` the change is ``E.T H + H.T E``.
 
-Numbers of K come as in `halves`. Rows of E and H are lists of segments: ``start`` (m + 1,), ``columns`` the coarse nodes,
-``values`` (n_segments * n,).
+Numbers of K come as a tuple, see `split_matrix_kernels`. Rows of E and H are lists of segments: ``start`` (m + 1,),
+``columns`` the coarse nodes, ``values`` (n_segments * n,).
 """
 
 import numpy as np
@@ -36,35 +36,35 @@ def _add_row(dof, factor, size, n, start, columns, P, place, values):
 
 
 @kernel
-def tied_prolongator(pivots, tstart, tcolumns, tie, start, columns, P, size, n, n_coarse):
+def prolongator_change(pivots, wstart, wcolumns, weights, start, columns, P, size, n, n_coarse):
     """Return (start, columns, values) of E; blocks of the prolongator are size x n."""
     m = pivots.shape[0]
     seen, place = np.full(n_coarse, -1, np.int64), np.empty(n_coarse, np.int64)
-    out_start = np.zeros(m + 1, np.int64)
     found = np.empty(n_coarse, np.int64)
-    for p in range(m):
-        count = _segments_of(pivots[p] // size, start, columns, p, seen, found, 0)
-        for k in range(tstart[p], tstart[p + 1]):
-            count = _segments_of(tcolumns[k] // size, start, columns, p, seen, found, count)
-        out_start[p + 1] = out_start[p] + count
-    out_columns, values = np.empty(out_start[m], np.int64), np.zeros(out_start[m] * n)
-    seen[:] = -1
-    for p in range(m):
-        low = out_start[p]
-        count = _segments_of(pivots[p] // size, start, columns, p, seen, found, 0)
-        for k in range(tstart[p], tstart[p + 1]):
-            count = _segments_of(tcolumns[k] // size, start, columns, p, seen, found, count)
-        for e in range(count):
-            out_columns[low + e] = found[e]
-            place[found[e]] = low + e
-        _add_row(pivots[p], -1.0, size, n, start, columns, P, place, values)
-        for k in range(tstart[p], tstart[p + 1]):
-            _add_row(tcolumns[k], tie[k], size, n, start, columns, P, place, values)
+    out_start = np.zeros(m + 1, np.int64)
+    out_columns, values = np.empty(0, np.int64), np.zeros(0)
+    for filling in range(2):
+        if filling:
+            out_columns, values = np.empty(out_start[m], np.int64), np.zeros(out_start[m] * n)
+            seen[:] = -1
+        for p in range(m):
+            count = _segments_of(pivots[p] // size, start, columns, p, seen, found, 0)
+            for k in range(wstart[p], wstart[p + 1]):
+                count = _segments_of(wcolumns[k] // size, start, columns, p, seen, found, count)
+            if not filling:
+                out_start[p + 1] = out_start[p] + count
+                continue
+            for e in range(count):
+                out_columns[out_start[p] + e] = found[e]
+                place[found[e]] = out_start[p] + e
+            _add_row(pivots[p], -1.0, size, n, start, columns, P, place, values)
+            for k in range(wstart[p], wstart[p + 1]):
+                _add_row(wcolumns[k], weights[k], size, n, start, columns, P, place, values)
     return out_start, out_columns, values
 
 
 @kernel
-def tied_products(pivots, number, indptr, indices, K, start, columns, P, estart, ecolumns, E, size, n, n_coarse):
+def products_at_pivots(pivots, number, indptr, indices, K, start, columns, P, estart, ecolumns, E, size, n, n_coarse):
     """Return (start, columns, values) of H; `number` (n_fine,) is the number of each pivot and -1 elsewhere."""
     m = pivots.shape[0]
     seen, place = np.full(n_coarse, -1, np.int64), np.empty(n_coarse, np.int64)
@@ -185,10 +185,10 @@ def coarse_change(estart, ecolumns, E, hstart, hcolumns, H, local, n_local, cols
 
 
 @kernel
-def tied_diagonal(pivots, number, tstart, tcolumns, tie, indptr, indices, K, local, blocks, size):
+def constrain_diagonal(pivots, number, wstart, wcolumns, weights, indptr, indices, K, local, blocks, size):
     """Turn diagonal `blocks` (n_local * size * size,) of K into those of ``T.T K T``.
 
-    `local` (n_nodes,) numbers the nodes that pivots or what they follow belong to.
+    `local` (n_nodes,) numbers the nodes of pivots and of the unknowns that they follow.
     """
     for p in range(pivots.shape[0]):
         i, a = pivots[p] // size, pivots[p] % size
@@ -199,39 +199,17 @@ def tied_diagonal(pivots, number, tstart, tcolumns, tie, indptr, indices, K, loc
                 if stiffness == 0.0:
                     continue
                 q = number[j * size + b]
-                for e in range(tstart[p], tstart[p + 1]):
-                    node, x = tcolumns[e] // size, tcolumns[e] % size
+                for e in range(wstart[p], wstart[p + 1]):
+                    node, x = wcolumns[e] // size, wcolumns[e] % size
                     base = local[node] * size * size
                     if node == j:
-                        blocks[base + x * size + b] += tie[e] * stiffness
-                        blocks[base + b * size + x] += tie[e] * stiffness
+                        blocks[base + x * size + b] += weights[e] * stiffness
+                        blocks[base + b * size + x] += weights[e] * stiffness
                     if q >= 0:
-                        for g in range(tstart[q], tstart[q + 1]):
-                            if tcolumns[g] // size == node:
-                                blocks[base + x * size + tcolumns[g] % size] += tie[e] * stiffness * tie[g]
+                        for g in range(wstart[q], wstart[q + 1]):
+                            if wcolumns[g] // size == node:
+                                blocks[base + x * size + wcolumns[g] % size] += weights[e] * stiffness * weights[g]
     for p in range(pivots.shape[0]):
         base, a = local[pivots[p] // size] * size * size, pivots[p] % size
         for b in range(size):
             blocks[base + a * size + b] = blocks[base + b * size + a] = 0.0
-
-
-@kernel
-def forces_at(pivots, indptr, indices, K, factor, size, u, f, out):
-    """Fill `out` (m,) with ``(factor K u - f)[pivots]``."""
-    for p in range(pivots.shape[0]):
-        i, a = pivots[p] // size, pivots[p] % size
-        s = 0.0
-        for k in range(indptr[i], indptr[i + 1]):
-            for b in range(size):
-                s += entry(K, (k * size + a) * size + b) * u[indices[k] * size + b]
-        out[p] = factor * s - f[pivots[p]]
-
-
-@kernel
-def forces_of(pivots, values, indptr, indices, K, factor, size, out):
-    """Add ``factor K[:, pivots] values`` for a symmetric K to `out` (n,)."""
-    for p in range(pivots.shape[0]):
-        i, a = pivots[p] // size, pivots[p] % size
-        for k in range(indptr[i], indptr[i + 1]):
-            for b in range(size):
-                out[indices[k] * size + b] += factor * entry(K, (k * size + a) * size + b) * values[p]

@@ -1,13 +1,13 @@
-"""Equations peeled layer by layer: the inverse of the pivots' columns is exact, and refused where there is no order."""
+"""Pivots of equations in layers: the inverse of the pivots' columns is exact, and refused where there is no order."""
 
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from fastcontact.linear.elimination.pivot_order import peeled
+from fastcontact.linear.elimination.pivot_order import layered
 
 
-def layered(seed, sizes=(5, 4, 3), n_others=6):
+def in_layers(seed, sizes=(5, 4, 3), n_others=6):
     """Equations in shuffled order, each with an own unknown that only earlier layers contain besides."""
     rng = np.random.default_rng(seed)
     m = sum(sizes)
@@ -24,8 +24,8 @@ def layered(seed, sizes=(5, 4, 3), n_others=6):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_inverse_is_exact(seed):
-    B = layered(seed)
-    found = peeled(csr_array(B), 0.25)
+    B = in_layers(seed)
+    found = layered(csr_array(B), 0.25)
     assert found is not None
     pivots, inverse = found
     assert len(set(pivots.tolist())) == len(B)
@@ -34,16 +34,16 @@ def test_the_inverse_is_exact(seed):
 
 def test_one_layer_is_a_diagonal():
     B = np.array([[2.0, 0.0, 1.0], [0.0, -4.0, 1.0]])
-    pivots, inverse = peeled(csr_array(B), 0.25)
+    pivots, inverse = layered(csr_array(B), 0.25)
     assert pivots.tolist() == [0, 1]
     assert inverse.toarray().tolist() == [[0.5, 0.0], [0.0, -0.25]]
 
 
 def test_equations_that_all_share_their_unknowns_have_no_order():
-    assert peeled(csr_array(np.array([[2.0, 1.0], [1.0, 2.0]])), 0.25) is None
+    assert layered(csr_array(np.array([[2.0, 1.0], [1.0, 2.0]])), 0.25) is None
 
 
 def test_weak_unknowns_are_no_pivots():
     B = csr_array(np.array([[0.1, 1.0, 0.0], [0.0, 1.0, 1.0]]))
-    assert peeled(B, 0.25)[0].tolist() == [1, 2]
-    assert peeled(B, 0.05)[0].tolist() == [0, 2]
+    assert layered(B, 0.25)[0].tolist() == [1, 2]
+    assert layered(B, 0.05)[0].tolist() == [0, 2]

@@ -1,4 +1,4 @@
-"""What direct solvers share: constraints through their compliance, from solutions with the factors of K."""
+"""What direct solvers share: right-hand sides by factors of K, equations by columns of K^-1."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array
 
-from fastcontact.linear.cholesky.symmetric import SymmetricFactors
-from fastcontact.linear.compliance import ComplianceCache, multipliers, reduced
-from fastcontact.linear.factors.condensed import LoadedInverse
+from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
+from fastcontact.linear.factors.condensed_problem import CondensedProblem
 from fastcontact.linear.factors.known_loads import KnownLoads
+from fastcontact.linear.flexibility import FlexibilityColumns, multipliers, reduced
 from fastcontact.linear.protocol import Counters, Monitor
 
 Array = NDArray[np.float64]
@@ -26,9 +26,9 @@ MARGIN = 10.0
 class FactorSolver:
     """A direct solver; sub-classes factorise and solve.
 
-    Where a sub-class gives symmetric factors with the unknowns last that constraints may involve, their compliance then
-    is the inverse of the trailing block, ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, and costs no solution with K at all; what
-    the other unknowns do under contact forces follows from theirs by half a solution.
+    Where a sub-class gives factors with the unknowns last that equations may involve, their flexibility is the inverse of
+    the trailing block, ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, and costs no solution with K at all; the displacement of the
+    other unknowns under contact forces follows from theirs by half a solution.
 
     Parameters
     ----------
@@ -45,14 +45,14 @@ class FactorSolver:
         self.tolerance = ROUND_OFF  # whatever was asked
         self.counters = Counters()
         self.n = 0
-        self._symmetric: SymmetricFactors | None = None
+        self._factors: SymmetricFactors | None = None
         self.last: Indices | None = None
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({f'{self.n} unknowns' if self.n else 'not prepared'})"
 
     def _factorise(self, K: csc_array) -> None:
-        """Factorise K (n, n).
+        """Factorise K (n, n) in any order.
 
         Raises
         ------
@@ -62,21 +62,21 @@ class FactorSolver:
         raise NotImplementedError
 
     def _solve(self, F: Array) -> Array:
-        """Return ``K^-1 F`` for right-hand sides (n,) or (n, k)."""
+        """Return ``K^-1 F`` for right-hand sides (n,) or (n, k), after `_factorise`."""
         raise NotImplementedError
 
     def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors | None:
-        """Factorise K (n, n) with the unknowns `last` (m,) last; None from solvers that cannot, or do better without.
+        """Factorise K (n, n) with the unknowns `last` (m,) last; None where nothing is gained by that.
 
         Raises
         ------
         ModelError
             If K is singular.
         """
-        return None
+        raise NotImplementedError
 
     def prepare(
-        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, own: bool = False
+        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
     ) -> bsr_array:
         """Factorise K, and leave it as it is; see `LinearSolver.prepare`.
 
@@ -85,25 +85,24 @@ class FactorSolver:
         ModelError
             If K is singular.
         """
-        self.n, self._symmetric, self.last = K.shape[0], None, None
+        self.n, self._factors, self.last = K.shape[0], None, None
         if involved is not None and len(involved) <= LAST_UP_TO:
-            self._symmetric = self._with_last(K, involved)
+            self._factors = self._with_last(K, involved)
         self.error = 0.0
-        if self._symmetric is None:
+        if self._factors is None:
             self._factorise(K.tocsc())
             self.error = MARGIN * self._error(K)
         self.counters.setups += 1
-        self.compliance = ComplianceCache(self.n, self._solution)
-        self.known_loads = KnownLoads()
-        if self._symmetric is not None and involved is not None and len(involved):
-            self.last, self._inverse = involved, self._symmetric.last_inverse()
-            self.compliance.give(self.last, self._inverse)
+        self.columns, self.known_loads = FlexibilityColumns(self.n, self._solution), KnownLoads()
+        if self._factors is not None and involved is not None and len(involved):
+            self.last, self.inverse = involved, self._factors.last_inverse()
+            self.columns.give(self.last, self.inverse)
         return K
 
     def _error(self, K: bsr_array) -> float:
         """Return by how much, in its largest component, a second solution corrects the first one.
 
-        What unknowns that are last move by comes from one and the same inverse, so that errors of the factors do not show
+        Displacements of unknowns that are last come from one and the same inverse, so that errors of the factors do not show
         from one pairing to the next; those of whole solutions do.
         """
         f = np.random.default_rng(0).normal(size=self.n)
@@ -116,15 +115,11 @@ class FactorSolver:
         """See `LinearSolver`."""
         return self.last is not None
 
-    def condensed(self, free: Array) -> LoadedInverse | None:
-        """Return the problem of the unknowns `last`, whose displacements without constraints are among `free` (n,)."""
-        return LoadedInverse(self._inverse, free[self.last]) if self.last is not None else None
-
     def _solution(self, F: Array) -> Array:
-        return self._solve(F) if self._symmetric is None else self._symmetric.solve(F)
+        return self._solve(F) if self._factors is None else self._factors.solve(F)
 
     def load(self, f: Array) -> Any:
-        """Return the prepared matrix with right-hand side `f`."""
+        """Return the prepared matrix with right-hand side `f` (n,)."""
         return LoadedFactor(self, f, self.known_loads.solution(f, self.back_substitute))
 
     def snapshot(self) -> Any:
@@ -138,31 +133,27 @@ class FactorSolver:
 
     def memory(self) -> dict[str, Any]:
         """See `LinearSolver.memory`: columns of ``K^-1`` asked for, and right-hand sides that others are made of."""
-        return {"asked": list(self.compliance.asked), "loads": self.known_loads.memory()}
+        return {"asked": list(self.columns.asked), "loads": self.known_loads.memory()}
 
     def remember(self, memory: dict[str, Any]) -> None:
         """See `LinearSolver.remember`."""
-        self.compliance.ask_again(memory["asked"])
+        self.columns.ask_again(memory["asked"])
         self.known_loads.remember(memory["loads"], self.n, self._solution)
 
-    def response(self, force: Array) -> Array:
-        """Return what forces on the unknowns `last` (m,) move these by."""
-        return np.asarray(self._inverse @ force)
-
     def back_substitute(self, f: Array) -> Array:
-        """Return ``K^-1 f``."""
+        """Return ``K^-1 f``, shape (n,)."""
         self.counters.iterations += 1
         return self._solution(f)
 
     def extend(self, u: Array) -> Array:
         """Return the displacement (n,) under forces on the unknowns `last` alone, which move by u (m,)."""
-        assert self._symmetric is not None
+        assert self._factors is not None
         self.counters.iterations += 1
-        return self._symmetric.extended(u)
+        return self._factors.extended(u)
 
 
 class LoadedFactor:
-    """See `linear.protocol.Loaded`; `free` is the displacement without constraints."""
+    """See `linear.protocol.Loaded`; `free` (n,) is the displacement without equations."""
 
     def __init__(self, solver: FactorSolver, f: Array, free: Array) -> None:
         self._solver, self._f, self._free = solver, f, free
@@ -174,36 +165,37 @@ class LoadedFactor:
         """See `Loaded`."""
         if B.shape[0] == 0:
             return self._free, np.empty(0)
-        multiplier = multipliers(self._solver.compliance, B, c - B @ self._free, C)
-        return self.near(B.T @ multiplier, guess), multiplier
+        multiplier = multipliers(self._solver.columns, B, c - B @ self._free, C)
+        return self.involved_solution(B.T @ multiplier, guess), multiplier
 
-    def reduce(self, R: csr_array) -> tuple[Array, Array]:
+    def flexibility(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
-        return R @ self._free, reduced(self._solver.compliance, R)
+        return R @ self._free, reduced(self._solver.columns, R)
 
-    def near(self, force: Array, elsewhere: Array | None) -> Array:
+    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         """See `Loaded`."""
         moved = self._moved(force) if elsewhere is not None else None
         if elsewhere is None or moved is None:
-            return self.everywhere(force)
+            return self.full_solution(force)
         u, last = elsewhere.copy(), self._solver.last
         u[last] = self._free[last] + moved
         return u
 
-    def everywhere(self, force: Array, u: Array | None = None) -> Array:
+    def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """See `Loaded`."""
         moved = self._moved(force)
         if moved is None:
             return self._solver.back_substitute(self._f + force)
         return self._free + self._solver.extend(moved) if force.any() else self._free.copy()
 
-    def condensed(self) -> LoadedInverse | None:
+    def condensed(self) -> CondensedProblem | None:
         """See `Loaded`."""
-        return self._solver.condensed(self._free)
+        last = self._solver.last
+        return None if last is None else CondensedProblem(self._solver.inverse, self._free[last])
 
     def _moved(self, force: Array) -> Array | None:
-        """Return what a force moves the unknowns `last` by; None where it acts on others, too."""
+        """Return the displacement (m,) of the unknowns `last` under a force (n,); None where that acts on others, too."""
         last = self._solver.last
         if last is None or np.count_nonzero(force) != np.count_nonzero(force[last]):
             return None
-        return self._solver.response(force[last])
+        return np.asarray(self._solver.inverse @ force[last])

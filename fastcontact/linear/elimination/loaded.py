@@ -1,0 +1,74 @@
+"""What iterative solvers share: a right-hand side solved for under equations, eliminated where they can be."""
+
+from __future__ import annotations
+
+import functools
+import logging
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from fastcontact.linear.elimination.elimination import eliminate
+from fastcontact.linear.elimination.pivot_order import RepeatedError
+from fastcontact.linear.flexibility import multipliers, reduced
+from fastcontact.linear.protocol import Monitor
+
+log = logging.getLogger("fastcontact")
+Array = NDArray[np.float64]
+
+
+class LoadedIteration:
+    """See `linear.protocol.Loaded`.
+
+    Parameters
+    ----------
+    solver : object
+        With ``columns``, columns of K^-1 (`FlexibilityColumns`), and two methods for an `Elimination` or None:
+        ``solution(f, elimination, guess, monitor, tolerance)`` returns u (n,), ``multiplier(elimination, u, f)`` the
+        multipliers (m,) of the equations.
+    f : ndarray (n,)
+        [force]
+    """
+
+    def __init__(self, solver: Any, f: Array) -> None:
+        self._solver, self._f = solver, np.ascontiguousarray(f, float)
+
+    @functools.cached_property
+    def _free(self) -> Array:
+        """Displacement (n,) without equations."""
+        return np.asarray(self._solver.solution(self._f, None, None))
+
+    def solve(
+        self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """See `Loaded`: equations that repeat each other or have a compliance go through columns of K^-1."""
+        solver = self._solver
+        if C is None or not B.shape[0]:
+            try:
+                elimination = eliminate(B, c) if B.shape[0] else None
+            except RepeatedError as repeated:
+                log.info("%s: their compliance is formed", repeated)
+            else:
+                u = solver.solution(self._f, elimination, guess, monitor, tolerance)
+                return u, solver.multiplier(elimination, u, self._f)
+        multiplier = multipliers(solver.columns, B, c - B @ self._free, C)
+        return solver.solution(self._f + B.T @ multiplier, None, guess), multiplier
+
+    def flexibility(self, R: csr_array) -> tuple[Array, Array]:
+        """See `Loaded`."""
+        return R @ self._free, reduced(self._solver.columns, R)
+
+    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
+        """See `Loaded`."""
+        return self._solver.solution(self._f + force, None, None) if force.any() else self._free
+
+    def full_solution(self, force: Array, u: Array | None = None) -> Array:
+        """See `Loaded`."""
+        return self.involved_solution(force, None) if u is None else u
+
+    def condensed(self) -> None:
+        """See `Loaded`."""
+        return None

@@ -1,0 +1,145 @@
+"""Conjugate gradients and conjugate residuals on compiled vector kernels.
+
+Both improve an iterate `x` step by step and know its residual `r`, so that a caller can look at the iterate, stop, change the
+problem a little and go on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.linear.krylov import krylov_kernels
+
+Array = NDArray[np.float64]
+# ``multiply(p, q)`` fills q (n,) with ``A p``; ``precondition(r, norm, z)`` fills z (n,) with an approximation of ``A^-1 r``,
+# given the 2-norm of r.
+Multiply = Callable[[Array, Array], None]
+Precondition = Callable[[Array, float, Array], None]
+# Search directions of conjugate residuals that a new one is made orthogonal to; older ones are forgotten.
+KEPT = 20
+
+
+class Iteration:
+    """An iterate and its residual.
+
+    Parameters
+    ----------
+    n : int
+        Number of unknowns.
+
+    Attributes
+    ----------
+    x, r : ndarray (n,)
+        Iterate and residual.
+    norm : float
+        2-norm of the residual.
+    """
+
+    def __init__(self, n: int) -> None:
+        self.x, self.r, self.z, self.q = (np.zeros(n) for _ in range(4))
+        self._sums = np.empty(-(-n // krylov_kernels.CHUNK))
+        self.norm = 0.0
+
+    def dot(self, a: Array, b: Array) -> float:
+        """Return the dot product of two vectors (n,)."""
+        return float(krylov_kernels.dot(a, b, self._sums))
+
+    def start(self) -> None:
+        """Begin anew from `x` and its residual `r`, both set by the caller."""
+        self.norm = float(np.sqrt(self.dot(self.r, self.r)))
+
+    def _advance(self, alpha: float, p: Array, q: Array) -> None:
+        """Step ``x += alpha p``, ``r -= alpha q``."""
+        self.norm = float(np.sqrt(krylov_kernels.advance(alpha, p, q, self.x, self.r, self._sums)))
+
+
+class ConjugateGradients(Iteration):
+    """Preconditioned conjugate gradients; see `Iteration`.
+
+    Round-off of a preconditioner in single precision makes it vary a little; the search directions are therefore
+    turned by what the preconditioned residual has in common with the change of the residual (Polak and Ribiere's
+    formula; Notay, 2000), which costs one more dot product.
+    """
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+        self.p = np.zeros(n)
+        self._rz = self._alpha = 0.0
+
+    @property
+    def nbytes(self) -> int:
+        """Memory [bytes]."""
+        return 5 * self.x.nbytes + self._sums.nbytes
+
+    def start(self) -> None:
+        """See `Iteration.start`."""
+        super().start()
+        self._rz = 0.0
+
+    def step(self, multiply: Multiply, precondition: Precondition) -> bool:
+        """Make one iteration; return False, nothing changed, where the preconditioner or A is not positive definite."""
+        precondition(self.r, self.norm, self.z)
+        rz = self.dot(self.r, self.z)
+        beta = 0.0
+        if self._rz > 0.0:
+            change = -self._alpha * self.dot(self.q, self.z)
+            beta = change / self._rz
+        self._rz = rz
+        krylov_kernels.turn(beta, self.z, self.p)
+        multiply(self.p, self.q)
+        curvature = self.dot(self.p, self.q)
+        if not (rz > 0.0 and curvature > 0.0):
+            return False
+        self._alpha = rz / curvature
+        self._advance(self._alpha, self.p, self.q)
+        return True
+
+
+class ConjugateResiduals(Iteration):
+    """Preconditioned generalised conjugate residuals, truncated (Eisenstat, Elman and Schultz, 1983); see `Iteration`.
+
+    For matrices that are not symmetric. Every iteration makes the residual as small as the directions kept allow, so it
+    never grows; the preconditioner may vary. Room for directions is made as they are needed.
+    """
+
+    def __init__(self, n: int) -> None:
+        super().__init__(n)
+        # Directions of unit image, and their images with the sign reversed: `advance` then serves to orthogonalise.
+        self._kept: list[tuple[Array, Array]] = []
+        self._made = 0
+
+    @property
+    def nbytes(self) -> int:
+        """Memory [bytes]."""
+        return (4 + 2 * len(self._kept)) * self.x.nbytes + self._sums.nbytes
+
+    def start(self) -> None:
+        """See `Iteration.start`."""
+        super().start()
+        self._made = 0
+
+    def step(self, multiply: Multiply, precondition: Precondition) -> bool:
+        """Make one iteration; return False where no direction is left that reduces the residual."""
+        z, q = self.z, self.q
+        precondition(self.r, self.norm, z)
+        multiply(z, q)
+        square = before = self.dot(q, q)
+        for direction, image in self._kept[: min(self._made, KEPT)]:
+            square = krylov_kernels.advance(self.dot(q, image), direction, image, z, q, self._sums)
+        if not square > np.finfo(float).eps ** 2 * before:
+            return False
+        self._advance(self.dot(self.r, q) / square, z, q)
+        self._keep(z, q, float(np.sqrt(square)))
+        return True
+
+    def _keep(self, z: Array, q: Array, size: float) -> None:
+        at = self._made % KEPT
+        if at == len(self._kept):
+            self._kept.append((np.empty_like(z), np.empty_like(q)))
+        direction, image = self._kept[at]
+        krylov_kernels.scaled(1.0 / size, z, direction)
+        krylov_kernels.scaled(-1.0 / size, q, image)
+        self._made += 1

@@ -1,0 +1,140 @@
+"""Reference solver: pyamg's smoothed aggregation as preconditioner of SciPy's conjugate gradients.
+
+Plain and slow on purpose. It is what our multigrid, "amg", is checked against and compared with: everything here but the
+choice of pivots is pyamg's and SciPy's. Equations are eliminated, ``u = T v + t``, and each set of equations gets a hierarchy
+of its own for the matrix ``T.T K T``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import bsr_array, bsr_matrix, csr_array, diags_array, eye_array
+from scipy.sparse.linalg import cg
+
+from fastcontact.errors import ConvergenceError
+from fastcontact.linear.elimination.elimination import Elimination
+from fastcontact.linear.elimination.loaded import LoadedIteration
+from fastcontact.linear.flexibility import FlexibilityColumns
+from fastcontact.linear.protocol import Counters, Monitor
+
+Array = NDArray[np.float64]
+MAX_ITERATIONS = 1000
+# All neighbours are strong, as in our multigrid; everything else as pyamg has it.
+OPTIONS: dict[str, Any] = {"strength": ("symmetric", {"theta": 0.0}), "max_coarse": 200}
+
+
+class Pyamg:
+    """See `linear.protocol.LinearSolver`.
+
+    Parameters
+    ----------
+    tolerance : float
+        The residual is reduced below this fraction of the right-hand side (2-norms).
+    """
+
+    name = "pyamg"
+    iterative = True
+    condenses = False
+    error = 0.0
+    gave_up = ""
+
+    def __init__(self, tolerance: float = 1e-10) -> None:
+        self.tolerance, self.counters = tolerance, Counters()
+        self._hierarchy: Any = None
+
+    def __repr__(self) -> str:
+        if self._hierarchy is None:
+            return "Pyamg(not prepared)"
+        sizes = " -> ".join(str(level.A.shape[0]) for level in self._hierarchy.levels)
+        complexity = self._hierarchy.operator_complexity()
+        return f"Pyamg({len(self._hierarchy.levels)} levels, unknowns {sizes}, operator complexity {complexity:.2f})"
+
+    def prepare(
+        self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, release: bool = False
+    ) -> bsr_array:
+        """Build the hierarchy of K, and leave K as it is; see `LinearSolver.prepare`."""
+        self.K, self._modes = K, rigid_modes
+        self._constrain(None)
+        self.columns = FlexibilityColumns(K.shape[0], self._solve_many)
+        return K
+
+    def _constrain(self, elimination: Elimination | None) -> None:
+        """Build the hierarchy of ``T.T K T``, with the diagonal of K at the eliminated unknowns."""
+        from pyamg import smoothed_aggregation_solver
+
+        n = self.K.shape[0]
+        self._elimination, self._T, A, modes = elimination, eye_array(n, format="csr"), self.K, self._modes
+        if elimination is not None:
+            pivots, kept = elimination.pivots, np.ones(n)
+            kept[pivots] = 0.0
+            spread = csr_array((np.ones(len(pivots)), (pivots, np.arange(len(pivots)))), shape=(n, len(pivots)))
+            self._T = csr_array(diags_array(kept) + spread @ elimination.weights)
+            A = self._T.T @ self.K @ self._T + diags_array((1.0 - kept) * self.K.diagonal())
+            modes = kept[:, None] * modes
+        self._A = bsr_matrix(A.tobsr(self.K.blocksize))
+        self._hierarchy = smoothed_aggregation_solver(self._A, B=modes, **OPTIONS)
+        self.counters.setups += 1
+
+    def _solve_many(self, F: Array) -> Array:
+        return np.column_stack([self.solution(f, None, None) for f in F.T])
+
+    def solution(
+        self, f: Array, elimination: Elimination | None, guess: Array | None, monitor: Monitor | None = None,
+        tolerance: float | None = None,
+    ) -> Array:  # fmt: skip
+        """Solve ``K u = f`` under the equations of `elimination` to the solver's tolerance, or a larger one.
+
+        Raises
+        ------
+        ConvergenceError
+            If the residual does not fall below the tolerance.
+        """
+        if elimination is not self._elimination:
+            self._constrain(elimination)
+        t = np.zeros(len(f))
+        if elimination is not None:
+            t[elimination.pivots] = elimination.offset
+        right = self._T.T @ (f - self.K @ t)
+        start = None if guess is None else guess - t
+        if start is not None and elimination is not None:
+            start[elimination.pivots] = 0.0
+        v, failed = cg(
+            self._A, right, start, rtol=max(self.tolerance, tolerance or 0.0), maxiter=MAX_ITERATIONS,
+            M=self._hierarchy.aspreconditioner(), callback=self._count,
+        )  # fmt: skip
+        if failed:
+            raise ConvergenceError(
+                f"conjugate gradients with pyamg do not reach {self.tolerance:.1e}: use amg or direct"
+            )
+        return np.asarray(self._T @ v + t)
+
+    def _count(self, _: Array) -> None:
+        self.counters.iterations += 1
+
+    def multiplier(self, elimination: Elimination | None, u: Array, f: Array) -> Array:
+        """Return the multipliers (m,) of the equations at `u` (n,) [force]."""
+        return np.empty(0) if elimination is None else elimination.multiplier((self.K @ u - f)[elimination.pivots])
+
+    def load(self, f: Array) -> LoadedIteration:
+        """Return the prepared matrix with right-hand side `f` (n,)."""
+        return LoadedIteration(self, f)
+
+    def snapshot(self) -> None:
+        """See `LinearSolver.snapshot`: nothing."""
+
+    def put_back(self, snapshot: Any) -> None:
+        """See `LinearSolver.put_back`."""
+
+    def memory(self) -> dict[str, Any]:
+        """See `LinearSolver.memory`: columns of ``K^-1`` asked for."""
+        return {"asked": list(self.columns.asked)}
+
+    def remember(self, memory: dict[str, Any]) -> None:
+        """See `LinearSolver.remember`."""
+        self.columns.ask_again(memory["asked"])
+
+
+SOLVER = Pyamg
