@@ -121,10 +121,14 @@ class ScaledMatrix:
         self._store(K, precision, release)
 
     def _store(self, K: bsr_array, precision: str, release: bool) -> None:
-        self.unit, self.scaled = 1.0, block_matrix(K)
-        if precision == "single":
-            self.unit = float(0.5 ** np.round(np.log2(K.diagonal().max())))
-            self.scaled.data, self.scaled.low = _split(K, self.unit, release)
+        self.unit = 1.0
+        if precision == "double":
+            self.scaled = block_matrix(K)
+            return
+        self.unit = float(0.5 ** np.round(np.log2(K.diagonal().max())))
+        indptr, indices, size = K.indptr, K.indices, (0,) * K.blocksize[0]
+        high, low = _split(K, self.unit, release)
+        self.scaled = BlockMatrix(indptr, indices, high, size, size, low)
 
     def change(self, precision: str) -> None:
         """Store the numbers for a cycle in another precision."""

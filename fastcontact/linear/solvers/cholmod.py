@@ -1,6 +1,6 @@
 """Direct solver by CHOLMOD's supernodal Cholesky factorisation, from the optional package kvxopt.
 
-A fifth to a quarter faster than "direct" in three dimensions with columns of K^-1 (59 000 unknowns), at twice the memory.
+A tenth to a quarter faster than "direct" in three dimensions with columns of K^-1 (59 000 unknowns), at twice the memory.
 """
 
 from __future__ import annotations
