@@ -11,18 +11,18 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 _FOLDERS = (_PACKAGE / "data" / "cases", _PACKAGE.parent / "data" / "cases")
 
 
-def ready_cases() -> dict[str, Path]:
+def shipped_cases() -> dict[str, Path]:
     """Return the case files that come with fastcontact by name, in alphabetical order."""
     folder = next((folder for folder in _FOLDERS if folder.is_dir()), None)
     return {} if folder is None else {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
-def ready_case(name: str) -> Path:
+def shipped_case(name: str) -> Path:
     """Return the case file of a ready case.
 
     Raises CaseError if there is none of that name; the message offers the nearest ones.
     """
-    found = ready_cases()
+    found = shipped_cases()
     if name not in found:
         raise CaseError(unknown("ready case", name, found))
     return found[name]
@@ -42,6 +42,6 @@ def case_path(given: str | Path) -> Path:
             f"cannot look for the case file '{str(given)[:200]}' ({error.strerror}): check its name"
         ) from None
     try:
-        return ready_case(path.name)
+        return shipped_case(path.name)
     except CaseError as error:
         raise CaseError(f"cannot read the case file '{given}': it does not exist, and {error}") from None

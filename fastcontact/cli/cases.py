@@ -20,7 +20,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """List, print or copy."""
-    from fastcontact.cases.shipped import ready_case, ready_cases
+    from fastcontact.cases.shipped import shipped_case, shipped_cases
     from fastcontact.errors import FastcontactError
 
     if options.copy and options.name:
@@ -28,13 +28,13 @@ def run(options: argparse.Namespace) -> int:
     if options.output and not options.copy:
         raise FastcontactError("-o says where to copy to: give --copy NAME with it")
     if options.copy:
-        written = copied(ready_case(options.copy), Path(options.output or f"{options.copy}.toml"))
+        written = copied(shipped_case(options.copy), Path(options.output or f"{options.copy}.toml"))
         if not options.quiet:
             print(f"wrote {', '.join(map(str, written))}")
     elif options.name:
-        print(ready_case(options.name).read_text(encoding="utf-8"), end="")
+        print(shipped_case(options.name).read_text(encoding="utf-8"), end="")
     elif not options.quiet:
-        print("\n".join(line for path in ready_cases().values() for line in _lines(path)))
+        print("\n".join(line for path in shipped_cases().values() for line in _lines(path)))
         print("solve one with: fastcontact run NAME")
     return 0
 
