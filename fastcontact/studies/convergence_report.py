@@ -153,7 +153,7 @@ class Study:
         for first in range(0, len(names), 2):
             parts.append(page.table(tables.level_rows(series, self.units, names[first : first + 2])))
         if series.limits:
-            parts.append(page.table(tables.page_limit_rows(series, self.units)))
+            parts.append(page.table(tables.limit_rows(series, self.units, page=True)))
         parts += [page.failure(f"level {number} failed: {text}") for number, text in series.failed.items()]
         warnings = sorted({text for level in series.levels for text in level.warnings})
         return parts + [page.paragraph(f"Warning: {text}") for text in warnings]

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from fastcontact.studies.fit import CONFIDENCE
 from fastcontact.studies.labels import title
-from fastcontact.studies.model_error import cancelling
 from fastcontact.studies.render.table import percent
-from fastcontact.studies.series import Series
+from fastcontact.studies.series import Series, cancelling
 
 # The quantities that sentences are about, in this order.
 MAIN = ("pressure_max", "force")
