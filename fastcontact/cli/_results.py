@@ -19,10 +19,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def chosen_step(results: Any, number: int) -> Any:
-    """Return the step with a number from 1, or the last for -1.
-
-    Raises CaseError if there is no such step.
-    """
+    """Return the step with a number from 1, or the last for -1; raises CaseError if there is no such step."""
     if not len(results):
         raise CaseError(f"'{results.path}' holds no finished step yet")
     if number == -1:
@@ -33,10 +30,7 @@ def chosen_step(results: Any, number: int) -> Any:
 
 
 def chosen_contact(step: Any, name: str | None) -> str:
-    """Return the name of a contact pair of a step.
-
-    Raises CaseError if there is none, or none of that name.
-    """
+    """Return the name of a contact pair of a step; raises CaseError if there is none, or none of that name."""
     if not step.contact:
         raise CaseError("this result holds no contact pair")
     if name is not None and name not in step.contact:
@@ -55,9 +49,15 @@ def case_data(results: Any) -> dict[str, Any]:
     return described(data)
 
 
-def curve(theory: Any) -> bool:
-    """Return whether a theory has a pressure that can be drawn over the contact; that of a punch is infinite."""
-    return all(hasattr(theory, name) for name in ("pressure", "pressure_max", "radius"))
+def pressure_curves(theory: Any, contact: Any, share: float) -> dict[str, Any]:
+    """Return the theories to draw over the pressure of a contact, by legend: at equal approach and at equal force.
+
+    There are none without a theory whose pressure can be drawn; that of a punch is infinite.
+    """
+    if not all(hasattr(theory, name) for name in ("pressure", "pressure_max", "radius")):
+        return {}
+    same = at_equal_force(theory, contact, share)
+    return {"Hertz, equal approach": theory} | ({} if same is None else {"Hertz, equal force": same})
 
 
 def at_equal_force(theory: Any, contact: Any, share: float) -> Any:

@@ -94,8 +94,13 @@ def stopped(options: argparse.Namespace) -> str:
     return "stopped; with --store DIR the same command would go on where it stopped"
 
 
-def write(options: argparse.Namespace, result: Any) -> list[str]:
-    """Write the files of the options and return their paths."""
+def report(
+    options: argparse.Namespace, result: Any, hint: str, failures: Sequence[str] = (), also: Sequence[str] = ()
+) -> int:
+    """Write the files of the options; print why runs failed, the lines of the result, and the files written.
+
+    `also` are files written before; without any file, the `hint` says how to get one. Returns the exit code.
+    """
     if options.json:
         write_json(options.json, result.as_dict())
     if options.csv:
@@ -106,13 +111,10 @@ def write(options: argparse.Namespace, result: Any) -> list[str]:
         save(result.figure(), options.png)
     if options.html:
         write_text(options.html, result.html())
-    return [path for path in (options.json, options.csv, options.png, options.html) if path]
-
-
-def show(options: argparse.Namespace, result: Any, written: Sequence[str], hint: str, failures: Sequence[str]) -> None:
-    """Print why runs failed, the lines of the result, and the files written; without any, a hint how to get one."""
     for text in failures:
         print(f"warning: {text}", file=sys.stderr)
     if not options.quiet:
         print("\n".join(result.lines()))
+        written = [path for path in (options.json, options.csv, options.png, options.html, *also) if path]
         print(f"wrote {', '.join(written)}" if written else f"nothing written: {hint}")
+    return 2 if failures else 0

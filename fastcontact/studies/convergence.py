@@ -12,9 +12,8 @@ from fastcontact.errors import CaseError, unknown
 from fastcontact.studies.convergence_report import Study
 from fastcontact.studies.execute import Progress, Result, raise_first, run_all
 from fastcontact.studies.fit import Limit, fit_limit
-from fastcontact.studies.job import Job, case_data, fields_of
+from fastcontact.studies.job import Job, fields_of, job_of
 from fastcontact.studies.labels import LABELS
-from fastcontact.studies.levels import recipe
 from fastcontact.studies.quantities import of_theory
 from fastcontact.studies.series import Level, Series
 from fastcontact.studies.settings import Combination, Settings, combinations, settings
@@ -47,11 +46,12 @@ def convergence_study(
     quantities : sequence of str
         Further ones to fit, such as ``"C1.stress.yy"``, ``"C1.displacement.y"``, ``"C1.pressure"``.
     executor : concurrent.futures.Executor, optional
-        Where to run, see `fastcontact.studies.execute.run_all`; by default processes of this machine.
+        Where to run: by default processes of this machine, or e.g. ``Client.get_executor()`` of Dask or an
+        ``MPIPoolExecutor`` of mpi4py. It is not shut down here.
     workers : int, optional
-        Number of these processes; 1 runs everything in this one.
+        Number of these processes, by default one for each processor; 1 runs everything in this one.
     store : path-like, optional
-        Folder of finished runs: what is there is not run again.
+        Folder of finished runs: those found there are not run again; new ones are added.
     on_progress : callable, optional
         Called with a `Progress` after every run.
 
@@ -74,18 +74,10 @@ def convergence_study(
     return gathered(case, jobs, results, [*chosen.quantities, *quantities])
 
 
-def level_job(case: Case, chosen: Settings, combination: Combination, level: int) -> Job:
+def level_job(case: Case, chosen: Settings, member: Combination, level: int) -> Job:
     """Return the run of one element and formulation on one mesh."""
-    return Job(
-        label=f"{combination} level {level}",
-        name=case.name,
-        data=case_data(chosen, combination),
-        pair=chosen.pair,
-        recipe=recipe(chosen, combination.element, level),
-        base=case.mesh if chosen.generator is None else None,
-        size=level,
-        marks={"level": level, "element": combination.element, "formulation": combination.formulation},
-    )
+    marks = {"level": level, "element": member.element, "formulation": member.formulation}
+    return job_of(case, chosen, member, level, label=f"{member} level {level}", marks=marks, size=level)
 
 
 def gathered(case: Case, jobs: Sequence[Job], results: Sequence[Result], wanted: Sequence[str]) -> Study:

@@ -210,6 +210,6 @@ def _one_thread() -> Iterator[None]:
         yield
     finally:
         for name, old in before.items():
-            os.environ.pop(name)
+            os.environ.pop(name, None)
             if old is not None:
                 os.environ[name] = old

@@ -25,7 +25,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.pair_options import SHARED_OPTIONS
 from fastcontact.results.step import StepResult
 from fastcontact.studies import quantities
-from fastcontact.studies.levels import Recipe, make_mesh
+from fastcontact.studies.levels import Recipe, make_mesh, recipe
 from fastcontact.studies.settings import Combination, Settings
 
 # Raised when the measured numbers or their form in a store change.
@@ -48,22 +48,20 @@ class Job:
     @property
     def key(self) -> str:
         """Hash of all that the numbers depend on: the case, its mesh, the version."""
-        title = {"title", "units", "check"}
-        text = json.dumps(
-            {
-                "version": __version__,
-                "schema": SCHEMA,
-                "data": {key: value for key, value in self.data.items() if key not in title},
-                "pair": self.pair,
-                "recipe": self.recipe,
-            },
-            sort_keys=True,
-            default=str,
-        )
-        found = hashlib.sha256(text.encode())
+        data = {key: value for key, value in self.data.items() if key not in ("title", "units", "check")}
+        whole = {"version": __version__, "schema": SCHEMA, "data": data, "pair": self.pair, "recipe": self.recipe}
+        found = hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode())
         if self.base is not None:
             found.update(_fingerprint(self.base))
         return found.hexdigest()[:32]
+
+
+def job_of(
+    case: Case, chosen: Settings, member: Combination, level: int, *, label: str, marks: dict[str, Any], size: float
+) -> Job:
+    """Return the run of a case with an element and a formulation on the mesh of a level."""
+    data, mesh = case_data(chosen, member), recipe(chosen, member.element, level)
+    return Job(label, case.name, data, chosen.pair, mesh, case.mesh if chosen.generator is None else None, marks, size)
 
 
 def _fingerprint(mesh: Mesh) -> bytes:
