@@ -18,10 +18,7 @@ def ready_cases() -> dict[str, Path]:
 
 
 def ready_case(name: str) -> Path:
-    """Return the case file of a ready case.
-
-    Raises CaseError if there is none of that name; the message offers the nearest ones.
-    """
+    """Return the case file of a ready case; raises CaseError if there is none, with the nearest names."""
     found = ready_cases()
     if name not in found:
         raise CaseError(unknown("ready case", name, found))

@@ -19,8 +19,7 @@ def check_outputs(
     """Refuse files that could not be written, or would replace the one to `read`; None means no file.
 
     Raises FileError if a folder is missing or write-protected, a path is a folder, the file to read or that of another
-    output, or the suffix of a picture is of no known format. Raises FastcontactError if there is no matplotlib for a
-    picture.
+    output, or a picture of no known format; FastcontactError if there is no matplotlib.
     """
     from fastcontact.mesh.files.targets import checked_target
 
@@ -51,10 +50,7 @@ def _check_formats(paths: list[str]) -> None:
 
 
 def write_text(path: str, content: str) -> None:
-    """Write a text file.
-
-    Raises FileError if it cannot be written.
-    """
+    """Write a text file; raises FileError if it cannot be written."""
     try:
         Path(path).write_text(content, encoding="utf-8")
     except OSError as error:

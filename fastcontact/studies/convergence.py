@@ -81,10 +81,7 @@ def level_job(case: Case, chosen: Settings, member: Combination, level: int) -> 
 
 
 def gathered(case: Case, jobs: Sequence[Job], results: Sequence[Result], wanted: Sequence[str]) -> Study:
-    """Return the study of finished runs; `wanted` are the quantities to fit besides the standard ones.
-
-    Raises CaseError or FastcontactError if a quantity is unknown, or no run succeeded.
-    """
+    """Return the study of finished runs; `wanted` are quantities to fit besides the standard ones and those of checks."""
     raise_first("no level could be solved", jobs, results)
     by_combination: dict[Combination, list[tuple[int, Result]]] = {}
     for job, result in zip(jobs, results, strict=True):

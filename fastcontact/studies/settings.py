@@ -26,8 +26,7 @@ class Combination:
     formulation: str | None
 
     def __str__(self) -> str:
-        parts = (self.element or "mixed cells", (self.formulation or "no contact").replace("_", "-"))
-        return " ".join(parts)
+        return f"{self.element or 'mixed cells'} {(self.formulation or 'no contact').replace('_', '-')}"
 
     @property
     def rank(self) -> tuple[int, int, int]:
@@ -61,23 +60,20 @@ class Settings:
 
 
 def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
-    """Return the settings of a case's studies; `data` replaces the parsed case file, e.g. with other values.
-
-    Raises CaseError if a value of ``[study]`` is wrong.
-    """
+    """Return the settings of a case's studies, checked; `data` replaces the parsed case file, e.g. with other values."""
     data = tomllib.loads(case.text) if data is None else data
     study = data.get("study", {})
-    pair = study.get("contact") or next((pair.name for pair in case.model.contact), None)
-    if pair is not None and pair not in {p.name for p in case.model.contact}:
-        raise CaseError(unknown("contact pair in study.contact", pair, [p.name for p in case.model.contact]))
-    formulation = next((p.formulation for p in case.model.contact if p.name == pair), None)
+    pair = study.get("contact") or next((own.name for own in case.model.contact), None)
+    formulations = {pair.name: pair.formulation for pair in case.model.contact}
+    if pair is not None and pair not in formulations:
+        raise CaseError(unknown("contact pair in study.contact", pair, formulations))
     solids = list(case.mesh.solids)
-    own = Combination(solids[0] if len(solids) == 1 else None, formulation)
+    own = Combination(solids[0] if len(solids) == 1 else None, formulations.get(pair or ""))
     generator, arguments = _generator(data, study)
     for name in study.get("options", {}):
         if name not in FORMULATIONS:
             raise CaseError(unknown("formulation in study.options", name, FORMULATIONS))
-    combinations = tuple(_combination(entry) for entry in study.get("combinations", ())) or (own,)
+    curves = tuple(_circle(i, entry) for i, entry in enumerate(study.get("curves", ())))
     return Settings(
         data=data,
         own=own,
@@ -86,11 +82,11 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
         arguments=arguments,
         halve=tuple(study["halve"]) if "halve" in study else None,
         double=tuple(study["double"]) if "double" in study else None,
-        curves=tuple(_circle(i, entry) for i, entry in enumerate(study["curves"])) if "curves" in study else None,
+        curves=curves if "curves" in study else None,
         load_steps=study.get("load_steps"),
         options=study.get("options", {}),
         quantities=tuple(study.get("quantities", ())),
-        combinations=combinations,
+        combinations=tuple(_combination(entry) for entry in study.get("combinations", ())) or (own,),
     )
 
 
@@ -111,9 +107,8 @@ def _circle(index: int, entry: Any) -> Circle:
     try:
         return Circle(tuple(entry["centre"]), float(entry["radius"]), entry.get("group"))
     except (TypeError, KeyError, ValueError) as error:
-        raise CaseError(
-            f"study.curves[{index}] must be {{ group = 'NAME', centre = [x, y], radius = R }}, not {entry!r}"
-        ) from error
+        form = "{ group = 'NAME', centre = [x, y], radius = R }"
+        raise CaseError(f"study.curves[{index}] must be {form}, not {entry!r}") from error
 
 
 def _combination(entry: Any) -> Combination:
@@ -169,9 +164,7 @@ def makeable(settings: Settings, element: str) -> bool:
     if settings.by_shape:
         return shape_of(element) in settings.arguments
     own = settings.own.element
-    if own is None:
-        return settings.generator is not None
-    return elements.get(own).linear == elements.get(element).linear
+    return elements.get(own).linear == elements.get(element).linear if own else settings.generator is not None
 
 
 def shape_of(element: str) -> str:
