@@ -22,11 +22,8 @@ Array = NDArray[np.float64]
 
 def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
     """Return every quantity of interest of a solved case, in the case's units; without a `pair` those of no contact."""
-    found: dict[str, float] = {}
-    if pair is not None:
-        found |= _of_contact(case, last.contact[pair], pair)
-    value, where = peak(case.mesh, last.von_mises, case.model.kinematics == "axisymmetric")
-    found["von_mises_max"] = value
+    found = {} if pair is None else _of_contact(case, last.contact[pair], pair)
+    found["von_mises_max"], where = peak(case.mesh, last.von_mises, case.model.kinematics == "axisymmetric")
     if pair is not None:
         found["von_mises_depth"] = _depth(case, pair, where)
     for name, point in case.probes.items():
@@ -43,13 +40,12 @@ def _of_contact(case: Case, contact: ContactResult, pair: str) -> dict[str, floa
     at_axis = np.abs(contact.coordinates[:, 0]) <= 1e-9 * np.ptp(contact.coordinates, axis=0).max()
     if at_axis.any():
         found["pressure_pole"] = float(contact.pressure[at_axis][0])
-    theory = case.theories.get(pair, {}).get("theory")
+    theory: Any = case.theories.get(pair, {}).get("theory")
     if hasattr(theory, "pressure") and case.mesh.dim == 2:
         side = secondary(case, pair)
         found["pressure_error"] = pressure_error(case, side, contact, theory)
-        at_force = getattr(theory, "at_force", None)
-        if at_force is not None and found["force"] > 0:
-            same = at_force(found["force"])
+        if hasattr(theory, "at_force") and found["force"] > 0:
+            same = theory.at_force(found["force"])
             found["pressure_error_equal_force"] = pressure_error(case, side, contact, same)
     return found
 
@@ -178,8 +174,7 @@ def _of_probe(name: str, point: int, last: StepResult) -> dict[str, float]:
         found[f"{name}.stress.{component}"] = float(value)
     for axis, value in zip("xyz", last.displacement[point], strict=False):
         found[f"{name}.displacement.{axis}"] = float(value)
-    at = at_point(last, point)
-    if at is not None:
+    if at := at_point(last, point):
         contact, row = at
         found[f"{name}.pressure"] = float(contact.pressure[row])
     return found
@@ -196,10 +191,8 @@ def mesh_size(case: Case, pair: str | None) -> float:
 
 def of_theory(theory: Any) -> dict[str, float]:
     """Return the quantities of interest that a theory gives, in its units."""
-    found = {}
-    for quantity, attribute in (("force", "force"), ("pressure_max", "pressure_max"), ("contact_radius", "radius")):
-        if hasattr(theory, attribute):
-            found[quantity] = float(getattr(theory, attribute))
+    names = {"force": "force", "pressure_max": "pressure_max", "contact_radius": "radius"}
+    found = {key: float(getattr(theory, name)) for key, name in names.items() if hasattr(theory, name)}
     if hasattr(theory, "pressure"):
         found["pressure_pole"] = float(theory.pressure(0.0))
     if hasattr(theory, "von_mises_maximum"):
@@ -211,8 +204,7 @@ def of_theory(theory: Any) -> dict[str, float]:
 def of_theories(case: Case, pair: str | None) -> tuple[dict[str, float], dict[str, float]]:
     """Return the quantities of a pair by its theory at equal approach, and by its mesh-converged solution."""
     theories = case.theories.get(pair or "", {})
-    theory, reference = (of_theory(theories[key]) if key in theories else {} for key in ("theory", "mesh_converged"))
-    return theory, reference
+    return of_theory(theories.get("theory")), of_theory(theories.get("mesh_converged"))
 
 
 def at_force(case: Case, pair: str | None, force: float) -> dict[str, float]:
