@@ -89,10 +89,7 @@ def read_check(
     pairs: Mapping[str, Any],
     theories: Mapping[str, Any],
 ) -> Check:
-    """Return the check that an entry of a case file describes; its keys and their types are right.
-
-    Raises CaseError if the quantity, or what it is compared with, is unknown.
-    """
+    """Return the check that an entry of a case file with the right keys describes; raises CaseError for wrong values."""
     for key in ("quantity", "tolerance"):
         if key not in entry:
             raise CaseError(f"{where} needs '{key}'")

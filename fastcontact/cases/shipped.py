@@ -26,10 +26,7 @@ def ready_case(name: str) -> Path:
 
 
 def case_path(given: str | Path) -> Path:
-    """Return the file of a path, or of the name of a ready case where no such file exists.
-
-    Raises CaseError if neither exists; the message offers the nearest ready cases.
-    """
+    """Return the file of a path, or of the name of a ready case where there is no such file; raises CaseError if none."""
     path = Path(given)
     try:
         if path.exists() or path.suffix or path.name != str(given):

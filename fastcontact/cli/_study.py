@@ -8,8 +8,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from fastcontact.cli._outputs import check_outputs, write_json, write_text
-from fastcontact.cli._pictures import save
+from fastcontact.cli._outputs import check_outputs, save, write_json, write_text
 from fastcontact.cli._progress import Runs
 from fastcontact.errors import CaseError, FastcontactError
 
@@ -42,10 +41,7 @@ def names(text: str | None) -> list[str] | None:
 
 
 def finished(options: argparse.Namespace, study: Callable[..., Any]) -> Any:
-    """Return the result of a study, run on the executor of the options with a line of progress.
-
-    Raises FastcontactError if it is interrupted from the keyboard; the message says how to go on.
-    """
+    """Return the result of a study, run on the executor of the options; the error of an interruption says how to go on."""
     progress = Runs(show=sys.stderr.isatty() and not options.quiet)
     try:
         with executor(options.executor) as where:

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from fastcontact.cli import _results
-from fastcontact.cli._pictures import save
+from fastcontact.cli._outputs import save
 from fastcontact.errors import CaseError
 
 HELP = "plot the deformed mesh with its von Mises stress, or force and radius over the load"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.cli import _results
-from fastcontact.cli._pictures import draw_profile
+from fastcontact.cli._outputs import draw_profile
 from fastcontact.cli._results import pressure_curves
 
 HELP = "pressure along the contact line against theory: CSV, XMGRACE .agr, PNG"

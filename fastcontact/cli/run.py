@@ -14,8 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fastcontact.cli._outputs import check_outputs, write_json
-from fastcontact.cli._pictures import profile_picture
+from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
 from fastcontact.cli._progress import Progress
 from fastcontact.errors import CaseError, ConvergenceError, FastcontactWarning, ModelError
 

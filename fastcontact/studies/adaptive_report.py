@@ -13,7 +13,7 @@ from fastcontact.cases.case import Case
 from fastcontact.mesh import elements
 from fastcontact.results.step import StepResult
 from fastcontact.studies.error_estimate import ErrorEstimate
-from fastcontact.studies.labels import column, title, unit
+from fastcontact.studies.quantities import column, title, unit
 from fastcontact.studies.render import page
 from fastcontact.studies.render.figure import Curve, Line, Panel, figure
 from fastcontact.studies.render.table import Rows, aligned, finite, number, structured

@@ -13,8 +13,7 @@ from fastcontact.studies.convergence_report import Study
 from fastcontact.studies.execute import Progress, Result, raise_first, run_all
 from fastcontact.studies.fit import Limit, fit_limit
 from fastcontact.studies.job import Job, fields_of, job_of
-from fastcontact.studies.labels import LABELS
-from fastcontact.studies.quantities import of_theory
+from fastcontact.studies.quantities import LABELS, of_theory
 from fastcontact.studies.series import Level, Series
 from fastcontact.studies.settings import Combination, Settings, combinations, settings
 

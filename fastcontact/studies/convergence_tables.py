@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from fastcontact.studies.labels import column, title
+from fastcontact.studies.quantities import column, title
 from fastcontact.studies.render.table import Rows, finite, number, percent, with_error_bar
 from fastcontact.studies.sentences import sentences
 from fastcontact.studies.series import Series

@@ -130,14 +130,11 @@ def measured(job: Job) -> dict[str, Any]:
         case = build_case(job.data, name=job.name, mesh=mesh)
         last = last_step(case)
     values = quantities.measure(case, last, job.pair)
-    theory, reference = quantities.of_theories(case, job.pair)
     return {
         "h": quantities.mesh_size(case, job.pair),
         "n_dofs": case.model.n_dofs,
         "values": {name: value for name, value in values.items() if np.isfinite(value)},
-        "theory": theory,
-        "reference": reference,
-        "equal_force": quantities.at_force(case, job.pair, values.get("force", 0.0)),
+        **quantities.by_theory(case, job.pair, values.get("force", 0.0)),
         "profile": _profile(case, last, job.pair),
         "iterations": {k: int(v) for k, v in last.iterations.items() if isinstance(v, int)},
         "seconds": time.perf_counter() - started,

@@ -1,7 +1,8 @@
-"""Quantities of interest: numbers measured on the last step of a run, and the same numbers by a theory."""
+"""Quantities of interest: measured on the last step of a run, given by a theory; their titles and units."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,17 @@ from fastcontact.mesh.topology import bodies
 from fastcontact.results.step import ContactResult, StepResult
 
 Array = NDArray[np.float64]
+# Of the standard quantities, which every study shows where they are known: title, and kind of the unit, empty for ratios.
+LABELS = {
+    "force": ("contact force", "force"),
+    "pressure_max": ("largest pressure", "pressure"),
+    "pressure_pole": ("pressure at the axis", "pressure"),
+    "contact_radius": ("contact radius", "length"),
+    "von_mises_max": ("largest von Mises stress", "pressure"),
+    "von_mises_depth": ("depth of the largest von Mises stress", "length"),
+    "pressure_error": ("pressure against theory at equal approach, relative L2 norm", ""),
+    "pressure_error_equal_force": ("pressure against theory at equal force, relative L2 norm", ""),
+}
 
 
 def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
@@ -201,13 +213,32 @@ def of_theory(theory: Any) -> dict[str, float]:
     return {quantity: value for quantity, value in found.items() if np.isfinite(value) and value > 0}
 
 
-def of_theories(case: Case, pair: str | None) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the quantities of a pair by its theory at equal approach, and by its mesh-converged solution."""
+def by_theory(case: Case, pair: str | None, force: float) -> dict[str, dict[str, float]]:
+    """Return the quantities of a pair by its theory at equal approach, its mesh-converged solution, and at equal force.
+
+    The keys are ``theory``, ``reference`` and ``equal_force``; `force` is that of the contact [force].
+    """
     theories = case.theories.get(pair or "", {})
-    return of_theory(theories.get("theory")), of_theory(theories.get("mesh_converged"))
+    theory: Any = theories.get("theory")
+    same = theory.at_force(force) if force > 0 and hasattr(theory, "at_force") else None
+    return {
+        "theory": of_theory(theory),
+        "reference": of_theory(theories.get("mesh_converged")),
+        "equal_force": of_theory(same),
+    }
 
 
-def at_force(case: Case, pair: str | None, force: float) -> dict[str, float]:
-    """Return the quantities of a pair by its theory at a contact force [force]; empty where it has no such method."""
-    theory: Any = case.theories.get(pair or "", {}).get("theory")
-    return of_theory(theory.at_force(force)) if force > 0 and hasattr(theory, "at_force") else {}
+def title(quantity: str) -> str:
+    """Return a quantity in words; ``"C1.stress.yy"`` and the like stay as they are."""
+    return LABELS[quantity][0] if quantity in LABELS else quantity
+
+
+def unit(quantity: str, units: Mapping[str, str]) -> str:
+    """Return the name of a quantity's unit, empty for ratios."""
+    kind = LABELS[quantity][1] if quantity in LABELS else "length" if ".displacement." in quantity else "pressure"
+    return units[kind] if kind else ""
+
+
+def column(label: str, quantity: str, units: Mapping[str, str]) -> str:
+    """Return the header of a column or axis: a label and the unit of its quantity, ``[1]`` for ratios."""
+    return f"{label} [{unit(quantity, units) or '1'}]"

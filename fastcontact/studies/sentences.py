@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fastcontact.studies.fit import CONFIDENCE
-from fastcontact.studies.labels import title
+from fastcontact.studies.quantities import title
 from fastcontact.studies.render.table import percent
 from fastcontact.studies.series import Series, cancelling
 

@@ -45,8 +45,8 @@ class Settings:
     generator: str | None  # of the meshes; None where a mesh file is refined
     # Arguments of the generator on level 0: by shape of the cells (a key of `SHAPES`), or the case's own by "".
     arguments: dict[str, dict[str, Any]]
-    halve: tuple[str, ...] | None = None  # arguments to halve from level to level; None: those of `levels.RULES`
-    double: tuple[str, ...] | None = None  # arguments to double likewise
+    halve: tuple[str, ...] = ()  # arguments to halve from level to level; without both, those of `levels.RULES`
+    double: tuple[str, ...] = ()  # arguments to double likewise
     curves: tuple[Circle, ...] | None = None  # true boundaries of a mesh file; None: the circles found
     load_steps: int | None = None  # of every run; None: the case's
     options: dict[str, dict[str, Any]] = field(default_factory=dict)  # of the contact pair, by formulation
@@ -80,8 +80,8 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
         pair=pair,
         generator=generator,
         arguments=arguments,
-        halve=tuple(study["halve"]) if "halve" in study else None,
-        double=tuple(study["double"]) if "double" in study else None,
+        halve=tuple(study.get("halve", ())),
+        double=tuple(study.get("double", ())),
         curves=curves if "curves" in study else None,
         load_steps=study.get("load_steps"),
         options=study.get("options", {}),
@@ -147,10 +147,7 @@ def combinations(
 
 
 def one_combination(settings: Settings, element: str | None, formulation: str | None) -> Combination:
-    """Return the last combination of ``[study]`` with this element and formulation, where given; else make one of them.
-
-    Raises CaseError if the element or the formulation is unknown.
-    """
+    """Return the last combination of ``[study]`` with this element and formulation, where given; else make one of them."""
     formulation = formulation.replace("-", "_") if formulation else None
     for known in reversed(settings.combinations):
         if element in (None, known.element) and formulation in (None, known.formulation):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.studies.labels import column, title
+from fastcontact.studies.quantities import column, title
 from fastcontact.studies.render import page
 from fastcontact.studies.render.figure import Curve, Line, Panel, figure, marker
 from fastcontact.studies.render.table import Rows, aligned, finite, number, percent, structured

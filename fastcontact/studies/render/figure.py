@@ -67,10 +67,7 @@ def marker(number: int) -> str:
 
 
 def figure(panels: Sequence[Sequence[Panel]], size: tuple[float, float], title: str = "", **style: Any) -> Figure:
-    """Return a figure of rows of panels, of a `size` [inch]; it needs no display. `style` is that of its title.
-
-    Raises FastcontactError if matplotlib is not installed.
-    """
+    """Return a figure of rows of panels, of a `size` [inch], for which matplotlib is needed; `style` is of its title."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
