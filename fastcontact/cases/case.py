@@ -227,15 +227,9 @@ def _theory(where: str, data: dict[str, Any]) -> Any:
 
 
 def described(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the labels and theories of a case: ``title``, ``units``, and by pair ``theories``, ``shares``, ``approach``.
+    """Return title, units, theories and approach of a case, as `Case` holds them.
 
     `data` is the parsed text kept in a result file; it may be empty.
     """
     theories, approach = _theories(data)
-    return {
-        "title": data.get("title", ""),
-        "units": _units(data),
-        "theories": {pair: entry["theory"] for pair, entry in theories.items()},
-        "shares": {pair: entry["share"] for pair, entry in theories.items()},
-        "approach": approach,
-    }
+    return {"title": data.get("title", ""), "units": _units(data), "theories": theories, "approach": approach}

@@ -77,8 +77,7 @@ def profile_picture(case: Any, step: StepResult, path: str) -> None:
     if not step.contact:
         raise FastcontactError("there is no contact pair whose pressure could be plotted")
     name, contact = next(iter(step.contact.items()))
-    theories = case.theories.get(name, {})
-    curves = pressure_curves(theories.get("theory"), contact, theories.get("share", 1.0))
+    curves = pressure_curves(case.theories.get(name, {}), contact)
     draw_profile(contact, step, curves, path, case.title, case.units)
 
 

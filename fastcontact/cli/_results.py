@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import tomllib
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -49,25 +50,25 @@ def case_data(results: Any) -> dict[str, Any]:
     return described(data)
 
 
-def pressure_curves(theory: Any, contact: Any, share: float) -> dict[str, Any]:
-    """Return the theories to draw over the pressure of a contact, by legend: at equal approach and at equal force.
+def pressure_curves(theories: Mapping[str, Any], contact: Any) -> dict[str, Any]:
+    """Return what to draw over the pressure of a contact, by legend: its theory at equal approach and at equal force.
 
-    There are none without a theory whose pressure can be drawn; that of a punch is infinite.
+    There is nothing without a theory whose pressure can be drawn; that of a punch is infinite.
     """
+    theory = theories.get("theory")
     if not all(hasattr(theory, name) for name in ("pressure", "pressure_max", "radius")):
         return {}
-    same = at_equal_force(theory, contact, share)
-    return {"Hertz, equal approach": theory} | ({} if same is None else {"Hertz, equal force": same})
+    return {"Hertz, equal approach": theory, **at_equal_force("Hertz, equal force", theory, contact, theories["share"])}
 
 
-def at_equal_force(theory: Any, contact: Any, share: float) -> Any:
-    """Return a theory at the force of a contact, of which the model holds a `share` [-]; None where there is none."""
+def at_equal_force(legend: str, theory: Any, contact: Any, share: float) -> dict[str, Any]:
+    """Return a theory by its legend at the force of a contact, of which the model holds a `share` [-]; empty without."""
     force = float(np.linalg.norm(contact.force)) / share
-    return theory.at_force(force) if force > 0 and hasattr(theory, "at_force") else None
+    return {legend: theory.at_force(force)} if force > 0 and hasattr(theory, "at_force") else {}
 
 
-def law(case: dict[str, Any], pair: str) -> Any:
-    """Return what gives force and radius of a contact pair by its approach, from none on; None where nothing does."""
-    theory = case["theories"].get(pair)
+def law(theories: Mapping[str, Any]) -> Any:
+    """Return what gives force and radius of a contact by its approach, from none on; None where nothing does."""
+    theory = theories.get("theory")
     theory = getattr(theory, "hertz", theory)
-    return theory if hasattr(theory, "at_approach") and case["shares"][pair] == 1.0 else None
+    return theory if hasattr(theory, "at_approach") and theories["share"] == 1.0 else None

@@ -33,7 +33,7 @@ def run(options: argparse.Namespace) -> int:
         case = _results.case_data(results)
     contact = step.contact[name]
     table = contact_table(contact, step)
-    theories = pressure_curves(case["theories"].get(name), contact, case["shares"].get(name, 1.0))
+    theories = pressure_curves(case["theories"].get(name, {}), contact)
     for label, theory in theories.items():
         table = with_theory(table, f"pressure_{label.replace(', ', '_').replace(' ', '_')}", theory.pressure)
     if options.csv:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,6 @@ from fastcontact.studies.render import page
 from fastcontact.studies.render.figure import Curve, Line, Panel, figure
 from fastcontact.studies.render.table import Rows, aligned, finite, number, structured
 from fastcontact.studies.report import Report
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +179,7 @@ class AdaptiveStudy(Report):
         heading = f"Last mesh: {self.rounds[-1].n_cells} cells, estimated error"
         return Panel(heading, f"x [{length}]", f"y [{length}]", grid=0.0, draw=self._draw_mesh)
 
-    def _draw_mesh(self, ax: Axes) -> None:
+    def _draw_mesh(self, ax: Any) -> None:
         from matplotlib.collections import PolyCollection
         from matplotlib.colors import LogNorm
 

@@ -119,13 +119,12 @@ def _at_force(theory: Any, force: Limit | None) -> tuple[dict[str, float], dict[
     """Return the theory's values at the limit of the force, and how much they change over its error bar."""
     if force is None or not force.value > force.uncertainty or not hasattr(theory, "at_force"):
         return {}, {}
-    middle = of_theory(theory.at_force(force.value))
-    upper = of_theory(theory.at_force(force.value + force.uncertainty))
+    middle, upper = (of_theory(theory.at_force(force.value + off)) for off in (0.0, force.uncertainty))
     return middle, {name: abs(upper[name] - value) for name, value in middle.items()}
 
 
 def _limit(levels: Sequence[Level], quantity: str) -> Limit | None:
-    known = [level for level in levels if quantity in level.values]
-    if len({level.h for level in known}) < max(3, len(known)):
+    known = [(level.h, level.values[quantity]) for level in levels if quantity in level.values]
+    if len({h for h, _ in known}) < max(3, len(known)):
         return None
-    return fit_limit([level.h for level in known], [level.values[quantity] for level in known])
+    return fit_limit(*zip(*known, strict=True))

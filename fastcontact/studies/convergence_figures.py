@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,6 @@ from numpy.typing import NDArray
 from fastcontact.studies.quantities import title
 from fastcontact.studies.render.figure import Curve, Line, Panel, marker
 from fastcontact.studies.series import Series
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 # With more curves than this, error bars would hide them.
@@ -53,7 +50,7 @@ def error_panel(all_series: Sequence[Series], quantity: str, units: Mapping[str,
     )
 
 
-def _slope_triangles(ax: Axes, quantity: str, all_series: Sequence[Series]) -> None:
+def _slope_triangles(ax: Any, quantity: str, all_series: Sequence[Series]) -> None:
     """Draw triangles whose slopes are the least and the greatest fitted order, rounded to halves."""
     orders = [series.limits[quantity].order for series in all_series]
     orders = [order for order in orders if math.isfinite(order)]

@@ -40,7 +40,7 @@ class Job:
     name: str  # of the case
     data: dict[str, Any]  # the parsed case file with all values of this run
     pair: str | None  # contact pair to measure
-    recipe: Recipe | None  # of the mesh; None: `base` as it is, or the mesh that the data name
+    recipe: Recipe  # of the mesh
     base: Mesh | None  # the case's mesh, where it was read from a file
     marks: dict[str, Any]  # distinguish this run from the others of its study, e.g. its level
     size: float = 0.0  # amount of work, in any unit that the runs of a study share
@@ -126,8 +126,7 @@ def measured(job: Job) -> dict[str, Any]:
     started = time.perf_counter()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FastcontactWarning)
-        mesh = job.base if job.recipe is None else make_mesh(job.recipe, job.base)
-        case = build_case(job.data, name=job.name, mesh=mesh)
+        case = build_case(job.data, name=job.name, mesh=make_mesh(job.recipe, job.base))
         last = last_step(case)
     values = quantities.measure(case, last, job.pair)
     return {
