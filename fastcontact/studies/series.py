@@ -59,19 +59,6 @@ def split(finest: float, limit: Limit, theory: float) -> Split:
     )
 
 
-def cancelling(values: list[float], limit: Limit, theory: float) -> int | None:
-    """Return the mesh, counted from 0, that is nearer to the theory than half the model error, by mesh error.
-
-    On that mesh two errors cancel: it looks better than it is. None if there is no such mesh.
-    """
-    found = split(values[-1], limit, theory)
-    if not found.resolved:
-        return None
-    off = [abs(value / theory - 1.0) for value in values]
-    best = min(range(len(off)), key=off.__getitem__)
-    return best if off[best] < 0.5 * abs(found.model) else None
-
-
 @dataclass(frozen=True, eq=False)
 class Level:
     """Results of one mesh.
