@@ -107,27 +107,10 @@ def _unreadable(path: Path, error: Exception) -> str:
 def build_case(
     data: dict[str, Any], *, name: str, folder: str | Path = ".", text: str = "", mesh: Mesh | None = None
 ) -> Case:
-    """Build a case from the parsed data of a case file.
+    """Build a case from the parsed data of a case file, as `tomllib` returns them.
 
-    Parameters
-    ----------
-    data : dict
-        As `tomllib` returns it.
-    name : str
-        Name of the case.
-    folder : path-like
-        Where the mesh file is looked for.
-    text : str
-        The case file, kept in result files.
-    mesh : Mesh, optional
-        Used instead of the one that ``[mesh]`` names.
-
-    Raises
-    ------
-    CaseError
-        If a key is unknown or a value wrong.
-    FastcontactError
-        If the mesh or the model is wrong.
+    Its mesh file lies relative to `folder`; a `mesh` replaces the one that ``[mesh]`` names. Result files keep the `text`.
+    Raises CaseError if a key is unknown or a value wrong, FastcontactError if the mesh or the model is wrong.
     """
     check_keys("", data, TOP)
     for key, known in (("study", STUDY), ("units", UNITS), ("solve", SOLVE)):
@@ -139,8 +122,7 @@ def build_case(
     ramp = _ramp(data.get("ramp", {}))
     criteria = Criteria(**{key: value for key, value in solve.items() if not key.startswith("linear_")})
     theories, approach = _theories(data)
-    if mesh is None:
-        mesh = _mesh(Path(folder), data["mesh"])
+    mesh = _mesh(Path(folder), data["mesh"]) if mesh is None else mesh
     model = build_model(mesh, data, text, Path(folder))
     probes = _probes(mesh, data.get("probes", {}))
     return Case(
@@ -230,30 +212,24 @@ def _share(where: str, data: dict[str, Any]) -> float:
     check_keys(where, {"share": data.get("share", 1.0)}, {"share": NUMBER})
     share = float(data.get("share", 1.0))
     if not 0.0 < share <= 1.0:
-        raise CaseError(
-            f"{where}.share = {share:g} must be more than 0 and at most 1: 0.25 for a quarter of the contact"
-        )
+        text = "must be more than 0 and at most 1: 0.25 for a quarter of the contact"
+        raise CaseError(f"{where}.share = {share:g} {text}")
     return share
 
 
 def _theory(where: str, data: dict[str, Any]) -> Any:
     if not isinstance(data, dict) or "kind" not in data:
         raise CaseError(f"'{where}' needs the key 'kind', one of {', '.join(analytic.THEORIES)}")
-    if not isinstance(data["kind"], str) or data["kind"] not in analytic.THEORIES:
-        raise CaseError(unknown(f"{where}.kind", str(data["kind"]), analytic.THEORIES))
-    return called(where, analytic.THEORIES[data["kind"]], {key: v for key, v in data.items() if key != "kind"})
+    kind, arguments = data["kind"], {key: value for key, value in data.items() if key != "kind"}
+    if not isinstance(kind, str) or kind not in analytic.THEORIES:
+        raise CaseError(unknown(f"{where}.kind", str(kind), analytic.THEORIES))
+    return called(where, analytic.THEORIES[kind], arguments)
 
 
 def described(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the labels and theories of a case: ``title``, ``units``, and by pair ``theories``, ``shares``, ``approach``.
+    """Return title, units, theories and approach of a case, as `Case` holds them.
 
     `data` is the parsed text kept in a result file; it may be empty.
     """
     theories, approach = _theories(data)
-    return {
-        "title": data.get("title", ""),
-        "units": _units(data),
-        "theories": {pair: entry["theory"] for pair, entry in theories.items()},
-        "shares": {pair: entry["share"] for pair, entry in theories.items()},
-        "approach": approach,
-    }
+    return {"title": data.get("title", ""), "units": _units(data), "theories": theories, "approach": approach}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -16,17 +17,12 @@ from fastcontact.results.step import ContactResult, StepResult
 STRESS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "yz": 4, "xz": 5}
 _AXES = {"x": 0, "y": 1, "z": 2}
 # Keys of a check in a case file.
-CHECK = {
-    "quantity": str,
-    "theory": str,
-    "of": str,
-    "value": NUMBER,
-    "source": str,
-    "factor": NUMBER,
-    "tolerance": NUMBER,
-    "name": str,
+CHECK: dict[str, Any] = {
+    **dict.fromkeys(("name", "quantity", "theory", "of", "source"), str),
+    **dict.fromkeys(("value", "factor", "tolerance"), NUMBER),
 }
 # Quantities of a contact pair, and of a probe.
+LENGTHS = ("radius", "stick_radius", "displacement")
 OF_PAIRS = ("force", "pressure_max", "radius", "stick_radius")
 OF_PROBES = ("pressure", "shear", "von_mises", *(f"stress.{c}" for c in STRESS), *(f"displacement.{a}" for a in _AXES))
 
@@ -68,31 +64,21 @@ class Check:
     @property
     def unit(self) -> str:
         """Kind of the number: ``"pressure"``, ``"force"`` or ``"length"``."""
-        what = self.quantity.partition(".")[2].partition(".")[0]
-        return {"force": "force", "radius": "length", "stick_radius": "length", "displacement": "length"}.get(
-            what, "pressure"
-        )
-
-    @property
-    def sign(self) -> float:
-        """Sign of the target against the number in the theory."""
-        return -1.0 if ".stress." in self.quantity and self.theory else 1.0
+        what = self.quantity.split(".")[1]
+        return "force" if what == "force" else "length" if what in LENGTHS else "pressure"
 
     def target(self, theory: Any) -> float:
         """Return the number to compare with; `theory` is that of the pair, or None for a documented value."""
         if theory is None:
             assert self.value is not None
             return self.value
-        number = theory
-        for part in self.of.split("."):
-            number = getattr(number, part)
-        return self.sign * float(number)
+        number = float(attrgetter(self.of)(theory))
+        return -number if ".stress." in self.quantity and self.theory else number
 
     def described(self) -> str:
         """Return what is compared with what, in one line."""
-        against = (
-            f"the theory's {self.of}" if self.theory else f"{self.value:g}{f' ({self.source})' * bool(self.source)}"
-        )
+        source = f" ({self.source})" if self.source else ""
+        against = f"the theory's {self.of}" if self.theory else f"{self.value:g}{source}"
         return f"{self.quantity} against {against} within {self.tolerance:g}"
 
 
@@ -103,10 +89,7 @@ def read_check(
     pairs: Mapping[str, Any],
     theories: Mapping[str, Any],
 ) -> Check:
-    """Return the check that an entry of a case file describes; its keys and their types are right.
-
-    Raises CaseError if the quantity, or what it is compared with, is unknown.
-    """
+    """Return the check that an entry of a case file with the right keys describes; raises CaseError for wrong values."""
     for key in ("quantity", "tolerance"):
         if key not in entry:
             raise CaseError(f"{where} needs '{key}'")

@@ -14,17 +14,11 @@ NUMBER = (int, float)
 AXES = {"x": NUMBER, "y": NUMBER, "z": NUMBER}
 UNITS = {"length": str, "force": str, "pressure": str}
 RAMP = {"steps": int, "end": NUMBER, "instants": list, "table": list}
-SOLVE = {
+SOLVE: dict[str, Any] = {
     "linear_solver": str,
-    "linear_tolerance": NUMBER,
-    "relative": NUMBER,
-    "absolute": NUMBER,
-    "geometry_updates": int,
-    "geometry": NUMBER,
     "keep_pairing": bool,
-    "max_geometry_updates": int,
-    "max_active_set_iterations": int,
-    "max_halvings": int,
+    **dict.fromkeys(("linear_tolerance", "relative", "absolute", "geometry"), NUMBER),
+    **dict.fromkeys(("geometry_updates", "max_geometry_updates", "max_active_set_iterations", "max_halvings"), int),
 }
 # Tables that may occur several times, by kind: the types of their keys, and the keys that are required.
 LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {

@@ -18,10 +18,7 @@ def shipped_cases() -> dict[str, Path]:
 
 
 def shipped_case(name: str) -> Path:
-    """Return the case file of a ready case.
-
-    Raises CaseError if there is none of that name; the message offers the nearest ones.
-    """
+    """Return the case file of a ready case; raises CaseError if there is none, with the nearest names."""
     found = shipped_cases()
     if name not in found:
         raise CaseError(unknown("ready case", name, found))
@@ -29,10 +26,7 @@ def shipped_case(name: str) -> Path:
 
 
 def case_path(given: str | Path) -> Path:
-    """Return the file of a path, or of the name of a ready case where no such file exists.
-
-    Raises CaseError if neither exists; the message offers the nearest ready cases.
-    """
+    """Return the file of a path, or of the name of a ready case where there is no such file; raises CaseError if none."""
     path = Path(given)
     try:
         if path.exists() or path.suffix or path.name != str(given):

@@ -69,6 +69,7 @@ def of_step(step: StepResult) -> dict[str, Any]:
 
 
 def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
+    moved = contact.obstacle_displacement
     return {
         "formulation": contact.formulation,
         "force": float(np.linalg.norm(contact.force)),
@@ -76,9 +77,7 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
         "radius": [_finite(value) for value in contact.radius],
         "pressure_max": contact.pressure_max,
         "closed_nodes": int(contact.active.sum()),
-        "obstacle_displacement": None
-        if contact.obstacle_displacement is None
-        else contact.obstacle_displacement.tolist(),
+        "obstacle_displacement": None if moved is None else moved.tolist(),
         "penetration": contact.penetration,
         "penalty": penalty,
     }
@@ -89,13 +88,12 @@ def _finite(value: float) -> float | None:
 
 
 def _probe(step: StepResult, point: int) -> dict[str, Any]:
-    found = at_point(step, point)
-    pressure = None if found is None else float(found[0].pressure[found[1]])
+    contact, row = at_point(step, point) or (None, 0)
     return {
         "stress": step.stress[point].tolist(),
         "displacement": step.displacement[point].tolist(),
         "von_mises": float(step.von_mises[point]),
-        "pressure": pressure,
+        "pressure": float(contact.pressure[row]) if contact else None,
     }
 
 
@@ -104,7 +102,7 @@ def _against_theory(
 ) -> dict[str, Any]:
     """Compare a contact with its theory at the given approach and at equal force; the model holds a `share` of it."""
     force = float(np.linalg.norm(contact.force)) / share
-    computed = {"force": force, "pressure_max": contact.pressure_max, "radius": list(contact.radius)}
+    computed = {"force": force, "pressure_max": contact.pressure_max, "radius": 0.5 * sum(contact.radius)}
     compared = {"equal_approach": {"approach": approach, **_deviations(computed, theory)}}
     if force > 0 and hasattr(theory, "at_force"):
         compared["equal_force"] = _deviations(computed, theory.at_force(force))
@@ -113,20 +111,10 @@ def _against_theory(
     return compared
 
 
-def _deviations(computed: Mapping[str, Any], theory: Any) -> dict[str, Any]:
+def _deviations(computed: Mapping[str, float], theory: Any) -> dict[str, Any]:
     """Return the theory's numbers, and the relative deviations of the computed ones from them."""
-    inside, outside = computed["radius"]
-    middle = 0.5 * (inside + outside)
-    return {
-        "force": theory.force,
-        "pressure_max": theory.pressure_max,
-        "radius": theory.radius,
-        "deviation": {
-            "force": computed["force"] / theory.force - 1.0,
-            "pressure_max": computed["pressure_max"] / theory.pressure_max - 1.0,
-            "radius": _finite(middle / theory.radius - 1.0),
-        },
-    }
+    exact = {name: getattr(theory, name) for name in COMPARED}
+    return {**exact, "deviation": {name: _finite(computed[name] / exact[name] - 1.0) for name in COMPARED}}
 
 
 def lines(summary: Mapping[str, Any]) -> list[str]:

@@ -1,4 +1,4 @@
-"""Files that a command writes when its work is done: checked before it begins, and written."""
+"""Files that a command writes when its work is done: checked before it begins, and written; pictures among them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from fastcontact.cli._results import pressure_curves
 from fastcontact.errors import FastcontactError, FileError
+from fastcontact.results.step import ContactResult, StepResult
 
 
 def check_outputs(
@@ -19,8 +21,7 @@ def check_outputs(
     """Refuse files that could not be written, or would replace the one to `read`; None means no file.
 
     Raises FileError if a folder is missing or write-protected, a path is a folder, the file to read or that of another
-    output, or the suffix of a picture is of no known format. Raises FastcontactError if there is no matplotlib for a
-    picture.
+    output, or a picture of no known format; FastcontactError if there is no matplotlib.
     """
     from fastcontact.mesh.files.paths import checked_target
 
@@ -51,10 +52,7 @@ def _check_formats(paths: list[str]) -> None:
 
 
 def write_text(path: str, content: str) -> None:
-    """Write a text file.
-
-    Raises FileError if it cannot be written.
-    """
+    """Write a text file; raises FileError if it cannot be written."""
     try:
         Path(path).write_text(content, encoding="utf-8")
     except OSError as error:
@@ -64,3 +62,39 @@ def write_text(path: str, content: str) -> None:
 def write_json(path: str, numbers: Any, indent: int = 2) -> None:
     """Write a JSON file; raises like `write_text`."""
     write_text(path, json.dumps(numbers, indent=indent) + "\n")
+
+
+def save(axes: Any, path: str) -> None:
+    """Write the figure of `axes` to `path`; raises FileError if it cannot be written or its format is unknown."""
+    try:
+        axes.figure.savefig(path)
+    except (OSError, ValueError) as error:
+        raise FileError(f"cannot write the picture '{path}': {error}") from error
+
+
+def profile_picture(case: Any, step: StepResult, path: str) -> None:
+    """Plot the pressure of the first contact pair with the theories of its case."""
+    if not step.contact:
+        raise FastcontactError("there is no contact pair whose pressure could be plotted")
+    name, contact = next(iter(step.contact.items()))
+    curves = pressure_curves(case.theories.get(name, {}), contact)
+    draw_profile(contact, step, curves, path, case.title, case.units)
+
+
+def draw_profile(
+    contact: ContactResult, step: StepResult, theories: dict[str, Any], path: str, title: str, units: Any
+) -> None:
+    """Plot the pressure of a contact pair with theories by legend."""
+    from fastcontact.results import plot
+
+    flat = contact.normal.shape[1] == 2
+    stress = step.stress[contact.points, 1] if flat else normal_stress(contact, step)
+    title = f"{title}\nload factor {step.load_factor:g}"
+    save(plot.pressure_profile(contact, other_theories=theories, stress=stress, title=title, units=units), path)
+
+
+def normal_stress(contact: ContactResult, step: StepResult) -> Any:
+    """Return the stress (m,) at the contact nodes along the normals that they face [pressure]."""
+    xx, yy, zz, xy, yz, xz = step.stress[contact.points].T
+    x, y, z = contact.normal.T
+    return x * x * xx + y * y * yy + z * z * zz + 2.0 * (x * y * xy + y * z * yz + x * z * xz)

@@ -61,8 +61,6 @@ class Runs(StatusLine):
         self._stored += progress.stored
         solved = progress.done - self._stored
         outcome = "failed" if progress.error else "found in the store" if progress.stored else "done"
-        left = ""
-        if solved and progress.left:
-            seconds = (time.perf_counter() - self._started) / solved * len(progress.left)
-            left = f", {len(progress.left)} left: about {seconds:.0f} s"
+        each, count = (time.perf_counter() - self._started) / max(solved, 1), len(progress.left)
+        left = f", {count} left: about {each * count:.0f} s" if solved and count else ""
         self.draw(f"{progress.done}/{progress.total} {progress.label} {outcome}{left}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import tomllib
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -19,10 +20,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def chosen_step(results: Any, number: int) -> Any:
-    """Return the step with a number from 1, or the last for -1.
-
-    Raises CaseError if there is no such step.
-    """
+    """Return the step with a number from 1, or the last for -1; raises CaseError if there is no such step."""
     if not len(results):
         raise CaseError(f"'{results.path}' holds no finished step yet")
     if number == -1:
@@ -33,10 +31,7 @@ def chosen_step(results: Any, number: int) -> Any:
 
 
 def chosen_contact(step: Any, name: str | None) -> str:
-    """Return the name of a contact pair of a step.
-
-    Raises CaseError if there is none, or none of that name.
-    """
+    """Return the name of a contact pair of a step; raises CaseError if there is none, or none of that name."""
     if not step.contact:
         raise CaseError("this result holds no contact pair")
     if name is not None and name not in step.contact:
@@ -55,19 +50,25 @@ def case_data(results: Any) -> dict[str, Any]:
     return described(data)
 
 
-def curve(theory: Any) -> bool:
-    """Return whether a theory has a pressure that can be drawn over the contact; that of a punch is infinite."""
-    return all(hasattr(theory, name) for name in ("pressure", "pressure_max", "radius"))
+def pressure_curves(theories: Mapping[str, Any], contact: Any) -> dict[str, Any]:
+    """Return what to draw over the pressure of a contact, by legend: its theory at equal approach and at equal force.
+
+    There is nothing without a theory whose pressure can be drawn; that of a punch is infinite.
+    """
+    theory = theories.get("theory")
+    if not all(hasattr(theory, name) for name in ("pressure", "pressure_max", "radius")):
+        return {}
+    return {"Hertz, equal approach": theory, **at_equal_force("Hertz, equal force", theory, contact, theories["share"])}
 
 
-def at_equal_force(theory: Any, contact: Any, share: float) -> Any:
-    """Return a theory at the force of a contact, of which the model holds a `share` [-]; None where there is none."""
+def at_equal_force(legend: str, theory: Any, contact: Any, share: float) -> dict[str, Any]:
+    """Return a theory by its legend at the force of a contact, of which the model holds a `share` [-]; empty without."""
     force = float(np.linalg.norm(contact.force)) / share
-    return theory.at_force(force) if force > 0 and hasattr(theory, "at_force") else None
+    return {legend: theory.at_force(force)} if force > 0 and hasattr(theory, "at_force") else {}
 
 
-def law(case: dict[str, Any], pair: str) -> Any:
-    """Return what gives force and radius of a contact pair by its approach, from none on; None where nothing does."""
-    theory = case["theories"].get(pair)
+def law(theories: Mapping[str, Any]) -> Any:
+    """Return what gives force and radius of a contact by its approach, from none on; None where nothing does."""
+    theory = theories.get("theory")
     theory = getattr(theory, "hertz", theory)
-    return theory if hasattr(theory, "at_approach") and case["shares"][pair] == 1.0 else None
+    return theory if hasattr(theory, "at_approach") and theories["share"] == 1.0 else None

@@ -8,8 +8,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from fastcontact.cli._outputs import check_outputs, write_json, write_text
-from fastcontact.cli._pictures import save
+from fastcontact.cli._outputs import check_outputs, save, write_json, write_text
 from fastcontact.cli._progress import Runs
 from fastcontact.errors import CaseError, FastcontactError
 
@@ -42,10 +41,7 @@ def names(text: str | None) -> list[str] | None:
 
 
 def finished(options: argparse.Namespace, study: Callable[..., Any]) -> Any:
-    """Return the result of a study, run on the executor of the options with a line of progress.
-
-    Raises FastcontactError if it is interrupted from the keyboard; the message says how to go on.
-    """
+    """Return the result of a study, run on the executor of the options; the error of an interruption says how to go on."""
     progress = Runs(show=sys.stderr.isatty() and not options.quiet)
     try:
         with executor(options.executor) as where:
@@ -94,8 +90,13 @@ def stopped(options: argparse.Namespace) -> str:
     return "stopped; with --store DIR the same command would go on where it stopped"
 
 
-def write(options: argparse.Namespace, result: Any) -> list[str]:
-    """Write the files of the options and return their paths."""
+def report(
+    options: argparse.Namespace, result: Any, hint: str, failures: Sequence[str] = (), also: Sequence[str] = ()
+) -> int:
+    """Write the files of the options; print why runs failed, the lines of the result, and the files written.
+
+    `also` are files written before; without any file, the `hint` says how to get one. Returns the exit code.
+    """
     if options.json:
         write_json(options.json, result.as_dict())
     if options.csv:
@@ -106,13 +107,10 @@ def write(options: argparse.Namespace, result: Any) -> list[str]:
         save(result.figure(), options.png)
     if options.html:
         write_text(options.html, result.html())
-    return [path for path in (options.json, options.csv, options.png, options.html) if path]
-
-
-def show(options: argparse.Namespace, result: Any, written: Sequence[str], hint: str, failures: Sequence[str]) -> None:
-    """Print why runs failed, the lines of the result, and the files written; without any, a hint how to get one."""
     for text in failures:
         print(f"warning: {text}", file=sys.stderr)
     if not options.quiet:
         print("\n".join(result.lines()))
+        written = [path for path in (options.json, options.csv, options.png, options.html, *also) if path]
         print(f"wrote {', '.join(written)}" if written else f"nothing written: {hint}")
+    return 2 if failures else 0

@@ -30,10 +30,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def suite(name: str) -> Any:
-    """Import a module of ``bench/suite`` in the checkout.
-
-    Raises FastcontactError if the package is installed without its checkout.
-    """
+    """Import a module of ``bench/suite``; raises FastcontactError if the package is installed without its checkout."""
     folder = Path(__file__).resolve().parents[2] / "bench"
     if not (folder / "suite").is_dir():
         raise FastcontactError(
@@ -92,10 +89,7 @@ def _stored(path: str) -> Any:
 
 
 def draw(path: str, results: dict[str, Any]) -> None:
-    """Draw every benchmark of several sizes into a folder.
-
-    Raises FileError if a picture cannot be written.
-    """
+    """Draw every benchmark of several sizes into a folder; raises FileError if a picture cannot be written."""
     pictures = suite("pictures")
     for name, sizes in results.items():
         if len({entry["n_dofs"] for entry in sizes}) > 1:

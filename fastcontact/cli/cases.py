@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import tomllib
 from pathlib import Path
 from typing import Any
 
-from fastcontact.errors import FileError
+from fastcontact.errors import FastcontactError, FileError
 
 HELP = "list the ready cases; print one, or copy it to change it"
 
@@ -21,7 +22,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """List, print or copy."""
     from fastcontact.cases.shipped import shipped_case, shipped_cases
-    from fastcontact.errors import FastcontactError
 
     if options.copy and options.name:
         raise FastcontactError("give either a name to print or --copy NAME, not both")
@@ -56,8 +56,6 @@ def _lines(path: Path) -> list[str]:
 
 def copied(case: Path, target: Path) -> list[Path]:
     """Copy a case file, and beside it the mesh file it reads, if any; refuse to overwrite."""
-    import tomllib
-
     text = case.read_text(encoding="utf-8")
     mesh: dict[str, Any] = tomllib.loads(text).get("mesh", {})
     files = {target: text.encode()}

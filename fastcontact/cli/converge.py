@@ -48,10 +48,8 @@ def run(options: argparse.Namespace) -> int:
         options,
         partial(convergence_study, options.case, options.levels, elements, formulations, quantities=quantities or ()),
     )
-    written = _study.write(options, study)
     failures = [text for series in study.series for text in series.failed.values()] + list(study.failed.values())
-    _study.show(options, study, written, HINT, failures)
-    return 2 if failures else 0
+    return _study.report(options, study, HINT, failures)
 
 
 def _adaptive(options: argparse.Namespace) -> int:
@@ -73,14 +71,12 @@ def _adaptive(options: argparse.Namespace) -> int:
         on_round=on_round,
     )
     line.close()
-    written = _study.write(options, study)
     if options.output:
         from fastcontact.results.writer import ResultWriter
 
         with ResultWriter(options.output, study.case.model, case_text=study.text, cell_fields=("error",)) as out:
             out.write(dataclasses.replace(study.last, cell_fields={"error": study.error.cells}))
-        written.append(options.output)
-    _study.show(options, study, written, HINT, ())
+    _study.report(options, study, HINT, also=[options.output])
     return 0 if study.reached else 2
 
 

@@ -26,12 +26,8 @@ def run(options: argparse.Namespace) -> int:
     for name, version in summary.versions().items():
         print(f"{name:<12} {version}")
     print(f"{'threads':<12} {_jit.threads()} of {os.cpu_count()}")
-    cache = getattr(
-        getattr(element_2d_kernels.add_stiffness, "_cache", None),
-        "cache_path",
-        "none: kernels compile in every process",
-    )
-    print(f"{'cache':<12} {cache}")
+    cache = getattr(element_2d_kernels.add_stiffness, "_cache", None)
+    print(f"{'cache':<12} {getattr(cache, 'cache_path', 'none: kernels compile in every process')}")
     if options.warmup:
         started = time.perf_counter()
         with warnings.catch_warnings():

@@ -33,25 +33,17 @@ class _Raw(argparse.RawDescriptionHelpFormatter):
 def _option(make: Callable[..., Any], parameter: inspect.Parameter) -> dict[str, Any]:
     """Return the argparse settings for one argument of a generator."""
     hint = typing.get_type_hints(make).get(parameter.name, str)
-    default = parameter.default
     options = [kind for kind in (hint, *typing.get_args(hint)) if kind is not type(None)]
     settings: dict[str, Any] = {
         "default": argparse.SUPPRESS,
-        "help": f"default: {default}",
+        "help": f"default: {parameter.default}",
         "metavar": "VALUE",
     }
-    if bool in options:
-        return {
-            "default": argparse.SUPPRESS,
-            "help": f"default: {default}",
-            "action": argparse.BooleanOptionalAction,
-        }
     for kind in options:
         if typing.get_origin(kind) is tuple:
             members = [member for member in typing.get_args(kind) if member is not Ellipsis]
             return {**settings, "nargs": len(members), "type": members[0]}
-    settings["type"] = int if int in options and float not in options else float if float in options else str
-    return settings
+    return {**settings, "type": next((kind for kind in (float, int) if kind in options), str)}
 
 
 def run(options: argparse.Namespace) -> int:

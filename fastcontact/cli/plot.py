@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from fastcontact.cli import _results
-from fastcontact.cli._pictures import save
+from fastcontact.cli._outputs import save
 from fastcontact.errors import CaseError
 
 HELP = "plot the deformed mesh with its von Mises stress, or force and radius over the load"
@@ -40,42 +40,33 @@ def run(options: argparse.Namespace) -> int:
         if options.view:
             plot.view(results, step, scale=options.scale, title=case["title"], screenshot=options.png)
             return 0
-        if options.axis or options.zones:
-            axes = _of_contact(options, results, step, case)
-        elif options.history:
-            name = _results.chosen_contact(step, options.contact)
-            axes = plot.history(
-                list(results),
-                name,
-                law=_results.law(case, name),
-                approach=case["approach"].get(name),
-                title=case["title"],
-                units=case["units"],
-            )[0]
-        else:
-            title = f"{case['title']}\nload factor {step.load_factor:g}, displacements x {options.scale:g}"
-            axes = plot.deformed_shape(
-                results.mesh, step, scale=options.scale, mirrored=options.mirrored, title=title.strip(),
-                units=case["units"],
-            )  # fmt: skip
-    save(axes, options.png)
+        save(_drawn(options, results, step, case), options.png)
     if not options.quiet:
         print(f"wrote {options.png}")
     return 0
 
 
-def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> Any:
-    """Draw what belongs to one contact pair: its zones over the load, or the stresses under it."""
+def _drawn(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> Any:
+    """Draw the deformed mesh, or of one contact pair its zones or history over the load, or the stresses under it."""
     from fastcontact.results import plot
 
+    labels = {"title": case["title"], "units": case["units"]}
+    loaded = f"load factor {step.load_factor:g}"
+    if not (options.history or options.axis or options.zones):
+        labels["title"] = f"{case['title']}\n{loaded}, displacements x {options.scale:g}".strip()
+        return plot.deformed_shape(results.mesh, step, scale=options.scale, mirrored=options.mirrored, **labels)
     name = _results.chosen_contact(step, options.contact)
+    theories = case["theories"].get(name, {})
     if options.zones:
-        return plot.contact_zones(list(results), name, title=case["title"], units=case["units"])
-    theory = case["theories"].get(name)
+        return plot.contact_zones(list(results), name, **labels)
+    if options.history:
+        approach = case["approach"].get(name)
+        return plot.history(list(results), name, law=_results.law(theories), approach=approach, **labels)[0]
+    theory = theories.get("theory")
     theory = getattr(theory, "hertz", theory)
-    curves = {"theory, equal approach": theory} if hasattr(theory, "stress_on_axis") else {}
-    same = _results.at_equal_force(theory, step.contact[name], case["shares"].get(name, 1.0))
-    if curves and same is not None:
-        curves["theory, equal force"] = same
-    title = f"{case['title']}\nstresses on the axis, load factor {step.load_factor:g}".strip()
-    return plot.axis_stress(results.mesh, step, name, curves, title=title, units=case["units"])
+    curves = {}
+    if hasattr(theory, "stress_on_axis"):
+        same = _results.at_equal_force("theory, equal force", theory, step.contact[name], theories["share"])
+        curves = {"theory, equal approach": theory, **same}
+    labels["title"] = f"{case['title']}\nstresses on the axis, {loaded}".strip()
+    return plot.axis_stress(results.mesh, step, name, curves, **labels)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from fastcontact.cli import _results
-from fastcontact.cli._pictures import save
-from fastcontact.cli._results import at_equal_force
+from fastcontact.cli._outputs import draw_profile
+from fastcontact.cli._results import pressure_curves
 
 HELP = "pressure along the contact line against theory: CSV, XMGRACE .agr, PNG"
 
@@ -33,29 +33,22 @@ def run(options: argparse.Namespace) -> int:
         case = _results.case_data(results)
     contact = step.contact[name]
     table = contact_table(contact, step)
-    theories = _theories(case, name, contact)
+    theories = pressure_curves(case["theories"].get(name, {}), contact)
     for label, theory in theories.items():
-        table = with_column(table, f"pressure_{label.replace(' ', '_')}", theory.pressure(table["radius"]))
+        column = f"pressure_{label.replace(', ', '_').replace(' ', '_')}"
+        table = with_column(table, column, theory.pressure(table["radius"]))
     if options.csv:
         write_csv(options.csv, table)
     if options.agr:
         _write_agr(options.agr, case, contact, step, theories)
     if options.png:
-        _write_png(options.png, case, contact, step, theories)
+        draw_profile(contact, step, theories, options.png, case["title"] or name, case["units"])
     written = [path for path in (options.csv, options.agr, options.png) if path]
     if not written:
         _print(table)
     elif not options.quiet:
         print(f"wrote {', '.join(written)}")
     return 0
-
-
-def _theories(case: dict[str, Any], name: str, contact: Any) -> dict[str, Any]:
-    theory = case["theories"].get(name)
-    if not _results.curve(theory):
-        return {}
-    found = {"Hertz equal approach": theory, "Hertz equal force": at_equal_force(theory, contact, case["shares"][name])}
-    return {label: theory for label, theory in found.items() if theory is not None}
 
 
 def _print(table: Any) -> None:
@@ -73,7 +66,7 @@ def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theorie
     curves = [Curve(r, contact.pressure, "computed", style="line+symbols")]
     for label, theory in theories.items():
         x = np.append(np.linspace(0.0, theory.radius, 200), r.max())
-        curves.append(Curve(x, theory.pressure(x), label.replace("Hertz ", "Hertz, ")))
+        curves.append(Curve(x, theory.pressure(x), label))
     write_agr(
         path,
         curves,
@@ -82,17 +75,3 @@ def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theorie
         xlabel=f"distance from the axis [{case['units']['length']}]",
         ylabel=f"contact pressure [{case['units']['pressure']}]",
     )
-
-
-def _write_png(path: str, case: dict[str, Any], contact: Any, step: Any, theories: dict[str, Any]) -> None:
-    from fastcontact.results import plot
-
-    named = {label.replace("Hertz ", "Hertz, "): theory for label, theory in theories.items()}
-    axes = plot.pressure_profile(
-        contact,
-        other_theories=named,
-        stress=step.stress[contact.points, 1],
-        title=f"{case['title'] or contact.name}\nload factor {step.load_factor:g}",
-        units=case["units"],
-    )
-    save(axes, path)

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import dataclasses
+import logging
 import os
 import sys
 import time
+import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fastcontact.cli._outputs import check_outputs, write_json
-from fastcontact.cli._pictures import profile_picture
+from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
 from fastcontact.cli._progress import Progress
-from fastcontact.cli._warnings import shown
-from fastcontact.errors import CaseError, ConvergenceError, ModelError
+from fastcontact.errors import CaseError, ConvergenceError, FastcontactWarning, ModelError
 
 if TYPE_CHECKING:
     from fastcontact.cases.case import Case
 
 HELP = "solve a case file and write the results of all steps"
+log = logging.getLogger("fastcontact")
 # Cell field of the estimated error.
 ERROR = "error"
 
@@ -53,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     check_outputs(options.case, [output, options.json], [options.plot])
     read = time.perf_counter()
     case.model.check(case.ramp)  # a wrong model must not replace the results of a right one
-    with shown() as caught:
+    with _warnings_shown() as caught:
         done, last, steps = _solved(options, case, output)
     texts = list(dict.fromkeys([*(text for step in done for text in step.warnings), *caught]))
     timings = {"read": read - started, "solve": time.perf_counter() - read, "cpu": time.process_time()}
@@ -69,6 +72,25 @@ def run(options: argparse.Namespace) -> int:
         print("\n".join(summary.lines(numbers)))
         print("  " + _written(output, len(done), len(steps), [path for path in (options.json, options.plot) if path]))
     return 0
+
+
+@contextlib.contextmanager
+def _warnings_shown() -> Iterator[list[str]]:
+    """Show each warning of the library once, in one line, as soon as it is given; collect their texts."""
+    texts: list[str] = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", FastcontactWarning)
+        ordinary = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *rest: object) -> None:
+            if not issubclass(category, FastcontactWarning):
+                ordinary(message, category, *rest)  # type: ignore[arg-type]
+            elif str(message) not in texts:
+                texts.append(str(message))
+                log.warning("warning: %s", message)
+
+        warnings.showwarning = show  # type: ignore[assignment]
+        yield texts
 
 
 def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[list[Any], Any, list[dict[str, Any]]]:

@@ -37,20 +37,13 @@ def run(options: argparse.Namespace) -> int:
 
     _study.check_targets(options)
     wanted = dict(values(text) for text in options.set)
-    formulation = options.formulation.replace("-", "_") if options.formulation else None
-    given = {"element": options.element, "formulation": formulation, "level": options.level}
+    given = {"element": options.element, "formulation": options.formulation, "level": options.level}
     sweep = _study.finished(options, partial(parameter_sweep, options.case, wanted, **given))
-    written = _study.write(options, sweep)
-    failures = [text for _, text in sweep.failed]
-    _study.show(options, sweep, written, "--png FILE makes a picture", failures)
-    return 2 if failures else 0
+    return _study.report(options, sweep, "--png FILE makes a picture", [text for _, text in sweep.failed])
 
 
 def values(text: str) -> tuple[str, list[Any]]:
-    """Return a parameter and its values from ``NAME=VALUES``.
-
-    Raises CaseError if the text is of another form.
-    """
+    """Return a parameter and its values from ``NAME=VALUES``; raises CaseError if the text is of another form."""
     name, equals, listed = text.partition("=")
     if not (name and equals and listed):
         raise CaseError(f"--set '{text}' must be NAME=VALUES, for example approach=0.04,0.4,4")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 import warnings
 from collections.abc import Callable, Sequence
@@ -132,31 +131,32 @@ def _solved(
     values = quantities.measure(case, last, pair)
     if quantity not in values:
         raise CaseError(unknown("quantity", quantity, values))
-    theory, reference = quantities.of_theories(case, pair)
+    exact = quantities.by_theory(case, pair, 0.0)
+    n_cells = sum(map(len, case.mesh.solids.values()))
+    estimate = _estimate([*(found.values[quantity] for found in before), values[quantity]])
     this = Round(
         n_dofs=case.model.n_dofs,
-        n_cells=sum(map(len, case.mesh.solids.values())),
+        n_cells=n_cells,
         values=values,
-        theory=theory,
-        reference=reference,
+        theory=exact["theory"],
+        reference=exact["reference"],
         energy_error=error.relative,
-        estimate=float("nan"),
+        estimate=estimate,
         seconds=time.perf_counter() - started,
     )
-    return last, error, _with_estimate(this, before, quantity)
+    return last, error, this
 
 
-def _with_estimate(this: Round, before: Sequence[Round], quantity: str) -> Round:
-    """Return the round with the estimated error of the quantity, once there are three meshes.
+def _estimate(values: Sequence[float]) -> float:
+    """Return the estimated relative error of the last of a quantity's values; NaN before there are three meshes.
 
     The last change bounds what is left where changes shrink by a factor of two or more; the one before guards against a
     change that is small by chance.
     """
-    if len(before) < 2:
-        return this
-    first, second, last = (found.values[quantity] for found in (*before[-2:], this))
-    change = max(abs(last - second), abs(second - first) / SHRINKING)
-    return dataclasses.replace(this, estimate=change / abs(last) if last else float("nan"))
+    if len(values) < 3 or not values[-1]:
+        return float("nan")
+    first, second, last = values[-3:]
+    return max(abs(last - second), abs(second - first) / SHRINKING) / abs(last)
 
 
 def _indicator(case: Case, last: StepResult, error: ErrorEstimate, quantity: str, pair: str | None) -> Array:

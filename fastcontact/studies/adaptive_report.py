@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.cases.case import Case
-from fastcontact.cases.summary import versions
 from fastcontact.mesh import elements
 from fastcontact.results.step import StepResult
 from fastcontact.studies.error_estimate import ErrorEstimate
-from fastcontact.studies.labels import column, title, unit
+from fastcontact.studies.quantities import column, title, unit
 from fastcontact.studies.render import page
 from fastcontact.studies.render.figure import Curve, Line, Panel, figure
 from fastcontact.studies.render.table import Rows, aligned, finite, number, structured
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from fastcontact.studies.report import Report
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,15 +53,11 @@ class Round:
 
 
 @dataclass(frozen=True, eq=False)
-class AdaptiveStudy:
-    """A finished adaptive study.
+class AdaptiveStudy(Report):
+    """A finished adaptive study; its case and units as in `Report`.
 
     Attributes
     ----------
-    name, title, text : str
-        Of the case: file name without suffix, title, text of the file.
-    units : dict of str to str
-        Names of the units of length, force and pressure.
     combination : str
         Element and formulation.
     quantity : str
@@ -81,10 +74,6 @@ class AdaptiveStudy:
         Its error, cell by cell.
     """
 
-    name: str
-    title: str
-    text: str
-    units: dict[str, str]
     combination: str
     quantity: str
     tolerance: float
@@ -102,28 +91,20 @@ class AdaptiveStudy:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, texts, lists and dictionaries, as ``--json`` writes them; errors are relative."""
-        errors = self._errors()
-        return {
-            "case": self.name,
-            "title": self.title,
-            "units": dict(self.units),
+        numbers = {
             "combination": self.combination,
             "quantity": self.quantity,
             "tolerance": self.tolerance,
             "reached": self.reached,
             "value": self.rounds[-1].values[self.quantity],
-            "rounds": [
-                {
-                    "n_dofs": found.n_dofs,
-                    "n_cells": found.n_cells,
-                    **found.values,
-                    **{name: finite(values[k]) for name, values in errors.items()},
-                    "seconds": found.seconds,
-                }
-                for k, found in enumerate(self.rounds)
-            ],
-            "versions": versions(),
+            "rounds": [self._round(k) for k in range(len(self.rounds))],
         }
+        return self.framed(numbers)
+
+    def _round(self, k: int) -> dict[str, Any]:
+        found, errors = self.rounds[k], {name: finite(values[k]) for name, values in self._errors().items()}
+        counts = {"n_dofs": found.n_dofs, "n_cells": found.n_cells}
+        return {**counts, **found.values, **errors, "seconds": found.seconds}
 
     def table(self) -> NDArray[Any]:
         """Return a structured array (n_rounds,), one row a mesh, as ``--csv`` writes it.
@@ -184,16 +165,12 @@ class AdaptiveStudy:
 
     def _error_panel(self) -> Panel:
         n_dofs, errors = [found.n_dofs for found in self.rounds], self._errors()
-        shown = {
-            "estimated error": ("o-", "estimate"),
-            "true error": ("s-", "true_error"),
-            "estimated error in the energy norm": ("^-", "energy_error"),
-        }
         curves = [
-            Curve(n_dofs, errors[name], style, label)
-            for label, (style, name) in shown.items()
-            if np.isfinite(errors[name]).any()
+            Curve(n_dofs, errors["estimate"], "o-", "estimated error"),
+            Curve(n_dofs, errors["true_error"], "s-", "true error"),
+            Curve(n_dofs, errors["energy_error"], "^-", "estimated error in the energy norm"),
         ]
+        curves = [curve for curve in curves if np.isfinite(curve.y).any()]
         heading, asked = f"Error of the {title(self.quantity)}", Line(self.tolerance, style="--", label="asked for")
         return Panel(heading, "degrees of freedom", "relative error", curves, [asked], x_scale="log", y_scale="log")
 
@@ -202,14 +179,13 @@ class AdaptiveStudy:
         heading = f"Last mesh: {self.rounds[-1].n_cells} cells, estimated error"
         return Panel(heading, f"x [{length}]", f"y [{length}]", grid=0.0, draw=self._draw_mesh)
 
-    def _draw_mesh(self, ax: Axes) -> None:
+    def _draw_mesh(self, ax: Any) -> None:
         from matplotlib.collections import PolyCollection
         from matplotlib.colors import LogNorm
 
         mesh, cells = self.case.mesh, self.error.cells
-        shapes = [
-            p for name, block in mesh.solids.items() for p in mesh.points[block[:, : elements.get(name).n_corners]]
-        ]
+        corners = [block[:, : elements.get(name).n_corners] for name, block in mesh.solids.items()]
+        shapes = [polygon for block in corners for polygon in mesh.points[block]]
         error = np.maximum(cells, 1e-6 * cells.max())
         drawn = PolyCollection(shapes, array=error, norm=LogNorm(), cmap="viridis", edgecolors="white", linewidths=0.1)
         ax.add_collection(drawn)

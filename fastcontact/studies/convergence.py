@@ -12,10 +12,8 @@ from fastcontact.errors import CaseError, unknown
 from fastcontact.studies.convergence_report import Study
 from fastcontact.studies.execute import Progress, Result, raise_first, run_all
 from fastcontact.studies.fit import Limit, fit_limit
-from fastcontact.studies.job import Job, case_data, fields_of
-from fastcontact.studies.labels import LABELS
-from fastcontact.studies.levels import recipe
-from fastcontact.studies.quantities import of_theory
+from fastcontact.studies.job import Job, fields_of, job_of
+from fastcontact.studies.quantities import LABELS, of_theory
 from fastcontact.studies.series import Level, Series
 from fastcontact.studies.settings import Combination, Settings, combinations, settings
 
@@ -47,11 +45,12 @@ def convergence_study(
     quantities : sequence of str
         Further ones to fit, such as ``"C1.stress.yy"``, ``"C1.displacement.y"``, ``"C1.pressure"``.
     executor : concurrent.futures.Executor, optional
-        Where to run, see `fastcontact.studies.execute.run_all`; by default processes of this machine.
+        Where to run: by default processes of this machine, or e.g. ``Client.get_executor()`` of Dask or an
+        ``MPIPoolExecutor`` of mpi4py. It is not shut down here.
     workers : int, optional
-        Number of these processes; 1 runs everything in this one.
+        Number of these processes, by default one for each processor; 1 runs everything in this one.
     store : path-like, optional
-        Folder of finished runs: what is there is not run again.
+        Folder of finished runs: those found there are not run again; new ones are added.
     on_progress : callable, optional
         Called with a `Progress` after every run.
 
@@ -74,25 +73,14 @@ def convergence_study(
     return gathered(case, jobs, results, [*chosen.quantities, *quantities])
 
 
-def level_job(case: Case, chosen: Settings, combination: Combination, level: int) -> Job:
+def level_job(case: Case, chosen: Settings, member: Combination, level: int) -> Job:
     """Return the run of one element and formulation on one mesh."""
-    return Job(
-        label=f"{combination} level {level}",
-        name=case.name,
-        data=case_data(chosen, combination),
-        pair=chosen.pair,
-        recipe=recipe(chosen, combination.element, level),
-        base=case.mesh if chosen.generator is None else None,
-        size=level,
-        marks={"level": level, "element": combination.element, "formulation": combination.formulation},
-    )
+    marks = {"level": level, "element": member.element, "formulation": member.formulation}
+    return job_of(case, chosen, member, level, label=f"{member} level {level}", marks=marks, size=level)
 
 
 def gathered(case: Case, jobs: Sequence[Job], results: Sequence[Result], wanted: Sequence[str]) -> Study:
-    """Return the study of finished runs; `wanted` are the quantities to fit besides the standard ones.
-
-    Raises CaseError or FastcontactError if a quantity is unknown, or no run succeeded.
-    """
+    """Return the study of finished runs; `wanted` are quantities to fit besides the standard ones and those of checks."""
     raise_first("no level could be solved", jobs, results)
     by_combination: dict[Combination, list[tuple[int, Result]]] = {}
     for job, result in zip(jobs, results, strict=True):
@@ -131,13 +119,12 @@ def _at_force(theory: Any, force: Limit | None) -> tuple[dict[str, float], dict[
     """Return the theory's values at the limit of the force, and how much they change over its error bar."""
     if force is None or not force.value > force.uncertainty or not hasattr(theory, "at_force"):
         return {}, {}
-    middle = of_theory(theory.at_force(force.value))
-    upper = of_theory(theory.at_force(force.value + force.uncertainty))
+    middle, upper = (of_theory(theory.at_force(force.value + off)) for off in (0.0, force.uncertainty))
     return middle, {name: abs(upper[name] - value) for name, value in middle.items()}
 
 
 def _limit(levels: Sequence[Level], quantity: str) -> Limit | None:
-    known = [level for level in levels if quantity in level.values]
-    if len({level.h for level in known}) < max(3, len(known)):
+    known = [(level.h, level.values[quantity]) for level in levels if quantity in level.values]
+    if len({h for h, _ in known}) < max(3, len(known)):
         return None
-    return fit_limit([level.h for level in known], [level.values[quantity] for level in known])
+    return fit_limit(*zip(*known, strict=True))

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.studies.labels import title
+from fastcontact.studies.quantities import title
 from fastcontact.studies.render.figure import Curve, Line, Panel, marker
 from fastcontact.studies.series import Series
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 # With more curves than this, error bars would hide them.
@@ -53,7 +50,7 @@ def error_panel(all_series: Sequence[Series], quantity: str, units: Mapping[str,
     )
 
 
-def _slope_triangles(ax: Axes, quantity: str, all_series: Sequence[Series]) -> None:
+def _slope_triangles(ax: Any, quantity: str, all_series: Sequence[Series]) -> None:
     """Draw triangles whose slopes are the least and the greatest fitted order, rounded to halves."""
     orders = [series.limits[quantity].order for series in all_series]
     orders = [order for order in orders if math.isfinite(order)]
@@ -100,15 +97,13 @@ def pressure_panel(series: Series, theory: Any, units: Mapping[str, str]) -> Pan
 def _theory_curves(theory: Any, series: Series, reach: float) -> list[Curve]:
     if not hasattr(theory, "pressure"):
         return []
-    curves = {"theory, equal approach": (theory, "k-")}
+    curves = [("approach", "k-", theory)]
     force = series.limits.get("force")
     if force is not None and force.value > 0 and hasattr(theory, "at_force"):
-        curves["theory, equal force"] = (theory.at_force(force.value), "k--")
+        curves.append(("force", "k--", theory.at_force(force.value)))
     x = np.linspace(0.0, reach, 600)
-    return [
-        Curve(x, own.pressure(x), style, f"{label} ($p_0$ = {own.pressure_max:.1f})", width=1.2)
-        for label, (own, style) in curves.items()
-    ]
+    label = "theory, equal {} ($p_0$ = {:.1f})"
+    return [Curve(x, t.pressure(x), style, label.format(at, t.pressure_max), width=1.2) for at, style, t in curves]
 
 
 def theory_panel(all_series: Sequence[Series], best: Series, quantity: str, units: Mapping[str, str]) -> Panel:
@@ -116,16 +111,10 @@ def theory_panel(all_series: Sequence[Series], best: Series, quantity: str, unit
     known = [(k, series) for k, series in enumerate(all_series) if series.split(quantity)]
     if not known:
         return Panel(instead=f"no theory of the {title(quantity)}, or no limit")
-    curves = [
-        Curve(
-            series.h,
-            [100 * off for off in series.from_theory(quantity)],
-            f"{marker(k)}-",
-            str(series.combination),
-            size=5,
-        )
-        for k, series in known
-    ]
+    curves = []
+    for k, series in known:
+        off = [100 * value for value in series.from_theory(quantity)]
+        curves.append(Curve(series.h, off, f"{marker(k)}-", str(series.combination), size=5))
     best = best if best.split(quantity) else known[-1][1]
     found, same = best.split(quantity), best.split_equal_force(quantity)
     assert found is not None

@@ -7,13 +7,13 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from fastcontact.cases.summary import versions
 from fastcontact.studies import convergence_tables as tables
 from fastcontact.studies.convergence_figures import error_panel, pressure_panel, theory_panel
 from fastcontact.studies.fit import CONFIDENCE
 from fastcontact.studies.render import page
 from fastcontact.studies.render.figure import Panel, figure
 from fastcontact.studies.render.table import aligned, structured
+from fastcontact.studies.report import Report
 from fastcontact.studies.sentences import MAIN, sentences
 from fastcontact.studies.series import Series
 
@@ -31,15 +31,11 @@ EXPLANATIONS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
-    """A finished mesh-convergence study.
+class Study(Report):
+    """A finished mesh-convergence study; its case and units as in `Report`.
 
     Attributes
     ----------
-    name, title, text : str
-        Of the case: file name without suffix, title, text of the file.
-    units : dict of str to str
-        Names of the units of length, force and pressure.
     series : list of Series
         One for each combination of element and formulation that could be solved.
     failed : dict of str to str
@@ -48,10 +44,6 @@ class Study:
         The theory at equal approach, of `fastcontact.analytic`.
     """
 
-    name: str
-    title: str
-    text: str
-    units: dict[str, str]
     series: list[Series]
     failed: dict[str, str]
     theory: Any
@@ -70,16 +62,13 @@ class Study:
         or without one to the limit; ``mesh_error`` is that of the finest mesh, and ``model_error + mesh_error`` its
         difference from theory. ``uncertainty`` is in the unit of the quantity, at a confidence of 95 %.
         """
-        return {
-            "case": self.name,
-            "title": self.title,
-            "units": dict(self.units),
+        numbers = {
             "confidence": CONFIDENCE,
             **tables.series_dict(self.best),
             "combinations": [tables.series_dict(series) for series in self.series],
             "failed_combinations": dict(self.failed),
-            "versions": versions(),
         }
+        return self.framed(numbers)
 
     def table(self) -> NDArray[Any]:
         """Return a structured array (n_rows,), one row a level of a combination, as ``--csv`` writes it.
@@ -130,18 +119,18 @@ class Study:
 
     def _pictures(self) -> list[str]:
         limits = [name for name in COMPARED if any(name in series.limits for series in self.series)]
-        errors = [error_panel(self.series, name, self.units) for name in limits] or [Panel(grid=0.0)]
-        found = [
-            page.image(
-                figure([errors], (5.6 * len(errors), 4.8), self.title),
-                "mesh errors over the mesh size, doubly logarithmic",
-            )
-        ]
         theories = [name for name in COMPARED if any(series.split(name) for series in self.series)]
-        if theories:
-            panels = [theory_panel(self.series, self.best, name, self.units) for name in theories]
-            drawn = figure([panels], (5.6 * len(panels), 4.8), self.title)
-            found.append(page.image(drawn, "difference from theory over the mesh size: model and mesh error"))
+        errors = [error_panel(self.series, name, self.units) for name in limits] or [Panel(grid=0.0)]
+        differences = [theory_panel(self.series, self.best, name, self.units) for name in theories]
+        described = {
+            "mesh errors over the mesh size, doubly logarithmic": errors,
+            "difference from theory over the mesh size: model and mesh error": differences,
+        }
+        found = [
+            page.image(figure([panels], (5.6 * len(panels), 4.8), self.title), description)
+            for description, panels in described.items()
+            if panels
+        ]
         if self.best.finest.profile:
             drawn = figure([[pressure_panel(self.best, self.theory, self.units)]], (7.4, 5.0))
             found.append(page.image(drawn, "contact pressure of all levels over theory"))
@@ -153,7 +142,7 @@ class Study:
         for first in range(0, len(names), 2):
             parts.append(page.table(tables.level_rows(series, self.units, names[first : first + 2])))
         if series.limits:
-            parts.append(page.table(tables.page_limit_rows(series, self.units)))
+            parts.append(page.table(tables.limit_rows(series, self.units, page=True)))
         parts += [page.failure(f"level {number} failed: {text}") for number, text in series.failed.items()]
         warnings = sorted({text for level in series.levels for text in level.warnings})
         return parts + [page.paragraph(f"Warning: {text}") for text in warnings]

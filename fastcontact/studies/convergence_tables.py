@@ -6,13 +6,17 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from fastcontact.studies.labels import column, title
+from fastcontact.studies.quantities import column, title
 from fastcontact.studies.render.table import Rows, finite, number, percent, with_error_bar
 from fastcontact.studies.sentences import sentences
 from fastcontact.studies.series import Series
 
 # Quantities with columns in the tables of levels; the limits are given for all quantities.
 IN_TABLES = ("force", "pressure_max", "contact_radius", "von_mises_max")
+# Columns about limits, and the first columns of a table of all combinations.
+ON_TERMINAL = ("limit", "+-", "order", "theory", "model error", "mesh error", "at equal force")
+ON_PAGE = ("theory", "limit", "order", "mesh error", "model error", "at equal force")
+COMBINATION = ("combination", "levels", "finest DOF")
 
 
 def level_rows(series: Series, units: Mapping[str, str], quantities: Sequence[str] = IN_TABLES) -> Rows:
@@ -24,56 +28,40 @@ def level_rows(series: Series, units: Mapping[str, str], quantities: Sequence[st
         header += [column(name, name, units), "error", "order"]
         columns = zip(series.values(name), series.errors(name), series.orders(name), strict=True)
         for row, (value, error, order) in zip(rows, columns, strict=True):
-            row += [number(value, 8), percent(error), _order(order)]
+            row += [number(value, 8), percent(error), f"{order:.2f}" if math.isfinite(order) else "-"]
     return [header, *rows]
 
 
-def limit_rows(series: Series, units: Mapping[str, str]) -> Rows:
-    """Return header and rows for a terminal: limit, order, theory and errors of every quantity with a limit."""
-    rows = [["quantity", "limit", "+-", "order", "theory", "model error", "mesh error", "at equal force"]]
-    for name, limit in series.limits.items():
-        order, mesh, model, equal_force = _errors(series, name)
-        theory = number(series.theory.get(name, math.nan), 8)
-        bar = number(limit.uncertainty, 2)
-        label = column(title(name), name, units)
-        rows.append([label, number(limit.value, 8), bar, order, theory, model, mesh, equal_force])
-    return rows
+def limit_rows(series: Series, units: Mapping[str, str], page: bool = False) -> Rows:
+    """Return header and rows: limit, order, theory and errors of every quantity with a limit.
 
-
-def page_limit_rows(series: Series, units: Mapping[str, str]) -> Rows:
-    """Return the same for a page: every limit is rounded to its error bar."""
-    rows = [["quantity", "theory", "limit", "order", "mesh error", "model error", "at equal force"]]
-    for name in series.limits:
-        theory = number(series.theory.get(name, math.nan), 8)
-        rows.append([caption(name, units), theory, *_limit_cells(series, name)])
-    return rows
+    On a page every limit is rounded to its error bar, which on a terminal has a column of its own.
+    """
+    columns = ON_PAGE if page else ON_TERMINAL
+    label = caption if page else lambda name, units: column(title(name), name, units)
+    cells = ([label(name, units), *_cells(series, name, columns, page)] for name in series.limits)
+    return [["quantity", *columns], *cells]
 
 
 def comparison_rows(all_series: Sequence[Series], quantities: Sequence[str], units: Mapping[str, str]) -> Rows:
     """Return header and a row for each combination: limits of the quantities, and their mesh and model errors."""
-    header = ["combination", "levels", "finest DOF"]
+    header, rows = [*COMBINATION], [_start(series) for series in all_series]
     for name in quantities:
         header += [column(name, name, units), "+-", "order", "mesh error", "model error"]
-    header += ["p at equal force"] if "pressure_max" in quantities else []
-    rows = [header]
-    for series in all_series:
-        row = _start(series)
-        for name in quantities:
-            limit = series.limits.get(name)
-            if limit is None:
-                row += ["-"] * 5
-                continue
-            _, mesh, model, _ = _errors(series, name)
-            row += [number(limit.value, 8), number(limit.uncertainty, 2), f"{limit.order:.2f}", mesh, model]
-        row += [_errors(series, "pressure_max")[3]] if "pressure_max" in quantities else []
-        rows.append(row)
-    return rows
+        for row, series in zip(rows, all_series, strict=True):
+            row += _cells(series, name, ("limit", "+-", "order alone", "mesh error", "model error"))
+    if "pressure_max" in quantities:
+        header.append("p at equal force")
+        for row, series in zip(rows, all_series, strict=True):
+            row += _cells(series, "pressure_max", ("at equal force",))
+    return [header, *rows]
 
 
 def page_comparison_rows(all_series: Sequence[Series], quantity: str) -> Rows:
     """Return the same for a page: one quantity, every limit rounded to its error bar."""
-    header = ["combination", "levels", "finest DOF", "limit", "order", "mesh error", "model error", "at equal force"]
-    return [header, *([*_start(series), *_limit_cells(series, quantity)] for series in all_series)]
+    columns = [name for name in ON_PAGE if name != "theory"]
+    rows = ([*_start(series), *_cells(series, quantity, columns, True)] for series in all_series)
+    return [[*COMBINATION, *columns], *rows]
 
 
 def caption(quantity: str, units: Mapping[str, str]) -> str:
@@ -85,27 +73,24 @@ def _start(series: Series) -> list[str]:
     return [str(series.combination), str(len(series.levels)), str(series.finest.n_dofs)]
 
 
-def _limit_cells(series: Series, quantity: str) -> list[str]:
-    """Return limit, order, mesh error, and model error at equal approach and at equal force of a quantity."""
-    limit = series.limits.get(quantity)
-    if limit is None:
-        return ["-"] * 5
-    order, mesh, model, equal_force = _errors(series, quantity)
-    return [with_error_bar(limit.value, limit.uncertainty), order, mesh, model, equal_force]
-
-
-def _errors(series: Series, quantity: str) -> tuple[str, str, str, str]:
-    """Return order, mesh error, and model error at equal approach and at equal force, as texts."""
+def _cells(series: Series, quantity: str, columns: Sequence[str], rounded: bool = False) -> list[str]:
+    """Return some columns about the limit of a quantity as texts; dashes where there is no limit."""
     limit, found = series.limits.get(quantity), series.split(quantity)
+    if limit is None:
+        return ["-"] * len(columns)
     same = series.split_equal_force(quantity) if quantity != "force" else None
-    known = limit is not None and math.isfinite(limit.order)
-    order = f"{limit.order:.2f} +- {limit.order_uncertainty:.2f}" if limit is not None and known else "-"
-    model, equal_force = (percent(entry.model if entry else None) for entry in (found, same))
-    return order, percent(series.mesh_error(quantity)), model, equal_force
-
-
-def _order(value: float) -> str:
-    return f"{value:.2f}" if math.isfinite(value) else "-"
+    order = f"{limit.order:.2f}"
+    texts = {
+        "limit": with_error_bar(limit.value, limit.uncertainty) if rounded else number(limit.value, 8),
+        "+-": number(limit.uncertainty, 2),
+        "order": f"{order} +- {limit.order_uncertainty:.2f}" if math.isfinite(limit.order) else "-",
+        "order alone": order,
+        "theory": number(series.theory.get(quantity, math.nan), 8),
+        "model error": percent(found.model if found else None),
+        "mesh error": percent(series.mesh_error(quantity)),
+        "at equal force": percent(same.model if same else None),
+    }
+    return [texts[name] for name in columns]
 
 
 def csv_columns(all_series: Sequence[Series]) -> dict[str, list[Any]]:

@@ -107,8 +107,7 @@ def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], 
     nodal = np.zeros(mesh.n_points)
     nodal[result.points] = result.pressure
     first = np.cumsum([0, *(len(block) for block in mesh.solids.values())])
-    stiffness = {name: [own.E for own, _ in model.materials] for name in mesh.solids}
-    _, material = model.material_numbers()
+    stiffness, (_, material) = np.array([own.E for own, _ in model.materials]), model.material_numbers()
     for block in surface(mesh, pair.secondary).blocks:
         xi, weights = fine_rule(block.element)
         reference = elements.get(block.element)
@@ -125,8 +124,11 @@ def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], 
             off = traction + p[:, :, None] * normals[facet]
             length = area[facet].sum(axis=1)
             size = np.linalg.norm(np.ptp(mesh.points[block.facets[facet]], axis=1), axis=1)
-            E = np.array(stiffness[name])[material[name][cell]]
-            value = size / E * ((off * normals[facet]).sum(axis=2) ** 2 * area[facet]).sum(axis=1)
+            value = (
+                size
+                / stiffness[material[name][cell]]
+                * ((off * normals[facet]).sum(axis=2) ** 2 * area[facet]).sum(axis=1)
+            )
             np.add.at(contact, first[number] + cell, np.where(length > 0, value, 0.0))
 
 
@@ -142,14 +144,8 @@ def _normals(corners: Array, gradient: Array) -> Array:
 
 def _traction(stress: Array, normal: Array) -> Array:
     """Return stress times normal (..., dim)."""
-    dim = normal.shape[-1]
-    xx, yy, zz, xy = (stress[..., i] for i in range(4))
-    if dim == 2:
-        n, m = normal[..., 0], normal[..., 1]
-        return np.stack([xx * n + xy * m, xy * n + yy * m], axis=-1)
-    yz, xz = stress[..., 4], stress[..., 5]
-    a, b, c = (normal[..., i] for i in range(3))
-    return np.stack([xx * a + xy * b + xz * c, xy * a + yy * b + yz * c, xz * a + yz * b + zz * c], axis=-1)
+    tensor = stress[..., [[0, 3], [3, 1]] if normal.shape[-1] == 2 else [[0, 3, 5], [3, 1, 4], [5, 4, 2]]]
+    return np.asarray((tensor * normal[..., None, :]).sum(axis=-1))
 
 
 def _owners(

@@ -1,8 +1,9 @@
-"""How runs are spread over processes: of this machine, or of any executor; finished runs are kept as they come."""
+"""How runs are spread over processes, of this machine or of any executor; finished runs are kept in a folder."""
 
 from __future__ import annotations
 
 import contextlib
+import json
 import multiprocessing
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -13,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from fastcontact import errors
-from fastcontact.errors import CaseError, FastcontactError
+from fastcontact.errors import CaseError, FastcontactError, FileError
+from fastcontact.mesh.files.paths import replacing
 from fastcontact.studies.job import Job, run
-from fastcontact.studies.store import Store
 
 Result = dict[str, Any]
 # NumPy and Numba read these when they are imported, so they are set before a worker process starts.
@@ -59,48 +60,59 @@ def run_all(
     store: str | Path | None = None,
     on_progress: Callable[[Progress], None] | None = None,
 ) -> list[Result]:
-    """Run jobs side by side and return their results in the order of the jobs.
+    """Run jobs side by side and return their results in the order of the jobs; the options as in `convergence_study`.
 
-    Parameters
-    ----------
-    jobs : sequence of Job
-    executor : concurrent.futures.Executor, optional
-        Where to run: processes of this machine by default, or e.g. ``Client.get_executor()`` of Dask or an
-        ``MPIPoolExecutor`` of mpi4py. It is not shut down here.
-    workers : int, optional
-        Processes where no executor is given, by default as many as there are processors for this process; 1 runs
-        everything in this process.
-    store : path-like, optional
-        Folder of finished runs: those found there are not run again; new ones are added.
-    on_progress : callable, optional
-        Called with a `Progress` after every run.
-
-    Raises
-    ------
-    CaseError
-        If the number of workers is wrong.
-    FastcontactError
-        If no worker process can start.
+    Raises CaseError if the number of workers is wrong, FastcontactError if no worker process can start.
     """
     kept = None if store is None else Store(store)
-    results: list[Result | None] = [None if kept is None else kept.get(job) for job in jobs]
-    stored = [index for index, result in enumerate(results) if result is not None]
+    results = {index: result for index, job in enumerate(jobs) if kept and (result := kept.get(job)) is not None}
     waiting = {index: job.label for index, job in enumerate(jobs)}
 
-    def ended(index: int, result: Result, seconds: float, found: bool) -> None:
-        results[index] = result
-        label = waiting.pop(index)
+    def ended(index: int, stored: bool = False) -> None:
+        label, result = waiting.pop(index), results[index]
         if on_progress is not None:
-            done, left, error = len(jobs) - len(waiting), tuple(waiting.values()), str(result.get("error", ""))
-            on_progress(Progress(label, done, len(jobs), left, seconds, error, found))
+            seconds = 0.0 if stored else float(result.get("seconds", 0.0))
+            error, left = str(result.get("error", "")), tuple(waiting.values())
+            on_progress(Progress(label, len(jobs) - len(left), len(jobs), left, seconds, error, stored))
 
-    for index in stored:
-        ended(index, results[index] or {}, 0.0, True)
+    for index in list(results):
+        ended(index, stored=True)
     for index, result in _run_rest(jobs, list(waiting), executor, workers):
         if kept is not None and "error" not in result:
             kept.put(jobs[index], result)
-        ended(index, result, float(result.get("seconds", 0.0)), False)
-    return [result for result in results if result is not None]
+        results[index] = result
+        ended(index)
+    return [results[index] for index in range(len(jobs))]
+
+
+class Store:
+    """A folder of finished runs, a JSON file each, named by the keys of their jobs; made if it is not there."""
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise FileError(f"the folder '{folder}' cannot be made: {error.strerror}; name another store") from error
+
+    def path(self, job: Job) -> Path:
+        """Return where the result of a run is kept."""
+        return self.folder / f"{job.key}.json"
+
+    def get(self, job: Job) -> Result | None:
+        """Return the result of a run, or None if it is not there or was not written whole."""
+        try:
+            stored = json.loads(self.path(job).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        result = stored.get("result") if isinstance(stored, dict) else None
+        return result if isinstance(result, dict) and "values" in result else None
+
+    def put(self, job: Job, result: Result) -> None:
+        """Keep the result of a run; the file appears whole or not at all."""
+        text = json.dumps({"label": job.label, "case": job.name, "marks": job.marks, "result": result}, default=str)
+        with replacing(self.path(job)) as temporary:
+            temporary.write_text(text + "\n", encoding="utf-8")
 
 
 def raise_first(what: str, jobs: Sequence[Job], results: Sequence[Result]) -> None:
@@ -141,14 +153,11 @@ def on_processes(count: int, jobs: Sequence[Job], rest: list[int]) -> Iterator[t
 
 
 def started_pool(count: int) -> ProcessPoolExecutor:
-    """Return a pool of processes of which one has answered.
-
-    Raises FastcontactError if none can start.
-    """
+    """Return a pool of processes of which one has answered; raises FastcontactError if none can start."""
     # Forked children of a process with OpenMP threads die, so workers are spawned.
     pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"))
     try:
-        with _environment(_ONE_THREAD, "1"):
+        with _one_thread():
             pool.submit(os.getpid).result()
     except BrokenProcessPool as error:
         raise FastcontactError(
@@ -180,7 +189,7 @@ def on_executor(executor: Executor, jobs: Sequence[Job], rest: list[int]) -> Ite
     """Run on any executor and yield number and result of each job as it ends; cancel the others if one raises."""
     futures: dict[Future[Result], int] = {}
     try:
-        with _environment(_ONE_THREAD, "1"):
+        with _one_thread():
             # The largest first, so that none keeps the others waiting at the end.
             for index in sorted(rest, key=lambda index: -jobs[index].size):
                 futures[executor.submit(run, jobs[index], 1)] = index
@@ -193,15 +202,14 @@ def on_executor(executor: Executor, jobs: Sequence[Job], rest: list[int]) -> Ite
 
 
 @contextlib.contextmanager
-def _environment(names: Sequence[str], value: str) -> Iterator[None]:
-    """Set environment variables for processes started inside the block, and put them back."""
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, value))
+def _one_thread() -> Iterator[None]:
+    """Let processes started inside the block have one thread each, by environment variables that are put back."""
+    before = {name: os.environ.get(name) for name in _ONE_THREAD}
+    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
     try:
         yield
     finally:
         for name, old in before.items():
-            if old is None:
-                os.environ.pop(name, None)
-            else:
+            os.environ.pop(name, None)
+            if old is not None:
                 os.environ[name] = old

@@ -4,15 +4,12 @@ The values are taken to be
 
 .. math:: v_i = L + C h_i^p (1 + s e_i)
 
-with independent normal :math:`e_i`: what remains of the mesh error fluctuates by a fraction s of itself, because the
-contact edge sits at another fraction of an element on every mesh. Steps from one mesh to the next therefore give erratic
-orders, and three meshes solved for three unknowns (Richardson 1911; Roache 1998) a limit without an error bar. Here L, C
-and s are integrated out for every order p (Bayesian linear regression with weights :math:`h^{-2p}`; Zellner 1971, chapter
-3), and the orders are averaged with their evidence. The prior of p is log-normal about 1.6, with 95 % between 0.8 and
-3.2; that of s^2 weighs as much as one and a half meshes and is centred at s = 0.2, so that a chance agreement of few
-meshes does not make the error bar too small. Meshes too coarse for one power of h are allowed for: the first k meshes
-may be off by ten times s, with a prior probability of 1/2 for each further k, as long as three meshes are left. The
-error bar is half of the 95 % interval of L, the greater half if they differ.
+with independent normal :math:`e_i`: what remains of the mesh error fluctuates by a fraction s of itself. L, C and s are
+integrated out for every order p (Bayesian linear regression with weights :math:`h^{-2p}`; Zellner 1971, chapter 3), and
+the orders are averaged with their evidence; docs/theory/convergence.md gives the reasons. The prior of p is log-normal;
+that of s^2 weighs as much as one and a half meshes, so that a chance agreement of few meshes does not make the error bar
+too small. The first k meshes may be too coarse for one power of h, with a prior probability of 1/2 for each further k, as
+long as three meshes are left. The error bar is half of the 95 % interval of L, the greater half if they differ.
 """
 
 from __future__ import annotations

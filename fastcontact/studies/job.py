@@ -25,7 +25,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.pair_options import SHARED_OPTIONS
 from fastcontact.results.step import StepResult
 from fastcontact.studies import quantities
-from fastcontact.studies.levels import Recipe, make_mesh
+from fastcontact.studies.levels import Recipe, make_mesh, recipe
 from fastcontact.studies.settings import Combination, Settings
 
 # Raised when the measured numbers or their form in a store change.
@@ -40,7 +40,7 @@ class Job:
     name: str  # of the case
     data: dict[str, Any]  # the parsed case file with all values of this run
     pair: str | None  # contact pair to measure
-    recipe: Recipe | None  # of the mesh; None: `base` as it is, or the mesh that the data name
+    recipe: Recipe  # of the mesh
     base: Mesh | None  # the case's mesh, where it was read from a file
     marks: dict[str, Any]  # distinguish this run from the others of its study, e.g. its level
     size: float = 0.0  # amount of work, in any unit that the runs of a study share
@@ -48,22 +48,20 @@ class Job:
     @property
     def key(self) -> str:
         """Hash of all that the numbers depend on: the case, its mesh, the version."""
-        title = {"title", "units", "check"}
-        text = json.dumps(
-            {
-                "version": __version__,
-                "schema": SCHEMA,
-                "data": {key: value for key, value in self.data.items() if key not in title},
-                "pair": self.pair,
-                "recipe": self.recipe,
-            },
-            sort_keys=True,
-            default=str,
-        )
-        found = hashlib.sha256(text.encode())
+        data = {key: value for key, value in self.data.items() if key not in ("title", "units", "check")}
+        whole = {"version": __version__, "schema": SCHEMA, "data": data, "pair": self.pair, "recipe": self.recipe}
+        found = hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode())
         if self.base is not None:
             found.update(_fingerprint(self.base))
         return found.hexdigest()[:32]
+
+
+def job_of(
+    case: Case, chosen: Settings, member: Combination, level: int, *, label: str, marks: dict[str, Any], size: float
+) -> Job:
+    """Return the run of a case with an element and a formulation on the mesh of a level."""
+    data, mesh = case_data(chosen, member), recipe(chosen, member.element, level)
+    return Job(label, case.name, data, chosen.pair, mesh, case.mesh if chosen.generator is None else None, marks, size)
 
 
 def _fingerprint(mesh: Mesh) -> bytes:
@@ -128,18 +126,14 @@ def measured(job: Job) -> dict[str, Any]:
     started = time.perf_counter()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FastcontactWarning)
-        mesh = job.base if job.recipe is None else make_mesh(job.recipe, job.base)
-        case = build_case(job.data, name=job.name, mesh=mesh)
+        case = build_case(job.data, name=job.name, mesh=make_mesh(job.recipe, job.base))
         last = last_step(case)
     values = quantities.measure(case, last, job.pair)
-    theory, reference = quantities.of_theories(case, job.pair)
     return {
         "h": quantities.mesh_size(case, job.pair),
         "n_dofs": case.model.n_dofs,
         "values": {name: value for name, value in values.items() if np.isfinite(value)},
-        "theory": theory,
-        "reference": reference,
-        "equal_force": quantities.at_force(case, job.pair, values.get("force", 0.0)),
+        **quantities.by_theory(case, job.pair, values.get("force", 0.0)),
         "profile": _profile(case, last, job.pair),
         "iterations": {k: int(v) for k, v in last.iterations.items() if isinstance(v, int)},
         "seconds": time.perf_counter() - started,

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from fastcontact.errors import CaseError, FastcontactError, unknown
 from fastcontact.mesh import elements, generate
 from fastcontact.mesh.generate import Circle, circles, linearised, refined, to_quadratic
-from fastcontact.mesh.generate.quadratic import Curve
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.studies.settings import Settings, makeable, shape_of
 
@@ -48,24 +47,17 @@ def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
     if element is not None and not makeable(settings, element):
         raise CaseError(_not_makeable(settings, element))
     if settings.generator is None:
-        curves = settings.curves
-        return {
-            "refinements": level,
-            "element": element,
-            "curves": None if curves is None else [[list(c.centre), c.radius, c.group] for c in curves],
-        }
+        curves = settings.curves and [[list(c.centre), c.radius, c.group] for c in settings.curves]
+        return {"refinements": level, "element": element, "curves": curves}
     element = element or "tri3"
     shape = shape_of(element)
     # Where level 0 is given by shape, it is that of quadratic cells; linear ones have the same nodes.
     finer = level + int(shape in settings.arguments and elements.get(element).order == 1)
     given = settings.arguments.get(shape, settings.arguments.get("", {}))
     # Free triangles of another size lie in another pattern, which changes the largest pressure at random: refine them.
-    free = shape == "triangles"
-    return {
-        "generator": settings.generator,
-        "arguments": _finer(settings, element, given, 0 if free else finer),
-        "refinements": finer if free else 0,
-    }
+    halvings, refinements = (0, finer) if shape == "triangles" else (finer, 0)
+    arguments = _finer(settings, element, given, halvings)
+    return {"generator": settings.generator, "arguments": arguments, "refinements": refinements}
 
 
 def _not_makeable(settings: Settings, element: str) -> str:
@@ -109,10 +101,7 @@ def _scaled(value: Any, factor: float) -> Any:
 
 
 def make_mesh(recipe: Recipe, base: Mesh | None) -> Mesh:
-    """Return the mesh of a recipe; `base` is the loaded mesh that is refined where no generator is named.
-
-    Raises MeshError if the generator refuses its arguments or a cell cannot be refined.
-    """
+    """Return the mesh of a recipe; `base` is the loaded mesh that is refined where no generator is named."""
     if "generator" in recipe:
         arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in recipe["arguments"].items()}
         mesh = generate.GENERATORS[recipe["generator"]](**arguments)
@@ -123,21 +112,17 @@ def make_mesh(recipe: Recipe, base: Mesh | None) -> Mesh:
 
 
 def _from_file(recipe: Recipe, base: Mesh) -> Mesh:
-    given = recipe["curves"]
+    given, element = recipe["curves"], recipe["element"]
     curves = circles(base) if given is None else [Circle(tuple(c), radius, group) for c, radius, group in given]
-    element = recipe["element"]
-    orders = {elements.get(name).order for name in base.solids}
-    mesh = base
-    if element is not None and elements.get(element).order == 1 and orders != {1}:
-        mesh = linearised(mesh)
+    order, orders = element and elements.get(element).order, {elements.get(name).order for name in base.solids}
+    mesh = linearised(base) if order == 1 and orders != {1} else base
     mesh = _refined(mesh, recipe["refinements"], curves)
-    if element is not None and elements.get(element).order == 2 and (orders == {1} or element not in mesh.solids):
+    if order == 2 and (orders == {1} or element not in mesh.solids):
         mesh = to_quadratic(linearised(mesh), curves, centre_nodes=element == "quad9")
     return mesh
 
 
-def _refined(mesh: Mesh, times: int, curves: Iterable[Curve]) -> Mesh:
-    kept = list(curves)
+def _refined(mesh: Mesh, times: int, curves: list[Circle]) -> Mesh:
     for _ in range(times):
-        mesh = refined(mesh, kept)
+        mesh = refined(mesh, curves)
     return mesh

@@ -1,7 +1,8 @@
-"""Quantities of interest: numbers measured on the last step of a run, and the same numbers by a theory."""
+"""Quantities of interest: measured on the last step of a run, given by a theory; their titles and units."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -18,15 +19,23 @@ from fastcontact.mesh.topology import bodies
 from fastcontact.results.step import ContactResult, StepResult
 
 Array = NDArray[np.float64]
+# Of the standard quantities, which every study shows where they are known: title, and kind of the unit, empty for ratios.
+LABELS = {
+    "force": ("contact force", "force"),
+    "pressure_max": ("largest pressure", "pressure"),
+    "pressure_pole": ("pressure at the axis", "pressure"),
+    "contact_radius": ("contact radius", "length"),
+    "von_mises_max": ("largest von Mises stress", "pressure"),
+    "von_mises_depth": ("depth of the largest von Mises stress", "length"),
+    "pressure_error": ("pressure against theory at equal approach, relative L2 norm", ""),
+    "pressure_error_equal_force": ("pressure against theory at equal force, relative L2 norm", ""),
+}
 
 
 def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
     """Return every quantity of interest of a solved case, in the case's units; without a `pair` those of no contact."""
-    found: dict[str, float] = {}
-    if pair is not None:
-        found |= _of_contact(case, last.contact[pair], pair)
-    value, where = peak(case.mesh, last.von_mises, case.model.kinematics == "axisymmetric")
-    found["von_mises_max"] = value
+    found = {} if pair is None else _of_contact(case, last.contact[pair], pair)
+    found["von_mises_max"], where = peak(case.mesh, last.von_mises, case.model.kinematics == "axisymmetric")
     if pair is not None:
         found["von_mises_depth"] = _depth(case, pair, where)
     for name, point in case.probes.items():
@@ -43,13 +52,12 @@ def _of_contact(case: Case, contact: ContactResult, pair: str) -> dict[str, floa
     at_axis = np.abs(contact.coordinates[:, 0]) <= 1e-9 * np.ptp(contact.coordinates, axis=0).max()
     if at_axis.any():
         found["pressure_pole"] = float(contact.pressure[at_axis][0])
-    theory = case.theories.get(pair, {}).get("theory")
+    theory: Any = case.theories.get(pair, {}).get("theory")
     if hasattr(theory, "pressure") and case.mesh.dim == 2:
         side = secondary(case, pair)
         found["pressure_error"] = pressure_error(case, side, contact, theory)
-        at_force = getattr(theory, "at_force", None)
-        if at_force is not None and found["force"] > 0:
-            same = at_force(found["force"])
+        if hasattr(theory, "at_force") and found["force"] > 0:
+            same = theory.at_force(found["force"])
             found["pressure_error_equal_force"] = pressure_error(case, side, contact, same)
     return found
 
@@ -178,8 +186,7 @@ def _of_probe(name: str, point: int, last: StepResult) -> dict[str, float]:
         found[f"{name}.stress.{component}"] = float(value)
     for axis, value in zip("xyz", last.displacement[point], strict=False):
         found[f"{name}.displacement.{axis}"] = float(value)
-    at = at_point(last, point)
-    if at is not None:
+    if at := at_point(last, point):
         contact, row = at
         found[f"{name}.pressure"] = float(contact.pressure[row])
     return found
@@ -196,10 +203,8 @@ def mesh_size(case: Case, pair: str | None) -> float:
 
 def of_theory(theory: Any) -> dict[str, float]:
     """Return the quantities of interest that a theory gives, in its units."""
-    found = {}
-    for quantity, attribute in (("force", "force"), ("pressure_max", "pressure_max"), ("contact_radius", "radius")):
-        if hasattr(theory, attribute):
-            found[quantity] = float(getattr(theory, attribute))
+    names = {"force": "force", "pressure_max": "pressure_max", "contact_radius": "radius"}
+    found = {key: float(getattr(theory, name)) for key, name in names.items() if hasattr(theory, name)}
     if hasattr(theory, "pressure"):
         found["pressure_pole"] = float(theory.pressure(0.0))
     if hasattr(theory, "von_mises_maximum"):
@@ -208,14 +213,32 @@ def of_theory(theory: Any) -> dict[str, float]:
     return {quantity: value for quantity, value in found.items() if np.isfinite(value) and value > 0}
 
 
-def of_theories(case: Case, pair: str | None) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the quantities of a pair by its theory at equal approach, and by its mesh-converged solution."""
+def by_theory(case: Case, pair: str | None, force: float) -> dict[str, dict[str, float]]:
+    """Return the quantities of a pair by its theory at equal approach, its mesh-converged solution, and at equal force.
+
+    The keys are ``theory``, ``reference`` and ``equal_force``; `force` is that of the contact [force].
+    """
     theories = case.theories.get(pair or "", {})
-    theory, reference = (of_theory(theories[key]) if key in theories else {} for key in ("theory", "mesh_converged"))
-    return theory, reference
+    theory: Any = theories.get("theory")
+    same = theory.at_force(force) if force > 0 and hasattr(theory, "at_force") else None
+    return {
+        "theory": of_theory(theory),
+        "reference": of_theory(theories.get("mesh_converged")),
+        "equal_force": of_theory(same),
+    }
 
 
-def at_force(case: Case, pair: str | None, force: float) -> dict[str, float]:
-    """Return the quantities of a pair by its theory at a contact force [force]; empty where it has no such method."""
-    theory: Any = case.theories.get(pair or "", {}).get("theory")
-    return of_theory(theory.at_force(force)) if force > 0 and hasattr(theory, "at_force") else {}
+def title(quantity: str) -> str:
+    """Return a quantity in words; ``"C1.stress.yy"`` and the like stay as they are."""
+    return LABELS[quantity][0] if quantity in LABELS else quantity
+
+
+def unit(quantity: str, units: Mapping[str, str]) -> str:
+    """Return the name of a quantity's unit, empty for ratios."""
+    kind = LABELS[quantity][1] if quantity in LABELS else "length" if ".displacement." in quantity else "pressure"
+    return units[kind] if kind else ""
+
+
+def column(label: str, quantity: str, units: Mapping[str, str]) -> str:
+    """Return the header of a column or axis: a label and the unit of its quantity, ``[1]`` for ratios."""
+    return f"{label} [{unit(quantity, units) or '1'}]"

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from fastcontact.studies.fit import CONFIDENCE
-from fastcontact.studies.labels import title
-from fastcontact.studies.model_error import cancelling
+from fastcontact.studies.quantities import title
 from fastcontact.studies.render.table import percent
-from fastcontact.studies.series import Series
+from fastcontact.studies.series import Series, Split
 
 # The quantities that sentences are about, in this order.
 MAIN = ("pressure_max", "force")
@@ -41,18 +40,19 @@ def _about_quantity(series: Series, quantity: str) -> list[str]:
         ]
     if not series.limits[quantity].converging:
         texts.append(f"The {name} does not settle: its last change is the largest, so finer meshes are needed.")
-    return texts + _about_cancelling(series, quantity, found.model) + _about_reference(series, quantity)
+    return texts + _about_cancelling(series, quantity, found) + _about_reference(series, quantity)
 
 
-def _about_cancelling(series: Series, quantity: str, model_error: float) -> list[str]:
-    """Name the mesh whose mesh error cancels the model error: it looks better than it is."""
-    best = cancelling(series.values(quantity), series.limits[quantity], series.theory[quantity])
-    if best is None:
+def _about_cancelling(series: Series, quantity: str, found: Split) -> list[str]:
+    """Name the mesh that lies nearer to theory than half the model error by its mesh error: it looks better than it is."""
+    off = series.from_theory(quantity)
+    best = min(range(len(off)), key=lambda k: abs(off[k]))
+    if not found.resolved or not abs(off[best]) < 0.5 * abs(found.model):
         return []
-    level, off = series.levels[best], series.from_theory(quantity)[best]
+    level = series.levels[best]
     return [
-        f"Level {level.number} ({level.n_dofs} degrees of freedom) lies only {percent(off)} from theory because its mesh "
-        f"error of {percent(off - model_error)} cancels model error: that it agrees is no proof of a good mesh."
+        f"Level {level.number} ({level.n_dofs} degrees of freedom) lies only {percent(off[best])} from theory because its "
+        f"mesh error of {percent(off[best] - found.model)} cancels model error: that it agrees is no proof of a good mesh."
     ]
 
 

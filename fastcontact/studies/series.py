@@ -1,4 +1,4 @@
-"""One element and formulation on all meshes of a convergence study: values, limits, errors."""
+"""One element and formulation on all meshes of a convergence study: values, limits, model error and mesh error."""
 
 from __future__ import annotations
 
@@ -7,8 +7,56 @@ import math
 from dataclasses import dataclass
 
 from fastcontact.studies.fit import Limit, step_orders
-from fastcontact.studies.model_error import Split, split
 from fastcontact.studies.settings import Combination
+
+
+@dataclass(frozen=True)
+class Split:
+    """Differences from a theory, relative to it; ``total = model + mesh``.
+
+    Attributes
+    ----------
+    theory : float
+        The theory's value, in the unit of the quantity.
+    model : float
+        Model error: difference of the limit from the theory.
+    mesh : float
+        Mesh error: difference of the finest mesh from the limit.
+    uncertainty : float
+        Of both, from that of the limit, at 95 %.
+    """
+
+    theory: float
+    model: float
+    mesh: float
+    uncertainty: float
+
+    @property
+    def total(self) -> float:
+        """Difference of the finest mesh from the theory."""
+        return self.model + self.mesh
+
+    @property
+    def resolved(self) -> bool:
+        """Whether the model error is larger than its error bar."""
+        return abs(self.model) > self.uncertainty
+
+
+def split(finest: float, limit: Limit, theory: float) -> Split:
+    """Split the difference of the value on the finest mesh from the theory's.
+
+    Examples
+    --------
+    >>> found = split(104.5, Limit(104.0, 0.1, 1.0, 0.1, 5, True), 100.0)
+    >>> round(found.model, 12), round(found.mesh, 12)
+    (0.04, 0.005)
+    """
+    return Split(
+        theory=theory,
+        model=limit.value / theory - 1.0,
+        mesh=(finest - limit.value) / theory,
+        uncertainty=limit.uncertainty / abs(theory),
+    )
 
 
 @dataclass(frozen=True, eq=False)

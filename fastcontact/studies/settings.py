@@ -26,8 +26,7 @@ class Combination:
     formulation: str | None
 
     def __str__(self) -> str:
-        parts = (self.element or "mixed cells", (self.formulation or "no contact").replace("_", "-"))
-        return " ".join(parts)
+        return f"{self.element or 'mixed cells'} {(self.formulation or 'no contact').replace('_', '-')}"
 
     @property
     def rank(self) -> tuple[int, int, int]:
@@ -46,8 +45,8 @@ class Settings:
     generator: str | None  # of the meshes; None where a mesh file is refined
     # Arguments of the generator on level 0: by shape of the cells (a key of `SHAPES`), or the case's own by "".
     arguments: dict[str, dict[str, Any]]
-    halve: tuple[str, ...] | None = None  # arguments to halve from level to level; None: those of `levels.RULES`
-    double: tuple[str, ...] | None = None  # arguments to double likewise
+    halve: tuple[str, ...] = ()  # arguments to halve from level to level; without both, those of `levels.RULES`
+    double: tuple[str, ...] = ()  # arguments to double likewise
     curves: tuple[Circle, ...] | None = None  # true boundaries of a mesh file; None: the circles found
     load_steps: int | None = None  # of every run; None: the case's
     options: dict[str, dict[str, Any]] = field(default_factory=dict)  # of the contact pair, by formulation
@@ -61,36 +60,33 @@ class Settings:
 
 
 def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
-    """Return the settings of a case's studies; `data` replaces the parsed case file, e.g. with other values.
-
-    Raises CaseError if a value of ``[study]`` is wrong.
-    """
+    """Return the settings of a case's studies, checked; `data` replaces the parsed case file, e.g. with other values."""
     data = tomllib.loads(case.text) if data is None else data
     study = data.get("study", {})
-    pair = study.get("contact") or next((pair.name for pair in case.model.contact), None)
-    if pair is not None and pair not in {p.name for p in case.model.contact}:
-        raise CaseError(unknown("contact pair in study.contact", pair, [p.name for p in case.model.contact]))
-    formulation = next((p.formulation for p in case.model.contact if p.name == pair), None)
+    pair = study.get("contact") or next((own.name for own in case.model.contact), None)
+    formulations = {pair.name: pair.formulation for pair in case.model.contact}
+    if pair is not None and pair not in formulations:
+        raise CaseError(unknown("contact pair in study.contact", pair, formulations))
     solids = list(case.mesh.solids)
-    own = Combination(solids[0] if len(solids) == 1 else None, formulation)
+    own = Combination(solids[0] if len(solids) == 1 else None, formulations.get(pair or ""))
     generator, arguments = _generator(data, study)
     for name in study.get("options", {}):
         if name not in FORMULATIONS:
             raise CaseError(unknown("formulation in study.options", name, FORMULATIONS))
-    combinations = tuple(_combination(entry) for entry in study.get("combinations", ())) or (own,)
+    curves = tuple(_circle(i, entry) for i, entry in enumerate(study.get("curves", ())))
     return Settings(
         data=data,
         own=own,
         pair=pair,
         generator=generator,
         arguments=arguments,
-        halve=tuple(study["halve"]) if "halve" in study else None,
-        double=tuple(study["double"]) if "double" in study else None,
-        curves=tuple(_circle(i, entry) for i, entry in enumerate(study["curves"])) if "curves" in study else None,
+        halve=tuple(study.get("halve", ())),
+        double=tuple(study.get("double", ())),
+        curves=curves if "curves" in study else None,
         load_steps=study.get("load_steps"),
         options=study.get("options", {}),
         quantities=tuple(study.get("quantities", ())),
-        combinations=combinations,
+        combinations=tuple(_combination(entry) for entry in study.get("combinations", ())) or (own,),
     )
 
 
@@ -111,9 +107,8 @@ def _circle(index: int, entry: Any) -> Circle:
     try:
         return Circle(tuple(entry["centre"]), float(entry["radius"]), entry.get("group"))
     except (TypeError, KeyError, ValueError) as error:
-        raise CaseError(
-            f"study.curves[{index}] must be {{ group = 'NAME', centre = [x, y], radius = R }}, not {entry!r}"
-        ) from error
+        form = "{ group = 'NAME', centre = [x, y], radius = R }"
+        raise CaseError(f"study.curves[{index}] must be {form}, not {entry!r}") from error
 
 
 def _combination(entry: Any) -> Combination:
@@ -152,10 +147,7 @@ def combinations(
 
 
 def one_combination(settings: Settings, element: str | None, formulation: str | None) -> Combination:
-    """Return the last combination of ``[study]`` with this element and formulation, where given; else make one of them.
-
-    Raises CaseError if the element or the formulation is unknown.
-    """
+    """Return the last combination of ``[study]`` with this element and formulation, where given; else make one of them."""
     formulation = formulation.replace("-", "_") if formulation else None
     for known in reversed(settings.combinations):
         if element in (None, known.element) and formulation in (None, known.formulation):
@@ -169,9 +161,7 @@ def makeable(settings: Settings, element: str) -> bool:
     if settings.by_shape:
         return shape_of(element) in settings.arguments
     own = settings.own.element
-    if own is None:
-        return settings.generator is not None
-    return elements.get(own).linear == elements.get(element).linear
+    return elements.get(own).linear == elements.get(element).linear if own else settings.generator is not None
 
 
 def shape_of(element: str) -> str:

@@ -12,9 +12,9 @@ from fastcontact.cases.case import Case, build_case, read_case
 from fastcontact.errors import CaseError
 from fastcontact.studies.case_parameters import substituted
 from fastcontact.studies.execute import Progress, raise_first, run_all
-from fastcontact.studies.job import Job, case_data, fields_of
+from fastcontact.studies.job import Job, fields_of, job_of
 from fastcontact.studies.levels import make_mesh, recipe
-from fastcontact.studies.settings import Combination, Settings, one_combination, settings
+from fastcontact.studies.settings import one_combination, settings
 from fastcontact.studies.sweep_report import Point, Sweep, Value
 
 # The level of the study's meshes by default: fine enough for trends larger than the mesh error.
@@ -76,9 +76,7 @@ def parameter_sweep(
         units=case.units,
         combination=str(jobs[0].marks["combination"]),
         parameters={name: tuple(values) for name, values in parameters.items()},
-        points=[
-            Point(parameters=choice, **fields_of(Point, result)) for choice, result in runs if "error" not in result
-        ],
+        points=[Point(parameters=choice, **fields_of(Point, r)) for choice, r in runs if "error" not in r],
         failed=[(choice, str(result["error"])) for choice, result in runs if "error" in result],
     )
 
@@ -91,18 +89,8 @@ def _job(case: Case, choice: dict[str, Value], element: str | None, formulation:
     chosen = settings(case, data)
     member = one_combination(chosen, element, formulation)
     finer = (LEVEL if chosen.by_shape else 0) if level is None else level
-    return Job(
-        label=", ".join(f"{name} = {value}" for name, value in choice.items()),
-        name=case.name,
-        data=case_data(chosen, member),
-        pair=chosen.pair,
-        recipe=recipe(chosen, member.element, finer),
-        base=case.mesh if chosen.generator is None else None,
-        size=_size(chosen, member),
-        marks={**choice, "combination": f"{member}, level {finer}"},
-    )
-
-
-def _size(chosen: Settings, member: Combination) -> float:
-    """Return the number of points of the coarsest mesh, by which the largest of the runs starts first."""
-    return make_mesh(recipe(chosen, member.element, 0), None).n_points if chosen.generator is not None else 0
+    # The largest mesh starts first; of a generator, its size is told by the number of points on level 0.
+    size = make_mesh(recipe(chosen, member.element, 0), None).n_points if chosen.generator is not None else 0
+    marks = {**choice, "combination": f"{member}, level {finer}"}
+    label = ", ".join(f"{name} = {value}" for name, value in choice.items())
+    return job_of(case, chosen, member, finer, label=label, marks=marks, size=size)

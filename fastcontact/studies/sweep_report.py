@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.cases.summary import versions
-from fastcontact.studies.labels import column, title
+from fastcontact.studies.quantities import column, title
 from fastcontact.studies.render import page
 from fastcontact.studies.render.figure import Curve, Line, Panel, figure, marker
 from fastcontact.studies.render.table import Rows, aligned, finite, number, percent, structured
+from fastcontact.studies.report import Report
 
 Value = float | int | str | bool
 # Quantities in tables and figures.
@@ -64,15 +65,11 @@ class Point:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
-    """A finished sweep.
+class Sweep(Report):
+    """A finished sweep; its case and units as in `Report`.
 
     Attributes
     ----------
-    name, title, text : str
-        Of the case: file name without suffix, title, text of the file.
-    units : dict of str to str
-        Names of the units of length, force and pressure.
     combination : str
         Element and formulation.
     parameters : dict of str to tuple
@@ -83,10 +80,6 @@ class Sweep:
         Parameters and reason of the others.
     """
 
-    name: str
-    title: str
-    text: str
-    units: dict[str, str]
     combination: str
     parameters: dict[str, tuple[Value, ...]]
     points: list[Point]
@@ -99,16 +92,13 @@ class Sweep:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, texts, lists and dictionaries, as ``--json`` writes them; differences are relative."""
-        return {
-            "case": self.name,
-            "title": self.title,
-            "units": dict(self.units),
+        numbers = {
             "combination": self.combination,
             "parameters": {name: list(values) for name, values in self.parameters.items()},
             "points": [_point_dict(point) for point in self.points],
             "failed": [{"parameters": choice, "error": text} for choice, text in self.failed],
-            "versions": versions(),
         }
+        return self.framed(numbers)
 
     def table(self) -> NDArray[Any]:
         """Return a structured array (n_points,), one row a point, as ``--csv`` writes it.
@@ -148,9 +138,9 @@ class Sweep:
     def html(self) -> str:
         """Return the sweep as one self-contained HTML page."""
         what = ", ".join(title(name) for name in MAIN if name in self.quantities) or "all quantities"
-        count, parameters = len(self.points), " and ".join(self.parameters)
+        choices = f"{len(self.points)} choices of {' and '.join(self.parameters)}"
         parts = [
-            page.paragraph(f"{self.combination}: {what} for {count} choices of {parameters}."),
+            page.paragraph(f"{self.combination}: {what} for {choices}."),
             page.image(self.figure(), "quantities over the parameter, and their ratio to theory"),
             page.table(self._rows()),
             *map(page.failure, self._failures("")),
@@ -178,14 +168,18 @@ class Sweep:
                 row += [percent(point.ratio(name, other) - 1.0) for other in compared]
         return [header, *rows]
 
-    def _curves(self) -> list[tuple[str, list[Value], list[Point]]]:
+    def _curves(self) -> list[tuple[str, Sequence[Value], list[Point]]]:
         """Return label, values of the first parameter and points, for each choice of the other parameters."""
         first, *others = self.parameters
         found: dict[str, list[Point]] = {}
         for point in self.points:
             label = ", ".join(f"{name} = {point.parameters[name]}" for name in others)
             found.setdefault(label, []).append(point)
-        return [(label, _places([p.parameters[first] for p in points]), points) for label, points in found.items()]
+        curves: list[tuple[str, Sequence[Value], list[Point]]] = []
+        for label, points in found.items():
+            x = [point.parameters[first] for point in points]
+            curves.append((label, x if _are_numbers(x) else list(map(str, x)), points))
+        return curves
 
     def _value_panel(self, quantity: str) -> Panel:
         curves = []
@@ -228,14 +222,11 @@ def _shown(value: Value) -> str:
     return number(value) if isinstance(value, float) else str(value)
 
 
-def _places(values: list[Value]) -> list[Value]:
-    """Return the places of values on an axis: numbers, or all as texts."""
-    return values if all(isinstance(value, (int, float)) for value in values) else [str(value) for value in values]
+def _are_numbers(values: Sequence[Value]) -> bool:
+    return all(isinstance(value, (int, float)) for value in values)
 
 
-def _scale(values: Any) -> str:
+def _scale(values: Sequence[Any]) -> str:
     """Return the scale of an axis: ``"log"`` for positive numbers that differ by more than a factor of `WIDE`."""
-    if not all(isinstance(value, (int, float)) for value in values):
-        return "linear"
-    known = [value for value in values if math.isfinite(value)]
+    known = [value for value in values if math.isfinite(value)] if _are_numbers(values) else []
     return "log" if known and min(known) > 0 and max(known) > WIDE * min(known) else "linear"

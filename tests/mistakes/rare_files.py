@@ -15,7 +15,7 @@ import numpy as np
 
 import fastcontact as fc
 from fastcontact.cases import case as cases
-from fastcontact.cli import _pictures, _results
+from fastcontact.cli import _outputs, _results
 from fastcontact.cli._outputs import write_json
 from fastcontact.mesh.files import abaqus, hdf5, packing, paths
 from fastcontact.mesh.files.blocks import build_mesh
@@ -157,7 +157,7 @@ def unexpected(patch):
 
 
 def picture_on_a_full_disk():
-    _pictures.save(SimpleNamespace(figure=SimpleNamespace(savefig=refusing(errno.ENOSPC))), "a.png")
+    _outputs.save(SimpleNamespace(figure=SimpleNamespace(savefig=refusing(errno.ENOSPC))), "a.png")
 
 
 def of_ansys(folder):
@@ -175,7 +175,7 @@ CALLS = [
     ("a case with a name beyond all limits", lambda: cases.read_case("a" * 5000 + ".toml"), fc.errors.CaseError, r"cannot look for the case file 'a+' \(File name too long\)"),
     ("a case with a value of another size", unexpected, fc.errors.CaseError, r"a value is of the wrong kind or size \(too large\): see the ready cases"),
     ("a picture on a full disk", picture_on_a_full_disk, fc.errors.FileError, r"cannot write the picture 'a\.png': .*No space left on device"),
-    ("a picture without contact", lambda: _pictures.profile_picture(None, SimpleNamespace(contact={}), "a.png"), fc.errors.FastcontactError, r"there is no contact pair whose pressure could be plotted"),
+    ("a picture without contact", lambda: _outputs.profile_picture(None, SimpleNamespace(contact={}), "a.png"), fc.errors.FastcontactError, r"there is no contact pair whose pressure could be plotted"),
     ("a step of no steps", no_step_yet, fc.errors.CaseError, r"a\.vtkhdf' holds no finished step yet"),
     ("a pair of a result without contact", lambda: _results.chosen_contact(SimpleNamespace(contact={}), None), fc.errors.CaseError, r"this result holds no contact pair"),
     ("figures of benchmarks on a full disk", lambda patch: full(patch, write_json), fc.errors.FileError, r"cannot write 'a\.json': .*No space left on device"),

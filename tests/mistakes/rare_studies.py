@@ -22,7 +22,6 @@ from fastcontact.studies.case_parameters import by_law
 from fastcontact.studies.convergence import convergence_study
 from fastcontact.studies.levels import make_mesh
 from fastcontact.studies.settings import combinations, settings
-from fastcontact.studies.store import Store
 
 CASES = [
     ("mesh is a word", '[mesh]\nfile = "forma04a.med"', 'mesh = "forma04a.med"', r"of 'mesh' must be of type dict|'mesh' must be a table"),
@@ -109,7 +108,7 @@ def file_for_a_store(patch):
         raise OSError(errno.EEXIST, "File exists")
 
     patch.setattr(Path, "mkdir", refuse)
-    Store("runs")
+    execute.Store("runs")
 
 
 def case_of(**parts):

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fastcontact.errors import FastcontactError
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 MARKERS = "osD^v<>ph*"
 
@@ -57,7 +53,7 @@ class Panel:
     minor_grid: float = 0.0  # opacity at minor ticks
     title_size: float | None = None  # [point]
     legend_size: float = 8  # [point]
-    draw: Callable[[Axes], None] | None = None  # draws on the axes what is more than curves and lines
+    draw: Callable[[Any], None] | None = None  # draws on the axes what is more than curves and lines
     instead: str = ""  # shown in place of everything else, where there is nothing to draw
 
 
@@ -66,11 +62,8 @@ def marker(number: int) -> str:
     return MARKERS[number % len(MARKERS)]
 
 
-def figure(panels: Sequence[Sequence[Panel]], size: tuple[float, float], title: str = "", **style: Any) -> Figure:
-    """Return a figure of rows of panels, of a `size` [inch]; it needs no display. `style` is that of its title.
-
-    Raises FastcontactError if matplotlib is not installed.
-    """
+def figure(panels: Sequence[Sequence[Panel]], size: tuple[float, float], title: str = "", **style: Any) -> Any:
+    """Return a figure of rows of panels, of a `size` [inch], for which matplotlib is needed; `style` is of its title."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
@@ -86,7 +79,7 @@ def figure(panels: Sequence[Sequence[Panel]], size: tuple[float, float], title: 
     return made
 
 
-def _draw(panel: Panel, ax: Axes) -> None:
+def _draw(panel: Panel, ax: Any) -> None:
     if panel.instead:
         ax.set_axis_off()
         ax.text(0.5, 0.5, panel.instead, ha="center", va="center", transform=ax.transAxes, wrap=True)
@@ -117,7 +110,7 @@ def _draw(panel: Panel, ax: Axes) -> None:
         ax.legend(fontsize=panel.legend_size)
 
 
-def _scale(panel: Panel, ax: Axes) -> None:
+def _scale(panel: Panel, ax: Any) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     if panel.x_scale != "linear":

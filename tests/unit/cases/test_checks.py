@@ -146,4 +146,7 @@ def test_the_share_of_a_contact_lies_between_nothing_and_all_of_it():
             described({"contact": {"a": {}}, "theory": {"a": {**theory, "share": share}}})
     with pytest.raises(CaseError, match="share"):
         described({"contact": {"a": {}}, "theory": {"a": {**theory, "share": "half"}}})
-    assert described({"contact": {"a": {}}, "theory": {"a": {**theory, "share": 0.5}}})["theories"]["a"].force == 1.0
+    assert (
+        described({"contact": {"a": {}}, "theory": {"a": {**theory, "share": 0.5}}})["theories"]["a"]["theory"].force
+        == 1.0
+    )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.cli._pictures import normal_stress
+from fastcontact.cli._outputs import normal_stress
 from fastcontact.mesh.generate import block, box, union
 from fastcontact.results.step import StepResult
 
