@@ -88,7 +88,7 @@ def stiffness(
         ``"axisymmetric"`` (forces over the full circle), ``"plane_strain"`` or ``"plane_stress"`` (unit thickness),
         or ``"3d"``.
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
-        Symmetric [pressure].
+        From `LinearElastic.moduli` [pressure].
     material : dict of str to ndarray of int (n_cells,)
         By solid element: material number of each cell.
     pattern : Sparsity, optional

@@ -9,7 +9,7 @@ from fastcontact.contact.search.closest import Closest, closest_of_kinds, flat_t
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies, outer_facets
-from fastcontact.model import body_overlap_2d_kernels, body_overlap_3d_kernels
+from fastcontact.model import body_overlap_kernels
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -80,7 +80,7 @@ def _depths_in_plane(points: Array, kinds: list[Array], axisymmetric: bool) -> t
     depth, size = np.zeros(len(points)), max(float(np.abs(corners).max()) for corners in kinds)
     crossed = np.zeros(len(points), np.int64)
     for corners in kinds:
-        body_overlap_2d_kernels.count_crossings(points, np.ascontiguousarray(corners), crossed)
+        body_overlap_kernels.count_crossings(points, np.ascontiguousarray(corners), crossed)
     inside = crossed % 2 == 1
     facet = np.zeros(len(points), np.intp)
     if inside.any():
@@ -113,7 +113,7 @@ def _depths_in_space(points: Array, kinds: list[Array]) -> tuple[Array, Indices]
             [corners[:, flat_triangles(corners.shape[1])].reshape(-1, 3, 3) for corners in kinds]
         )
         number = np.empty(len(unsure))
-        body_overlap_3d_kernels.winding_numbers(np.ascontiguousarray(points[unsure]), triangles, number)
+        body_overlap_kernels.winding_numbers(np.ascontiguousarray(points[unsure]), triangles, number)
         inside[unsure] = number > 0.5
     return np.where(inside & (found.distance > ON_SURFACE * size), found.distance, 0.0), found.facet
 

@@ -13,7 +13,7 @@ from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.loads import check_number, check_value, evaluated
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.model.ramp import Ramp, Table, checked_table
+from fastcontact.model.ramp import Table, table_of
 
 # Options that every contact pair takes, beside those of its formulation.
 SHARED_OPTIONS = ("clearance", "clearance_primary", "clearance_ramp", "excluded", "frictionless", "kind", "penalty")
@@ -78,10 +78,7 @@ def _penalty(name: str, options: Mapping[str, Any]) -> float | None:
 
 def clearance_ramp(name: str, options: Mapping[str, Any]) -> Table | None:
     """Return the history of the clearance of contact pair `name`, None where it does not change."""
-    ramp = options.get("clearance_ramp")
-    if ramp is None:
-        return None
-    return ramp.table if isinstance(ramp, Ramp) else checked_table(ramp, f"the clearance_ramp of contact '{name}'")
+    return table_of(options.get("clearance_ramp"), f"the clearance_ramp of contact '{name}'")
 
 
 def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side: Surface) -> Mask | None:

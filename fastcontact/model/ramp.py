@@ -32,6 +32,13 @@ def checked_table(rows: Iterable[Iterable[float]], what: str = "the ramp") -> Ta
     return table
 
 
+def table_of(ramp: History, what: str) -> Table | None:
+    """Return the table of a history, None for none; errors as for `checked_table`."""
+    if ramp is None:
+        return None
+    return ramp.table if isinstance(ramp, Ramp) else checked_table(ramp, what)
+
+
 def table_value(table: Table, instant: float) -> float:
     """Return the piecewise linear function `table` at `instant`; constant beyond its ends."""
     times, values = zip(*table, strict=True)
@@ -80,6 +87,10 @@ class Ramp:
     def value(self, instant: float) -> float:
         """Return the multiplier of the loads at `instant`."""
         return table_value(self.table, instant)
+
+
+# A history of a single load: a ramp, whose table counts, or pairs (instant, multiplier).
+History = Ramp | Iterable[Iterable[float]] | None
 
 
 def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:

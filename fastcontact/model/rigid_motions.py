@@ -6,11 +6,11 @@ then lie inside the cone of the contact forces (Fichera, 1964; Lions and Stampac
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.contact.constraints import Constraints
@@ -115,7 +115,7 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
                 labels.append((f"point {dof // mesh.dim}", f"translation along {'xyz'[dof % mesh.dim]}"))
     if not columns:
         return FreeMotions(np.empty((dofs, 0)), np.empty((0, 0)), [])
-    motions = FreeMotions(np.hstack(columns), _block_diagonal(parts), labels)
+    motions = FreeMotions(np.hstack(columns), block_diag(*parts), labels)
     if relations is None or not relations.shape[0]:
         return motions
     return motions.combined(_null_space(relations @ motions.displacement))
@@ -133,14 +133,6 @@ def _null_space(A: Array) -> Array:
     k = A.shape[1]
     _, values, right = np.linalg.svd(np.vstack([A, np.zeros((k, k))]), full_matrices=False)
     return np.asarray(right[values < ZERO * max(values.max(initial=0.0), 1.0)].T)
-
-
-def _block_diagonal(blocks: Sequence[Array]) -> Array:
-    heights, widths = [b.shape[0] for b in blocks], [b.shape[1] for b in blocks]
-    whole = np.zeros((sum(heights), sum(widths)))
-    for block, row, column in zip(blocks, np.cumsum([0, *heights]), np.cumsum([0, *widths]), strict=False):
-        whole[row : row + block.shape[0], column : column + block.shape[1]] = block
-    return whole
 
 
 def resisting(constraints: Constraints) -> tuple[csr_array, Array]:

@@ -183,7 +183,7 @@ def _some(cells: NDArray[Any]) -> NDArray[Any]:
 def _load_integral(model: Model, load: Load) -> list[str]:
     """Return a warning if a load that is a function varies too much within a cell for the quadrature of loads."""
     off = total = 0.0
-    for value in _functions(load):
+    for value in (value for value in load.values if callable(value)):
         for element, cells in _loaded(model, load):
             coarse, fine = (
                 _integrals(model.mesh, element, _some(cells), value, load.name, finer) for finer in (False, True)
@@ -195,11 +195,6 @@ def _load_integral(model: Model, load: Load) -> list[str]:
         f"{load.name} varies within single elements, so that its quadrature is not exact: it is off by {off / total:.2%} of "
         "the whole; refine the mesh there"
     ]
-
-
-def _functions(load: Load) -> list[Value]:
-    values = [load.value] if isinstance(load, Pressure) else list(getattr(load, "components", {}).values())
-    return [value for value in values if callable(value)]
 
 
 def _loaded(model: Model, load: Load) -> Iterator[tuple[str, NDArray[np.int32]]]:
