@@ -24,18 +24,12 @@ class HertzElliptical:
     ----------
     bodies : Bodies
         Elastic constants.
-    E_star : float
-        Contact modulus [pressure].
-    R_x, R_y : float
-        Relative principal radii, 1/R_x = 1/R1x + 1/R2x [length].
-    radius_x, radius_y : float
-        Semi-axes of the contact area along x and y [length].
-    approach : float
-        Approach of distant points of the two bodies [length].
-    force : float
-        [force].
-    pressure_max : float
-        Pressure p0 at the centre [pressure].
+    E_star, R_x, R_y : float
+        Contact modulus [pressure] and relative principal radii, 1/R_x = 1/R1x + 1/R2x [length].
+    radius_x, radius_y, approach : float
+        Semi-axes of the contact area along x and y, and approach of distant points of the two bodies [length].
+    force, pressure_max : float
+        Force [force] and pressure p0 at the centre [pressure].
     """
 
     bodies: Bodies

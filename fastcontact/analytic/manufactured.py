@@ -152,16 +152,10 @@ def hertz_box(
 
     Parameters
     ----------
-    kinematics : str
-        "plane_strain", "plane_stress", "axisymmetric" or "3d" (the axis is z).
-    E, nu : float
-        Material of the box [pressure], [-].
-    radius : float
-        Contact radius, less than `width` [length].
-    pressure_max : float
-        Pressure at the centre [pressure].
-    width, height : float
-        Size of the box [length].
+    kinematics, E, nu, width, height
+        As the attributes of `HertzBox`.
+    radius, pressure_max : float
+        Contact radius, less than `width` [length], and pressure at the centre [pressure].
 
     Examples
     --------

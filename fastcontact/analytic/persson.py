@@ -107,8 +107,7 @@ def persson_pin(
     Raises
     ------
     ModelError
-        If a number is out of range; if `contact_angle` exceeds what a pin with clearance can reach, or is
-        given without clearance, when any force gives the same angle.
+        Also if `contact_angle` exceeds what a pin with clearance can reach, or is given without clearance.
     """
     from scipy.optimize import brentq
 

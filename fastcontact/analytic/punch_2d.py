@@ -75,14 +75,8 @@ def flat_punch_2d(*, nu: float, half_width: float, force: float, bonded: bool = 
 
     Parameters
     ----------
-    nu : float
-        Poisson ratio of the half plane.
-    half_width : float
-        Half-width of the punch [length].
-    force : float
-        Force per unit length [force/length].
-    bonded : bool
-        The punch sticks to the half plane; otherwise there is no friction.
+    nu, half_width, force, bonded
+        As the attributes of `FlatPunch2D`; without bond there is no friction.
     """
     return FlatPunch2D(poisson("nu", nu), positive("half_width", half_width), positive("force", force), bool(bonded))
 

@@ -183,10 +183,8 @@ def flat_punch(
 
     Parameters
     ----------
-    E, nu : float
-        Half space [pressure], [-].
-    radius : float
-        Radius of the punch [length].
+    E, nu, radius : float
+        Half space [pressure], [-], and radius of the punch [length].
     force, approach : float
         Exactly one of them: force [force] or indentation [length].
     bonded : bool

@@ -30,17 +30,9 @@ Table = tuple[tuple[float, float], ...]
 Value = float | Callable[[Array], Array]
 Components = Mapping[int, Value]
 
-# By the linear element on the same corners. Of degree 7 at least (products: in each direction): enough for a constant
-# load on curved quadratic cells of a ring, and for one that varies quadratically over straight facets.
-_RULES: dict[str, Callable[[], quadrature.Rule]] = {
-    "line2": lambda: quadrature.gauss_line(5),
-    "tri3": lambda: quadrature.collapsed_triangle(5),
-    "quad4": lambda: quadrature.gauss_square(4),
-    "tet4": lambda: quadrature.collapsed_tetrahedron(5),
-    "hex8": lambda: quadrature.gauss_cube(4),
-    "wedge6": lambda: quadrature.prism(quadrature.collapsed_triangle(5), quadrature.gauss_line(4)),
-    "pyramid5": lambda: quadrature.conical_pyramid(5),
-}
+# Points of the product rule along each direction, and along those of squares, cubes and prisms: exact to degree 7 at least,
+# enough for a constant load on curved quadratic cells of a ring, and for one that varies quadratically over straight facets.
+_POINTS, _STRAIGHT = 5, 4
 
 
 class Load:
@@ -284,7 +276,7 @@ def axes_of(what: str, components: Mapping[str, Any], dim: int) -> dict[int, Any
 def _mapped(mesh: Mesh, element: str, cells: Indices) -> tuple[Array, Array, Array, Array]:
     """Return positions (c, q, dim), shape values (q, n), Jacobians (c, q, dim, cell dim) and weights (q,)."""
     reference = elements.get(element)
-    xi, weights = _RULES[reference.linear]()
+    xi, weights = quadrature.product_rule(reference.linear, _POINTS, _STRAIGHT)
     N, dN = reference.shape(xi), reference.gradient(xi)
     corners = mesh.points[cells]
     x = np.einsum("qn,cnd->cqd", N, corners)

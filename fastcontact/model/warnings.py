@@ -207,8 +207,7 @@ def _loaded(model: Model, load: Load) -> Iterator[tuple[str, NDArray[np.int32]]]
 def _integrals(mesh: Mesh, element: str, cells: NDArray[np.int32], value: Value, name: str, finer: bool) -> Array:
     """Return the integral (n_cells,) of a load over each cell, by about the rule of loads or by a finer one."""
     reference = elements.get(element)
-    n = 9 if finer else 5
-    xi, weights = quadrature.gauss_line(n) if reference.dim == 1 else integration_rule(reference, n)
+    xi, weights = quadrature.product_rule(reference.linear, 9 if finer else 5)
     J = np.einsum("qnk,cnd->cqdk", reference.gradient(xi), mesh.points[cells])
     x = np.einsum("qn,cnd->cqd", reference.shape(xi), mesh.points[cells])
     measure = np.sqrt(np.linalg.det(np.einsum("cqdk,cqdl->cqkl", J, J)))

@@ -13,6 +13,12 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Function = Callable[[Array], Array]
 
+# Names of facets by the dimension of the cell and the number of nodes of the facet.
+_FACETS = {
+    (2, 2): "line2", (2, 3): "line3",
+    (3, 3): "tri3", (3, 6): "tri6", (3, 4): "quad4", (3, 8): "quad8", (3, 9): "quad9",
+}  # fmt: skip
+
 
 @dataclass(frozen=True, eq=False)
 class Element:
@@ -22,10 +28,6 @@ class Element:
     ----------
     name : str
         Our name, e.g. ``"tri6"``.
-    dim : int
-        Dimension of the reference cell: 1 for lines, 2 for faces, 3 for solids.
-    order : int
-        1 for linear, 2 for quadratic.
     nodes : ndarray (n_nodes, dim)
         Reference coordinates [-], in the order of VTK; corners first, then mid nodes in the order of `edges`, then
         centre nodes of faces and of the cell.
@@ -33,8 +35,6 @@ class Element:
         Corner pairs, one per edge; in 2D counter-clockwise.
     facets : tuple of tuple of int
         Local nodes of each boundary facet, oriented so that its normal points outward.
-    facet_elements : tuple of str
-        Name of each facet's element; empty for lines.
     shape : callable
         ``shape(xi)`` maps (m, dim) to values (m, n_nodes) [-].
     gradient : callable
@@ -52,12 +52,9 @@ class Element:
     """
 
     name: str
-    dim: int
-    order: int
     nodes: Array
     edges: tuple[tuple[int, int], ...]
     facets: tuple[tuple[int, ...], ...]
-    facet_elements: tuple[str, ...]
     shape: Function
     gradient: Function
     quadrature: tuple[Array, Array]
@@ -67,6 +64,21 @@ class Element:
     linear: str
     quadratic: str
     corner_shape: Function
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the reference cell: 1 for lines, 2 for faces, 3 for solids."""
+        return int(self.nodes.shape[1])
+
+    @property
+    def order(self) -> int:
+        """1 for linear, 2 for quadratic."""
+        return 1 if self.name == self.linear else 2
+
+    @property
+    def facet_elements(self) -> tuple[str, ...]:
+        """Name of each facet's element; empty for lines."""
+        return tuple(_FACETS[self.dim, len(facet)] for facet in self.facets if self.dim > 1)
 
     @property
     def n_nodes(self) -> int:

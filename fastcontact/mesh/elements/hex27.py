@@ -25,8 +25,8 @@ def gradient(xi: Array) -> Array:
 
 
 ELEMENT = Element(
-    name="hex27", dim=3, order=2, nodes=NODES, edges=hex8.EDGES,
-    facets=tuple((*facet, 20 + i) for i, facet in enumerate(hex20.ELEMENT.facets)), facet_elements=("quad9",) * 6,
-    shape=shape, gradient=gradient, quadrature=gauss_cube(3), meshio="hexahedron27", med="H27", vtk=29,
-    linear="hex8", quadratic="hex27", corner_shape=hex8.shape,
+    name="hex27", nodes=NODES, edges=hex8.EDGES,
+    facets=tuple((*facet, 20 + i) for i, facet in enumerate(hex20.ELEMENT.facets)), shape=shape, gradient=gradient,
+    quadrature=gauss_cube(3), meshio="hexahedron27", med="H27", vtk=29, linear="hex8", quadratic="hex27",
+    corner_shape=hex8.shape,
 )  # fmt: skip

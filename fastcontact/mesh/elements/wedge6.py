@@ -16,11 +16,8 @@ I = np.array([0, 1, 2, 0, 1, 2])  # noqa: E741
 J = np.array([0, 0, 0, 1, 1, 1])
 shape, gradient = _product.of_two(tri3, line2, I, J)
 
-
 ELEMENT = Element(
-    name="wedge6", dim=3, order=1, nodes=NODES, edges=EDGES,
-    facets=((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
-    facet_elements=("tri3", "tri3", "quad4", "quad4", "quad4"),
-    shape=shape, gradient=gradient, quadrature=prism(triangle_3_sides(), gauss_line(2)),
-    meshio="wedge", med="PE6", vtk=13, linear="wedge6", quadratic="wedge15", corner_shape=shape,
+    name="wedge6", nodes=NODES, edges=EDGES, facets=((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+    shape=shape, gradient=gradient, quadrature=prism(triangle_3_sides(), gauss_line(2)), meshio="wedge", med="PE6",
+    vtk=13, linear="wedge6", quadratic="wedge15", corner_shape=shape,
 )  # fmt: skip

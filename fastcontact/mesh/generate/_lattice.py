@@ -1,4 +1,4 @@
-"""Blocks and boxes between grid lines, and the places of those lines."""
+"""Blocks and boxes between grid lines."""
 
 from __future__ import annotations
 
@@ -7,25 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.mesh.generate._check import segments
-from fastcontact.mesh.generate._spacing import Spacing, divided
 from fastcontact.mesh.generate.blocks import block
 from fastcontact.mesh.generate.box import box
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
-
-
-def graded(length: float, spacing: Spacing) -> Array:
-    """Return places (n + 1,) [length] from 0 to `length`, their distances after a spacing about 0."""
-    return divided(lambda s: np.column_stack([length * s, np.zeros(len(s))]), length, spacing)[:, 0]
-
-
-def growing(length: float, first: float, growth: float) -> Array:
-    """Return places (n + 1,) [length] from 0 to `length`: about `first` apart, then each time `growth` times as far."""
-    n = segments(np.log1p(length * (growth - 1.0) / first) / np.log(growth))
-    places = np.concatenate([[0.0], np.cumsum(growth ** np.arange(n))])
-    return np.asarray(length * places / places[-1])
 
 
 def on_lines(element: str, lines: Sequence[Array], name: str = "BLOCK") -> Mesh:

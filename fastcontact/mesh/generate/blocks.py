@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from fastcontact.errors import MeshError
 from fastcontact.mesh.generate._blocks import SIDES, rectangular, structured
 from fastcontact.mesh.generate._check import FACES, TRIANGLES, count, each, number, one_of, positive, within
-from fastcontact.mesh.generate._outline import filled, straight
-from fastcontact.mesh.generate._places import with_points_at
-from fastcontact.mesh.generate._spacing import Spacing, divided, geometric, segments_for
+from fastcontact.mesh.generate._spacing import Spacing, divided, geometric, segments_for, straight
+from fastcontact.mesh.generate._triangulate import filled
 from fastcontact.mesh.generate.half_spheres import quarter_disc
 from fastcontact.mesh.generate.quadratic import in_element
-from fastcontact.mesh.generate.transform import renamed, union
+from fastcontact.mesh.generate.transform import renamed, union, with_points_at
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]

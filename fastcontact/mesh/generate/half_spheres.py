@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from fastcontact.mesh.generate._blocks import structured, transfinite
 from fastcontact.mesh.generate._check import FACES, TRIANGLES, at_most, count, each, one_of, positive, unused, within
-from fastcontact.mesh.generate._outline import arc, filled, straight
-from fastcontact.mesh.generate._places import with_points_at
-from fastcontact.mesh.generate._spacing import Spacing, divided, geometric
+from fastcontact.mesh.generate._spacing import Spacing, arc, divided, geometric, straight
+from fastcontact.mesh.generate._triangulate import filled
 from fastcontact.mesh.generate.quadratic import Circle, in_element
-from fastcontact.mesh.generate.transform import merge_points, mirrored, union
+from fastcontact.mesh.generate.transform import merge_points, mirrored, union, with_points_at
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]

@@ -1,8 +1,8 @@
-"""Mirror, move, unite, weld and rename meshes."""
+"""Mirror, move, unite, weld and rename meshes, and name groups by their places."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -195,3 +195,22 @@ def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
             )
     point_groups = {name: target[members] for name, members in mesh.point_groups.items()}
     return mesh.replace(points=mesh.points[kept], cells=cells, point_groups=point_groups)
+
+
+def with_points_at(mesh: Mesh, places: Mapping[str, Sequence[float]]) -> Mesh:
+    """Return the mesh with a point group for the point nearest to each place [length]."""
+    nearest = {
+        name: [int(((mesh.points - np.asarray(place)) ** 2).sum(axis=1).argmin())] for name, place in places.items()
+    }
+    return mesh.with_groups(points=nearest)
+
+
+def with_cells_inside(mesh: Mesh, name: str, group: str, inside: Callable[[Array], NDArray[np.bool_]]) -> Mesh:
+    """Return the mesh with a cell group `name`: the cells of `group` whose nodes are all inside.
+
+    `inside` (n,) maps points (n, dim) [length] to booleans.
+    """
+    near = inside(mesh.points)
+    rows = mesh.split(mesh.cell_groups[group])
+    parts = [mesh.offsets[kind] + own[near[mesh.cells[kind][own]].all(axis=1)] for kind, own in rows.items()]
+    return mesh.with_groups(cells={name: np.concatenate(parts)})
