@@ -128,6 +128,8 @@ def hertz_elliptical(
 ) -> HertzElliptical:
     """Return the Hertz contact of two bodies with parallel principal curvatures (Johnson 1985, 4.24-4.31).
 
+    ModelError also if the bodies are straight in one direction: a line contact.
+
     Parameters
     ----------
     E1, nu1, E2, nu2 : float
@@ -136,11 +138,6 @@ def hertz_elliptical(
         Principal radii of bodies 1 and 2 in the planes through x and y; infinity is straight [length].
     force, approach, pressure_max : float
         Exactly one of them: force [force], approach [length] or largest pressure [pressure].
-
-    Raises
-    ------
-    ModelError
-        Also if the bodies are straight in one direction: a line contact.
 
     Examples
     --------

@@ -91,6 +91,8 @@ def persson_pin(
 ) -> PerssonPin:
     """Return the contact of a pin with the hole of an infinite plate of the same material (Persson 1964).
 
+    ModelError also if `contact_angle` exceeds what a pin with clearance can reach, or is given without clearance.
+
     Parameters
     ----------
     E, nu : float
@@ -103,11 +105,6 @@ def persson_pin(
         Exactly one of them: force per unit length [force/length], or half the contact angle [degrees].
     kinematics : str
         "plane_stress" or "plane_strain".
-
-    Raises
-    ------
-    ModelError
-        Also if `contact_angle` exceeds what a pin with clearance can reach, or is given without clearance.
     """
     from scipy.optimize import brentq
 

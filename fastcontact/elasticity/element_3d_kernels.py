@@ -96,69 +96,46 @@ def _owned(cells, c, owner, part, mine):
     return found
 
 
-@kernel
-def _add_block(flat, at_upper, at_lower, upper, lower, k00, k01, k02, k10, k11, k12, k20, k21, k22):
-    """Add the block of a node pair if `at_upper`, and its transpose on the other side of the diagonal if `at_lower`."""
-    u, v = 9 * upper, 9 * lower
-    if at_upper:
-        flat[u] += k00
-        flat[u + 1] += k01
-        flat[u + 2] += k02
-        flat[u + 3] += k10
-        flat[u + 4] += k11
-        flat[u + 5] += k12
-        flat[u + 6] += k20
-        flat[u + 7] += k21
-        flat[u + 8] += k22
-    if u != v and at_lower:
-        flat[v] += k00
-        flat[v + 1] += k10
-        flat[v + 2] += k20
-        flat[v + 3] += k01
-        flat[v + 4] += k11
-        flat[v + 5] += k21
-        flat[v + 6] += k02
-        flat[v + 7] += k12
-        flat[v + 8] += k22
-
-
 @inlined_kernel
-def _add_isotropic_block(flat, pair, at_upper, at_lower, upper, lower, coupling, shear, g):
+def _add_block(data, pair, at_upper, at_lower, upper, lower, coupling, shear, g, block):
     """Add the block of two nodes for Lame's constants: K_ij = lambda g_ij + mu g_ji + mu g_kk delta_ij.
 
-    `pair` is whether the nodes differ; the order of g is xx, yy, zz, xy, xz, yz, yx, zx, zy.
+    It is added if `at_upper`, and its transpose on the other side of the diagonal if `at_lower`. `pair` is whether the nodes
+    differ; the order of g is xx, yy, zz, xy, xz, yz, yx, zx, zy. `block` (3, 3) is overwritten.
     """
     xx, yy, zz, xy, xz, yz, yx, zx, zy = g
     trace, both = shear * (xx + yy + zz), coupling + shear
-    k01, k02, k12 = coupling * xy + shear * yx, coupling * xz + shear * zx, coupling * yz + shear * zy
-    k10, k20, k21 = coupling * yx + shear * xy, coupling * zx + shear * xz, coupling * zy + shear * yz
+    block[0, 0], block[1, 1], block[2, 2] = both * xx + trace, both * yy + trace, both * zz + trace
+    block[0, 1], block[1, 0] = coupling * xy + shear * yx, coupling * yx + shear * xy
+    block[0, 2], block[2, 0] = coupling * xz + shear * zx, coupling * zx + shear * xz
+    block[1, 2], block[2, 1] = coupling * yz + shear * zy, coupling * zy + shear * yz
     if not pair:  # equal but for round-off; K is symmetric to the last bit
-        k10, k20, k21 = k01, k02, k12
-    _add_block(
-        flat, at_upper, at_lower, upper, lower,
-        both * xx + trace, k01, k02, k10, both * yy + trace, k12, k20, k21, both * zz + trace,
-    )  # fmt: skip
+        block[1, 0], block[2, 0], block[2, 1] = block[0, 1], block[0, 2], block[1, 2]
+    for i in range(3):
+        for j in range(3):
+            if at_upper:
+                data[upper, i, j] += block[i, j]
+            if pair and at_lower:
+                data[lower, j, i] += block[i, j]
 
 
 @kernel
-def _add_isotropic(g, coupling, shear, slots, c, mine, flat):
+def _add_blocks(g, coupling, shear, slots, c, mine, block, data):
     """Add the blocks of a cell for Lame's constants, given the integrals of `_integrate_products`."""
     for b in range(g.shape[1]):
         for a in range(b + 1):
             products = (
                 g[0, a, b], g[3, a, b], g[5, a, b], g[1, a, b], g[2, a, b], g[4, a, b], g[1, b, a], g[2, b, a], g[4, b, a],
             )  # fmt: skip
-            _add_isotropic_block(
-                flat, a != b, mine[a], mine[b], slots[c, a, b], slots[c, b, a], coupling, shear, products
-            )
+            _add_block(data, a != b, mine[a], mine[b], slots[c, a, b], slots[c, b, a], coupling, shear, products, block)
 
 
 @kernel
-def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, gradient, flat):
+def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, gradient, block, data):
     """Add the blocks of a linear tetrahedron for Lame's constants: its gradients (4, 3) are constant.
 
     `volume` is that of the reference cell. Returns whether the Jacobian is positive. Loops over exactly four nodes
-    take half the time of `_integrate_products` and `_add_isotropic`.
+    take half the time of `_integrate_products` and `_add_blocks`.
     """
     first = cells[c, 0]
     x0, y0, z0 = points[first, 0], points[first, 1], points[first, 2]
@@ -180,9 +157,7 @@ def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, gra
         for a in range(b + 1):
             x, y, z = gradient[a, 0], gradient[a, 1], gradient[a, 2]
             products = x * gx, y * gy, z * gz, x * gy, x * gz, y * gz, y * gx, z * gx, z * gy
-            _add_isotropic_block(
-                flat, a != b, mine[a], mine[b], slots[c, a, b], slots[c, b, a], coupling, shear, products
-            )
+            _add_block(data, a != b, mine[a], mine[b], slots[c, a, b], slots[c, b, a], coupling, shear, products, block)
     return True
 
 
@@ -197,22 +172,21 @@ def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric,
     n_cells, n_nodes = cells.shape
     slopes, x, gradient = _transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
     g, mine, corners = np.empty((6, n_nodes, n_nodes)), np.empty(n_nodes, np.bool_), np.empty((4, 3))
-    volume = 0.0
+    block, volume = np.empty((3, 3)), 0.0
     for weight in weights:
         volume += weight
-    flat = data.reshape(-1)
     for c in range(n_cells):
         if not _owned(cells, c, owner, part, mine):
             continue
         coupling, shear = moduli[material[c], 0, 1], moduli[material[c], 3, 3]
         if n_nodes == 4:
-            if not _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, corners, flat):
+            if not _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, corners, block, data):
                 return c
             continue
         _gather(points, cells, c, x)
         if not _integrate_products(x, slopes, weights, gradient, g):
             return c
-        _add_isotropic(g, coupling, shear, slots, c, mine, flat)
+        _add_blocks(g, coupling, shear, slots, c, mine, block, data)
     return -1
 
 

@@ -24,10 +24,7 @@ def pair_options(
 ) -> PairOptions:
     """Return the options of contact pair `name` with the secondary `side`, as formulations need them.
 
-    Raises
-    ------
-    ContactError, ModelError
-        If an option is wrong; the message names the pair.
+    ContactError or ModelError if an option is wrong; the message names the pair.
     """
     if against_obstacle and "clearance_primary" in options:
         raise ContactError(

@@ -49,17 +49,14 @@ def table_value(table: Table, instant: float) -> float:
 class Ramp:
     """Instants and a piecewise linear load function.
 
+    ModelError if the instants or the table do not ascend, or an instant lies outside the table.
+
     Parameters
     ----------
     instants : sequence of float
         Load factors (pseudo-times) at which a step ends, ascending.
     table : sequence of (float, float)
         Points (instant, multiplier of the loads) of the function, ascending instants.
-
-    Raises
-    ------
-    ModelError
-        If the instants or the table do not ascend, or an instant lies outside the table.
     """
 
     instants: tuple[float, ...]
@@ -96,10 +93,7 @@ History = Ramp | Iterable[Iterable[float]] | None
 def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:
     """Return a ramp of equal steps from zero to the full loads at `end`.
 
-    Raises
-    ------
-    ModelError
-        If `steps` is not a whole number from 1 to a million or `end` is not positive.
+    ModelError if `steps` is not a whole number from 1 to a million or `end` is not positive.
     """
     if int(steps) != steps or steps < 1:
         raise ModelError(f"the number of load steps must be a positive whole number, not {steps}")

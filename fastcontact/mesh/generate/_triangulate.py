@@ -48,13 +48,9 @@ def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> 
 def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Numbers]:
     """Return points (n_points, 2) [length] and triangles (n_triangles, 3), counter-clockwise, that fill a convex polygon.
 
-    The corners of the `outline` (n, 2) [length], counter-clockwise, become the first n points, and no other point lies on it.
-    `spacing` gives the longest edge allowed, at the middle of each inner edge.
-
-    Raises
-    ------
-    MeshError
-        If no well-shaped triangulation with edges that short is found.
+    The corners of the `outline` (n, 2) [length], counter-clockwise, become the first n points, and no other point lies
+    on it. `spacing` gives the longest edge allowed, at the middle of each inner edge. MeshError if no well-shaped
+    triangulation with edges that short is found.
     """
     best, best_angle = None, 0.0
     for density, good_angle in _ATTEMPTS:

@@ -50,17 +50,14 @@ class _Leaves:
 class Forest:
     """A mesh that can be refined locally, as often as wanted.
 
+    MeshError if a cell is of another kind, or a curve's group has no facet on the curve.
+
     Parameters
     ----------
     mesh : Mesh
         Two-dimensional: line2, tri3, quad4.
     curves : iterable of Curve
         True shapes of the boundary: new points on facets that lie on a curve are put on it.
-
-    Raises
-    ------
-    MeshError
-        If a cell is of another kind, or a curve's group has no facet on the curve.
     """
 
     def __init__(self, mesh: Mesh, curves: Iterable[Curve] = ()) -> None:

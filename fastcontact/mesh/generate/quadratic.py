@@ -71,8 +71,10 @@ class Circle:
 def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool = False) -> Mesh:
     """Return the mesh with a mid node on every edge: tri3 to tri6, quad4 to quad8 or quad9, hex8 to hex20 ...
 
-    A mid node stands half-way between its ends, but on the curve where the edge belongs to a facet of the curve's
-    group and both its ends lie on the curve. Points keep their numbers, mid nodes follow, then centre nodes.
+    A mid node stands half-way between its ends, but on the curve where the edge belongs to a facet of the curve's group
+    and both its ends lie on the curve. Points keep their numbers, mid nodes follow, then centre nodes. MeshError if a
+    cell is quadratic already, `centre_nodes` is given for a 3D mesh, a curve's group has no edge on the curve, or a cell
+    is folded by its curved side (its Jacobian is not positive at a quadrature point).
 
     Parameters
     ----------
@@ -82,12 +84,6 @@ def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool
         True shapes of the boundary, for example `Circle`.
     centre_nodes : bool
         Whether quadrangles get a centre node (quad9); 2D only.
-
-    Raises
-    ------
-    MeshError
-        If a cell is quadratic already, `centre_nodes` is given for a 3D mesh, a curve's group has no edge on the
-        curve, or a cell is folded by its curved side (its Jacobian is not positive at a quadrature point).
     """
     names = _quadratic_names(mesh, centre_nodes)
     edges = _edges(mesh.cells)

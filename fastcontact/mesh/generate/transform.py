@@ -48,6 +48,8 @@ def renamed(mesh: Mesh, names: Names) -> Mesh:
 def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None) -> Mesh:
     """Return the mirror image; cells and facets are turned so that they stay oriented as they were.
 
+    MeshError if the mesh has no such axis.
+
     Parameters
     ----------
     mesh : Mesh
@@ -57,11 +59,6 @@ def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None
         Where the mirror stands on that axis [length].
     rename : mapping or callable, optional
         New names of groups, as in `renamed`.
-
-    Raises
-    ------
-    MeshError
-        If the mesh has no such axis.
     """
     column = _AXES.index(one_of("axis", axis, _AXES[: mesh.dim]))
     points = mesh.points.copy()
@@ -74,6 +71,8 @@ def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None
 def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float = 1.0, rotate: float = 0.0) -> Mesh:
     """Return the mesh scaled about the origin, then rotated about it (2D only), then translated.
 
+    MeshError if a number is out of range, or a 3D mesh is to be rotated.
+
     Parameters
     ----------
     mesh : Mesh
@@ -83,11 +82,6 @@ def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float 
         Factor, greater than 0.
     rotate : float
         Angle, counter-clockwise [degrees].
-
-    Raises
-    ------
-    MeshError
-        If a number is out of range, or a 3D mesh is to be rotated.
     """
     if not number("scale", scale) > 0.0:
         raise MeshError(f"scale = {scale:g} is out of range: it must be greater than 0 (reflect with mirrored)")
@@ -108,10 +102,7 @@ def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float 
 def union(*meshes: Mesh) -> Mesh:
     """Return one mesh of several: points one after the other, none merged, groups of the same name united.
 
-    Raises
-    ------
-    MeshError
-        If there is no mesh or the dimensions differ.
+    MeshError if there is no mesh or the dimensions differ.
     """
     if not meshes:
         raise MeshError("union needs at least one mesh")
@@ -159,18 +150,14 @@ def _renumbering(mesh: Mesh, starts: dict[str, int]) -> Indices:
 def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
     """Return the mesh with points closer than `tolerance` welded into one, the first of them.
 
-    Points are welded wherever they lie, also where two bodies only touch. Chains of close points become one.
+    Points are welded wherever they lie, also where two bodies only touch. Chains of close points become one. MeshError
+    if two nodes of one cell fall together: the tolerance is larger than an edge.
 
     Parameters
     ----------
     mesh : Mesh
     tolerance : float
         Largest distance of points that are the same, at least 0 [length].
-
-    Raises
-    ------
-    MeshError
-        If two nodes of one cell fall together: the tolerance is larger than an edge.
     """
     from scipy.spatial import cKDTree
 
