@@ -260,10 +260,8 @@ class BlockSliding:
 
     Attributes
     ----------
-    shear_traction : float
-        On the interface [pressure].
-    slip : float
-        Sliding distance of the block on the plane [length].
+    shear_traction, slip : float
+        Traction on the interface [pressure], and sliding distance of the block on the plane [length].
     sliding : bool
         The friction limit is reached.
     dissipation : float

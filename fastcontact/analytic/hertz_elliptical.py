@@ -67,8 +67,7 @@ class HertzElliptical:
 def _ratio_of_radii(ratio: float) -> float:
     """Return R'/R'' >= 1 of an ellipse with ratio of axes b/a <= 1 (Johnson 1985, eq. 4.28).
 
-    Carlson's integral R_D stands for [(a/b)^2 E - K]/[K - E] of the textbooks: near the circle both
-    differences vanish.
+    Carlson's integral R_D stands for [(a/b)^2 E - K]/[K - E] of the textbooks: near the circle both differences vanish.
     """
     from scipy.special import elliprd
 

@@ -147,10 +147,8 @@ class PressFit:
 
     Attributes
     ----------
-    interference : float
-        Radius of the inner body less that of the hole, before fitting [length].
-    pressure : float
-        Contact pressure [pressure].
+    interference, pressure : float
+        Radius of the inner body less that of the hole, before fitting [length]; contact pressure [pressure].
     inner, outer : LameShell
         The two bodies, with their displacements and stresses.
     """

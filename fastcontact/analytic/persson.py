@@ -21,14 +21,10 @@ class PerssonPin:
 
     Attributes
     ----------
-    R : float
-        Radius of the hole [length].
-    clearance : float
-        Radius of the hole less that of the pin [length].
-    force : float
-        Force per unit length [force/length].
-    contact_angle : float
-        Half the angle of the contact [degrees].
+    R, clearance : float
+        Radius of the hole, and that less the radius of the pin [length].
+    force, contact_angle : float
+        Force per unit length [force/length], and half the angle of the contact [degrees].
     """
 
     R: float
@@ -97,10 +93,8 @@ def persson_pin(
     ----------
     E, nu : float
         Material of both [pressure], [-]; in plane stress `nu` does not matter.
-    R : float
-        Radius of the hole [length].
-    clearance : float
-        Radius of the hole less that of the pin, >= 0 [length].
+    R, clearance : float
+        Radius of the hole, and that less the radius of the pin, >= 0 [length].
     force, contact_angle : float
         Exactly one of them: force per unit length [force/length], or half the contact angle [degrees].
     kinematics : str

@@ -19,12 +19,8 @@ class FlatPunch2D:
 
     Attributes
     ----------
-    nu : float
-        Poisson ratio of the half plane.
-    half_width : float
-        Half-width a of the punch [length].
-    force : float
-        Force per unit length [force/length].
+    nu, half_width, force : float
+        Poisson ratio of the half plane [-], half-width a of the punch [length], force per unit length [force/length].
     bonded : bool
         The punch sticks to the half plane.
     """
@@ -84,18 +80,15 @@ def flat_punch_2d(*, nu: float, half_width: float, force: float, bonded: bool = 
 def spence_stick_ratio(*, nu: float, friction: float) -> float:
     """Return the half-width of the stick zone under a flat rigid punch over that of the punch, c/a.
 
-    The root of K(sqrt(1 - k^2))/K(k) = beta/f with k = c/a, beta = (1 - 2 nu)/(2 (1 - nu)) and the complete
-    elliptic integral K of modulus k (Spence 1973; Johnson 1985, eq. 2.73), for a monotonic load in plane
-    strain. The formula leaves out what the shear does to the pressure; solutions with that coupling by
-    boundary elements stick less far, by 3 % at nu = 0.3, f = 0.5, by 26 % at nu = 0, f = 0.5, and by more for
-    less friction.
+    The root of K(sqrt(1 - k^2))/K(k) = beta/f with k = c/a, beta = (1 - 2 nu)/(2 (1 - nu)) and the complete elliptic
+    integral K of modulus k (Spence 1973; Johnson 1985, eq. 2.73), for a monotonic load in plane strain. The formula
+    leaves out what the shear does to the pressure; solutions with that coupling by boundary elements stick less far, by
+    3 % at nu = 0.3, f = 0.5, by 26 % at nu = 0, f = 0.5, and by more for less friction.
 
     Parameters
     ----------
-    nu : float
-        Poisson ratio of the half plane.
-    friction : float
-        Coulomb's coefficient f > 0.
+    nu, friction : float
+        Poisson ratio of the half plane and Coulomb's coefficient f > 0 [-].
     """
     from scipy.optimize import brentq
     from scipy.special import ellipk, ellipkm1

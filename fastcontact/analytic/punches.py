@@ -20,14 +20,10 @@ class FlatPunch:
 
     Attributes
     ----------
-    E_star : float
-        E/(1 - nu^2) of the half space [pressure].
-    radius : float
-        Radius of the punch [length].
-    approach : float
-        Indentation [length].
-    force : float
-        [force].
+    E_star, radius : float
+        E/(1 - nu^2) of the half space [pressure], and radius of the punch [length].
+    approach, force : float
+        Indentation [length] and force [force].
     bonded : bool
         The punch sticks to the half space.
     """
@@ -76,18 +72,10 @@ class PowerLawPunch:
 
     Attributes
     ----------
-    E_star : float
-        E/(1 - nu^2) of the half space [pressure].
-    coefficient : float
-        A [length^(1 - n)].
-    exponent : float
-        n.
-    radius : float
-        Contact radius a [length].
-    approach : float
-        Indentation of the tip [length].
-    force : float
-        [force].
+    E_star, coefficient, exponent : float
+        E/(1 - nu^2) of the half space [pressure]; A [length^(1 - n)] and n of the profile.
+    radius, approach, force : float
+        Contact radius a [length], indentation of the tip [length] and force [force].
     """
 
     E_star: float

@@ -21,15 +21,7 @@ Indices = NDArray[np.int64]
 
 
 class Owners(NamedTuple):
-    """How threads share the assembly.
-
-    Attributes
-    ----------
-    owner : ndarray of int (n_points,)
-        The part that each point belongs to.
-    cells : list of (int, int)
-        The range of cells that each part computes.
-    """
+    """How threads share the assembly: the part of each point, `owner` (n_points,) of int; the range of cells of each part."""
 
     owner: NDArray[np.uint8]
     cells: list[tuple[int, int]]

@@ -29,20 +29,14 @@ class MeshQuality:
     ----------
     smallest_angle, largest_angle : float
         Corner angles of all two-dimensional cells [degrees]; NaN without such cells.
-    shortest_edge, longest_edge : float
-        Edges of the solid cells [length]; NaN without cells.
-    worst_aspect : float
-        Largest ratio of longest to shortest edge in one solid cell.
+    shortest_edge, longest_edge, worst_aspect : float
+        Edges of the solid cells [length], and the largest ratio of two in one cell; NaN without cells.
     measure : float
         Area in 2D [length^2], volume in 3D [length^3], of the solid cells with their curved sides.
-    n_points : int
-        Number of points.
+    n_points, n_bad, dim : int
+        Number of points, and of solid cells that are degenerate or inverted, see `check_cells`; dimension of the space.
     n_cells : dict of str to int
         Number of cells by element, facets too.
-    n_bad : int
-        Number of solid cells that are degenerate or inverted; see `check_cells`.
-    dim : int
-        Dimension of the space.
     """
 
     smallest_angle: float

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.contact.search.closest import Closest, closest_of_kinds, flat_triangles
+from fastcontact.contact.search.closest import closest_of_kinds, flat_triangles
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies, outer_facets
@@ -105,7 +105,7 @@ def _depths_in_space(points: Array, kinds: list[Array]) -> tuple[Array, Indices]
     """
     found = closest_of_kinds(points, kinds)
     size = max(float(np.abs(corners).max()) for corners in kinds)
-    height = _heights(points, found)
+    height = np.einsum("nd,nd->n", points - found.position, found.normal)  # above the tangent planes
     inside = height < 0
     unsure = np.flatnonzero((np.abs(height) < 0.999 * found.distance) & (found.distance > ON_SURFACE * size))
     if len(unsure):
@@ -116,8 +116,3 @@ def _depths_in_space(points: Array, kinds: list[Array]) -> tuple[Array, Indices]
         body_overlap_kernels.winding_numbers(np.ascontiguousarray(points[unsure]), triangles, number)
         inside[unsure] = number > 0.5
     return np.where(inside & (found.distance > ON_SURFACE * size), found.distance, 0.0), found.facet
-
-
-def _heights(points: Array, found: Closest) -> Array:
-    """Return the heights (n,) of points above the tangent planes at their projections [length]."""
-    return np.einsum("nd,nd->n", points - found.position, found.normal)

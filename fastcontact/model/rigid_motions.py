@@ -99,13 +99,14 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
     count, body = bodies(mesh)
     for number in range(count):
         members = np.flatnonzero(body == number)
-        loose = _loose(mesh.points[members], kinematics, fixed[members])
-        if loose.shape[1]:
-            own = np.zeros((mesh.n_points, mesh.dim, loose.shape[1]))
-            modes = rigid_modes(mesh.points[members], kinematics)
-            own[members] = (modes / np.abs(modes).max(axis=0) @ loose).reshape(len(members), mesh.dim, -1)
+        modes = rigid_modes(mesh.points[members], kinematics)
+        modes = modes / np.abs(modes).max(axis=0)
+        free = _null_space(modes[fixed[members].ravel()])  # combinations of the body's modes that no support stops
+        if free.shape[1]:
+            own = np.zeros((mesh.n_points, mesh.dim, free.shape[1]))
+            own[members] = (modes @ free).reshape(len(members), mesh.dim, -1)
             columns.append(own.reshape(dofs, -1))
-            parts.append(loose)
+            parts.append(free)
             labels += [(f"body {body_name(mesh, body, number)}", name) for name in MODE_NAMES[kinematics]]
     if relations is not None:
         for dof in np.unique(relations.indices[(body[relations.indices // mesh.dim] < 0)]):
@@ -119,13 +120,6 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
     if relations is None or not relations.shape[0]:
         return motions
     return motions.combined(_null_space(relations @ motions.displacement))
-
-
-def _loose(points: Array, kinematics: str, fixed: Mask) -> Array:
-    """Return the combinations (n_modes, k) of a body's rigid-body modes, of largest entry 1, that are not held."""
-    modes = rigid_modes(points, kinematics)
-    modes = modes / np.abs(modes).max(axis=0)
-    return _null_space(modes[fixed.ravel()])
 
 
 def _null_space(A: Array) -> Array:
@@ -171,16 +165,8 @@ def generalised(motions: FreeMotions, force: Array) -> Array:
 def unstopped(gaps: Array, works: Array) -> Array:
     """Return motions (k, j) that neither contact nor contact and loads together can stop.
 
-    Parameters
-    ----------
-    gaps : ndarray (m, k)
-        Change of the gaps under each motion, whose largest displacement is about 1.
-    works : ndarray (l, k)
-        Work of each load on each motion.
-
-    Notes
-    -----
-    A motion is stopped if it changes some gap, and closes one or is driven by some load. Whether the load drives it
+    From the change of the `gaps` (m, k) and the `works` (l, k) of the loads under each motion, whose largest displacement is
+    about 1. A motion is stopped if it changes some gap, and closes one or is driven by some load. Whether the load drives it
     against the contact, or away from it, shows in the solution.
     """
     k = gaps.shape[1]
@@ -201,16 +187,8 @@ def unstopped(gaps: Array, works: Array) -> Array:
 def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | None:
     """Return the amplitudes (k,) at which rigid bodies under the loads come to rest in contact, None if they never do.
 
-    Parameters
-    ----------
-    gaps : ndarray (m, k)
-        Change of the gaps under each motion.
-    gap : ndarray (m,)
-        Gaps now; penetration counts as closed [length].
-    work : ndarray (k,)
-        Work of the loads on each motion.
-    size : float
-        Of the model [length].
+    From the change of the `gaps` (m, k) under each motion, every `gap` (m,) now, of which penetration counts as closed
+    [length], the `work` (k,) of the loads on each motion, and the `size` of the model [length].
     """
     if not work.any():
         return np.zeros(len(work))

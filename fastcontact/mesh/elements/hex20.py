@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fastcontact.mesh.elements import _product, hex8
-from fastcontact.mesh.elements._element import Array, Element
+from fastcontact.mesh.elements import hex8
+from fastcontact.mesh.elements._element import Array, Element, product_gradients, product_values
 from fastcontact.mesh.quadrature import gauss_cube
 
 FIRST, SECOND = np.array(hex8.EDGES).T
@@ -21,14 +21,14 @@ def _middle_factors(xi: Array) -> tuple[Array, Array]:
 def shape(xi: Array) -> Array:
     """Shape functions (m, 20) [-] at `xi` (m, 3) [-]."""
     corner = hex8.shape(xi) * (xi @ hex8.NODES.T - 2)
-    return np.column_stack([corner, _product.values(_middle_factors(xi)[0])])
+    return np.column_stack([corner, product_values(_middle_factors(xi)[0])])
 
 
 def gradient(xi: Array) -> Array:
     """Derivatives (m, 20, 3) [-] at `xi` (m, 3) [-]."""
     factor = (xi @ hex8.NODES.T - 2)[:, :, None]
     corner = hex8.gradient(xi) * factor + hex8.shape(xi)[:, :, None] * hex8.NODES
-    return np.concatenate([corner, _product.gradients(*_middle_factors(xi))], axis=1)
+    return np.concatenate([corner, product_gradients(*_middle_factors(xi))], axis=1)
 
 
 ELEMENT = Element(

@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from fastcontact.mesh.elements import _product, line3, quad4, quad8
-from fastcontact.mesh.elements._element import Element
+from fastcontact.mesh.elements import line3, quad4, quad8
+from fastcontact.mesh.elements._element import Element, product_of_two
 from fastcontact.mesh.quadrature import gauss_square
 
 NODES = np.vstack([quad8.NODES, np.zeros(2)])
 # Node i is the product of the line3 functions I[i] in s and J[i] in t.
 I = np.array([0, 1, 1, 0, 2, 1, 2, 0, 2])  # noqa: E741
 J = np.array([0, 0, 1, 1, 0, 2, 1, 2, 2])
-shape, gradient = _product.of_two(line3, line3, I, J)
+shape, gradient = product_of_two(line3, line3, I, J)
 
 ELEMENT = Element(
     name="quad9", nodes=NODES, edges=quad4.EDGES, facets=quad8.ELEMENT.facets, shape=shape, gradient=gradient,

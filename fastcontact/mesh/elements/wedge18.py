@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from fastcontact.mesh.elements import _product, line3, tri6, wedge6, wedge15
-from fastcontact.mesh.elements._element import Element
+from fastcontact.mesh.elements import line3, tri6, wedge6, wedge15
+from fastcontact.mesh.elements._element import Element, product_of_two
 from fastcontact.mesh.quadrature import gauss_line, prism, triangle_7
 
 NODES = np.vstack([wedge15.NODES, np.column_stack([tri6.ELEMENT.nodes[3:], np.zeros(3)])])
 # Node i is the product of the tri6 function I[i] in x, y and the line3 function J[i] in z.
 I = np.array([0, 1, 2, 0, 1, 2, 3, 4, 5, 3, 4, 5, 0, 1, 2, 3, 4, 5])  # noqa: E741
 J = np.array([0, 0, 0, 1, 1, 1, 0, 0, 0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
-shape, gradient = _product.of_two(tri6, line3, I, J)
+shape, gradient = product_of_two(tri6, line3, I, J)
 
 ELEMENT = Element(
     name="wedge18", nodes=NODES, edges=wedge6.EDGES,

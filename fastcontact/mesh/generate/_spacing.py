@@ -23,12 +23,8 @@ class Spacing:
 
     Attributes
     ----------
-    near, far : float
-        Edge length at the pole and far from it [length].
-    pole : (float, float)
-        Coordinates of the pole [length].
-    plateau, reach : float
-        Distances from the pole [length].
+    near, far, pole, plateau, reach
+        Edge lengths at the pole and far from it, coordinates of the pole, distances from it [length].
     """
 
     near: float

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -108,27 +108,26 @@ def union(*meshes: Mesh) -> Mesh:
         raise MeshError("union needs at least one mesh")
     if len({mesh.dim for mesh in meshes}) > 1:
         raise MeshError(f"union needs meshes of one dimension, not {[mesh.dim for mesh in meshes]}")
-    first_point = np.cumsum([0] + [mesh.n_points for mesh in meshes])
-    blocks: dict[str, list[Indices]] = {}
-    for mesh, shift in zip(meshes, first_point[:-1], strict=True):
-        for name, block in mesh.cells.items():
-            blocks.setdefault(name, []).append(block + shift)
-    cells = {name: np.concatenate(parts) for name, parts in blocks.items()}
-    cell_groups: dict[str, list[Indices]] = {}
-    point_groups: dict[str, list[Indices]] = {}
+    shifts = np.cumsum([0] + [mesh.n_points for mesh in meshes])[:-1]
+    both = list(zip(meshes, shifts, strict=True))
+    cells = _joined({name: block + shift for name, block in mesh.cells.items()} for mesh, shift in both)
     starts = _starts(cells)
-    for mesh, shift in zip(meshes, first_point[:-1], strict=True):
-        numbers = _renumbering(mesh, starts)
-        for name, members in mesh.cell_groups.items():
-            cell_groups.setdefault(name, []).append(numbers[members])
-        for name, members in mesh.point_groups.items():
-            point_groups.setdefault(name, []).append(members + shift)
+    numbers = [(mesh, _renumbering(mesh, starts)) for mesh in meshes]
     return Mesh(
         np.concatenate([mesh.points for mesh in meshes]),
         cells,
-        {name: np.concatenate(parts) for name, parts in cell_groups.items()},
-        {name: np.concatenate(parts) for name, parts in point_groups.items()},
+        _joined({name: new[members] for name, members in mesh.cell_groups.items()} for mesh, new in numbers),
+        _joined({name: members + shift for name, members in mesh.point_groups.items()} for mesh, shift in both),
     )
+
+
+def _joined(parts: Iterable[Groups]) -> Groups:
+    """Return the arrays of the same name, one after the other."""
+    found: dict[str, list[Indices]] = {}
+    for part in parts:
+        for name, values in part.items():
+            found.setdefault(name, []).append(values)
+    return {name: np.concatenate(arrays) for name, arrays in found.items()}
 
 
 def _starts(cells: Mapping[str, Indices]) -> dict[str, int]:
