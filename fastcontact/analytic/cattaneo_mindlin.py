@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._checks import not_negative, number, poisson, positive
+from fastcontact.analytic._inputs import not_negative, number, poisson, positive
 from fastcontact.analytic.hertz_line import HertzLine, hertz_line
 from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
 from fastcontact.errors import FastcontactWarning, ModelError

@@ -13,7 +13,7 @@ from importlib import resources
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.analytic._checks import number, positive
+from fastcontact.analytic._inputs import number, positive
 from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
 from fastcontact.errors import ModelError
 
@@ -100,10 +100,8 @@ def finite_half_spheres(approach: float, *, R: float = 50.0, E: float = 20_000.0
     ----------
     approach : float
         Of the two flat faces, between 4e-5 R and 0.08 R [length].
-    R, E : float
-        Radius [length] and Young's modulus [pressure]; by default those of FORMA04 in mm and MPa.
-    nu : float
-        Poisson ratio: 0.3, the only one of the table.
+    R, E, nu : float
+        Radius [length] and Young's modulus [pressure], by default those of FORMA04 in mm and MPa; nu is 0.3 [-].
 
     Examples
     --------

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._bodies import Bodies, effective_radius
-from fastcontact.analytic._checks import exactly_one
+from fastcontact.analytic._inputs import Bodies, effective_radius, exactly_one
 from fastcontact.errors import ModelError
 
 Array = NDArray[np.float64]
@@ -131,7 +130,7 @@ def hertz_elliptical(
 
     Parameters
     ----------
-    E1, nu1, E2, nu2 : float
+    E1, nu1, E2, nu2
         As for `hertz_point`.
     R1x, R1y, R2x, R2y : float
         Principal radii of bodies 1 and 2 in the planes through x and y; infinity is straight [length].

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastcontact.analytic import _half_plane
-from fastcontact.analytic._bodies import Bodies, effective_radius, plane_kinematics
-from fastcontact.analytic._checks import exactly_one, poisson
 from fastcontact.analytic._half_space import VonMisesMaximum, von_mises
+from fastcontact.analytic._inputs import Bodies, effective_radius, exactly_one, plane_kinematics, poisson
 
 Array = NDArray[np.float64]
 

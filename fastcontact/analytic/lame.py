@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._bodies import plane_kinematics
-from fastcontact.analytic._checks import not_negative, number, poisson, positive
+from fastcontact.analytic._inputs import not_negative, number, plane_kinematics, poisson, positive
 from fastcontact.errors import ModelError
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._checks import one_of, poisson, positive
+from fastcontact.analytic._inputs import one_of, poisson, positive
 from fastcontact.analytic.hertz_line import HertzLine, hertz_line
 from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
 from fastcontact.errors import ModelError

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._bodies import plane_kinematics
-from fastcontact.analytic._checks import exactly_one, not_negative, poisson, positive
+from fastcontact.analytic._inputs import exactly_one, not_negative, plane_kinematics, poisson, positive
 from fastcontact.errors import ModelError
 
 Array = NDArray[np.float64]

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._bodies import Bodies, plane_kinematics
-from fastcontact.analytic._checks import not_negative, positive
+from fastcontact.analytic._inputs import Bodies, not_negative, plane_kinematics, positive
 from fastcontact.errors import ModelError
 
 Array = NDArray[np.float64]

@@ -23,14 +23,12 @@ class Springs:
 
     Attributes
     ----------
-    name : str
-        For messages.
+    name, grounded
+        Name for messages, and whether they connect nodes to the ground rather than two nodes.
     rows : csr_array (m, n_dofs)
         Elongation of each spring from the displacements [-].
     stiffness : ndarray (m,)
         [force / length]; in axisymmetry over the full circle.
-    grounded : bool
-        Whether they connect nodes to the ground rather than two nodes.
     """
 
     name: str

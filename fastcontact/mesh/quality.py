@@ -53,14 +53,12 @@ class MeshQuality:
     def __str__(self) -> str:
         cells = ", ".join(f"{count} {name}" for name, count in self.n_cells.items()) or "no cells"
         kind = "area" if self.dim == 2 else "volume"
-        return "\n".join(
-            [
-                f"{self.n_points} points, {cells}; degenerate or inverted: {self.n_bad}",
-                f"smallest angle {self.smallest_angle:.1f}, largest {self.largest_angle:.1f} degrees",
-                f"edges {self.shortest_edge:.6g} to {self.longest_edge:.6g} [length], "
-                f"worst aspect ratio {self.worst_aspect:.3g}",
-                f"{kind} {self.measure:.9g} [length^{self.dim}]",
-            ]
+        return (
+            f"{self.n_points} points, {cells}; degenerate or inverted: {self.n_bad}\n"
+            f"smallest angle {self.smallest_angle:.1f}, largest {self.largest_angle:.1f} degrees\n"
+            f"edges {self.shortest_edge:.6g} to {self.longest_edge:.6g} [length], "
+            f"worst aspect ratio {self.worst_aspect:.3g}\n"
+            f"{kind} {self.measure:.9g} [length^{self.dim}]"
         )
 
 

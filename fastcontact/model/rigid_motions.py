@@ -36,14 +36,8 @@ FAR = 1e3
 class FreeMotions:
     """Independent motions without deformation that supports and relations allow.
 
-    Attributes
-    ----------
-    displacement : ndarray (n_dofs, k)
-        Of all points; the largest entry of a column is about 1.
-    parts : ndarray (p, k)
-        The same motions as combinations of elementary ones.
-    labels : list of (str, str)
-        Body and name of each elementary motion.
+    The `displacement` (n_dofs, k) of all points has about 1 as largest entry of a column; `parts` (p, k) are the same motions
+    as combinations of elementary ones, and `labels` body and name of each of those.
     """
 
     displacement: Array

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -195,12 +196,9 @@ def _free_block(element: str, width: float, height: float, spacing: Spacing) -> 
     """Triangles whose sides grow with the distance from the pole, as in the cylinder."""
     corners = [(0.0, 0.0), (0.0, -height), (width, -height), (width, 0.0)]
     names = ["LEFT", "BOTTOM", "RIGHT", "TOP"]
-    sides = []
-    for name, start, end in zip(names, corners, corners[1:] + corners[:1], strict=True):
-
-        def side(s: Array, start: tuple[float, float] = start, end: tuple[float, float] = end) -> Array:
-            return straight(start, end, s)
-
-        sides.append((name, divided(side, math.dist(start, end), spacing)))
+    sides = [
+        (name, divided(partial(straight, start, end), math.dist(start, end), spacing))
+        for name, start, end in zip(names, corners, corners[1:] + corners[:1], strict=True)
+    ]
     mesh = in_element(filled("BLOCK", sides, spacing), element)
     return renamed(with_points_at(mesh, {"TOP_LEFT": (0.0, 0.0)}), _BLOCK_NAMES.get)

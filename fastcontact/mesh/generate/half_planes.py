@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate._check import FACES, QUADRANGLES, growth_of, one_of, positive, segments, unused
-from fastcontact.mesh.generate._lattice import on_lines
 from fastcontact.mesh.generate._spacing import Spacing, graded, growing
-from fastcontact.mesh.generate.box import SOLIDS
+from fastcontact.mesh.generate.box import SOLIDS, on_lines
 from fastcontact.mesh.generate.transform import mirrored, renamed, union, with_cells_inside, with_points_at
 from fastcontact.mesh.mesh import Mesh
 
