@@ -17,11 +17,6 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 
-def plane_nu(nu: float, kinematics: str) -> float:
-    """Return the Poisson ratio for which plane-strain formulas hold in `kinematics`."""
-    return nu if kinematics == "plane_strain" else nu / (1.0 + nu)
-
-
 def _roots(x: ArrayLike, y: ArrayLike, b: float) -> tuple[Array, ComplexArray, ComplexArray, ComplexArray]:
     """Return depth, k, w and w - k (...) [-], all over b."""
     across, depth = np.broadcast_arrays(np.asarray(x, dtype=np.float64) / b, below_surface(y, b) / b)
@@ -52,7 +47,7 @@ def displacement(x: ArrayLike, y: ArrayLike, b: float, p0: float, E: float, nu: 
     """
     depth, k, w, q = _roots(x, y, b)
     H = 0.5 * (k * q + np.log(k + w))
-    nu_plane = plane_nu(nu, kinematics)
+    nu_plane = nu if kinematics == "plane_strain" else nu / (1.0 + nu)
     u_x = -depth * q.imag - (1.0 - 2.0 * nu_plane) * H.imag
     u_y = -depth * q.real + 2.0 * (1.0 - nu_plane) * H.real
     return p0 * b * (1.0 + nu) / E * np.stack([u_x, u_y], axis=-1)

@@ -118,9 +118,5 @@ def persson_pin(
     goal = modulus * gap / value
     # The angle of Hertz's line contact bounds the root from below to within a small factor.
     start = min(0.5 * limit, 0.5 * math.degrees(math.sqrt(8.0 / (math.pi * goal))))
-    angle = float(brentq(lambda e: math.log(_positive_ratio(e) / goal), start, limit - 1e-12, xtol=1e-13))
-    return PerssonPin(R, gap, value, angle)
-
-
-def _positive_ratio(angle: float) -> float:
-    return max(_clearance_ratio(angle), 1e-300)
+    angle = brentq(lambda e: math.log(max(_clearance_ratio(e), 1e-300) / goal), start, limit - 1e-12, xtol=1e-13)
+    return PerssonPin(R, gap, value, float(angle))

@@ -118,8 +118,9 @@ class ForceDrivenObstacles:
         displacement = np.zeros((self.n_dofs, count + len(free)))
         displacement[: len(motions.displacement), :count] = motions.displacement
         displacement[free, count + np.arange(len(free))] = 1.0
+        n, dim = self.shape
         labels = [
-            (f"obstacle '{self.pairs[dof // self.shape[1] - self.shape[0]].name}'", _translation(dof % self.shape[1]))
+            (f"obstacle '{self.pairs[dof // dim - n].name}'", f"translation along {'xyz'[dof % dim]}")
             for dof in free.tolist()
         ]
         parts = np.asarray(block_diag(motions.parts, np.eye(len(free))), float)
@@ -151,7 +152,3 @@ class ForceDrivenObstacles:
         own = np.zeros((rows.shape[0], len(self) * dim))
         own[:, number * dim : (number + 1) * dim] = -direction
         return csr_array(hstack([rows, csr_array(own)], format="csr")), direction
-
-
-def _translation(axis: int) -> str:
-    return f"translation along {'xyz'[axis]}"
