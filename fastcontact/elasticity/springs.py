@@ -82,13 +82,6 @@ def between(
     return Springs(name, rows, np.array(values, float), False)
 
 
-def check_stiffness(name: str, values: Sequence[float]) -> None:
-    """Raise ModelError unless all stiffnesses are positive."""
-    for value in values:
-        if not value > 0:
-            raise ModelError(f"{name}: the stiffness {value:g} must be positive")
-
-
 def stacked(springs: Sequence[Springs], n_dofs: int) -> csr_array:
     """Return the rows of all springs as one matrix (m, n_dofs) [-]."""
     empty = csr_array((0, n_dofs))

@@ -37,7 +37,7 @@ from fastcontact.elasticity.loads import (
 )
 from fastcontact.elasticity.materials import KINEMATICS, LinearElastic
 from fastcontact.elasticity.relations import Relation, stacked_rows
-from fastcontact.elasticity.springs import Springs, between, check_stiffness, grounded, stacked
+from fastcontact.elasticity.springs import Springs, between, grounded, stacked
 from fastcontact.elasticity.system import ConstrainedMotion
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.mesh.mesh import Mesh
@@ -313,7 +313,8 @@ class Model:
         values = [*axes.values(), *([] if axial is None else [axial])]
         for value in values:
             check_number(f"the stiffness of {name}", value)
-        check_stiffness(name, values)
+            if not value > 0:
+                raise ModelError(f"{name}: the stiffness {value:g} must be positive")
         nodes = self._nodes(group)
         if not len(nodes):
             raise ModelError(f"group '{group}' is empty: no spring can be there")

@@ -73,8 +73,9 @@ def _named_units(model: Model) -> list[str]:
         for material, groups in model.materials:
             if not SOLIDS[0] <= material.E * pascal <= SOLIDS[1]:
                 limit, what = (SOLIDS[1], "diamond") if material.E * pascal > SOLIDS[1] else (SOLIDS[0], "aerogel")
+                where = "all cells" if groups is None else ", ".join(f"'{group}'" for group in groups)
                 texts.append(
-                    f"Young's modulus E = {material.E:g} {units['pressure']} of {_named(groups)} is "
+                    f"Young's modulus E = {material.E:g} {units['pressure']} of {where} is "
                     f"{material.E * pascal / limit:.3g} times that of {what}: is it in another unit?"
                 )
     metre, newton = METRES.get(units.get("length", "")), NEWTONS.get(units.get("force", ""))
@@ -86,10 +87,6 @@ def _named_units(model: Model) -> list[str]:
                 f"{units['pressure']}; change one of the three"
             )
     return texts
-
-
-def _named(groups: tuple[str, ...] | None) -> str:
-    return "all cells" if groups is None else ", ".join(f"'{group}'" for group in groups)
 
 
 def _proportions(model: Model) -> list[str]:
