@@ -13,8 +13,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from fastcontact.analytic._bodies import Bodies
-from fastcontact.analytic._von_mises import VonMisesMaximum
+from fastcontact.analytic._half_space import VonMisesMaximum
+from fastcontact.analytic._inputs import Bodies
 from fastcontact.analytic.cattaneo_mindlin import (
     BlockSliding,
     CattaneoMindlinLine,
@@ -27,19 +27,27 @@ from fastcontact.analytic.finite_spheres import FiniteHalfSpheres, finite_half_s
 from fastcontact.analytic.hertz_elliptical import HertzElliptical, hertz_elliptical
 from fastcontact.analytic.hertz_line import HertzLine, hertz_line
 from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
-from fastcontact.analytic.lame import LameShell, thick_cylinder, thick_sphere
+from fastcontact.analytic.lame import (
+    LameShell,
+    PressFit,
+    press_fit_cylinders,
+    press_fit_spheres,
+    thick_cylinder,
+    thick_sphere,
+)
 from fastcontact.analytic.manufactured import HertzBox, hertz_box
 from fastcontact.analytic.persson import PerssonPin, persson_limit_angle, persson_pin
-from fastcontact.analytic.press_fit import PressFit, press_fit_cylinders, press_fit_spheres
-from fastcontact.analytic.punch_2d import FlatPunch2D, flat_punch_2d, spence_stick_ratio
 from fastcontact.analytic.punches import (
     FlatPunch,
+    FlatPunch2D,
     PowerLawPunch,
     bonded_stiffness_ratio,
     cone_punch,
     flat_punch,
+    flat_punch_2d,
     paraboloid_punch,
     power_law_punch,
+    spence_stick_ratio,
 )
 from fastcontact.analytic.receding import RecedingLayer, receding_layer
 

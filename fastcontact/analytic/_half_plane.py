@@ -1,10 +1,9 @@
 """Elastic half plane under Hertz's pressure: stress and displacement anywhere, in closed form.
 
-The half plane is y <= 0 and carries the pressure p0 sqrt(1 - x^2/b^2) on |x| <= b. With k = |y| + i x and the
-root w = sqrt(b^2 + k^2), Re w >= 0, the harmonic function that equals the pressure on the surface is p0/b
-Re(w - k) (McEwen 1949; Johnson 1985, eq. 4.49). Displacements are measured from the point (0, 0): in a half
-plane there is no point at infinity to measure from. Plane stress: the same with nu/(1 + nu) for nu and the
-same shear modulus.
+The half plane is y <= 0 and carries the pressure p0 sqrt(1 - x^2/b^2) on |x| <= b. With k = |y| + i x and the root w =
+sqrt(b^2 + k^2), Re w >= 0, the harmonic function that equals the pressure on the surface is p0/b Re(w - k) (McEwen 1949;
+Johnson 1985, eq. 4.49). Displacements are measured from the point (0, 0): in a half plane there is no point at infinity
+to measure from. Plane stress: the same with nu/(1 + nu) for nu and the same shear modulus.
 """
 
 from __future__ import annotations
@@ -16,11 +15,6 @@ from fastcontact.analytic._half_space import below_surface
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-
-
-def plane_nu(nu: float, kinematics: str) -> float:
-    """Return the Poisson ratio for which plane-strain formulas hold in `kinematics`."""
-    return nu if kinematics == "plane_strain" else nu / (1.0 + nu)
 
 
 def _roots(x: ArrayLike, y: ArrayLike, b: float) -> tuple[Array, ComplexArray, ComplexArray, ComplexArray]:
@@ -53,7 +47,7 @@ def displacement(x: ArrayLike, y: ArrayLike, b: float, p0: float, E: float, nu: 
     """
     depth, k, w, q = _roots(x, y, b)
     H = 0.5 * (k * q + np.log(k + w))
-    nu_plane = plane_nu(nu, kinematics)
+    nu_plane = nu if kinematics == "plane_strain" else nu / (1.0 + nu)
     u_x = -depth * q.imag - (1.0 - 2.0 * nu_plane) * H.imag
     u_y = -depth * q.real + 2.0 * (1.0 - nu_plane) * H.real
     return p0 * b * (1.0 + nu) / E * np.stack([u_x, u_y], axis=-1)

@@ -1,13 +1,14 @@
-"""Elastic half space under Hertz's axisymmetric pressure: stress and displacement anywhere, in closed form.
+"""Elastic half space under Hertz's axisymmetric pressure: stress and displacement anywhere, in closed form; von Mises stress.
 
-The half space is z <= 0 and carries the pressure p0 sqrt(1 - r^2/a^2) on r <= a. In oblate spheroidal
-coordinates s >= 0, 0 <= t <= 1 with r^2 = a^2 (1 + s^2)(1 - t^2) and -z = a s t, every quantity is a rational
-function of s and t and the Legendre functions of the second kind of i s, without cancellation near the axis
-or the surface. Huber 1904 gives the stresses in other coordinates; the displacement follows from Boussinesq's
-potentials (Johnson 1985, section 3.1).
+The half space is z <= 0 and carries the pressure p0 sqrt(1 - r^2/a^2) on r <= a. In oblate spheroidal coordinates s >=
+0, 0 <= t <= 1 with r^2 = a^2 (1 + s^2)(1 - t^2) and -z = a s t, every quantity is a rational function of s and t and the
+Legendre functions of the second kind of i s, without cancellation near the axis or the surface. Huber 1904 gives the
+stresses in other coordinates; the displacement follows from Boussinesq's potentials (Johnson 1985, section 3.1).
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -83,3 +84,24 @@ def displacement(r: ArrayLike, z: ArrayLike, a: float, p0: float, E: float, nu: 
     u_r = radial * (hoop - nu * (rr + zz)) / E
     u_z = (1.0 + nu) / E * (height * P - 2.0 * (1.0 - nu) * V)
     return np.stack([u_r, u_z], axis=-1)
+
+
+class VonMisesMaximum(NamedTuple):
+    """Largest equivalent stress under a contact.
+
+    Attributes
+    ----------
+    value : float
+        [pressure].
+    depth : float
+        Distance below the surface, on the axis [length].
+    """
+
+    value: float
+    depth: float
+
+
+def von_mises(stress: Array) -> Array:
+    """Return the equivalent stress (...) [pressure] of `stress` (..., 4) [pressure], xx, yy, zz, xy (von Mises 1913)."""
+    xx, yy, zz, xy = np.moveaxis(stress, -1, 0)
+    return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * xy**2)

@@ -11,8 +11,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._bodies import Bodies
-from fastcontact.analytic._checks import not_negative, number, poisson, positive
+from fastcontact.analytic._inputs import not_negative, number, poisson, positive
 from fastcontact.analytic.hertz_line import HertzLine, hertz_line
 from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
 from fastcontact.errors import FastcontactWarning, ModelError
@@ -38,20 +37,11 @@ class _PartialSlip:
 
     @property
     def stick_radius(self) -> float:
-        """Radius or half-width of the zone that sticks [length].
-
-        While loading a (1 - T/(f F))^p with p = 1/2 for the line (Cattaneo 1938), 1/3 for the sphere (Mindlin 1949).
-        """
+        """Radius or half-width of the zone that sticks (Cattaneo 1938; Mindlin 1949) [length]."""
         return self._zone(self._reversal if self._reversal > 0.0 else self.tangential_force)
 
     def unloaded_to(self, tangential_force: float) -> Self:
-        """Return the contact after the tangential force went down to a value not below the opposite peak.
-
-        Raises
-        ------
-        ModelError
-            If the force would rise, or pass the opposite peak.
-        """
+        """Return the contact after the tangential force went down to a value not below the opposite peak, or ModelError."""
         force = number("tangential_force", tangential_force)
         if not -self.tangential_force_peak <= force <= self.tangential_force:
             raise ModelError(
@@ -93,18 +83,9 @@ class _PartialSlip:
 class CattaneoMindlinLine(_PartialSlip):
     """Two cylinders under a normal and a tangential force per unit length (Cattaneo 1938; Mindlin 1949).
 
-    Formulas as in Johnson (1985), section 7.2(a).
-
-    Attributes
-    ----------
-    friction : float
-        Coulomb's coefficient f.
-    tangential_force : float
-        Present tangential force per unit length [force/length].
-    tangential_force_peak : float
-        Largest one so far; equal to the present one while loading [force/length].
-    normal : HertzLine
-        The normal contact.
+    Formulas as in Johnson (1985), section 7.2(a). Fields are Coulomb's coefficient `friction`, the present
+    `tangential_force` and the largest so far, `tangential_force_peak`, equal while loading [force/length], and the normal
+    contact `normal`, a `HertzLine`.
     """
 
     normal: HertzLine
@@ -153,18 +134,8 @@ class CattaneoMindlinSphere(_PartialSlip):
     """Two spheres under a normal and a tangential force (Cattaneo 1938; Mindlin 1949).
 
     Formulas as in Johnson (1985), section 7.2(b) and 7.4(b). The direction of slip is taken along the force, which is exact
-    for nu = 0 and leaves an error of the order nu/(4 - 2 nu) otherwise.
-
-    Attributes
-    ----------
-    friction : float
-        Coulomb's coefficient f.
-    tangential_force : float
-        Present tangential force [force].
-    tangential_force_peak : float
-        Largest one so far; equal to the present one while loading [force].
-    normal : HertzPoint
-        The normal contact.
+    for nu = 0 and leaves an error of the order nu/(4 - 2 nu) otherwise. Fields as for `CattaneoMindlinLine`, but forces are
+    not per unit length [force], and `normal` is a `HertzPoint`.
     """
 
     normal: HertzPoint
@@ -182,7 +153,8 @@ class CattaneoMindlinSphere(_PartialSlip):
 
         While loading, 3 f F/(16 a G*) [1 - (1 - T/(f F))^(2/3)].
         """
-        return float(self._present(self._shift))
+        factor, a = 3.0 * self._limit / (16.0 * self.normal.radius * self.G_star), self.normal.radius
+        return float(self._present(lambda load: factor * (1.0 - (self._zone(load) / a) ** 2)))
 
     @property
     def dissipation_per_cycle(self) -> float:
@@ -196,29 +168,19 @@ class CattaneoMindlinSphere(_PartialSlip):
         """Return the shear traction (...) [pressure] along the force at `r` (...) [length] (Johnson 1985, section 7.2b)."""
         return self._traction(r)
 
-    def _shift(self, load: float) -> float:
-        a = self.normal.radius
-        return 3.0 * self._limit / (16.0 * a * self.G_star) * (1.0 - (self._zone(load) / a) ** 2)
 
-
-def _friction_limit(friction: float, normal_force: float, tangential_force: float) -> tuple[float, float]:
-    """Return the checked coefficient and tangential force."""
+def _checked(normal: HertzLine | HertzPoint, friction: float, tangential_force: float) -> tuple[float, float]:
+    """Return coefficient and tangential force; warn where unlike materials couple it with the normal force."""
     f = positive("friction", friction)
     T = not_negative("tangential_force", tangential_force)
-    limit = f * normal_force
+    limit = f * normal.force
     if limit < T:
         raise ModelError(f"tangential_force is {T:g}: the bodies slide above friction times normal force, {limit:g}")
+    beta = normal.bodies.dundurs
+    if abs(beta) > 1e-12:
+        text = f"Cattaneo-Mindlin is exact for like materials: Dundurs' beta is {beta:.4g}, not 0"
+        warnings.warn(text, FastcontactWarning, stacklevel=3)
     return f, T
-
-
-def _warn_of_coupling(bodies: Bodies) -> None:
-    """Warn where normal and tangential loads are coupled, which the theory leaves out."""
-    if abs(bodies.dundurs) > 1e-12:
-        warnings.warn(
-            f"Cattaneo-Mindlin is exact for like materials: Dundurs' beta is {bodies.dundurs:.4g}, not 0",
-            FastcontactWarning,
-            stacklevel=3,
-        )
 
 
 def cattaneo_mindlin_line(
@@ -252,8 +214,7 @@ def cattaneo_mindlin_line(
     normal = hertz_line(
         E1=E1, nu1=nu1, R1=R1, E2=E2, nu2=nu2, R2=R2, force=force, radius=radius, pressure_max=pressure_max
     )
-    f, Q = _friction_limit(friction, normal.force, tangential_force)
-    _warn_of_coupling(normal.bodies)
+    f, Q = _checked(normal, friction, tangential_force)
     return CattaneoMindlinLine(f, Q, Q, normal)
 
 
@@ -287,8 +248,7 @@ def cattaneo_mindlin_sphere(
         E1=E1, nu1=nu1, R1=R1, E2=E2, nu2=nu2, R2=R2,
         force=force, approach=approach, radius=radius, pressure_max=pressure_max,
     )  # fmt: skip
-    f, T = _friction_limit(friction, normal.force, tangential_force)
-    _warn_of_coupling(normal.bodies)
+    f, T = _checked(normal, friction, tangential_force)
     return CattaneoMindlinSphere(f, T, T, normal)
 
 
@@ -300,10 +260,8 @@ class BlockSliding:
 
     Attributes
     ----------
-    shear_traction : float
-        On the interface [pressure].
-    slip : float
-        Sliding distance of the block on the plane [length].
+    shear_traction, slip : float
+        Traction on the interface [pressure], and sliding distance of the block on the plane [length].
     sliding : bool
         The friction limit is reached.
     dissipation : float
@@ -323,16 +281,10 @@ def block_sliding(
 
     Parameters
     ----------
-    E, nu : float
-        Material [pressure], [-].
-    height : float
-        [length].
-    pressure : float
-        Uniform contact pressure [pressure].
-    friction : float
-        Coulomb's coefficient f >= 0.
-    displacement : float
-        Sideways displacement of the top, >= 0 [length].
+    E, nu, friction : float
+        Material [pressure], [-], and Coulomb's coefficient f >= 0.
+    height, pressure, displacement : float
+        Height [length], uniform contact pressure [pressure] and sideways displacement of the top, >= 0 [length].
     """
     G = positive("E", E) / (2.0 * (1.0 + poisson("nu", nu)))
     H, shift = positive("height", height), not_negative("displacement", displacement)

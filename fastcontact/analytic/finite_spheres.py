@@ -13,7 +13,7 @@ from importlib import resources
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.analytic._checks import number, positive
+from fastcontact.analytic._inputs import number, positive
 from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
 from fastcontact.errors import ModelError
 
@@ -29,14 +29,10 @@ class FiniteHalfSpheres:
     ----------
     E, R : float
         Young's modulus [pressure] and radius [length] of both; nu is 0.3.
-    approach : float
-        Of the two flat faces, which may slide sideways [length].
-    force : float
-        Full circle [force].
-    pressure_max : float
-        Pressure at the centre, per reference area [pressure].
-    radius : float
-        Contact radius on the reference geometry [length].
+    approach, force : float
+        Approach of the two flat faces, which may slide sideways [length]; force over the full circle [force].
+    pressure_max, radius : float
+        Pressure at the centre per reference area [pressure], contact radius on the reference geometry [length].
     """
 
     E: float
@@ -94,21 +90,18 @@ def _interpolated(table: Array, x: float) -> tuple[float, float, float]:
 def finite_half_spheres(approach: float, *, R: float = 50.0, E: float = 20_000.0, nu: float = NU) -> FiniteHalfSpheres:
     """Return the contact of two equal half spheres as finite bodies.
 
-    Interpolates the mesh-converged axisymmetric solution of a half sphere on a frictionless plane (linear
-    elasticity on the reference geometry, gap measured along the axis), computed independently twice with
-    elements of degree 8 to 10 at three approaches, and with degree 4 at 21 others. Leaving out any one row
-    of the table and interpolating it from the others changes force and pressure by less than 2e-5 and the
-    radius by less than 4e-5, relatively; at approaches from 0.8 % to 8 % of the radius by less than 4e-6 and
-    1e-5. The rows themselves are good to about 3e-6.
+    Interpolates the mesh-converged axisymmetric solution of a half sphere on a frictionless plane (linear elasticity on the
+    reference geometry, gap measured along the axis), computed independently twice with elements of degree 8 to 10 at three
+    approaches, and with degree 4 at 21 others. Leaving out any one row of the table and interpolating it from the others
+    changes force and pressure by less than 2e-5 and the radius by less than 4e-5, relatively; at approaches from 0.8 % to
+    8 % of the radius by less than 4e-6 and 1e-5. The rows themselves are good to about 3e-6.
 
     Parameters
     ----------
     approach : float
         Of the two flat faces, between 4e-5 R and 0.08 R [length].
-    R, E : float
-        Radius [length] and Young's modulus [pressure]; by default those of FORMA04 in mm and MPa.
-    nu : float
-        Poisson ratio: 0.3, the only one of the table.
+    R, E, nu : float
+        Radius [length] and Young's modulus [pressure], by default those of FORMA04 in mm and MPa; nu is 0.3 [-].
 
     Examples
     --------

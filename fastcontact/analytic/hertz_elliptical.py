@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._bodies import Bodies, effective_radius
-from fastcontact.analytic._checks import exactly_one
+from fastcontact.analytic._inputs import Bodies, effective_radius, exactly_one
 from fastcontact.errors import ModelError
 
 Array = NDArray[np.float64]
@@ -24,18 +23,12 @@ class HertzElliptical:
     ----------
     bodies : Bodies
         Elastic constants.
-    E_star : float
-        Contact modulus [pressure].
-    R_x, R_y : float
-        Relative principal radii, 1/R_x = 1/R1x + 1/R2x [length].
-    radius_x, radius_y : float
-        Semi-axes of the contact area along x and y [length].
-    approach : float
-        Approach of distant points of the two bodies [length].
-    force : float
-        [force].
-    pressure_max : float
-        Pressure p0 at the centre [pressure].
+    E_star, R_x, R_y : float
+        Contact modulus [pressure] and relative principal radii, 1/R_x = 1/R1x + 1/R2x [length].
+    radius_x, radius_y, approach : float
+        Semi-axes of the contact area along x and y, and approach of distant points of the two bodies [length].
+    force, pressure_max : float
+        Force [force] and pressure p0 at the centre [pressure].
     """
 
     bodies: Bodies
@@ -73,8 +66,7 @@ class HertzElliptical:
 def _ratio_of_radii(ratio: float) -> float:
     """Return R'/R'' >= 1 of an ellipse with ratio of axes b/a <= 1 (Johnson 1985, eq. 4.28).
 
-    Carlson's integral R_D stands for [(a/b)^2 E - K]/[K - E] of the textbooks: near the circle both
-    differences vanish.
+    Carlson's integral R_D stands for [(a/b)^2 E - K]/[K - E] of the textbooks: near the circle both differences vanish.
     """
     from scipy.special import elliprd
 
@@ -134,19 +126,16 @@ def hertz_elliptical(
 ) -> HertzElliptical:
     """Return the Hertz contact of two bodies with parallel principal curvatures (Johnson 1985, 4.24-4.31).
 
+    ModelError also if the bodies are straight in one direction: a line contact.
+
     Parameters
     ----------
-    E1, nu1, E2, nu2 : float
+    E1, nu1, E2, nu2
         As for `hertz_point`.
     R1x, R1y, R2x, R2y : float
         Principal radii of bodies 1 and 2 in the planes through x and y; infinity is straight [length].
     force, approach, pressure_max : float
         Exactly one of them: force [force], approach [length] or largest pressure [pressure].
-
-    Raises
-    ------
-    ModelError
-        Also if the bodies are straight in one direction: a line contact.
 
     Examples
     --------

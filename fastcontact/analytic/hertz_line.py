@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastcontact.analytic import _half_plane
-from fastcontact.analytic._bodies import Bodies, effective_radius, plane_kinematics
-from fastcontact.analytic._checks import exactly_one, poisson
-from fastcontact.analytic._von_mises import VonMisesMaximum, von_mises
+from fastcontact.analytic._half_space import VonMisesMaximum, von_mises
+from fastcontact.analytic._inputs import Bodies, effective_radius, exactly_one, plane_kinematics, poisson
 
 Array = NDArray[np.float64]
 
@@ -31,16 +30,10 @@ class HertzLine:
         Elastic constants.
     kinematics : str
         "plane_strain" or "plane_stress".
-    E_star : float
-        Contact modulus [pressure].
-    R_effective : float
-        1/R = 1/R1 + 1/R2 [length].
-    radius : float
-        Half-width b of the contact [length].
-    force : float
-        Force per unit length [force/length].
-    pressure_max : float
-        Pressure p0 at the centre [pressure].
+    E_star, R_effective : float
+        Contact modulus [pressure] and relative radius, 1/R = 1/R1 + 1/R2 [length].
+    radius, force, pressure_max : float
+        Half-width b [length], force per unit length [force/length] and pressure p0 at the centre [pressure].
     """
 
     bodies: Bodies

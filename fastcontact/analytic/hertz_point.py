@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastcontact.analytic import _half_space
-from fastcontact.analytic._bodies import Bodies, effective_radius
-from fastcontact.analytic._checks import exactly_one, poisson
-from fastcontact.analytic._von_mises import VonMisesMaximum, von_mises
+from fastcontact.analytic._half_space import VonMisesMaximum, von_mises
+from fastcontact.analytic._inputs import Bodies, effective_radius, exactly_one, poisson
 
 Array = NDArray[np.float64]
 
@@ -28,18 +27,12 @@ class HertzPoint:
     ----------
     bodies : Bodies
         Elastic constants.
-    E_star : float
-        Contact modulus [pressure].
-    R_effective : float
-        1/R = 1/R1 + 1/R2 [length].
-    radius : float
-        Contact radius a [length].
-    approach : float
-        Approach of distant points of the two bodies [length].
-    force : float
-        [force].
-    pressure_max : float
-        Pressure p0 at the centre [pressure].
+    E_star, R_effective : float
+        Contact modulus [pressure] and relative radius, 1/R = 1/R1 + 1/R2 [length].
+    radius, approach : float
+        Contact radius a, and approach of distant points of the two bodies [length].
+    force, pressure_max : float
+        Force [force] and pressure p0 at the centre [pressure].
     """
 
     bodies: Bodies

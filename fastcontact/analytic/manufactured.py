@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._checks import one_of, poisson, positive
+from fastcontact.analytic._inputs import one_of, poisson, positive
 from fastcontact.analytic.hertz_line import HertzLine, hertz_line
 from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
 from fastcontact.errors import ModelError
@@ -26,12 +26,11 @@ KINEMATICS = ("plane_strain", "plane_stress", "axisymmetric", "3d")
 class HertzBox:
     """Exact solution of a linear contact problem on the box 0 <= x <= width, -height <= y <= 0.
 
-    The problem: u_y <= obstacle(x) at the top, without friction, on the reference geometry; `displacement`
-    prescribed on the side x = width and at the bottom; u_x = 0 on x = 0 (in the full box ``|x| <= width``:
-    prescribed on both sides). In three dimensions z stands for y, and y is a second coordinate like x, up to the
-    same width. The box is the rigid obstacle over its own top, too (see `distance`), for a model with
-    ``Criteria(geometry_updates=0)``. Choose a contact radius that no mesh node hits, or results superconverge by
-    chance. Points above the top raise ModelError.
+    The problem: u_y <= obstacle(x) at the top, without friction, on the reference geometry; `displacement` prescribed on
+    the side x = width and at the bottom; u_x = 0 on x = 0 (in the full box ``|x| <= width``: prescribed on both sides).
+    In three dimensions z stands for y, and y is a second coordinate like x, up to the same width. The box is the rigid
+    obstacle over its own top, too (see `distance`), for a model with ``Criteria(geometry_updates=0)``. Choose a contact
+    radius that no mesh node hits, or results superconverge by chance. Points above the top raise ModelError.
 
     Attributes
     ----------
@@ -39,10 +38,8 @@ class HertzBox:
         The contact whose field this is.
     kinematics : str
         "plane_strain", "plane_stress", "axisymmetric" (x is the distance from the axis) or "3d".
-    E, nu : float
-        Material of the box [pressure], [-].
-    width, height : float
-        Size of the box [length].
+    E, nu, width, height : float
+        Material [pressure], [-], and size of the box [length].
     """
 
     hertz: HertzLine | HertzPoint
@@ -152,16 +149,10 @@ def hertz_box(
 
     Parameters
     ----------
-    kinematics : str
-        "plane_strain", "plane_stress", "axisymmetric" or "3d" (the axis is z).
-    E, nu : float
-        Material of the box [pressure], [-].
-    radius : float
-        Contact radius, less than `width` [length].
-    pressure_max : float
-        Pressure at the centre [pressure].
-    width, height : float
-        Size of the box [length].
+    kinematics, E, nu, width, height
+        As the attributes of `HertzBox`.
+    radius, pressure_max : float
+        Contact radius, less than `width` [length], and pressure at the centre [pressure].
 
     Examples
     --------

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._bodies import plane_kinematics
-from fastcontact.analytic._checks import exactly_one, not_negative, poisson, positive
+from fastcontact.analytic._inputs import exactly_one, not_negative, plane_kinematics, poisson, positive
 from fastcontact.errors import ModelError
 
 Array = NDArray[np.float64]
@@ -21,14 +20,10 @@ class PerssonPin:
 
     Attributes
     ----------
-    R : float
-        Radius of the hole [length].
-    clearance : float
-        Radius of the hole less that of the pin [length].
-    force : float
-        Force per unit length [force/length].
-    contact_angle : float
-        Half the angle of the contact [degrees].
+    R, clearance : float
+        Radius of the hole, and that less the radius of the pin [length].
+    force, contact_angle : float
+        Force per unit length [force/length], and half the angle of the contact [degrees].
     """
 
     R: float
@@ -91,24 +86,18 @@ def persson_pin(
 ) -> PerssonPin:
     """Return the contact of a pin with the hole of an infinite plate of the same material (Persson 1964).
 
+    ModelError also if `contact_angle` exceeds what a pin with clearance can reach, or is given without clearance.
+
     Parameters
     ----------
     E, nu : float
         Material of both [pressure], [-]; in plane stress `nu` does not matter.
-    R : float
-        Radius of the hole [length].
-    clearance : float
-        Radius of the hole less that of the pin, >= 0 [length].
+    R, clearance : float
+        Radius of the hole, and that less the radius of the pin, >= 0 [length].
     force, contact_angle : float
         Exactly one of them: force per unit length [force/length], or half the contact angle [degrees].
     kinematics : str
         "plane_stress" or "plane_strain".
-
-    Raises
-    ------
-    ModelError
-        If a number is out of range; if `contact_angle` exceeds what a pin with clearance can reach, or is
-        given without clearance, when any force gives the same angle.
     """
     from scipy.optimize import brentq
 
@@ -129,9 +118,5 @@ def persson_pin(
     goal = modulus * gap / value
     # The angle of Hertz's line contact bounds the root from below to within a small factor.
     start = min(0.5 * limit, 0.5 * math.degrees(math.sqrt(8.0 / (math.pi * goal))))
-    angle = float(brentq(lambda e: math.log(_positive_ratio(e) / goal), start, limit - 1e-12, xtol=1e-13))
-    return PerssonPin(R, gap, value, angle)
-
-
-def _positive_ratio(angle: float) -> float:
-    return max(_clearance_ratio(angle), 1e-300)
+    angle = brentq(lambda e: math.log(max(_clearance_ratio(e), 1e-300) / goal), start, limit - 1e-12, xtol=1e-13)
+    return PerssonPin(R, gap, value, float(angle))

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._bodies import Bodies, plane_kinematics
-from fastcontact.analytic._checks import not_negative, positive
+from fastcontact.analytic._inputs import Bodies, not_negative, plane_kinematics, positive
 from fastcontact.errors import ModelError
 
 Array = NDArray[np.float64]
@@ -26,14 +25,10 @@ class RecedingLayer:
 
     Attributes
     ----------
-    thickness : float
-        Of the layer [length].
-    load_half_width : float
-        The force is spread evenly over ``|x| <= load_half_width`` on the top [length].
-    force : float
-        Force per unit length [force/length].
-    radius : float
-        Half-width c of the contact [length].
+    thickness, load_half_width : float
+        Thickness of the layer, on whose top the force is spread evenly over ``|x| <= load_half_width`` [length].
+    force, radius : float
+        Force per unit length [force/length], and half-width c of the contact [length].
     series : tuple of float
         Coefficients of the pressure, p(c cos theta) sin(theta) = sum of series[k] cos(2 k theta) [pressure].
     """
@@ -138,13 +133,10 @@ def receding_layer(
         Layer [pressure], [-].
     E2, nu2 : float
         Half plane; `E2` None is rigid [pressure], [-].
-    thickness : float
-        Of the layer [length].
-    force : float
-        Force per unit length [force/length].
+    thickness, force : float
+        Thickness of the layer [length], and force per unit length [force/length].
     load_half_width : float
-        The force is spread evenly over ``|x| <= load_half_width``, at most ten thicknesses; 0 is a line force
-        [length].
+        The force is spread evenly over ``|x| <= load_half_width``, at most ten thicknesses; 0 is a line force [length].
     kinematics : str
         "plane_strain" or "plane_stress".
     """

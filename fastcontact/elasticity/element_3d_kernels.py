@@ -2,7 +2,7 @@
 """Element loops of three-dimensional solids: stiffness, stresses, rotations.
 
 Shared arguments: ``points`` (n_points, 3) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes), ``dN`` (n_q,
-n_nodes, 3), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 6, 6) [pressure], symmetric, for strains
+n_nodes, 3), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 6, 6) [pressure], isotropic, for strains
 (xx, yy, zz, 2xy, 2yz, 2xz); ``material`` (n_cells,). `N` and `axisymmetric` have no effect here: the loops of both dimensions
 have the same arguments. What they share is written in both files, since Numba's cache does not see changes in other files.
 """
@@ -60,43 +60,6 @@ def _map(x, slopes, q, gradient):
         gradient[1, a] = c01 * r + c11 * s + c21 * t
         gradient[2, a] = c02 * r + c12 * s + c22 * t
     return det
-
-
-@kernel
-def _is_isotropic(D):
-    """Return whether the moduli are those of an isotropic material, but for round-off."""
-    for i in range(6):
-        for j in range(6):
-            expected = 0.0
-            if i < 3 and j < 3:
-                expected = D[0, 1]
-            if i == j:
-                expected += 2.0 * D[3, 3] if i < 3 else D[3, 3]
-            if not abs(D[i, j] - expected) <= 1e-14 * abs(D[0, 0]):
-                return False
-    return True
-
-
-@kernel
-def _component(i, j):
-    """Return the number of a stress component in the order xx, yy, zz, xy, yz, xz."""
-    if i == j:
-        return i
-    if i + j == 1:
-        return 3
-    return 4 if i + j == 3 else 5
-
-
-@kernel
-def _tensors(moduli):
-    """Return the moduli as (n_materials, 9, 9): row 3 i + j, column 3 k + l holds D_ikjl, for K_ij = D_ikjl g_kl."""
-    tensors = np.empty((moduli.shape[0], 9, 9))
-    for m in range(moduli.shape[0]):
-        for row in range(9):
-            for column in range(9):
-                i, j, k, n = row // 3, row % 3, column // 3, column % 3
-                tensors[m, row, column] = moduli[m, _component(i, k), _component(j, n)]
-    return tensors
 
 
 @kernel
@@ -191,27 +154,6 @@ def _add_isotropic(g, coupling, shear, slots, c, mine, flat):
 
 
 @kernel
-def _add_general(g, tensors, m, products, block, slots, c, mine, flat):
-    """Add the blocks of a cell for any moduli: K_ij = D_ikjl g_kl; `products` and `block` (9,) are overwritten."""
-    for b in range(g.shape[1]):
-        for a in range(b + 1):
-            products[0], products[4], products[8] = g[0, a, b], g[3, a, b], g[5, a, b]
-            products[1], products[2], products[5] = g[1, a, b], g[2, a, b], g[4, a, b]
-            products[3], products[6], products[7] = g[1, b, a], g[2, b, a], g[4, b, a]
-            for row in range(9):
-                total = 0.0
-                for column in range(9):
-                    total += tensors[m, row, column] * products[column]
-                block[row] = total
-            if a == b:  # as above
-                block[3], block[6], block[7] = block[1], block[2], block[5]
-            _add_block(
-                flat, mine[a], mine[b], slots[c, a, b], slots[c, b, a],
-                block[0], block[1], block[2], block[3], block[4], block[5], block[6], block[7], block[8],
-            )  # fmt: skip
-
-
-@kernel
 def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, gradient, flat):
     """Add the blocks of a linear tetrahedron for Lame's constants: its gradients (4, 3) are constant.
 
@@ -250,36 +192,27 @@ def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric,
 
     `data` is written in place at `slots`. Threads share the nodes; each adds to its rows in the order of the cells.
     Returns the number of the first cell with a Jacobian that is not positive, or -1. The products of gradients are
-    integrated first; the moduli, constant in a cell, come in once at the end.
+    integrated first; Lame's constants of the cell, ``D[0, 1]`` and ``D[3, 3]``, come in once at the end.
     """
     n_cells, n_nodes = cells.shape
-    slopes, tensors = _transposed(dN), _tensors(moduli)
-    isotropic = np.empty(moduli.shape[0], np.bool_)
-    for m in range(moduli.shape[0]):
-        isotropic[m] = _is_isotropic(moduli[m])
-    x, gradient = np.empty((3, n_nodes)), np.empty((3, n_nodes))
-    g, products, block = np.empty((6, n_nodes, n_nodes)), np.empty(9), np.empty(9)
-    mine, corners, volume = np.empty(n_nodes, np.bool_), np.empty((4, 3)), 0.0
+    slopes, x, gradient = _transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
+    g, mine, corners = np.empty((6, n_nodes, n_nodes)), np.empty(n_nodes, np.bool_), np.empty((4, 3))
+    volume = 0.0
     for weight in weights:
         volume += weight
     flat = data.reshape(-1)
     for c in range(n_cells):
         if not _owned(cells, c, owner, part, mine):
             continue
-        m = material[c]
-        if n_nodes == 4 and isotropic[m]:
-            if not _add_tetrahedron(
-                points, cells, c, volume, moduli[m, 0, 1], moduli[m, 3, 3], slots, mine, corners, flat
-            ):
+        coupling, shear = moduli[material[c], 0, 1], moduli[material[c], 3, 3]
+        if n_nodes == 4:
+            if not _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, corners, flat):
                 return c
             continue
         _gather(points, cells, c, x)
         if not _integrate_products(x, slopes, weights, gradient, g):
             return c
-        if isotropic[m]:
-            _add_isotropic(g, moduli[m, 0, 1], moduli[m, 3, 3], slots, c, mine, flat)
-        else:
-            _add_general(g, tensors, m, products, block, slots, c, mine, flat)
+        _add_isotropic(g, coupling, shear, slots, c, mine, flat)
     return -1
 
 

@@ -35,13 +35,4 @@ def cell_volumes(corners: Array, N: Array, dN: Array, axisymmetric: bool) -> Arr
 
 def integration_rule(element: Element, n_points: int | None = None) -> quadrature.Rule:
     """Return a product rule on the reference cell, by default with three points more along each direction than its order."""
-    n = element.order + 3 if n_points is None else n_points
-    line, face = quadrature.gauss_line(n), quadrature.collapsed_triangle(n)
-    return {
-        (2, 3): lambda: face,
-        (2, 4): lambda: quadrature.gauss_square(n),
-        (3, 4): lambda: quadrature.collapsed_tetrahedron(n),
-        (3, 5): lambda: quadrature.conical_pyramid(n),
-        (3, 6): lambda: quadrature.prism(face, line),
-        (3, 8): lambda: quadrature.gauss_cube(n),
-    }[element.dim, element.n_corners]()
+    return quadrature.product_rule(element.linear, element.order + 3 if n_points is None else n_points)

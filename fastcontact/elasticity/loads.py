@@ -1,6 +1,6 @@
 """Loads and their nodal forces, in the reference configuration.
 
-Each kind is a class with ``check`` and ``vector``; a new class here, with an ``add_...`` of the model, is a new load.
+Each kind of `Load` is a class; a new class here, with an ``add_...`` of the model, is a new load.
 Nodal forces are the work-equivalent ones, the integrals of the load times the shape functions. In axisymmetry every
 force is that over the full circle.
 
@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,99 +30,91 @@ Table = tuple[tuple[float, float], ...]
 Value = float | Callable[[Array], Array]
 Components = Mapping[int, Value]
 
-# By the linear element on the same corners. Of degree 7 at least (products: in each direction): enough for a constant
-# load on curved quadratic cells of a ring, and for one that varies quadratically over straight facets.
-_RULES: dict[str, Callable[[], quadrature.Rule]] = {
-    "line2": lambda: quadrature.gauss_line(5),
-    "tri3": lambda: quadrature.collapsed_triangle(5),
-    "quad4": lambda: quadrature.gauss_square(4),
-    "tet4": lambda: quadrature.collapsed_tetrahedron(5),
-    "hex8": lambda: quadrature.gauss_cube(4),
-    "wedge6": lambda: quadrature.prism(quadrature.collapsed_triangle(5), quadrature.gauss_line(4)),
-    "pyramid5": lambda: quadrature.conical_pyramid(5),
-}
+# Points of the product rule along each direction, and along those of squares, cubes and prisms: exact to degree 7 at least,
+# enough for a constant load on curved quadratic cells of a ring, and for one that varies quadratically over straight facets.
+_POINTS, _STRAIGHT = 5, 4
 
 
-class Load(Protocol):
-    """A load of a model: ``ramp`` is its own history, None that of the analysis."""
+class Load:
+    """A load of a model; its `ramp`, points (instant, multiplier), is its own history, None that of the analysis."""
+
+    KIND: ClassVar[str]
+    CONSTANT: ClassVar[bool] = False  # values are numbers, not functions of position
+    group: str
+    components: Components
+    ramp: Table | None
 
     @property
     def name(self) -> str:
         """Kind of the load and where it acts, for messages."""
-        ...
+        return f"{self.KIND} on '{self.group}'"
 
     @property
-    def ramp(self) -> Table | None:
-        """Points (instant, multiplier), or None."""
-        ...
+    def values(self) -> list[Value]:
+        """Values of all components."""
+        return list(self.components.values())
 
     def check(self, mesh: Mesh, kinematics: str) -> None:
         """Raise MeshError or ModelError if the load cannot act on this mesh."""
-        ...
+        self._check_place(mesh, kinematics)
+        for value in self.values:
+            (check_number if self.CONSTANT else check_value)(self.name, value)
 
     def vector(self, mesh: Mesh, kinematics: str) -> Array:
         """Return the nodal forces (n_points, dim) at multiplier 1 [force]; errors as for `check`."""
-        ...
+        forces = np.zeros((mesh.n_points, mesh.dim))
+        self._add_to(forces, mesh, kinematics)
+        return forces
+
+    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+        facets_of(mesh, self.group)
+
+    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
-class Pressure:
+class Pressure(Load):
     """A pressure [pressure] on a group of outer facets, > 0 in compression, along their outward normals."""
 
+    KIND = "the pressure"
     group: str
     value: Value
     ramp: Table | None = None
 
     @property
-    def name(self) -> str:
-        """See `Load`."""
-        return f"the pressure on '{self.group}'"
+    def values(self) -> list[Value]:
+        """The pressure alone."""
+        return [self.value]
 
-    def check(self, mesh: Mesh, kinematics: str) -> None:
-        """See `Load`."""
-        check_value(self.name, self.value)
+    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         for element, block in facets_of(mesh, self.group).items():
             outward(mesh, self.group, element, block)
 
-    def vector(self, mesh: Mesh, kinematics: str) -> Array:
-        """See `Load`."""
-        forces = np.zeros((mesh.n_points, mesh.dim))
+    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
         for element, block in facets_of(mesh, self.group).items():
             facets = outward(mesh, self.group, element, block)
             x, N, normal = _facet_points(mesh, element, facets, kinematics)
             _add(forces, facets, N, -evaluated(self.value, x, self.name)[:, :, None] * normal)
-        return forces
 
 
 @dataclass(frozen=True)
-class Traction:
+class Traction(Load):
     """Components of a force per area [pressure] on a group of facets."""
 
+    KIND = "the traction"
     group: str
     components: Components
     ramp: Table | None = None
 
-    @property
-    def name(self) -> str:
-        """See `Load`."""
-        return f"the traction on '{self.group}'"
-
-    def check(self, mesh: Mesh, kinematics: str) -> None:
-        """See `Load`."""
-        facets_of(mesh, self.group)
-        _check_each(self, check_value)
-
-    def vector(self, mesh: Mesh, kinematics: str) -> Array:
-        """See `Load`."""
-        forces = np.zeros((mesh.n_points, mesh.dim))
+    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
         for element, facets in facets_of(mesh, self.group).items():
             x, N, normal = _facet_points(mesh, element, facets, kinematics)
             _add(forces, facets, N, _density(self, x, np.linalg.norm(normal, axis=2)))
-        return forces
 
 
 @dataclass(frozen=True)
-class BodyForce:
+class BodyForce(Load):
     """Components of a force per volume [force / length^3] on groups of solid cells, or on all."""
 
     groups: tuple[str, ...] | None
@@ -131,25 +123,9 @@ class BodyForce:
 
     @property
     def name(self) -> str:
-        """See `Load`."""
+        """As for other loads."""
         where = ", ".join(f"'{group}'" for group in self.groups) if self.groups is not None else "all solid cells"
         return f"the body force on {where}"
-
-    def check(self, mesh: Mesh, kinematics: str) -> None:
-        """See `Load`."""
-        for group in self.groups or ():
-            if not mesh.cells_of(group, dim=mesh.dim):
-                raise ModelError(f"group '{group}' holds no solid cells: no body force can act on it")
-        _check_each(self, check_value)
-
-    def vector(self, mesh: Mesh, kinematics: str) -> Array:
-        """See `Load`."""
-        forces = np.zeros((mesh.n_points, mesh.dim))
-        for element, cells in self.cells(mesh):
-            x, N, J, weights = _mapped(mesh, element, cells)
-            volume = np.linalg.det(J) * weights
-            _add(forces, cells, N, _density(self, x, _turned(volume, x, kinematics)))
-        return forces
 
     def cells(self, mesh: Mesh) -> Iterator[tuple[str, Indices]]:
         """Yield each element and the solid cells (n_cells, n_nodes) on which the load acts."""
@@ -161,69 +137,62 @@ class BodyForce:
             if element in mesh.solids:
                 yield element, mesh.cells[element][rows]
 
+    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+        for group in self.groups or ():
+            if not mesh.cells_of(group, dim=mesh.dim):
+                raise ModelError(f"group '{group}' holds no solid cells: no body force can act on it")
+
+    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
+        for element, cells in self.cells(mesh):
+            x, N, J, weights = _mapped(mesh, element, cells)
+            volume = np.linalg.det(J) * weights
+            _add(forces, cells, N, _density(self, x, _turned(volume, x, kinematics)))
+
 
 @dataclass(frozen=True)
-class NodalForce:
+class NodalForce(Load):
     """Components of a force [force] on every node of a group."""
 
+    KIND, CONSTANT = "the nodal force", True
     group: str
     components: Mapping[int, float]
     ramp: Table | None = None
 
-    @property
-    def name(self) -> str:
-        """See `Load`."""
-        return f"the nodal force on '{self.group}'"
-
-    def check(self, mesh: Mesh, kinematics: str) -> None:
-        """See `Load`."""
+    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         if not len(mesh.points_of(self.group)):
             raise ModelError(f"group '{self.group}' is empty: no force can act on it")
-        _check_each(self, check_number)
 
-    def vector(self, mesh: Mesh, kinematics: str) -> Array:
-        """See `Load`."""
-        forces = np.zeros((mesh.n_points, mesh.dim))
+    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
         for axis, value in self.components.items():
             forces[mesh.points_of(self.group), axis] = value
-        return forces
 
 
 @dataclass(frozen=True)
-class TotalForce:
+class TotalForce(Load):
     """Components of a total force [force], spread as a uniform traction over a group of facets."""
 
+    KIND, CONSTANT = "the total force", True
     group: str
     components: Mapping[int, float]
     ramp: Table | None = None
 
-    @property
-    def name(self) -> str:
-        """See `Load`."""
-        return f"the total force on '{self.group}'"
-
-    def check(self, mesh: Mesh, kinematics: str) -> None:
-        """See `Load`."""
+    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         facets_of(mesh, self.group)
         if kinematics == "axisymmetric" and 0 in self.components:
             raise ModelError(
                 f"{self.name} has a radial component x, but radial forces cancel over the full circle: "
                 "use add_pressure or add_traction for a radial load"
             )
-        _check_each(self, check_number)
 
-    def vector(self, mesh: Mesh, kinematics: str) -> Array:
-        """See `Load`."""
+    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
         shares, area = np.zeros((mesh.n_points, 1)), 0.0
         for element, facets in facets_of(mesh, self.group).items():
             _, N, normal = _facet_points(mesh, element, facets, kinematics)
             measure = np.linalg.norm(normal, axis=2)
             _add(shares, facets, N, measure[:, :, None])
             area += float(measure.sum())
-        forces = np.zeros((mesh.n_points, mesh.dim))
         for axis, value in self.components.items():
             forces[:, axis] = shares[:, 0] * (value / area)
-        return forces
 
 
 def facets_of(mesh: Mesh, group: str) -> dict[str, Indices]:
@@ -290,12 +259,6 @@ def check_value(name: str, value: Any) -> None:
         check_number(name, value)
 
 
-def _check_each(load: Traction | BodyForce | NodalForce | TotalForce, check: Callable[[str, Any], None]) -> None:
-    """Apply a check to every component of a load."""
-    for value in load.components.values():
-        check(load.name, value)
-
-
 def axes_of(what: str, components: Mapping[str, Any], dim: int) -> dict[int, Any]:
     """Return components given by the names of their axes, those that are not None, by number.
 
@@ -313,7 +276,7 @@ def axes_of(what: str, components: Mapping[str, Any], dim: int) -> dict[int, Any
 def _mapped(mesh: Mesh, element: str, cells: Indices) -> tuple[Array, Array, Array, Array]:
     """Return positions (c, q, dim), shape values (q, n), Jacobians (c, q, dim, cell dim) and weights (q,)."""
     reference = elements.get(element)
-    xi, weights = _RULES[reference.linear]()
+    xi, weights = quadrature.product_rule(reference.linear, _POINTS, _STRAIGHT)
     N, dN = reference.shape(xi), reference.gradient(xi)
     corners = mesh.points[cells]
     x = np.einsum("qn,cnd->cqd", N, corners)

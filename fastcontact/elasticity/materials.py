@@ -17,17 +17,14 @@ KINEMATICS = ("axisymmetric", "plane_strain", "plane_stress", "3d")
 class LinearElastic:
     """Isotropic linear elasticity.
 
+    ModelError if a constant is outside its range.
+
     Parameters
     ----------
     E : float
         Young's modulus [pressure], positive.
     nu : float
         Poisson's ratio, -1 < nu < 0.5.
-
-    Raises
-    ------
-    ModelError
-        If a constant is outside its range.
     """
 
     E: float

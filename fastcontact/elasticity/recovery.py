@@ -14,7 +14,6 @@ Array = NDArray[np.float64]
 Materials = dict[str, NDArray[np.int32]]
 # Memory for stresses at points while nodal ones are formed [bytes].
 BATCH = 16_000_000
-# Number of the component xx, yy, zz, xy, yz or xz at each place of a tensor.
 
 
 def stress_at_points(
@@ -48,10 +47,8 @@ def nodal_stress(mesh: Mesh, kinematics: str, moduli: Array, material: Materials
 
     The stresses at points are formed for few cells at a time, which takes less memory. Arguments as for `stress_at_points`.
     """
-    loops, average = (
-        _CellStresses(mesh, kinematics, moduli, material, displacement),
-        NodalAverage(mesh, moduli.shape[1]),
-    )
+    loops = _CellStresses(mesh, kinematics, moduli, material, displacement)
+    average = NodalAverage(mesh, moduli.shape[1])
     for name, block in mesh.solids.items():
         room = loops.room(name, 1)
         room = loops.room(name, min(len(block), BATCH // room.nbytes + 1))

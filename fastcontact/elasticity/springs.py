@@ -23,14 +23,12 @@ class Springs:
 
     Attributes
     ----------
-    name : str
-        For messages.
+    name, grounded
+        Name for messages, and whether they connect nodes to the ground rather than two nodes.
     rows : csr_array (m, n_dofs)
         Elongation of each spring from the displacements [-].
     stiffness : ndarray (m,)
         [force / length]; in axisymmetry over the full circle.
-    grounded : bool
-        Whether they connect nodes to the ground rather than two nodes.
     """
 
     name: str
@@ -82,13 +80,6 @@ def between(
     rows.eliminate_zeros()
     rows.sort_indices()
     return Springs(name, rows, np.array(values, float), False)
-
-
-def check_stiffness(name: str, values: Sequence[float]) -> None:
-    """Raise ModelError unless all stiffnesses are positive."""
-    for value in values:
-        if not value > 0:
-            raise ModelError(f"{name}: the stiffness {value:g} must be positive")
 
 
 def stacked(springs: Sequence[Springs], n_dofs: int) -> csr_array:

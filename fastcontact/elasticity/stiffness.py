@@ -21,15 +21,7 @@ Indices = NDArray[np.int64]
 
 
 class Owners(NamedTuple):
-    """How threads share the assembly.
-
-    Attributes
-    ----------
-    owner : ndarray of int (n_points,)
-        The part that each point belongs to.
-    cells : list of (int, int)
-        The range of cells that each part computes.
-    """
+    """How threads share the assembly: the part of each point, `owner` (n_points,) of int; the range of cells of each part."""
 
     owner: NDArray[np.uint8]
     cells: list[tuple[int, int]]
@@ -81,6 +73,8 @@ def stiffness(
 ) -> bsr_array:
     """Assemble the stiffness matrix of the solid cells.
 
+    MeshError if a cell is degenerate or turned inside out.
+
     Parameters
     ----------
     mesh : Mesh
@@ -88,7 +82,7 @@ def stiffness(
         ``"axisymmetric"`` (forces over the full circle), ``"plane_strain"`` or ``"plane_stress"`` (unit thickness),
         or ``"3d"``.
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
-        Symmetric [pressure].
+        From `LinearElastic.moduli` [pressure].
     material : dict of str to ndarray of int (n_cells,)
         By solid element: material number of each cell.
     pattern : Sparsity, optional
@@ -98,11 +92,6 @@ def stiffness(
     -------
     bsr_array (n_points * dim, n_points * dim)
         Symmetric, blocks of dim x dim [force / length].
-
-    Raises
-    ------
-    MeshError
-        If a cell is degenerate or turned inside out.
     """
     pattern = pattern or sparsity(mesh)
     data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))

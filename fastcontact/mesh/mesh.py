@@ -40,7 +40,8 @@ class Mesh:
     """Points, cells and named groups.
 
     A mesh has cells of several dimensions: solids, and the facets (lines in 2D) that carry group names. Cells are
-    numbered through all elements in the order of `cells`; a cell group is a sorted array of those numbers.
+    numbered through all elements in the order of `cells`; a cell group is a sorted array of those numbers. MeshError if
+    an array has the wrong shape, a number is not finite, or an index is out of range.
 
     Parameters
     ----------
@@ -52,11 +53,6 @@ class Mesh:
         Cell numbers of each named group of cells.
     point_groups : mapping of str to array_like (n,)
         Point numbers of each named group of points.
-
-    Raises
-    ------
-    MeshError
-        If an array has the wrong shape, a number is not finite, or an index is out of range.
 
     Examples
     --------
@@ -169,10 +165,7 @@ class Mesh:
     def cells_of(self, group: str, dim: int | None = None) -> dict[str, Indices]:
         """Return the connectivity (n_cells, n_nodes) of a cell group by element, only that of dimension `dim` if given.
 
-        Raises
-        ------
-        MeshError
-            If there is no cell group of that name.
+        MeshError if there is no cell group of that name.
         """
         if group not in self.cell_groups:
             raise MeshError(self._no_group("group of cells", group, self.cell_groups))
@@ -182,10 +175,7 @@ class Mesh:
     def points_of(self, group: str) -> Indices:
         """Return the sorted point numbers (n,) of a group: a point group, or else all nodes of a cell group.
 
-        Raises
-        ------
-        MeshError
-            If there is no group of that name; the message offers the nearest names.
+        MeshError if there is no group of that name; the message offers the nearest names.
         """
         if group in self.point_groups:
             return self.point_groups[group]
@@ -202,10 +192,7 @@ class Mesh:
     def point(self, group: str) -> int:
         """Return the number of the only point of a group.
 
-        Raises
-        ------
-        MeshError
-            If the group does not hold exactly one point.
+        MeshError if the group does not hold exactly one point.
         """
         numbers = self.points_of(group)
         if len(numbers) != 1:

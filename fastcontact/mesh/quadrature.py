@@ -194,6 +194,23 @@ def _gauss_squared_complement(n: int) -> tuple[Array, Array]:
     return (1.0 + roots) / 2.0, vectors[0] ** 2 / 3.0
 
 
+def product_rule(cell: str, n: int, straight: int | None = None) -> Rule:
+    """Return a product rule with `n` points along each direction on the reference cell of a linear element.
+
+    Along the directions of squares, cubes and prisms that run straight through, `straight` points if given.
+    """
+    m = n if straight is None else straight
+    return {
+        "line2": lambda: gauss_line(n),
+        "tri3": lambda: collapsed_triangle(n),
+        "quad4": lambda: gauss_square(m),
+        "tet4": lambda: collapsed_tetrahedron(n),
+        "hex8": lambda: gauss_cube(m),
+        "wedge6": lambda: prism(collapsed_triangle(n), gauss_line(m)),
+        "pyramid5": lambda: conical_pyramid(n),
+    }[cell]()
+
+
 def subdivided(rule: Rule, parts: int) -> Rule:
     """Return a rule on [-1, 1] applied on `parts` equal pieces; points that coincide are merged."""
     points, weights = rule

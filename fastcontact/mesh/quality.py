@@ -29,20 +29,14 @@ class MeshQuality:
     ----------
     smallest_angle, largest_angle : float
         Corner angles of all two-dimensional cells [degrees]; NaN without such cells.
-    shortest_edge, longest_edge : float
-        Edges of the solid cells [length]; NaN without cells.
-    worst_aspect : float
-        Largest ratio of longest to shortest edge in one solid cell.
+    shortest_edge, longest_edge, worst_aspect : float
+        Edges of the solid cells [length], and the largest ratio of two in one cell; NaN without cells.
     measure : float
         Area in 2D [length^2], volume in 3D [length^3], of the solid cells with their curved sides.
-    n_points : int
-        Number of points.
+    n_points, n_bad, dim : int
+        Number of points, and of solid cells that are degenerate or inverted, see `check_cells`; dimension of the space.
     n_cells : dict of str to int
         Number of cells by element, facets too.
-    n_bad : int
-        Number of solid cells that are degenerate or inverted; see `check_cells`.
-    dim : int
-        Dimension of the space.
     """
 
     smallest_angle: float
@@ -59,14 +53,12 @@ class MeshQuality:
     def __str__(self) -> str:
         cells = ", ".join(f"{count} {name}" for name, count in self.n_cells.items()) or "no cells"
         kind = "area" if self.dim == 2 else "volume"
-        return "\n".join(
-            [
-                f"{self.n_points} points, {cells}; degenerate or inverted: {self.n_bad}",
-                f"smallest angle {self.smallest_angle:.1f}, largest {self.largest_angle:.1f} degrees",
-                f"edges {self.shortest_edge:.6g} to {self.longest_edge:.6g} [length], "
-                f"worst aspect ratio {self.worst_aspect:.3g}",
-                f"{kind} {self.measure:.9g} [length^{self.dim}]",
-            ]
+        return (
+            f"{self.n_points} points, {cells}; degenerate or inverted: {self.n_bad}\n"
+            f"smallest angle {self.smallest_angle:.1f}, largest {self.largest_angle:.1f} degrees\n"
+            f"edges {self.shortest_edge:.6g} to {self.longest_edge:.6g} [length], "
+            f"worst aspect ratio {self.worst_aspect:.3g}\n"
+            f"{kind} {self.measure:.9g} [length^{self.dim}]"
         )
 
 
@@ -103,11 +95,9 @@ def quality(mesh: Mesh) -> MeshQuality:
 def check_cells(mesh: Mesh) -> None:
     """Check that every solid cell has a positive Jacobian at its default quadrature points.
 
-    Raises
-    ------
-    MeshError
-        If a cell is degenerate (its area or volume is zero to rounding) or inverted (clockwise, or folded so that the
-        Jacobian is negative at a quadrature point), or is in the mesh twice; the message names the first one and its place.
+    MeshError if a cell is degenerate (its area or volume is zero to rounding) or inverted (clockwise, or folded so that
+    the Jacobian is negative at a quadrature point), or is in the mesh twice; the message names the first one and its
+    place.
     """
     for name in mesh.solids:
         _check_twice(mesh, name)

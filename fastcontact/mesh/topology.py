@@ -49,13 +49,9 @@ def corner_volumes(mesh: Mesh, name: str) -> Array:
 def oriented(mesh: Mesh) -> tuple[Mesh, int]:
     """Return the mesh with every solid cell oriented as it should be, and how many cells were turned.
 
-    Two-dimensional cells run counter-clockwise; in three dimensions the normals of facets point outward.
-
-    Raises
-    ------
-    MeshError
-        If a cell that was inside out lies on the same side of a facet as its neighbour: the mesh is folded there, and
-        turning the cell would hide that.
+    Two-dimensional cells run counter-clockwise; in three dimensions the normals of facets point outward. MeshError if a
+    cell that was inside out lies on the same side of a facet as its neighbour: the mesh is folded there, and turning the
+    cell would hide that.
     """
     measure = corner_areas if mesh.dim == 2 else corner_volumes
     cells, turned = dict(mesh.cells), 0
@@ -179,6 +175,8 @@ class OrderedLine:
 def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> OrderedLine:
     """Return the nodes of a line group in order, as code_aster's NOEUD_ORDO and ABSC_CURV.
 
+    MeshError if the group holds no lines, branches, closes on itself, is in pieces, or `start` is not one of its ends.
+
     Parameters
     ----------
     mesh : Mesh
@@ -186,11 +184,6 @@ def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> Orde
         A group of line cells that form one open line.
     start : str or int, optional
         The end to start from: a group with one point, or a point number; by default the end nearest to x = 0.
-
-    Raises
-    ------
-    MeshError
-        If the group holds no lines, branches, closes on itself, is in pieces, or `start` is not one of its ends.
     """
     blocks = mesh.cells_of(group, dim=1)
     if not blocks:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.contact.search.closest import Closest, closest_of_kinds
+from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies, outer_facets
-from fastcontact.model import body_overlap_2d_kernels, body_overlap_3d_kernels
+from fastcontact.model import body_overlap_kernels
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -81,7 +81,7 @@ def _depths_in_plane(points: Array, kinds: list[Array], axisymmetric: bool) -> t
     depth, size = np.zeros(len(points)), max(float(np.abs(corners).max()) for corners in kinds)
     crossed = np.zeros(len(points), np.int64)
     for corners in kinds:
-        body_overlap_2d_kernels.count_crossings(points, np.ascontiguousarray(corners), crossed)
+        body_overlap_kernels.count_crossings(points, np.ascontiguousarray(corners), crossed)
     inside = crossed % 2 == 1
     facet = np.zeros(len(points), np.intp)
     if inside.any():
@@ -106,7 +106,7 @@ def _depths_in_space(points: Array, kinds: list[Array]) -> tuple[Array, Indices]
     """
     found = closest_of_kinds(points, kinds)
     size = max(float(np.abs(corners).max()) for corners in kinds)
-    height = _heights(points, found)
+    height = np.einsum("nd,nd->n", points - found.position, found.normal)  # above the tangent planes
     inside = height < 0
     unsure = np.flatnonzero((np.abs(height) < 0.999 * found.distance) & (found.distance > ON_SURFACE * size))
     if len(unsure):
@@ -114,11 +114,6 @@ def _depths_in_space(points: Array, kinds: list[Array]) -> tuple[Array, Indices]
             [corners[:, flat_triangles(corners.shape[1])].reshape(-1, 3, 3) for corners in kinds]
         )
         number = np.empty(len(unsure))
-        body_overlap_3d_kernels.winding_numbers(np.ascontiguousarray(points[unsure]), triangles, number)
+        body_overlap_kernels.winding_numbers(np.ascontiguousarray(points[unsure]), triangles, number)
         inside[unsure] = number > 0.5
     return np.where(inside & (found.distance > ON_SURFACE * size), found.distance, 0.0), found.facet
-
-
-def _heights(points: Array, found: Closest) -> Array:
-    """Return the heights (n,) of points above the tangent planes at their projections [length]."""
-    return np.einsum("nd,nd->n", points - found.position, found.normal)

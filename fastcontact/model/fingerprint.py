@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.model.model import ContactPair, Model
+from fastcontact.model.contact_pair import ContactPair
+from fastcontact.model.model import Model
 
 Array = NDArray[np.float64]
 LENGTH = 16

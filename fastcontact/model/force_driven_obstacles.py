@@ -12,7 +12,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,37 +20,12 @@ from scipy.sparse import bsr_array, csr_array, hstack
 
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.relations import Relation
+from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.rigid_motions import FreeMotions
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Table = tuple[tuple[float, float], ...]
-# Force on an obstacle by component, None where the component is prescribed; empty for none at all.
-Driving = tuple[float | None, ...]
-
-
-class DrivenPair(Protocol):
-    """What is asked of a contact pair: name, force and motion by component, history."""
-
-    @property
-    def name(self) -> str:
-        """Name of the pair."""
-        ...
-
-    @property
-    def motion(self) -> tuple[float, ...]:
-        """Displacement at multiplier 1 [length]."""
-        ...
-
-    @property
-    def force(self) -> Driving:
-        """Force at multiplier 1 [force]."""
-        ...
-
-    @property
-    def ramp(self) -> Table | None:
-        """History of both."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +34,13 @@ class ForceDrivenObstacles:
 
     Parameters
     ----------
-    pairs : sequence of DrivenPair
-        Contact pairs with such an obstacle.
+    pairs : sequence of ContactPair
+        Those with such an obstacle.
     shape : (int, int)
         Of the points of the mesh, (n_points, dim).
     """
 
-    pairs: Sequence[DrivenPair]
+    pairs: Sequence[ContactPair]
     shape: tuple[int, int]
 
     def __len__(self) -> int:
@@ -144,8 +118,9 @@ class ForceDrivenObstacles:
         displacement = np.zeros((self.n_dofs, count + len(free)))
         displacement[: len(motions.displacement), :count] = motions.displacement
         displacement[free, count + np.arange(len(free))] = 1.0
+        n, dim = self.shape
         labels = [
-            (f"obstacle '{self.pairs[dof // self.shape[1] - self.shape[0]].name}'", _translation(dof % self.shape[1]))
+            (f"obstacle '{self.pairs[dof // dim - n].name}'", f"translation along {'xyz'[dof % dim]}")
             for dof in free.tolist()
         ]
         parts = np.asarray(block_diag(motions.parts, np.eye(len(free))), float)
@@ -177,7 +152,3 @@ class ForceDrivenObstacles:
         own = np.zeros((rows.shape[0], len(self) * dim))
         own[:, number * dim : (number + 1) * dim] = -direction
         return csr_array(hstack([rows, csr_array(own)], format="csr")), direction
-
-
-def _translation(axis: int) -> str:
-    return f"translation along {'xyz'[axis]}"

@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 import logging
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -37,7 +37,7 @@ from fastcontact.elasticity.loads import (
 )
 from fastcontact.elasticity.materials import KINEMATICS, LinearElastic
 from fastcontact.elasticity.relations import Relation, stacked_rows
-from fastcontact.elasticity.springs import Springs, between, check_stiffness, grounded, stacked
+from fastcontact.elasticity.springs import Springs, between, grounded, stacked
 from fastcontact.elasticity.system import ConstrainedMotion
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.mesh.mesh import Mesh
@@ -50,17 +50,16 @@ from fastcontact.model.checks import (
     check_ramps,
     check_supports,
 )
-from fastcontact.model.force_driven_obstacles import Driving, ForceDrivenObstacles
-from fastcontact.model.pair_options import SHARED_OPTIONS, clearance_ramp, pair_options
-from fastcontact.model.ramp import Ramp, Table, checked_table, table_value
+from fastcontact.model.contact_pair import ContactPair, Driving
+from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
+from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
+from fastcontact.model.ramp import History, Ramp, Table, table_of, table_value
 from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
 
 Array = NDArray[np.float64]
 log = logging.getLogger("fastcontact")
 # Formulations that need no facets on the primary side.
 AGAINST_OBSTACLES = ("node_to_segment", "continuous")
-# A history of a single load: a ramp, whose table counts, or pairs (instant, multiplier).
-History = Ramp | Iterable[Iterable[float]] | None
 
 
 @dataclass(frozen=True)
@@ -81,42 +80,13 @@ class Support:
         return f"the displacement {'xyz'[self.component]} prescribed on '{self.group}'"
 
 
-@dataclass(frozen=True)
-class ContactPair:
-    """Two groups of facets that may touch, or one and a rigid obstacle, with a formulation and its options.
-
-    With an `obstacle`, `primary` is empty; `motion` is the obstacle's displacement at multiplier 1 [length], and `ramp`
-    a history of its own or None. Components of `force` that are not None drive the obstacle at multiplier 1 [force].
-    """
-
-    name: str
-    secondary: str
-    primary: str
-    formulation: str
-    options: dict[str, Any] = field(default_factory=dict)
-    obstacle: Obstacle | None = None
-    motion: tuple[float, ...] = ()
-    ramp: Table | None = None
-    force: Driving = ()
-
-    @property
-    def eliminable(self) -> bool:
-        """Whether closed constraints can be eliminated: not where they give way by themselves."""
-        return self.formulation != "continuous" and not self.options.get("penalty")
-
-    @property
-    def clearance_ramp(self) -> Table | None:
-        """History of the clearance; None where it does not change."""
-        return clearance_ramp(self.name, self.options)
-
-    @property
-    def opposite(self) -> str:
-        """What the secondary side may touch, for messages."""
-        return self.primary if self.obstacle is None else "a rigid obstacle"
-
-
 class Model:
     """An elastic contact problem.
+
+    Methods check what they are given at once, and `check` the whole: a MeshError, ModelError or ContactError says in one
+    line what is wrong and how to mend it. Prescribed values are numbers, or functions from reference positions (n, dim)
+    [length] to numbers (n,). A `ramp` is a history of its own, as pairs (instant, multiplier) or a `Ramp`, whose table
+    counts; without one the history is that of the analysis. Normals and areas are those of the reference configuration.
 
     Parameters
     ----------
@@ -125,13 +95,6 @@ class Model:
         ``"axisymmetric"`` (x is the radius, y the axis), ``"plane_strain"``, ``"plane_stress"`` or ``"3d"``.
     case_text : str
         Text kept in result files beside the numbers, usually the case file.
-
-    Raises
-    ------
-    ModelError
-        If the kinematics do not fit the mesh.
-    MeshError
-        If a cell is degenerate or turned inside out.
 
     Examples
     --------
@@ -181,13 +144,7 @@ class Model:
         return self.mesh.n_points * self.mesh.dim
 
     def add_material(self, material: LinearElastic, groups: Sequence[str] | str | None = None) -> None:
-        """Give a material to groups of solid cells, by default to all; groups override what was given to all before.
-
-        Raises
-        ------
-        MeshError, ModelError
-            If a group is unknown or holds no solid cells. A cell with two materials shows when the model is checked.
-        """
+        """Give a material to groups of solid cells, by default to all; groups override what was given to all before."""
         names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
         for name in names or ():
             if not self.mesh.cells_of(name, dim=self.mesh.dim):
@@ -203,13 +160,7 @@ class Model:
     def prescribe(self, group: str, *, ramp: History = None, **components: Value) -> None:
         """Prescribe displacement components of all nodes of a group, e.g. ``y=-2.0`` [length], times the ramp.
 
-        A component is a number, or a function from reference positions (n, dim) [length] to displacements (n,). `ramp` is a
-        history of its own: pairs (instant, multiplier), or a `Ramp`, of which the table counts.
-
-        Raises
-        ------
-        MeshError, ModelError
-            If the group is unknown, a component is not x, y (or z in 3D), or a value is not finite.
+        A component is a number, or a function from reference positions (n, dim) [length] to displacements (n,) [length].
         """
         self._support(group, components, ramp)
 
@@ -217,28 +168,18 @@ class Model:
         if not len(self.mesh.points_of(group)):
             raise ModelError(f"group '{group}' is empty: no displacement can be prescribed on it")
         for axis, value in axes_of(f"prescribe('{group}')", components, self.mesh.dim).items():
-            support = Support(group, axis, value, _table(ramp, f"the displacement prescribed on '{group}'"))
+            support = Support(
+                group, axis, value, table_of(ramp, f"the ramp of the displacement prescribed on '{group}'")
+            )
             check_value(support.name, value)
             self.supports.append(support)
 
     def add_pressure(self, group: str, value: Value, *, ramp: History = None) -> None:
-        """Press on a group of outer facets with `value` [pressure], along their normals into the body.
+        """Press on a group of outer facets with `value` [pressure], positive along their normals into the body.
 
-        Parameters
-        ----------
-        group : str
-        value : float or callable
-            Positive in compression; a number, or a function from positions (n, dim) [length] to pressures (n,) [pressure].
-            Positions, normals and areas are those of the reference configuration.
-        ramp : Ramp or iterable of (float, float), optional
-            A history of its own, as pairs (instant, multiplier); by default that of the analysis.
-
-        Raises
-        ------
-        MeshError, ModelError
-            If the group is unknown, holds no outer facets, or the value is not finite.
+        It is a number, or a function from reference positions (n, dim) [length] to pressures (n,) [pressure].
         """
-        self._add(Pressure(group, value, _table(ramp, f"the pressure on '{group}'")))
+        self._add(Pressure(group, value, table_of(ramp, f"the ramp of the pressure on '{group}'")))
 
     def add_traction(
         self,
@@ -249,9 +190,9 @@ class Model:
         z: Value | None = None,
         ramp: History = None,
     ) -> None:
-        """Load a group of facets with forces per reference area [pressure]; values and `ramp` as in `add_pressure`."""
+        """Load a group of facets with forces per reference area [pressure]; values as in `add_pressure`."""
         axes = axes_of(f"the traction on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
-        self._add(Traction(group, axes, _table(ramp, f"the traction on '{group}'")))
+        self._add(Traction(group, axes, table_of(ramp, f"the ramp of the traction on '{group}'")))
 
     def add_body_force(
         self,
@@ -262,13 +203,10 @@ class Model:
         z: Value | None = None,
         ramp: History = None,
     ) -> None:
-        """Load groups of solid cells, by default all, with forces per volume [force / length^3], such as the weight.
-
-        Values and `ramp` as in `add_pressure`.
-        """
+        """Load groups of solid cells, by default all, with forces per volume [force / length^3], such as the weight."""
         names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
         axes = axes_of("the body force", {"x": x, "y": y, "z": z}, self.mesh.dim)
-        self._add(BodyForce(names, axes, _table(ramp, "the body force")))
+        self._add(BodyForce(names, axes, table_of(ramp, "the ramp of the body force")))
 
     def add_force(
         self,
@@ -280,7 +218,7 @@ class Model:
         distribute: bool | None = None,
         ramp: History = None,
     ) -> None:
-        """Load a group with forces [force]; `ramp` as in `add_pressure`.
+        """Load a group with forces [force].
 
         Parameters
         ----------
@@ -290,31 +228,20 @@ class Model:
         distribute : bool, optional
             True: the total force, spread as a uniform traction over the facets of the group. False: the force on every
             node of the group. By default True for a group of facets and False for a group of points.
-
-        Raises
-        ------
-        MeshError, ModelError
-            If the group is unknown or empty, or a value is not finite.
         """
         self.mesh.points_of(group)
         if distribute is None:
             distribute = group in self.mesh.cell_groups and bool(self.mesh.cells_of(group, dim=self.mesh.dim - 1))
         kind: type[TotalForce] | type[NodalForce] = TotalForce if distribute else NodalForce
         axes = axes_of(f"the force on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
-        self._add(kind(group, axes, _table(ramp, f"the force on '{group}'")))
+        self._add(kind(group, axes, table_of(ramp, f"the ramp of the force on '{group}'")))
 
     def _add(self, load: Load) -> None:
         load.check(self.mesh, self.kinematics)
         self.loads.append(load)
 
     def couple(self, group: str, component: str) -> None:
-        """Let all nodes of a group move together in one displacement component, or several (``"xy"``).
-
-        Raises
-        ------
-        MeshError, ModelError
-            If the group is unknown or holds fewer than two nodes, or a component is not x, y (or z in 3D).
-        """
+        """Let all nodes of a group move together in one displacement component, or several (``"xy"``)."""
         nodes = self.mesh.points_of(group)
         if len(nodes) < 2:
             raise ModelError(f"group '{group}' holds {len(nodes)} points: at least two are needed to couple")
@@ -336,13 +263,6 @@ class Model:
             costs much, since it ties every displacement in it to every other.
         value : float
             [length times the unit of the coefficients].
-        ramp : Ramp or iterable of (float, float), optional
-            As in `add_pressure`.
-
-        Raises
-        ------
-        MeshError, ModelError
-            If a group, point or component is unknown, a number is not finite, or no displacement is left.
         """
         row: dict[int, float] = {}
         listed = [(place, component, coefficient) for place, component, coefficient in terms]
@@ -360,7 +280,7 @@ class Model:
         dofs = np.array(sorted(row), np.intp)
         values = np.array([row[dof] for dof in dofs])
         rows = csr_array((values, dofs, np.array([0, len(dofs)])), shape=(1, self.n_dofs))
-        self.relations.append(Relation(name, rows, float(value), _table(ramp, name)))
+        self.relations.append(Relation(name, rows, float(value), table_of(ramp, f"the ramp of {name}")))
 
     def add_spring(
         self,
@@ -384,11 +304,6 @@ class Model:
             Stiffness along the axes [force / length]; in axisymmetry over the full circle.
         axial : float
             Stiffness along the line between the two nodes [force / length], which keeps its reference direction.
-
-        Raises
-        ------
-        MeshError, ModelError
-            If a group is unknown or has not the right number of nodes, or a stiffness is not a positive number.
         """
         name = f"the spring on '{group}'" if to is None else f"the spring between '{group}' and '{to}'"
         given = {"x": x, "y": y, "z": z}
@@ -398,7 +313,8 @@ class Model:
         values = [*axes.values(), *([] if axial is None else [axial])]
         for value in values:
             check_number(f"the stiffness of {name}", value)
-        check_stiffness(name, values)
+            if not value > 0:
+                raise ModelError(f"{name}: the stiffness {value:g} must be positive")
         nodes = self._nodes(group)
         if not len(nodes):
             raise ModelError(f"group '{group}' is empty: no spring can be there")
@@ -459,11 +375,6 @@ class Model:
             - ``normals``: ``"facet"`` or ``"averaged"`` between the facets at a node, which curved sides that fit closely
               need; ``projection_tolerance``: how far points may stand out beyond the end of the primary side, in facet
               lengths.
-
-        Raises
-        ------
-        ContactError, ModelError
-            If a side is wrong, an option unknown or wrong, or the name taken.
         """
         if formulation is None:
             sides = surface(self.mesh, secondary), surface(self.mesh, primary)
@@ -498,16 +409,11 @@ class Model:
             these components the obstacle is a rigid body that moves freely until contact holds it; in the others it
             follows `motion`. Results tell where it is.
         ramp : Ramp or iterable of (float, float), optional
-            A history of its own for motion and force; by default that of the analysis.
+            History of motion and force.
         formulation : str
             ``"node_to_segment"`` (then: node against obstacle) or ``"continuous"``.
         **options
             Fields of the formulation.
-
-        Raises
-        ------
-        ContactError, ModelError
-            If the group, an option, the motion or the force is wrong, or the name taken.
         """
         moves = axes_of(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
         displacement = tuple(float(moves.get(axis, 0.0)) for axis in range(self.mesh.dim))  # type: ignore[arg-type]
@@ -516,7 +422,7 @@ class Model:
         if isinstance(obstacle, MeshedSurface):
             obstacle.check_apart(self.mesh)
         obstacle.distance(self.mesh.points[:1])  # what does not fit this dimension shows at once
-        history = _table(ramp, f"the motion of obstacle '{name}'")
+        history = table_of(ramp, f"the ramp of the motion of obstacle '{name}'")
         driving = self._driving(name, moves, force)
         self._add_pair(ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving))
 
@@ -592,13 +498,7 @@ class Model:
         )
 
     def material_numbers(self) -> tuple[Array, dict[str, NDArray[np.int32]]]:
-        """Return moduli (n_materials, 4, 4), in 3D (n_materials, 6, 6), and by element every solid cell's material.
-
-        Raises
-        ------
-        ModelError
-            If cells are left without a material, or have two; their groups are named.
-        """
+        """Return moduli (n_materials, 4, 4), in 3D (n_materials, 6, 6), and by element every solid cell's material."""
         if not self.materials:
             raise ModelError("no material: call add_material(LinearElastic(E=..., nu=...)) for the solid cells")
         numbers = {name: np.full(len(block), -1, np.int32) for name, block in self.mesh.solids.items()}
@@ -638,21 +538,12 @@ class Model:
         raise ModelError(f"{total} solid cells have no material{named}: add_material for their groups")
 
     def prescribed(self) -> tuple[NDArray[np.bool_], Array]:
-        """Return (fixed, values), both (n_points, dim): supported components, and their displacement at ramp value 1.
-
-        Raises
-        ------
-        ModelError
-            If two supports ask for different values of one component at one node.
-        """
+        """Return (fixed, values), both (n_points, dim): supported components, and their displacement at ramp value 1."""
         fixed, by_ramp = self.prescribed_by_ramp()
         return fixed, sum(by_ramp.values(), np.zeros(self.mesh.points.shape))
 
     def prescribed_by_ramp(self) -> tuple[NDArray[np.bool_], dict[Table | None, Array]]:
-        """Return supported components (n_points, dim), and by history their displacement at multiplier 1 [length].
-
-        Errors as for `prescribed`.
-        """
+        """Return supported components (n_points, dim), and by history their displacement at multiplier 1 [length]."""
         fixed = np.zeros(self.mesh.points.shape, bool)
         by_ramp: dict[Table | None, Array] = {}
         owner: dict[tuple[int, int], Support] = {}
@@ -675,13 +566,7 @@ class Model:
         return fixed, by_ramp
 
     def forces_by_ramp(self) -> dict[Table | None, Array]:
-        """Return by history the nodal forces (n_points, dim) of all loads at multiplier 1 [force].
-
-        Raises
-        ------
-        ModelError
-            If a load is a function that fails, or acts on points that nothing holds.
-        """
+        """Return by history the nodal forces (n_points, dim) of all loads at multiplier 1 [force]."""
         related = self._related()
         by_ramp: dict[Table | None, Array] = {}
         for load in self.loads:
@@ -697,13 +582,7 @@ class Model:
         return related
 
     def check(self, ramp: Ramp | None = None) -> None:
-        """Check the whole model, and its histories against `ramp`; `solve` does so before any numerics.
-
-        Raises
-        ------
-        MeshError, ModelError, ContactError
-            One clear line that names the culprit and the remedy.
-        """
+        """Check the whole model, and its histories against `ramp`; `solve` does so before any numerics."""
         self.material_numbers()
         fixed, prescribed = self.prescribed_by_ramp()
         forces = self.forces_by_ramp()
@@ -754,9 +633,3 @@ def multiplier(own: Table | None, ramp: Ramp, instant: float) -> float:
 def combined(by_ramp: Mapping[Table | None, Array], ramp: Ramp, instant: float, shape: tuple[int, ...]) -> Array:
     """Return the sum of the parts at `instant`, each times its multiplier."""
     return sum((multiplier(own, ramp, instant) * part for own, part in by_ramp.items()), np.zeros(shape))
-
-
-def _table(ramp: History, what: str) -> Table | None:
-    if ramp is None:
-        return None
-    return ramp.table if isinstance(ramp, Ramp) else checked_table(ramp, f"the ramp of {what}")

@@ -13,7 +13,7 @@ from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.loads import check_number, check_value, evaluated
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.model.ramp import Ramp, Table, checked_table
+from fastcontact.model.ramp import Table, table_of
 
 # Options that every contact pair takes, beside those of its formulation.
 SHARED_OPTIONS = ("clearance", "clearance_primary", "clearance_ramp", "excluded", "frictionless", "kind", "penalty")
@@ -24,10 +24,7 @@ def pair_options(
 ) -> PairOptions:
     """Return the options of contact pair `name` with the secondary `side`, as formulations need them.
 
-    Raises
-    ------
-    ContactError, ModelError
-        If an option is wrong; the message names the pair.
+    ContactError or ModelError if an option is wrong; the message names the pair.
     """
     if against_obstacle and "clearance_primary" in options:
         raise ContactError(
@@ -78,10 +75,7 @@ def _penalty(name: str, options: Mapping[str, Any]) -> float | None:
 
 def clearance_ramp(name: str, options: Mapping[str, Any]) -> Table | None:
     """Return the history of the clearance of contact pair `name`, None where it does not change."""
-    ramp = options.get("clearance_ramp")
-    if ramp is None:
-        return None
-    return ramp.table if isinstance(ramp, Ramp) else checked_table(ramp, f"the clearance_ramp of contact '{name}'")
+    return table_of(options.get("clearance_ramp"), f"the clearance_ramp of contact '{name}'")
 
 
 def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side: Surface) -> Mask | None:

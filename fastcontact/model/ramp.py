@@ -32,6 +32,13 @@ def checked_table(rows: Iterable[Iterable[float]], what: str = "the ramp") -> Ta
     return table
 
 
+def table_of(ramp: History, what: str) -> Table | None:
+    """Return the table of a history, None for none; errors as for `checked_table`."""
+    if ramp is None:
+        return None
+    return ramp.table if isinstance(ramp, Ramp) else checked_table(ramp, what)
+
+
 def table_value(table: Table, instant: float) -> float:
     """Return the piecewise linear function `table` at `instant`; constant beyond its ends."""
     times, values = zip(*table, strict=True)
@@ -42,17 +49,14 @@ def table_value(table: Table, instant: float) -> float:
 class Ramp:
     """Instants and a piecewise linear load function.
 
+    ModelError if the instants or the table do not ascend, or an instant lies outside the table.
+
     Parameters
     ----------
     instants : sequence of float
         Load factors (pseudo-times) at which a step ends, ascending.
     table : sequence of (float, float)
         Points (instant, multiplier of the loads) of the function, ascending instants.
-
-    Raises
-    ------
-    ModelError
-        If the instants or the table do not ascend, or an instant lies outside the table.
     """
 
     instants: tuple[float, ...]
@@ -82,13 +86,14 @@ class Ramp:
         return table_value(self.table, instant)
 
 
+# A history of a single load: a ramp, whose table counts, or pairs (instant, multiplier).
+History = Ramp | Iterable[Iterable[float]] | None
+
+
 def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:
     """Return a ramp of equal steps from zero to the full loads at `end`.
 
-    Raises
-    ------
-    ModelError
-        If `steps` is not a whole number from 1 to a million or `end` is not positive.
+    ModelError if `steps` is not a whole number from 1 to a million or `end` is not positive.
     """
     if int(steps) != steps or steps < 1:
         raise ModelError(f"the number of load steps must be a positive whole number, not {steps}")

@@ -6,11 +6,11 @@ then lie inside the cone of the contact forces (Fichera, 1964; Lions and Stampac
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.contact.constraints import Constraints
@@ -36,14 +36,8 @@ FAR = 1e3
 class FreeMotions:
     """Independent motions without deformation that supports and relations allow.
 
-    Attributes
-    ----------
-    displacement : ndarray (n_dofs, k)
-        Of all points; the largest entry of a column is about 1.
-    parts : ndarray (p, k)
-        The same motions as combinations of elementary ones.
-    labels : list of (str, str)
-        Body and name of each elementary motion.
+    The `displacement` (n_dofs, k) of all points has about 1 as largest entry of a column; `parts` (p, k) are the same motions
+    as combinations of elementary ones, and `labels` body and name of each of those.
     """
 
     displacement: Array
@@ -99,13 +93,14 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
     count, body = bodies(mesh)
     for number in range(count):
         members = np.flatnonzero(body == number)
-        loose = _loose(mesh.points[members], kinematics, fixed[members])
-        if loose.shape[1]:
-            own = np.zeros((mesh.n_points, mesh.dim, loose.shape[1]))
-            modes = rigid_modes(mesh.points[members], kinematics)
-            own[members] = (modes / np.abs(modes).max(axis=0) @ loose).reshape(len(members), mesh.dim, -1)
+        modes = rigid_modes(mesh.points[members], kinematics)
+        modes = modes / np.abs(modes).max(axis=0)
+        free = _null_space(modes[fixed[members].ravel()])  # combinations of the body's modes that no support stops
+        if free.shape[1]:
+            own = np.zeros((mesh.n_points, mesh.dim, free.shape[1]))
+            own[members] = (modes @ free).reshape(len(members), mesh.dim, -1)
             columns.append(own.reshape(dofs, -1))
-            parts.append(loose)
+            parts.append(free)
             labels += [(f"body {body_name(mesh, body, number)}", name) for name in MODE_NAMES[kinematics]]
     if relations is not None:
         for dof in np.unique(relations.indices[(body[relations.indices // mesh.dim] < 0)]):
@@ -115,17 +110,10 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
                 labels.append((f"point {dof // mesh.dim}", f"translation along {'xyz'[dof % mesh.dim]}"))
     if not columns:
         return FreeMotions(np.empty((dofs, 0)), np.empty((0, 0)), [])
-    motions = FreeMotions(np.hstack(columns), _block_diagonal(parts), labels)
+    motions = FreeMotions(np.hstack(columns), block_diag(*parts), labels)
     if relations is None or not relations.shape[0]:
         return motions
     return motions.combined(_null_space(relations @ motions.displacement))
-
-
-def _loose(points: Array, kinematics: str, fixed: Mask) -> Array:
-    """Return the combinations (n_modes, k) of a body's rigid-body modes, of largest entry 1, that are not held."""
-    modes = rigid_modes(points, kinematics)
-    modes = modes / np.abs(modes).max(axis=0)
-    return _null_space(modes[fixed.ravel()])
 
 
 def _null_space(A: Array) -> Array:
@@ -133,14 +121,6 @@ def _null_space(A: Array) -> Array:
     k = A.shape[1]
     _, values, right = np.linalg.svd(np.vstack([A, np.zeros((k, k))]), full_matrices=False)
     return np.asarray(right[values < ZERO * max(values.max(initial=0.0), 1.0)].T)
-
-
-def _block_diagonal(blocks: Sequence[Array]) -> Array:
-    heights, widths = [b.shape[0] for b in blocks], [b.shape[1] for b in blocks]
-    whole = np.zeros((sum(heights), sum(widths)))
-    for block, row, column in zip(blocks, np.cumsum([0, *heights]), np.cumsum([0, *widths]), strict=False):
-        whole[row : row + block.shape[0], column : column + block.shape[1]] = block
-    return whole
 
 
 def resisting(constraints: Constraints) -> tuple[csr_array, Array]:
@@ -179,16 +159,8 @@ def generalised(motions: FreeMotions, force: Array) -> Array:
 def unstopped(gaps: Array, works: Array) -> Array:
     """Return motions (k, j) that neither contact nor contact and loads together can stop.
 
-    Parameters
-    ----------
-    gaps : ndarray (m, k)
-        Change of the gaps under each motion, whose largest displacement is about 1.
-    works : ndarray (l, k)
-        Work of each load on each motion.
-
-    Notes
-    -----
-    A motion is stopped if it changes some gap, and closes one or is driven by some load. Whether the load drives it
+    From the change of the `gaps` (m, k) and the `works` (l, k) of the loads under each motion, whose largest displacement is
+    about 1. A motion is stopped if it changes some gap, and closes one or is driven by some load. Whether the load drives it
     against the contact, or away from it, shows in the solution.
     """
     k = gaps.shape[1]
@@ -209,16 +181,8 @@ def unstopped(gaps: Array, works: Array) -> Array:
 def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | None:
     """Return the amplitudes (k,) at which rigid bodies under the loads come to rest in contact, None if they never do.
 
-    Parameters
-    ----------
-    gaps : ndarray (m, k)
-        Change of the gaps under each motion.
-    gap : ndarray (m,)
-        Gaps now; penetration counts as closed [length].
-    work : ndarray (k,)
-        Work of the loads on each motion.
-    size : float
-        Of the model [length].
+    From the change of the `gaps` (m, k) under each motion, every `gap` (m,) now, of which penetration counts as closed
+    [length], the `work` (k,) of the loads on each motion, and the `size` of the model [length].
     """
     if not work.any():
         return np.zeros(len(work))

@@ -73,8 +73,9 @@ def _named_units(model: Model) -> list[str]:
         for material, groups in model.materials:
             if not SOLIDS[0] <= material.E * pascal <= SOLIDS[1]:
                 limit, what = (SOLIDS[1], "diamond") if material.E * pascal > SOLIDS[1] else (SOLIDS[0], "aerogel")
+                where = "all cells" if groups is None else ", ".join(f"'{group}'" for group in groups)
                 texts.append(
-                    f"Young's modulus E = {material.E:g} {units['pressure']} of {_named(groups)} is "
+                    f"Young's modulus E = {material.E:g} {units['pressure']} of {where} is "
                     f"{material.E * pascal / limit:.3g} times that of {what}: is it in another unit?"
                 )
     metre, newton = METRES.get(units.get("length", "")), NEWTONS.get(units.get("force", ""))
@@ -86,10 +87,6 @@ def _named_units(model: Model) -> list[str]:
                 f"{units['pressure']}; change one of the three"
             )
     return texts
-
-
-def _named(groups: tuple[str, ...] | None) -> str:
-    return "all cells" if groups is None else ", ".join(f"'{group}'" for group in groups)
 
 
 def _proportions(model: Model) -> list[str]:
@@ -183,7 +180,7 @@ def _some(cells: NDArray[Any]) -> NDArray[Any]:
 def _load_integral(model: Model, load: Load) -> list[str]:
     """Return a warning if a load that is a function varies too much within a cell for the quadrature of loads."""
     off = total = 0.0
-    for value in _functions(load):
+    for value in (value for value in load.values if callable(value)):
         for element, cells in _loaded(model, load):
             coarse, fine = (
                 _integrals(model.mesh, element, _some(cells), value, load.name, finer) for finer in (False, True)
@@ -197,11 +194,6 @@ def _load_integral(model: Model, load: Load) -> list[str]:
     ]
 
 
-def _functions(load: Load) -> list[Value]:
-    values = [load.value] if isinstance(load, Pressure) else list(getattr(load, "components", {}).values())
-    return [value for value in values if callable(value)]
-
-
 def _loaded(model: Model, load: Load) -> Iterator[tuple[str, NDArray[np.int32]]]:
     if isinstance(load, BodyForce):
         yield from load.cells(model.mesh)
@@ -212,8 +204,7 @@ def _loaded(model: Model, load: Load) -> Iterator[tuple[str, NDArray[np.int32]]]
 def _integrals(mesh: Mesh, element: str, cells: NDArray[np.int32], value: Value, name: str, finer: bool) -> Array:
     """Return the integral (n_cells,) of a load over each cell, by about the rule of loads or by a finer one."""
     reference = elements.get(element)
-    n = 9 if finer else 5
-    xi, weights = quadrature.gauss_line(n) if reference.dim == 1 else integration_rule(reference, n)
+    xi, weights = quadrature.product_rule(reference.linear, 9 if finer else 5)
     J = np.einsum("qnk,cnd->cqdk", reference.gradient(xi), mesh.points[cells])
     x = np.einsum("qn,cnd->cqd", reference.shape(xi), mesh.points[cells])
     measure = np.sqrt(np.linalg.det(np.einsum("cqdk,cqdl->cqkl", J, J)))

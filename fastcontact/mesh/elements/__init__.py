@@ -24,10 +24,7 @@ BY_VTK = {element.vtk: element for element in ELEMENTS.values()}
 def get(name: str) -> Element:
     """Return the element called `name`.
 
-    Raises
-    ------
-    MeshError
-        If there is no such element; the message offers the nearest names.
+    MeshError if there is no such element; the message offers the nearest names.
     """
     try:
         return ELEMENTS[name]

@@ -1,10 +1,14 @@
-"""A reference element: data, two functions and its default quadrature. Its coordinates have no dimension."""
+"""A reference element: data, two functions and its default quadrature; shape functions that are products.
+
+Reference coordinates have no dimension.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +16,12 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Function = Callable[[Array], Array]
+
+# Names of facets by the dimension of the cell and the number of nodes of the facet.
+_FACETS = {
+    (2, 2): "line2", (2, 3): "line3",
+    (3, 3): "tri3", (3, 6): "tri6", (3, 4): "quad4", (3, 8): "quad8", (3, 9): "quad9",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,10 +32,6 @@ class Element:
     ----------
     name : str
         Our name, e.g. ``"tri6"``.
-    dim : int
-        Dimension of the reference cell: 1 for lines, 2 for faces, 3 for solids.
-    order : int
-        1 for linear, 2 for quadratic.
     nodes : ndarray (n_nodes, dim)
         Reference coordinates [-], in the order of VTK; corners first, then mid nodes in the order of `edges`, then
         centre nodes of faces and of the cell.
@@ -33,8 +39,6 @@ class Element:
         Corner pairs, one per edge; in 2D counter-clockwise.
     facets : tuple of tuple of int
         Local nodes of each boundary facet, oriented so that its normal points outward.
-    facet_elements : tuple of str
-        Name of each facet's element; empty for lines.
     shape : callable
         ``shape(xi)`` maps (m, dim) to values (m, n_nodes) [-].
     gradient : callable
@@ -52,12 +56,9 @@ class Element:
     """
 
     name: str
-    dim: int
-    order: int
     nodes: Array
     edges: tuple[tuple[int, int], ...]
     facets: tuple[tuple[int, ...], ...]
-    facet_elements: tuple[str, ...]
     shape: Function
     gradient: Function
     quadrature: tuple[Array, Array]
@@ -67,6 +68,21 @@ class Element:
     linear: str
     quadratic: str
     corner_shape: Function
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the reference cell: 1 for lines, 2 for faces, 3 for solids."""
+        return int(self.nodes.shape[1])
+
+    @property
+    def order(self) -> int:
+        """1 for linear, 2 for quadratic."""
+        return 1 if self.name == self.linear else 2
+
+    @property
+    def facet_elements(self) -> tuple[str, ...]:
+        """Name of each facet's element; empty for lines."""
+        return tuple(_FACETS[self.dim, len(facet)] for facet in self.facets if self.dim > 1)
 
     @property
     def n_nodes(self) -> int:
@@ -110,3 +126,38 @@ class Element:
         if len(points) < self.n_corners:
             return np.full((self.n_nodes, len(points)), 1.0 / len(points))
         return self.corner_shape(self.nodes) @ np.linalg.pinv(self.corner_shape(points))
+
+
+def product_values(factors: Array) -> Array:
+    """Return the products (m, n_nodes) [-] of `factors` (m, n_nodes, 3) [-], one of each coordinate."""
+    return factors.prod(axis=2)
+
+
+def product_gradients(factors: Array, slopes: Array) -> Array:
+    """Return the derivatives (m, n_nodes, 3) [-] of the products.
+
+    From the `factors` (m, n_nodes, 3) [-] and the derivative of each in its coordinate, `slopes` (m, n_nodes, 3) [-].
+    """
+    f, g, h = np.moveaxis(factors, 2, 0)
+    df, dg, dh = np.moveaxis(slopes, 2, 0)
+    return np.stack([df * g * h, f * dg * h, f * g * dh], axis=2)
+
+
+def product_of_two(first: ModuleType, second: ModuleType, I: Indices, J: Indices) -> tuple[Function, Function]:  # noqa: E741
+    """Return shape functions (m, n_nodes) [-] and derivatives (m, n_nodes, dim) [-] of a product of two elements.
+
+    Node i has function number I[i] of the first element in the first coordinates, times number J[i] of the second in the
+    others; `I` (n_nodes,) of int, `J` (n_nodes,) of int.
+    """
+    split = first.ELEMENT.dim
+
+    def shape(xi: Array) -> Array:
+        return np.asarray(first.shape(xi[:, :split])[:, I] * second.shape(xi[:, split:])[:, J])
+
+    def gradient(xi: Array) -> Array:
+        x, y = xi[:, :split], xi[:, split:]
+        along_first = first.gradient(x)[:, I] * second.shape(y)[:, J, None]
+        along_second = first.shape(x)[:, I, None] * second.gradient(y)[:, J]
+        return np.concatenate([along_first, along_second], axis=2)
+
+    return shape, gradient

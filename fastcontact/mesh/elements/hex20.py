@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fastcontact.mesh.elements import _product, hex8
-from fastcontact.mesh.elements._element import Array, Element
+from fastcontact.mesh.elements import hex8
+from fastcontact.mesh.elements._element import Array, Element, product_gradients, product_values
 from fastcontact.mesh.quadrature import gauss_cube
 
 FIRST, SECOND = np.array(hex8.EDGES).T
@@ -21,23 +21,22 @@ def _middle_factors(xi: Array) -> tuple[Array, Array]:
 def shape(xi: Array) -> Array:
     """Shape functions (m, 20) [-] at `xi` (m, 3) [-]."""
     corner = hex8.shape(xi) * (xi @ hex8.NODES.T - 2)
-    return np.column_stack([corner, _product.values(_middle_factors(xi)[0])])
+    return np.column_stack([corner, product_values(_middle_factors(xi)[0])])
 
 
 def gradient(xi: Array) -> Array:
     """Derivatives (m, 20, 3) [-] at `xi` (m, 3) [-]."""
     factor = (xi @ hex8.NODES.T - 2)[:, :, None]
     corner = hex8.gradient(xi) * factor + hex8.shape(xi)[:, :, None] * hex8.NODES
-    return np.concatenate([corner, _product.gradients(*_middle_factors(xi))], axis=1)
+    return np.concatenate([corner, product_gradients(*_middle_factors(xi))], axis=1)
 
 
 ELEMENT = Element(
-    name="hex20", dim=3, order=2, nodes=NODES, edges=hex8.EDGES,
+    name="hex20", nodes=NODES, edges=hex8.EDGES,
     facets=(
         (0, 4, 7, 3, 16, 15, 19, 11), (1, 2, 6, 5, 9, 18, 13, 17), (0, 1, 5, 4, 8, 17, 12, 16),
         (3, 7, 6, 2, 19, 14, 18, 10), (0, 3, 2, 1, 11, 10, 9, 8), (4, 5, 6, 7, 12, 13, 14, 15),
     ),
-    facet_elements=("quad8",) * 6,
-    shape=shape, gradient=gradient, quadrature=gauss_cube(3), meshio="hexahedron20", med="H20", vtk=25,
-    linear="hex8", quadratic="hex20", corner_shape=hex8.shape,
+    shape=shape, gradient=gradient, quadrature=gauss_cube(3), meshio="hexahedron20", med="H20", vtk=25, linear="hex8",
+    quadratic="hex20", corner_shape=hex8.shape,
 )  # fmt: skip

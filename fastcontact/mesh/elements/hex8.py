@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fastcontact.mesh.elements import _product, quad4
-from fastcontact.mesh.elements._element import Array, Element
+from fastcontact.mesh.elements import quad4
+from fastcontact.mesh.elements._element import Array, Element, product_gradients, product_values
 from fastcontact.mesh.quadrature import gauss_cube
 
 NODES = np.column_stack([np.tile(quad4.NODES, (2, 1)), np.repeat([-1.0, 1.0], 4)])
@@ -12,19 +12,18 @@ EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4),
 
 def shape(xi: Array) -> Array:
     """Shape functions (m, 8) [-] at `xi` (m, 3) [-]."""
-    return _product.values((1 + xi[:, None] * NODES) / 2)
+    return product_values((1 + xi[:, None] * NODES) / 2)
 
 
 def gradient(xi: Array) -> Array:
     """Derivatives (m, 8, 3) [-] at `xi` (m, 3) [-]."""
     factors = (1 + xi[:, None] * NODES) / 2
-    return _product.gradients(factors, np.broadcast_to(NODES / 2, factors.shape))
+    return product_gradients(factors, np.broadcast_to(NODES / 2, factors.shape))
 
 
 ELEMENT = Element(
-    name="hex8", dim=3, order=1, nodes=NODES, edges=EDGES,
-    facets=((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7)),
-    facet_elements=("quad4",) * 6,
-    shape=shape, gradient=gradient, quadrature=gauss_cube(2), meshio="hexahedron", med="HE8", vtk=12,
-    linear="hex8", quadratic="hex20", corner_shape=shape,
+    name="hex8", nodes=NODES, edges=EDGES,
+    facets=((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7)), shape=shape,
+    gradient=gradient, quadrature=gauss_cube(2), meshio="hexahedron", med="HE8", vtk=12, linear="hex8",
+    quadratic="hex20", corner_shape=shape,
 )  # fmt: skip

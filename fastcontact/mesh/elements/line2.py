@@ -18,7 +18,7 @@ def gradient(xi: Array) -> Array:
 
 
 ELEMENT = Element(
-    name="line2", dim=1, order=1, nodes=np.array([[-1.0], [1.0]]), edges=((0, 1),), facets=((0,), (1,)),
-    facet_elements=(), shape=shape, gradient=gradient, quadrature=gauss_line(2), meshio="line", med="SE2", vtk=3,
-    linear="line2", quadratic="line3", corner_shape=shape,
+    name="line2", nodes=np.array([[-1.0], [1.0]]), edges=((0, 1),), facets=((0,), (1,)), shape=shape,
+    gradient=gradient, quadrature=gauss_line(2), meshio="line", med="SE2", vtk=3, linear="line2", quadratic="line3",
+    corner_shape=shape,
 )  # fmt: skip

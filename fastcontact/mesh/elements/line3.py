@@ -20,7 +20,7 @@ def gradient(xi: Array) -> Array:
 
 
 ELEMENT = Element(
-    name="line3", dim=1, order=2, nodes=np.array([[-1.0], [1.0], [0.0]]), edges=((0, 1),), facets=((0,), (1,)),
-    facet_elements=(), shape=shape, gradient=gradient, quadrature=gauss_line(3), meshio="line3", med="SE3", vtk=21,
-    linear="line2", quadratic="line3", corner_shape=line2.shape,
+    name="line3", nodes=np.array([[-1.0], [1.0], [0.0]]), edges=((0, 1),), facets=((0,), (1,)), shape=shape,
+    gradient=gradient, quadrature=gauss_line(3), meshio="line3", med="SE3", vtk=21, linear="line2", quadratic="line3",
+    corner_shape=line2.shape,
 )  # fmt: skip

@@ -49,11 +49,10 @@ def _side(a: Array, b: Array, t: Array, axes: tuple[int, int]) -> Array:
 
 
 ELEMENT = Element(
-    name="pyramid13", dim=3, order=2, nodes=NODES, edges=pyramid5.EDGES,
+    name="pyramid13", nodes=NODES, edges=pyramid5.EDGES,
     facets=(
         (0, 3, 2, 1, 8, 7, 6, 5), (0, 1, 4, 5, 10, 9), (1, 2, 4, 6, 11, 10), (2, 3, 4, 7, 12, 11), (3, 0, 4, 8, 9, 12),
     ),
-    facet_elements=("quad8", "tri6", "tri6", "tri6", "tri6"),
     shape=shape, gradient=gradient, quadrature=conical_pyramid(3), meshio="pyramid13", med="P13", vtk=27,
     linear="pyramid5", quadratic="pyramid13", corner_shape=pyramid5.shape,
 )  # fmt: skip

@@ -38,9 +38,7 @@ def gradient(xi: Array) -> Array:
 
 
 ELEMENT = Element(
-    name="pyramid5", dim=3, order=1, nodes=NODES, edges=EDGES,
-    facets=((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
-    facet_elements=("quad4", "tri3", "tri3", "tri3", "tri3"),
-    shape=shape, gradient=gradient, quadrature=pyramid_5(), meshio="pyramid", med="PY5", vtk=14,
-    linear="pyramid5", quadratic="pyramid13", corner_shape=shape,
+    name="pyramid5", nodes=NODES, edges=EDGES, facets=((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+    shape=shape, gradient=gradient, quadrature=pyramid_5(), meshio="pyramid", med="PY5", vtk=14, linear="pyramid5",
+    quadratic="pyramid13", corner_shape=shape,
 )  # fmt: skip

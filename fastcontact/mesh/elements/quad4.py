@@ -6,6 +6,7 @@ from fastcontact.mesh.elements._element import Array, Element
 from fastcontact.mesh.quadrature import gauss_square
 
 NODES = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+EDGES = ((0, 1), (1, 2), (2, 3), (3, 0))
 
 
 def shape(xi: Array) -> Array:
@@ -21,8 +22,6 @@ def gradient(xi: Array) -> Array:
 
 
 ELEMENT = Element(
-    name="quad4", dim=2, order=1, nodes=NODES, edges=((0, 1), (1, 2), (2, 3), (3, 0)),
-    facets=((0, 1), (1, 2), (2, 3), (3, 0)), facet_elements=("line2",) * 4,
-    shape=shape, gradient=gradient, quadrature=gauss_square(2), meshio="quad", med="QU4", vtk=9,
-    linear="quad4", quadratic="quad8", corner_shape=shape,
+    name="quad4", nodes=NODES, edges=EDGES, facets=EDGES, shape=shape, gradient=gradient, quadrature=gauss_square(2),
+    meshio="quad", med="QU4", vtk=9, linear="quad4", quadratic="quad8", corner_shape=shape,
 )  # fmt: skip

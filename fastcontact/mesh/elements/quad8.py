@@ -33,8 +33,7 @@ def gradient(xi: Array) -> Array:
 
 
 ELEMENT = Element(
-    name="quad8", dim=2, order=2, nodes=NODES, edges=((0, 1), (1, 2), (2, 3), (3, 0)),
-    facets=((0, 1, 4), (1, 2, 5), (2, 3, 6), (3, 0, 7)), facet_elements=("line3",) * 4,
-    shape=shape, gradient=gradient, quadrature=gauss_square(3), meshio="quad8", med="QU8", vtk=23,
-    linear="quad4", quadratic="quad8", corner_shape=quad4.shape,
+    name="quad8", nodes=NODES, edges=quad4.EDGES, facets=((0, 1, 4), (1, 2, 5), (2, 3, 6), (3, 0, 7)), shape=shape,
+    gradient=gradient, quadrature=gauss_square(3), meshio="quad8", med="QU8", vtk=23, linear="quad4",
+    quadratic="quad8", corner_shape=quad4.shape,
 )  # fmt: skip

@@ -2,20 +2,18 @@
 
 import numpy as np
 
-from fastcontact.mesh.elements import _product, line3, quad4
-from fastcontact.mesh.elements._element import Element
+from fastcontact.mesh.elements import line3, quad4, quad8
+from fastcontact.mesh.elements._element import Element, product_of_two
 from fastcontact.mesh.quadrature import gauss_square
 
-NODES = np.vstack([quad4.NODES, [[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, 0.0]]])
+NODES = np.vstack([quad8.NODES, np.zeros(2)])
 # Node i is the product of the line3 functions I[i] in s and J[i] in t.
 I = np.array([0, 1, 1, 0, 2, 1, 2, 0, 2])  # noqa: E741
 J = np.array([0, 0, 1, 1, 0, 2, 1, 2, 2])
-shape, gradient = _product.of_two(line3, line3, I, J)
-
+shape, gradient = product_of_two(line3, line3, I, J)
 
 ELEMENT = Element(
-    name="quad9", dim=2, order=2, nodes=NODES, edges=((0, 1), (1, 2), (2, 3), (3, 0)),
-    facets=((0, 1, 4), (1, 2, 5), (2, 3, 6), (3, 0, 7)), facet_elements=("line3",) * 4,
-    shape=shape, gradient=gradient, quadrature=gauss_square(3), meshio="quad9", med="QU9", vtk=28,
-    linear="quad4", quadratic="quad9", corner_shape=quad4.shape,
+    name="quad9", nodes=NODES, edges=quad4.EDGES, facets=quad8.ELEMENT.facets, shape=shape, gradient=gradient,
+    quadrature=gauss_square(3), meshio="quad9", med="QU9", vtk=28, linear="quad4", quadratic="quad9",
+    corner_shape=quad4.shape,
 )  # fmt: skip

@@ -22,8 +22,7 @@ def gradient(xi: Array) -> Array:
 
 
 ELEMENT = Element(
-    name="tet4", dim=3, order=1, nodes=NODES, edges=EDGES,
-    facets=((0, 1, 3), (1, 2, 3), (2, 0, 3), (0, 2, 1)), facet_elements=("tri3",) * 4,
-    shape=shape, gradient=gradient, quadrature=tetrahedron_1(), meshio="tetra", med="TE4", vtk=10,
-    linear="tet4", quadratic="tet10", corner_shape=shape,
+    name="tet4", nodes=NODES, edges=EDGES, facets=((0, 1, 3), (1, 2, 3), (2, 0, 3), (0, 2, 1)), shape=shape,
+    gradient=gradient, quadrature=tetrahedron_1(), meshio="tetra", med="TE4", vtk=10, linear="tet4",
+    quadratic="tet10", corner_shape=shape,
 )  # fmt: skip

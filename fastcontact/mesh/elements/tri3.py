@@ -17,8 +17,7 @@ def gradient(xi: Array) -> Array:
 
 
 ELEMENT = Element(
-    name="tri3", dim=2, order=1, nodes=np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]),
-    edges=((0, 1), (1, 2), (2, 0)), facets=((0, 1), (1, 2), (2, 0)), facet_elements=("line2",) * 3,
-    shape=shape, gradient=gradient, quadrature=triangle_1(), meshio="triangle", med="TR3", vtk=5,
-    linear="tri3", quadratic="tri6", corner_shape=shape,
+    name="tri3", nodes=np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), edges=((0, 1), (1, 2), (2, 0)),
+    facets=((0, 1), (1, 2), (2, 0)), shape=shape, gradient=gradient, quadrature=triangle_1(), meshio="triangle",
+    med="TR3", vtk=5, linear="tri3", quadratic="tri6", corner_shape=shape,
 )  # fmt: skip

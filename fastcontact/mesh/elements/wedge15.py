@@ -8,6 +8,10 @@ from fastcontact.mesh.quadrature import gauss_line, prism, triangle_7
 
 FIRST, SECOND = np.array(wedge6.EDGES).T
 NODES = np.vstack([wedge6.NODES, (wedge6.NODES[FIRST] + wedge6.NODES[SECOND]) / 2])
+FACETS = (
+    (0, 2, 1, 8, 7, 6), (3, 4, 5, 9, 10, 11),
+    (0, 1, 4, 3, 6, 13, 9, 12), (1, 2, 5, 4, 7, 14, 10, 13), (2, 0, 3, 5, 8, 12, 11, 14),
+)  # fmt: skip
 # Ends of the edges of the two triangles, and the side z = -1 or 1 of each.
 A, B, SIDE = FIRST[:6], SECOND[:6], wedge6.NODES[FIRST[:6], 2]
 
@@ -33,12 +37,7 @@ def gradient(xi: Array) -> Array:
 
 
 ELEMENT = Element(
-    name="wedge15", dim=3, order=2, nodes=NODES, edges=wedge6.EDGES,
-    facets=(
-        (0, 2, 1, 8, 7, 6), (3, 4, 5, 9, 10, 11),
-        (0, 1, 4, 3, 6, 13, 9, 12), (1, 2, 5, 4, 7, 14, 10, 13), (2, 0, 3, 5, 8, 12, 11, 14),
-    ),
-    facet_elements=("tri6", "tri6", "quad8", "quad8", "quad8"),
-    shape=shape, gradient=gradient, quadrature=prism(triangle_7(), gauss_line(3)),
-    meshio="wedge15", med="P15", vtk=26, linear="wedge6", quadratic="wedge15", corner_shape=wedge6.shape,
+    name="wedge15", nodes=NODES, edges=wedge6.EDGES, facets=FACETS, shape=shape, gradient=gradient,
+    quadrature=prism(triangle_7(), gauss_line(3)), meshio="wedge15", med="P15", vtk=26, linear="wedge6",
+    quadratic="wedge15", corner_shape=wedge6.shape,
 )  # fmt: skip

@@ -10,11 +10,9 @@ from collections.abc import Callable
 
 from fastcontact.mesh.generate.blocks import block, block_on_block, cylinder_on_block
 from fastcontact.mesh.generate.box import box
-from fastcontact.mesh.generate.crowned_blocks import crowned_blocks
 from fastcontact.mesh.generate.forest import Forest
-from fastcontact.mesh.generate.graded_block import graded_block
+from fastcontact.mesh.generate.half_planes import crowned_blocks, graded_block, punched_block
 from fastcontact.mesh.generate.half_spheres import half_spheres, quarter_disc
-from fastcontact.mesh.generate.punched_block import punched_block
 from fastcontact.mesh.generate.quadratic import Circle, to_quadratic
 from fastcontact.mesh.generate.refine import circles, linearised, refined
 from fastcontact.mesh.generate.rings import rings

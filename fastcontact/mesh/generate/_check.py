@@ -45,11 +45,6 @@ def positive(name: str, value: Any, at_most: float = math.inf, limit: str = "") 
     return result
 
 
-def at_most(limit: float) -> Callable[[str, Any], float]:
-    """Return the check of a positive number up to `limit`."""
-    return lambda name, value: positive(name, value, limit)
-
-
 def growth_of(name: str, value: Any) -> float:
     """Return the ratio of neighbouring edges as a float; MeshError unless it is more than 1."""
     result = positive(name, value)

@@ -1,9 +1,9 @@
-"""Places of the nodes of a line: equal or geometric segments, or segments after a size function."""
+"""Places of the nodes of a line: equal or geometric segments, or segments after a size function; straight lines and arcs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,12 +23,8 @@ class Spacing:
 
     Attributes
     ----------
-    near, far : float
-        Edge length at the pole and far from it [length].
-    pole : (float, float)
-        Coordinates of the pole [length].
-    plateau, reach : float
-        Distances from the pole [length].
+    near, far, pole, plateau, reach
+        Edge lengths at the pole and far from it, coordinates of the pole, distances from it [length].
     """
 
     near: float
@@ -92,3 +88,26 @@ def divided(curve: Curve, length: float, spacing: Spacing) -> Array:
     parameter = np.interp(np.linspace(0.0, number[-1], n + 1), number, fine)
     parameter[0], parameter[-1] = 0.0, 1.0
     return curve(parameter)
+
+
+def graded(length: float, spacing: Spacing) -> Array:
+    """Return places (n + 1,) [length] from 0 to `length`, their distances after a spacing about 0."""
+    return divided(lambda s: np.column_stack([length * s, np.zeros(len(s))]), length, spacing)[:, 0]
+
+
+def growing(length: float, first: float, growth: float) -> Array:
+    """Return places (n + 1,) [length] from 0 to `length`: about `first` apart, then each time `growth` times as far."""
+    n = segments(np.log1p(length * (growth - 1.0) / first) / np.log(growth))
+    places = np.concatenate([[0.0], np.cumsum(growth ** np.arange(n))])
+    return np.asarray(length * places / places[-1])
+
+
+def straight(start: Sequence[float], end: Sequence[float], relative: Array) -> Array:
+    """Return points (n, 2) [length] of a straight side at the abscissae `relative` (n,) [-], its ends exact."""
+    a, b, s = np.asarray(start, float), np.asarray(end, float), relative[:, None]
+    return np.where(s < 1.0, a + s * (b - a), b)
+
+
+def arc(centre: Sequence[float], radius: float, angles: Array) -> Array:
+    """Return points (n, 2) [length] of a circle at `angles` (n,) [radian] from its topmost point, clockwise."""
+    return np.asarray(centre, float) + radius * np.column_stack([np.sin(angles), np.cos(angles)])

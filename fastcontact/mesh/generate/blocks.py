@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +11,11 @@ from numpy.typing import NDArray
 from fastcontact.errors import MeshError
 from fastcontact.mesh.generate._blocks import SIDES, rectangular, structured
 from fastcontact.mesh.generate._check import FACES, TRIANGLES, count, each, number, one_of, positive, within
-from fastcontact.mesh.generate._outline import filled, straight
-from fastcontact.mesh.generate._places import with_points_at
-from fastcontact.mesh.generate._spacing import Spacing, divided, geometric, segments_for
+from fastcontact.mesh.generate._spacing import Spacing, divided, geometric, segments_for, straight
+from fastcontact.mesh.generate._triangulate import filled
 from fastcontact.mesh.generate.half_spheres import quarter_disc
 from fastcontact.mesh.generate.quadratic import in_element
-from fastcontact.mesh.generate.transform import renamed, union
+from fastcontact.mesh.generate.transform import renamed, union, with_points_at
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -196,12 +196,9 @@ def _free_block(element: str, width: float, height: float, spacing: Spacing) -> 
     """Triangles whose sides grow with the distance from the pole, as in the cylinder."""
     corners = [(0.0, 0.0), (0.0, -height), (width, -height), (width, 0.0)]
     names = ["LEFT", "BOTTOM", "RIGHT", "TOP"]
-    sides = []
-    for name, start, end in zip(names, corners, corners[1:] + corners[:1], strict=True):
-
-        def side(s: Array, start: tuple[float, float] = start, end: tuple[float, float] = end) -> Array:
-            return straight(start, end, s)
-
-        sides.append((name, divided(side, math.dist(start, end), spacing)))
+    sides = [
+        (name, divided(partial(straight, start, end), math.dist(start, end), spacing))
+        for name, start, end in zip(names, corners, corners[1:] + corners[:1], strict=True)
+    ]
     mesh = in_element(filled("BLOCK", sides, spacing), element)
     return renamed(with_points_at(mesh, {"TOP_LEFT": (0.0, 0.0)}), _BLOCK_NAMES.get)

@@ -1,6 +1,8 @@
-"""Rectangular boxes in three dimensions: hexahedra, or hexahedra cut into tetrahedra, wedges or pyramids."""
+"""Rectangular boxes in three dimensions: hexahedra, or hexahedra cut into tetrahedra, wedges or pyramids; grids of lines."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +10,7 @@ from numpy.typing import NDArray
 from fastcontact.mesh import elements
 from fastcontact.mesh.elements import Element
 from fastcontact.mesh.generate._check import affordable, count, each, number, one_of, positive
+from fastcontact.mesh.generate.blocks import block as rectangle
 from fastcontact.mesh.mesh import Mesh
 
 Indices = NDArray[np.int64]
@@ -105,3 +108,25 @@ def _sides(
                 rows, side = sides.setdefault(kind, {}), f"{AXES[axis].upper()}{end}"
                 rows[side] = np.concatenate([rows.get(side, found[:0, 0]), start + np.arange(len(found))])
     return {kind: np.concatenate(parts) for kind, parts in facets.items()}, sides
+
+
+def on_lines(element: str, lines: Sequence[NDArray[np.float64]], name: str = "BLOCK") -> Mesh:
+    """Return a block, or a box in three dimensions, with the groups of `block` or `box`.
+
+    Parameters
+    ----------
+    element : str
+        Element of the solid.
+    lines : sequence of ndarray (n + 1,)
+        Coordinates of the grid lines of each axis, ascending [length].
+    name : str
+        Name of the solid group.
+    """
+    divisions = [len(places) - 1 for places in lines]
+    if len(lines) == 2:
+        lattice = rectangle((divisions[0], divisions[1]), (divisions[0], divisions[1]), element, name=name)
+    else:
+        n, m, k = divisions
+        lattice = box((n, m, k), (n, m, k), element, name=name)
+    moved = [np.interp(x, np.arange(len(places)), places) for x, places in zip(lattice.points.T, lines, strict=True)]
+    return lattice.replace(points=np.column_stack(moved))

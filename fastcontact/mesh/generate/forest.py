@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.generate.quadratic import Curve, centres, edges_on
+from fastcontact.mesh.generate.quadratic import Curve, centres, edge_keys, edges_of, edges_on, ends_of
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 
@@ -50,17 +50,14 @@ class _Leaves:
 class Forest:
     """A mesh that can be refined locally, as often as wanted.
 
+    MeshError if a cell is of another kind, or a curve's group has no facet on the curve.
+
     Parameters
     ----------
     mesh : Mesh
         Two-dimensional: line2, tri3, quad4.
     curves : iterable of Curve
         True shapes of the boundary: new points on facets that lie on a curve are put on it.
-
-    Raises
-    ------
-    MeshError
-        If a cell is of another kind, or a curve's group has no facet on the curve.
     """
 
     def __init__(self, mesh: Mesh, curves: Iterable[Curve] = ()) -> None:
@@ -107,13 +104,6 @@ class Forest:
             marks = {name: self._too_coarse(name) for name in self.solids}
         self._halve_lines()
 
-    def _key(self, ends: Indices) -> Indices:
-        """One number for each edge (..., 2), the same from either end; good for up to 2**31 points."""
-        return (ends.min(axis=-1) << 32) | ends.max(axis=-1)
-
-    def _edges(self, name: str, corners: Indices) -> Indices:
-        return self._key(corners[:, elements.get(name).edges]) if name != "line2" else self._key(corners)[:, None]
-
     def _middles(self, keys: Indices) -> Indices:
         """Points in the middle of edges, -1 where an edge is not divided."""
         if not len(self._divided):
@@ -126,13 +116,13 @@ class Forest:
         new = np.setdiff1d(keys, self._divided)
         if not len(new):
             return
-        ends = np.column_stack([new >> 32, new & 0xFFFFFFFF])
+        ends = ends_of(new)
         numbers = len(self.points) + np.arange(len(new))
         places = self.points[ends].mean(axis=1)
         for k, curve in enumerate(self.curves):
             on = np.isin(new, self._on_curve[k])
             places[on] = curve.project(places[on])
-            halves = self._key(np.stack([ends[on], np.column_stack([numbers[on], numbers[on]])], axis=2).reshape(-1, 2))
+            halves = edge_keys(np.stack([ends[on], np.column_stack([numbers[on], numbers[on]])], axis=2).reshape(-1, 2))
             self._on_curve[k] = np.concatenate([self._on_curve[k], halves])
         self.points = np.concatenate([self.points, places])
         for group, members in self._groups.items():
@@ -146,7 +136,7 @@ class Forest:
         """Divide the marked leaves of one kind."""
         leaves = self._leaves[name]
         parents = leaves.corners[mask]
-        keys = self._edges(name, parents)
+        keys = edges_of(name, parents)
         self._divide(np.unique(keys))
         lattice = [parents, self._middles(keys)]
         if name == "quad4":
@@ -162,13 +152,13 @@ class Forest:
     def _too_coarse(self, name: str) -> Mask:
         """Return the leaves (n,) that green division cannot adapt: an edge is divided twice, or too many edges are."""
         corners = self._leaves[name].corners
-        keys = self._edges(name, corners)
+        keys = edges_of(name, corners)
         middles = self._middles(keys)
         divided = middles >= 0
         ends = corners[:, elements.get(name).edges]
         twice = np.zeros(divided.shape, bool)
         for end in (0, 1):
-            half = self._key(np.stack([ends[:, :, end], np.where(divided, middles, 0)], axis=2))
+            half = edge_keys(np.stack([ends[:, :, end], np.where(divided, middles, 0)], axis=2))
             twice |= divided & (self._middles(half) >= 0)
         count = divided.sum(axis=1)
         opposite = (count == 2) & (divided[:, 0] == divided[:, 2]) if name == "quad4" else np.zeros(len(corners), bool)
@@ -179,7 +169,7 @@ class Forest:
             return
         while True:
             corners = self._leaves["line2"].corners
-            mask = (self._middles(self._edges("line2", corners)) >= 0).ravel()
+            mask = (self._middles(edges_of("line2", corners)) >= 0).ravel()
             if not mask.any():
                 return
             self._quarter("line2", mask)
@@ -210,7 +200,7 @@ class Forest:
         """Return kinds, cells and their leaves: whole, or divided (green) where their edges are."""
         if name == "line2":
             return [(name, corners, np.arange(len(corners)))]
-        middles = self._middles(self._edges(name, corners))
+        middles = self._middles(edges_of(name, corners))
         count = (middles >= 0).sum(axis=1)
         found = [(name, corners[count == 0], np.flatnonzero(count == 0))]
         sides = CORNERS[name]

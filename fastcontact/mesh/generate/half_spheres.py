@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.mesh.generate._blocks import structured, transfinite
-from fastcontact.mesh.generate._check import FACES, TRIANGLES, at_most, count, each, one_of, positive, unused, within
-from fastcontact.mesh.generate._outline import arc, filled, straight
-from fastcontact.mesh.generate._places import with_points_at
-from fastcontact.mesh.generate._spacing import Spacing, divided, geometric
+from fastcontact.mesh.generate._check import FACES, TRIANGLES, count, each, one_of, positive, unused, within
+from fastcontact.mesh.generate._spacing import Spacing, arc, divided, geometric, straight
+from fastcontact.mesh.generate._triangulate import filled
 from fastcontact.mesh.generate.quadratic import Circle, in_element
-from fastcontact.mesh.generate.transform import merge_points, mirrored, union
+from fastcontact.mesh.generate.transform import merge_points, mirrored, union, with_points_at
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -147,14 +147,16 @@ def _of_quadrangles(
     """Lower body in quad4: the square A-P-N-M and the two blocks between it and the arc."""
     n = 15 if segments is None else count("segments", segments)
     length = 0.25 * math.pi * R
-    near, far = (R / 250, R / 25) if arc_sizes is None else each(at_most(length), "arc_sizes", arc_sizes)
+    near, far = (
+        (R / 250, R / 25) if arc_sizes is None else each(partial(positive, at_most=length), "arc_sizes", arc_sizes)
+    )
     along = geometric(length, near, far)
     equal = np.linspace(0.0, 1.0, n + 1)
     if radial_sizes is None:
         lengths = (near / far) ** (np.arange(n) / max(n - 1, 1))
         outward = np.append(0.0, np.cumsum(lengths)) / lengths.sum()
     else:
-        at_contact, inside = each(at_most(0.5 * R), "radial_sizes", radial_sizes)
+        at_contact, inside = each(partial(positive, at_most=0.5 * R), "radial_sizes", radial_sizes)
         outward = geometric(0.5 * R, inside, at_contact)
     return _three_blocks(R, along, outward, equal)
 

@@ -71,8 +71,10 @@ class Circle:
 def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool = False) -> Mesh:
     """Return the mesh with a mid node on every edge: tri3 to tri6, quad4 to quad8 or quad9, hex8 to hex20 ...
 
-    A mid node stands half-way between its ends, but on the curve where the edge belongs to a facet of the curve's
-    group and both its ends lie on the curve. Points keep their numbers, mid nodes follow, then centre nodes.
+    A mid node stands half-way between its ends, but on the curve where the edge belongs to a facet of the curve's group
+    and both its ends lie on the curve. Points keep their numbers, mid nodes follow, then centre nodes. MeshError if a
+    cell is quadratic already, `centre_nodes` is given for a 3D mesh, a curve's group has no edge on the curve, or a cell
+    is folded by its curved side (its Jacobian is not positive at a quadrature point).
 
     Parameters
     ----------
@@ -82,23 +84,17 @@ def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool
         True shapes of the boundary, for example `Circle`.
     centre_nodes : bool
         Whether quadrangles get a centre node (quad9); 2D only.
-
-    Raises
-    ------
-    MeshError
-        If a cell is quadratic already, `centre_nodes` is given for a 3D mesh, a curve's group has no edge on the
-        curve, or a cell is folded by its curved side (its Jacobian is not positive at a quadrature point).
     """
     names = _quadratic_names(mesh, centre_nodes)
-    edges = _edges(mesh.cells, mesh.n_points)
-    middles = mesh.points[_ends(edges, mesh.n_points)].mean(axis=1)
+    edges = _edges(mesh.cells)
+    middles = mesh.points[ends_of(edges)].mean(axis=1)
     for curve in curves:
-        rows = _rows_on(mesh, curve, edges)
+        rows = np.searchsorted(edges, edges_on(mesh, curve))
         middles[rows] = curve.project(middles[rows])
     points = [mesh.points, middles]
     cells, n_points = {}, mesh.n_points + len(middles)
     for name, block in mesh.cells.items():
-        mids = mesh.n_points + np.searchsorted(edges, _edge_keys(name, block, mesh.n_points))
+        mids = mesh.n_points + np.searchsorted(edges, edges_of(name, block))
         columns = [block, mids]
         if names[name] in _WITH_CENTRE.values():
             points.append(centres(mesh.points[block], middles[mids - mesh.n_points]))
@@ -131,34 +127,35 @@ def _quadratic_names(mesh: Mesh, centre_nodes: bool) -> dict[str, str]:
     return names
 
 
-def _edge_keys(name: str, block: Indices, n_points: int) -> Indices:
-    """Return one number for each edge (n_cells, n_edges), the same in all cells that share it."""
-    ends = np.sort(block[:, elements.get(name).edges].astype(np.int64), axis=2)
-    return ends[:, :, 0] * n_points + ends[:, :, 1]
+def edge_keys(ends: Indices) -> Indices:
+    """Return one number for each edge (...), the same from either end, by its `ends` (..., 2) of int."""
+    return (ends.min(axis=-1).astype(np.int64) << 32) | ends.max(axis=-1)
 
 
-def _edges(cells: Mapping[str, Indices], n_points: int) -> Indices:
-    """Sorted edge keys of all cells, each once."""
-    keys = [_edge_keys(name, block, n_points).ravel() for name, block in cells.items()]
+def ends_of(keys: Indices) -> Indices:
+    """Return the point numbers (n, 2) at the ends of the edges with the `keys` (n,) of int."""
+    return np.column_stack([keys >> 32, keys & 0xFFFFFFFF])
+
+
+def edges_of(name: str, cells: Indices) -> Indices:
+    """Return the keys (n_cells, n_edges) of the edges of `cells` (n_cells, n_nodes) of element `name`."""
+    return edge_keys(cells[:, elements.get(name).edges])
+
+
+def _edges(cells: Mapping[str, Indices]) -> Indices:
+    """Sorted keys of the edges of all cells, each once."""
+    keys = [edges_of(name, block).ravel() for name, block in cells.items()]
     return np.unique(np.concatenate(keys)) if keys else np.empty(0, np.int64)
 
 
-def _ends(keys: Indices, n_points: int) -> Indices:
-    """Point numbers (n_edges, 2) of the ends of edges."""
-    return np.column_stack([keys // n_points, keys % n_points])
-
-
 def edges_on(mesh: Mesh, curve: Curve) -> Indices:
-    """Return the edges (n,) of the curve's facets that have both ends on it, each as ``least end << 32 | greatest end``.
-
-    MeshError if there is none.
-    """
-    ends = _ends(_edges(facets_of(mesh, curve), mesh.n_points), mesh.n_points)
-    on = all_on(mesh, curve, ends)
+    """Return the keys (n,) of the edges of the curve's facets that have both ends on it; MeshError if there is none."""
+    edges = _edges(facets_of(mesh, curve))
+    on = all_on(mesh, curve, ends_of(edges))
     if not on.any():
         where = "outer facets" if curve.group is None else f"group '{curve.group}'"
         raise MeshError(f"no edge of {where} has both ends on {curve}: check its centre and radius")
-    return ends[on, 0] << 32 | ends[on, 1]
+    return edges[on]
 
 
 def facets_of(mesh: Mesh, curve: Curve) -> Mapping[str, Indices]:
@@ -173,12 +170,6 @@ def all_on(mesh: Mesh, curve: Curve, nodes: Indices) -> Mask:
     flat = places.reshape(-1, mesh.dim)
     off = np.linalg.norm(curve.project(flat) - flat, axis=1).reshape(nodes.shape).max(axis=1)
     return np.asarray(off <= ON_CURVE * length)
-
-
-def _rows_on(mesh: Mesh, curve: Curve, edges: Indices) -> Indices:
-    """Rows of `edges` that belong to the curve's facets and have both ends on it."""
-    found = edges_on(mesh, curve)
-    return np.searchsorted(edges, (found >> 32) * mesh.n_points + (found & 0xFFFFFFFF))
 
 
 def centres(corners: Array, middles: Array) -> Array:

@@ -85,7 +85,8 @@ def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
 
     New points stand where the parent's shape functions put them; on a curve if they belong to a facet of the curve's
     group all of whose nodes lie on it. Points keep their numbers. Cell groups hold the children of their cells; a new
-    point joins every point group that holds all nodes of its edge (or, inside a cell, of the cell).
+    point joins every point group that holds all nodes of its edge (or, inside a cell, of the cell). MeshError if a cell
+    is of another kind, a curve's group has no facet on the curve, or a child is folded by its curved side.
 
     Parameters
     ----------
@@ -93,12 +94,6 @@ def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
         Two-dimensional; tri3, tri6, quad4, quad8, quad9, line2, line3.
     curves : iterable of Curve
         True shapes of the boundary, for example `Circle`; see also `circles`.
-
-    Raises
-    ------
-    MeshError
-        If a cell is of another kind, a curve's group has no facet on the curve, or a child is folded by its curved
-        side.
     """
     curves = list(curves)
     keys, where, numbers = _numbered(mesh)

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.mesh.generate._check import count, each, one_of, positive
-from fastcontact.mesh.generate._lattice import graded, on_lines
-from fastcontact.mesh.generate._places import with_points_at
-from fastcontact.mesh.generate._spacing import Spacing, segments_for
-from fastcontact.mesh.generate.transform import merge_points, renamed, union
+from fastcontact.mesh.generate._spacing import Spacing, graded, segments_for
+from fastcontact.mesh.generate.box import on_lines
+from fastcontact.mesh.generate.transform import merge_points, renamed, union, with_points_at
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 

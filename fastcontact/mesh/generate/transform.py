@@ -1,8 +1,8 @@
-"""Mirror, move, unite, weld and rename meshes."""
+"""Mirror, move, unite, weld and rename meshes, and name groups by their places."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -48,6 +48,8 @@ def renamed(mesh: Mesh, names: Names) -> Mesh:
 def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None) -> Mesh:
     """Return the mirror image; cells and facets are turned so that they stay oriented as they were.
 
+    MeshError if the mesh has no such axis.
+
     Parameters
     ----------
     mesh : Mesh
@@ -57,11 +59,6 @@ def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None
         Where the mirror stands on that axis [length].
     rename : mapping or callable, optional
         New names of groups, as in `renamed`.
-
-    Raises
-    ------
-    MeshError
-        If the mesh has no such axis.
     """
     column = _AXES.index(one_of("axis", axis, _AXES[: mesh.dim]))
     points = mesh.points.copy()
@@ -74,6 +71,8 @@ def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None
 def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float = 1.0, rotate: float = 0.0) -> Mesh:
     """Return the mesh scaled about the origin, then rotated about it (2D only), then translated.
 
+    MeshError if a number is out of range, or a 3D mesh is to be rotated.
+
     Parameters
     ----------
     mesh : Mesh
@@ -83,11 +82,6 @@ def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float 
         Factor, greater than 0.
     rotate : float
         Angle, counter-clockwise [degrees].
-
-    Raises
-    ------
-    MeshError
-        If a number is out of range, or a 3D mesh is to be rotated.
     """
     if not number("scale", scale) > 0.0:
         raise MeshError(f"scale = {scale:g} is out of range: it must be greater than 0 (reflect with mirrored)")
@@ -108,36 +102,32 @@ def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float 
 def union(*meshes: Mesh) -> Mesh:
     """Return one mesh of several: points one after the other, none merged, groups of the same name united.
 
-    Raises
-    ------
-    MeshError
-        If there is no mesh or the dimensions differ.
+    MeshError if there is no mesh or the dimensions differ.
     """
     if not meshes:
         raise MeshError("union needs at least one mesh")
     if len({mesh.dim for mesh in meshes}) > 1:
         raise MeshError(f"union needs meshes of one dimension, not {[mesh.dim for mesh in meshes]}")
-    first_point = np.cumsum([0] + [mesh.n_points for mesh in meshes])
-    blocks: dict[str, list[Indices]] = {}
-    for mesh, shift in zip(meshes, first_point[:-1], strict=True):
-        for name, block in mesh.cells.items():
-            blocks.setdefault(name, []).append(block + shift)
-    cells = {name: np.concatenate(parts) for name, parts in blocks.items()}
-    cell_groups: dict[str, list[Indices]] = {}
-    point_groups: dict[str, list[Indices]] = {}
+    shifts = np.cumsum([0] + [mesh.n_points for mesh in meshes])[:-1]
+    both = list(zip(meshes, shifts, strict=True))
+    cells = _joined({name: block + shift for name, block in mesh.cells.items()} for mesh, shift in both)
     starts = _starts(cells)
-    for mesh, shift in zip(meshes, first_point[:-1], strict=True):
-        numbers = _renumbering(mesh, starts)
-        for name, members in mesh.cell_groups.items():
-            cell_groups.setdefault(name, []).append(numbers[members])
-        for name, members in mesh.point_groups.items():
-            point_groups.setdefault(name, []).append(members + shift)
+    numbers = [(mesh, _renumbering(mesh, starts)) for mesh in meshes]
     return Mesh(
         np.concatenate([mesh.points for mesh in meshes]),
         cells,
-        {name: np.concatenate(parts) for name, parts in cell_groups.items()},
-        {name: np.concatenate(parts) for name, parts in point_groups.items()},
+        _joined({name: new[members] for name, members in mesh.cell_groups.items()} for mesh, new in numbers),
+        _joined({name: members + shift for name, members in mesh.point_groups.items()} for mesh, shift in both),
     )
+
+
+def _joined(parts: Iterable[Groups]) -> Groups:
+    """Return the arrays of the same name, one after the other."""
+    found: dict[str, list[Indices]] = {}
+    for part in parts:
+        for name, values in part.items():
+            found.setdefault(name, []).append(values)
+    return {name: np.concatenate(arrays) for name, arrays in found.items()}
 
 
 def _starts(cells: Mapping[str, Indices]) -> dict[str, int]:
@@ -159,18 +149,14 @@ def _renumbering(mesh: Mesh, starts: dict[str, int]) -> Indices:
 def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
     """Return the mesh with points closer than `tolerance` welded into one, the first of them.
 
-    Points are welded wherever they lie, also where two bodies only touch. Chains of close points become one.
+    Points are welded wherever they lie, also where two bodies only touch. Chains of close points become one. MeshError
+    if two nodes of one cell fall together: the tolerance is larger than an edge.
 
     Parameters
     ----------
     mesh : Mesh
     tolerance : float
         Largest distance of points that are the same, at least 0 [length].
-
-    Raises
-    ------
-    MeshError
-        If two nodes of one cell fall together: the tolerance is larger than an edge.
     """
     from scipy.spatial import cKDTree
 
@@ -195,3 +181,22 @@ def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
             )
     point_groups = {name: target[members] for name, members in mesh.point_groups.items()}
     return mesh.replace(points=mesh.points[kept], cells=cells, point_groups=point_groups)
+
+
+def with_points_at(mesh: Mesh, places: Mapping[str, Sequence[float]]) -> Mesh:
+    """Return the mesh with a point group for the point nearest to each place [length]."""
+    nearest = {
+        name: [int(((mesh.points - np.asarray(place)) ** 2).sum(axis=1).argmin())] for name, place in places.items()
+    }
+    return mesh.with_groups(points=nearest)
+
+
+def with_cells_inside(mesh: Mesh, name: str, group: str, inside: Callable[[Array], NDArray[np.bool_]]) -> Mesh:
+    """Return the mesh with a cell group `name`: the cells of `group` whose nodes are all inside.
+
+    `inside` (n,) maps points (n, dim) [length] to booleans.
+    """
+    near = inside(mesh.points)
+    rows = mesh.split(mesh.cell_groups[group])
+    parts = [mesh.offsets[kind] + own[near[mesh.cells[kind][own]].all(axis=1)] for kind, own in rows.items()]
+    return mesh.with_groups(cells={name: np.concatenate(parts)})

@@ -13,7 +13,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.generate import block, box, quarter_disc, sphere_octant
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.model.body_overlap_3d_kernels import winding_numbers
+from fastcontact.model.body_overlap_kernels import winding_numbers
 
 SOLIDS_3D = ("hex8", "hex20", "hex27", "tet4", "tet10", "wedge6", "wedge15", "pyramid5")
 

@@ -205,25 +205,15 @@ def test_stiffness_equals_its_numpy_twin(element):
     assert np.array_equal(K, K.T)
 
 
-@pytest.mark.parametrize("element", ["tet4", "hex8", "wedge15", "pyramid13"])
-def test_stiffness_of_any_symmetric_moduli_equals_its_twin(element):
-    root = np.random.default_rng(3).normal(size=(6, 6))
-    moduli = root @ root.T
-    mesh = patch(element, (2, 1, 1))
-    K, expected = assembled(mesh, moduli).toarray(), twin(mesh, moduli)
-    assert np.abs(K - expected).max() < 1e-12 * np.abs(expected).max()
-    assert np.array_equal(K, K.T)
-
-
 def test_each_cell_has_its_own_material():
     mesh = patch("hex8", (2, 1, 1))
-    orthotropic = D + np.diag([50.0, 0, 0, 0, 0, 20.0])
+    other = fc.LinearElastic(2 * E, -0.2).moduli("3d")
     first, second = (
         stiffness(mesh.replace(cells={"hex8": mesh.cells["hex8"][[i]]}, cell_groups={}), "3d", moduli[None],
                   {"hex8": np.zeros(1, np.int32)}).toarray()
-        for i, moduli in enumerate((D, orthotropic))
+        for i, moduli in enumerate((D, other))
     )  # fmt: skip
-    both = stiffness(mesh, "3d", np.stack([orthotropic, D]), {"hex8": np.array([1, 0], np.int32)}).toarray()
+    both = stiffness(mesh, "3d", np.stack([other, D]), {"hex8": np.array([1, 0], np.int32)}).toarray()
     assert np.abs(both - first - second).max() < 1e-12 * np.abs(both).max()
 
 

@@ -10,8 +10,7 @@ import fastcontact as fc
 from fastcontact.mesh.generate import block, box, sphere_octant, union
 from fastcontact.mesh.topology import outer_facets
 from fastcontact.model.body_overlap import _depths_in_space, penetration
-from fastcontact.model.body_overlap_2d_kernels import count_crossings
-from fastcontact.model.body_overlap_3d_kernels import winding_numbers
+from fastcontact.model.body_overlap_kernels import count_crossings, winding_numbers
 
 SOLIDS = ("hex8", "hex20", "hex27", "tet4", "tet10", "wedge6", "wedge15", "pyramid5", "pyramid13")
 

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fastcontact as fc
-from fastcontact.mesh.generate._delaunay import delaunay, edges_of, stars_of
-from fastcontact.mesh.generate._outline import filled
+from fastcontact.mesh.generate._smooth import delaunay, edges_of, stars_of
 from fastcontact.mesh.generate._spacing import Spacing, divided, geometric
+from fastcontact.mesh.generate._triangulate import filled
 
 size = st.floats(0.01, 1.0)
 

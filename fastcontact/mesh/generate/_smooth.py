@@ -1,4 +1,4 @@
-"""Improve a triangulation: single points are moved so that the worst triangle around each becomes better."""
+"""Improve a Delaunay triangulation: points are spread evenly, then moved one by one off the worst triangles."""
 
 from __future__ import annotations
 
@@ -7,19 +7,92 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.mesh.generate._delaunay import delaunay, edges_of, stars_of
-
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 Size = Callable[[Array], Array]
 
-_KEPT = 4  # sweeps with one triangulation
+_KEPT = 4  # steps with one triangulation
+_STEP = 0.2  # pseudo-time of one step of `relax`
+_STRETCH = 1.2  # bars push until they are this much longer than they can be, so that the points spread
 _DIRECTIONS = np.linspace(0.0, 2 * np.pi, 13)[:-1]
 _TRIALS = np.column_stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
 _TRIALS = np.vstack([_TRIALS, 0.5 * _TRIALS])
 _GOOD = np.sin(np.radians(50.0))  # a star whose smallest angle is larger is left as it is
 _TOO_LONG = 0.5, 2.0  # penalty of an edge too long, and per relative excess, in sines of an angle
+
+
+def delaunay(points: Array) -> Numbers:
+    """Return counter-clockwise triangles (n_triangles, 3) of the convex hull of `points` (n, 2) [length], without flat ones.
+
+    Nodes in line on the hull give triangles of zero area by rounding; they are dropped.
+    """
+    from scipy.spatial import Delaunay
+
+    triangles = Delaunay(points).simplices.astype(np.intp)
+    first, second, third = (points[triangles[:, i]] for i in range(3))
+    u, v = second - first, third - first
+    twice_area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    flat = np.abs(twice_area) <= 1e-9 * ((u * u).sum(axis=1) + (v * v).sum(axis=1))
+    clockwise = twice_area < 0
+    triangles[clockwise] = triangles[clockwise][:, [0, 2, 1]]
+    return triangles[~flat]
+
+
+def edges_of(triangles: Numbers) -> Numbers:
+    """Return the edges (n_edges, 2) of `triangles` (n_triangles, 3), each once, smaller point number first."""
+    ends = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    ends.sort(axis=1)
+    n = int(ends.max()) + 1
+    keys = np.unique(ends[:, 0] * n + ends[:, 1])
+    return np.column_stack([keys // n, keys % n])
+
+
+def stars_of(triangles: Numbers, n_points: int) -> Numbers:
+    """Return the edges (n_points, degree, 2) of `triangles` (n_triangles, 3) opposite to each point, padded with -1."""
+    centre = triangles.ravel()
+    opposite = np.stack([np.roll(triangles, -1, axis=1), np.roll(triangles, -2, axis=1)], axis=2).reshape(-1, 2)
+    order = np.argsort(centre, kind="stable")
+    centre, opposite = centre[order], opposite[order]
+    degree = np.bincount(centre, minlength=n_points)
+    first = np.concatenate([[0], np.cumsum(degree)[:-1]])
+    stars = np.full((n_points, degree.max(), 2), -1)
+    stars[centre, np.arange(len(centre)) - first[centre]] = opposite
+    return stars
+
+
+def relax(points: Array, movable: Mask, size: Size, steps: int) -> Array:
+    """Return points (n, 2) [length], the movable ones spread by repulsive bars along the edges.
+
+    The bars of a truss push its nodes apart until the lengths follow the size function (P.-O. Persson and
+    G. Strang, A simple mesh generator in MATLAB, SIAM Review 46, 2004, section 2). Of the `points` (n, 2) [length] those
+    `movable` (n,) of bool move, in so many `steps`; ``size(points)``, `size` (n,) [length], is the wanted length of edges.
+    """
+    points = points.copy()
+    if not movable.any():
+        return points
+    for step in range(steps):
+        if step % _KEPT == 0:
+            edges = edges_of(delaunay(points))
+            edges = edges[movable[edges].any(axis=1)]
+            wanted = size(points[edges].mean(axis=1))
+        push = _push(points, edges, wanted)
+        points[movable] += _STEP * push[movable]
+    return points
+
+
+def _push(points: Array, edges: Numbers, wanted: Array) -> Array:
+    """Sum (n, 2) of the bar forces at the points; a bar longer than its rest length does not pull."""
+    bars = points[edges[:, 0]] - points[edges[:, 1]]
+    length = np.sqrt((bars * bars).sum(axis=1))
+    # The rest lengths are scaled to the lengths there are, so that the pressure is the same everywhere.
+    rest = _STRETCH * wanted * np.sqrt((length**2).sum() / (wanted**2).sum())
+    force = (np.maximum(rest - length, 0.0) / length)[:, None] * bars
+    push = np.empty_like(points)
+    for axis in range(2):
+        push[:, axis] = np.bincount(edges[:, 0], force[:, axis], len(points))
+        push[:, axis] -= np.bincount(edges[:, 1], force[:, axis], len(points))
+    return push
 
 
 def polish(points: Array, movable: Mask, limit: Size, sweeps: int) -> Array:

@@ -1,0 +1,47 @@
+"""A contact pair as a user describes it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from fastcontact.contact.obstacles import Obstacle
+from fastcontact.model.pair_options import clearance_ramp
+from fastcontact.model.ramp import Table
+
+# Force on an obstacle by component, None where the component is prescribed; empty for none at all.
+Driving = tuple[float | None, ...]
+
+
+@dataclass(frozen=True)
+class ContactPair:
+    """Two groups of facets that may touch, or one and a rigid obstacle, with a formulation and its options.
+
+    With an `obstacle`, `primary` is empty; `motion` is the obstacle's displacement at multiplier 1 [length], and `ramp`
+    a history of its own or None. Components of `force` that are not None drive the obstacle at multiplier 1 [force].
+    """
+
+    name: str
+    secondary: str
+    primary: str
+    formulation: str
+    options: dict[str, Any] = field(default_factory=dict)
+    obstacle: Obstacle | None = None
+    motion: tuple[float, ...] = ()
+    ramp: Table | None = None
+    force: Driving = ()
+
+    @property
+    def eliminable(self) -> bool:
+        """Whether closed constraints can be eliminated: not where they give way by themselves."""
+        return self.formulation != "continuous" and not self.options.get("penalty")
+
+    @property
+    def clearance_ramp(self) -> Table | None:
+        """History of the clearance; None where it does not change."""
+        return clearance_ramp(self.name, self.options)
+
+    @property
+    def opposite(self) -> str:
+        """What the secondary side may touch, for messages."""
+        return self.primary if self.obstacle is None else "a rigid obstacle"
