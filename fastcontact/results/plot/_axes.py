@@ -15,13 +15,7 @@ UNITS: Units = {"length": "mm", "force": "N", "pressure": "MPa"}
 
 
 def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None = None) -> Any:
-    """Return `ax`, or new axes in a figure of their own, ``projection="3d"`` for solids.
-
-    Raises
-    ------
-    FastcontactError
-        If matplotlib is not installed.
-    """
+    """Return `ax`, or new axes in a figure of their own, ``projection="3d"`` for solids."""
     if ax is not None:
         return ax
     try:

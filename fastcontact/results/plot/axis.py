@@ -76,13 +76,7 @@ def axis_stress(
 
 
 def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, NDArray[np.int64], Array]:
-    """Return depth (n,) [length], side (n,), 1 above and -1 below the surface, and stress (n, 4) of the axis nodes.
-
-    Raises
-    ------
-    FastcontactError
-        If the mesh is three-dimensional or has no nodes on the axis.
-    """
+    """Return depth (n,) [length], side (n,), 1 above and -1 below the surface, and stress (n, 4) of the axis nodes."""
     if mesh.dim != 2:
         raise FastcontactError("stresses along the axis are for meshes in two dimensions: probe points in three")
     contact = step.contact[pair]

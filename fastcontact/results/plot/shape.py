@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.contact.search.closest import flat_triangles
+from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import UNITS, Units, name_axes, new_axes
