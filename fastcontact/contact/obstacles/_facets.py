@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact.errors import ContactError
@@ -228,11 +228,7 @@ def _smooth_normals(blocks: list[Block], own: list[tuple[Array, Array]], crease:
 
 def _pairs_at_nodes(node: Indices) -> tuple[Indices, Indices]:
     """Return all pairs (i, j), i = j among them, of entries with the same node."""
-    order = np.argsort(node, kind="stable")
-    first = np.flatnonzero(np.r_[True, np.diff(node[order]) != 0])
-    count = np.diff(np.r_[first, len(node)])
-    reach, start = np.repeat(count, count), np.repeat(first, count)
-    i = np.repeat(np.arange(len(node)), reach)
-    begin = np.concatenate([[0], np.cumsum(reach)[:-1]])
-    j = np.arange(len(i)) - np.repeat(begin, reach) + np.repeat(start, reach)
-    return order[i], order[j]
+    at = csr_array((np.ones(len(node)), node, np.arange(len(node) + 1)))
+    pairs = at @ at.T
+    pairs.sort_indices()
+    return pairs.nonzero()

@@ -102,7 +102,8 @@ class MeshedSurface:
         found = closest_of_kinds(points, [block.corners for block in self._facets.blocks])
         sense, smooth, on_ridge, on_border = self._frames(found)
         apart = points - found.position
-        size = self._sizes(found.facet)
+        extents = [np.linalg.norm(np.ptp(block.corners, axis=1), axis=1) for block in self._facets.blocks]
+        size = np.concatenate(extents)[found.facet]
         touching = found.distance <= TOUCHING * size
         outside = np.einsum("nd,nd->n", apart, sense) >= 0
         distance = np.where(outside, found.distance, -found.distance)
@@ -116,10 +117,6 @@ class MeshedSurface:
         aside = np.sqrt(np.maximum(found.distance**2 - height**2, 0.0))
         nothing = on_border & (aside > BEYOND * size) & (aside > LEAN * height)
         return np.where(nothing, np.inf, distance), normal
-
-    def _sizes(self, facet: Indices) -> Array:
-        sizes = [np.linalg.norm(np.ptp(block.corners, axis=1), axis=1) for block in self._facets.blocks]
-        return np.asarray(np.concatenate(sizes)[facet])
 
     def _frames(self, found: Closest) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
         """Return, at projections, a vector that tells in from out (n, dim), smooth normals, what is on a ridge or border.

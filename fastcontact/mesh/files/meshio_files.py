@@ -44,13 +44,9 @@ HDF5_FORMATS = ("cgns", "h5m", "hmf", "exodus")
 # Cells that meshio gets in another order than ours: our node k is its node NODE_ORDER[format][element][k]. It mirrors
 # the linear wedge of VTK, as old documents of VTK want and VTK 9.7 does not, and leaves Gmsh's wedge of 18 nodes alone.
 Orders = Mapping[str, tuple[int, ...]]
-_WEDGE_OF_VTK: Orders = {"wedge6": elements.get("wedge6").reversed}
-_WEDGE_OF_GMSH: Orders = {"wedge18": (0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16)}
 NODE_ORDER: dict[str, Orders] = {
-    "vtk": _WEDGE_OF_VTK,
-    "vtu": _WEDGE_OF_VTK,
-    "gmsh": _WEDGE_OF_GMSH,
-    "gmsh22": _WEDGE_OF_GMSH,
+    **{key: {"wedge6": elements.get("wedge6").reversed} for key in ("vtk", "vtu")},
+    **{key: {"wedge18": (0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16)} for key in ("gmsh", "gmsh22")},
 }
 
 # How much of what meshio says goes into a message.

@@ -26,10 +26,3 @@ def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None 
     figure = Figure(figsize=size, layout="constrained", dpi=150)
     FigureCanvasAgg(figure)
     return figure.add_subplot(projection=projection)
-
-
-def name_axes(ax: Axes, x: str, y: str, title: str) -> None:
-    """Write the names of both axes and the title."""
-    ax.set_xlabel(x)
-    ax.set_ylabel(y)
-    ax.set_title(title)

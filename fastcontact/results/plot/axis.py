@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNITS, Units, name_axes, new_axes
+from fastcontact.results.plot._axes import UNITS, Units, new_axes
 from fastcontact.results.step import StepResult
 
 if TYPE_CHECKING:
@@ -69,7 +69,8 @@ def axis_stress(
         axes.plot(fine, von_mises(exact), style, color="C2", lw=1.0)
         axes.plot([], [], f"k{style}", lw=1.0, label=label)
     title = title or f"Stresses on the axis, load factor {step.load_factor:g}"
-    name_axes(axes, f"depth under the surface [{units['length']}]", f"stress [{units['pressure']}]", title)
+    depth_name, stress_name = f"depth under the surface [{units['length']}]", f"stress [{units['pressure']}]"
+    axes.set(xlabel=depth_name, ylabel=stress_name, title=title)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
     return axes
