@@ -82,11 +82,6 @@ def check_threads() -> None:
 
     The threads of GNU's OpenMP do not survive a fork; its library ends such a child without an exception, and a process
     pool then waits for ever.
-
-    Raises
-    ------
-    FastcontactError
-        If this process was forked from one that had started the threads.
     """
     if _forked_without_threads:
         raise FastcontactError(

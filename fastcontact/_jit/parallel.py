@@ -9,7 +9,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager
 from functools import lru_cache, wraps
 from typing import Any, ParamSpec, TypeVar
 
@@ -41,21 +40,15 @@ def _libraries() -> Any:
     return ThreadpoolController()
 
 
-def one_blas_thread() -> AbstractContextManager[object]:
-    """Keep BLAS to one thread for a while: its others spin between the small calls of a contact iteration.
+def on_one_blas_thread(function: Callable[Given, Result]) -> Callable[Given, Result]:
+    """Keep BLAS to one thread while a function runs: its others spin between the small calls of a contact iteration.
 
     Also, the number of its threads decides the order of its sums, and so the last bits of a result.
     """
-    limited: AbstractContextManager[object] = _libraries().limit(limits=1, user_api="blas")
-    return limited
-
-
-def on_one_blas_thread(function: Callable[Given, Result]) -> Callable[Given, Result]:
-    """Let a function run under `one_blas_thread`."""
 
     @wraps(function)
     def limited(*args: Given.args, **kwargs: Given.kwargs) -> Result:
-        with one_blas_thread():
+        with _libraries().limit(limits=1, user_api="blas"):
             return function(*args, **kwargs)
 
     return limited

@@ -38,12 +38,8 @@ def left_at(path: Path) -> tuple[int, ...] | None:
 class PathLock:
     """Exclusive right to write one path, through a locked file beside it; viewers may lock the result file itself.
 
-    The operating system ends the lock with its process, however that ends, so that no lock is left over.
-
-    Raises
-    ------
-    FileError
-        If another writer, in this process or in another one, holds the path.
+    The operating system ends the lock with its process, however that ends, so that no lock is left over. FileError is
+    raised where another writer, in this process or in another one, holds the path.
     """
 
     def __init__(self, target: Path) -> None:

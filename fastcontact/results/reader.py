@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import FileError
-from fastcontact.mesh.files.hdf5 import check_contents, is_hdf5
+from fastcontact.mesh.files.hdf5 import check_contents
 from fastcontact.mesh.files.packing import unpacked
 from fastcontact.mesh.files.paths import PathLike, existing_file
 from fastcontact.mesh.mesh import Mesh
@@ -79,27 +79,26 @@ class Results(Sequence[StepResult]):
     """
 
     def __init__(self, path: PathLike) -> None:
-        self.path = Path(path)
-        existing_file(self.path)
+        import h5py
+
+        self.path: Path = existing_file(path)
         if not os.access(path, os.R_OK, effective_ids=os.access in os.supports_effective_ids):
             raise FileError(f"'{path}' may not be read: ask its owner for the permission")
-        if not is_hdf5(self.path):
+        if not h5py.is_hdf5(self.path):
             raise FileError(f"'{path}' is no HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
         # A file object of our own: by its name HDF5 would return a file that this process has open, as it was then.
         self._raw = open(path, "rb")  # noqa: SIM115
         self._file: Any = None
         try:
             with self._explained():
-                self._read_header(self._open())
+                self._file = h5py.File(self._raw, "r")
+                self._read_header(self._checked())
         except BaseException:
             self.close()
             raise
 
-    def _open(self) -> Any:
-        """Open the file with HDF5, if it is one of ours and of a known schema; return our group in it."""
-        import h5py
-
-        self._file = h5py.File(self._raw, "r")
+    def _checked(self) -> Any:
+        """Return our group in the file, if it is one of ours and of a known schema."""
         if self._file.userblock_size or self._file.id.get_create_plist().get_sizes() != (8, 8):
             raise ValueError("its addresses are none of ours")
         check_contents(self._file, self.path)
@@ -150,15 +149,7 @@ class Results(Sequence[StepResult]):
     @overload
     def __getitem__(self, number: slice) -> list[StepResult]: ...
     def __getitem__(self, number: int | slice) -> StepResult | list[StepResult]:
-        """Return a step by its position, from 0, or from the end if negative; a slice gives a list of steps.
-
-        Raises
-        ------
-        IndexError
-            If there is no such step.
-        FileError
-            If the file was closed or is damaged.
-        """
+        """Return a step by its position, from 0, or from the end if negative; a slice gives a list of steps."""
         if isinstance(number, slice):
             return [self._read_step(position) for position in range(*number.indices(self._n_steps))]
         if not -self._n_steps <= number < self._n_steps:
@@ -184,17 +175,9 @@ class Results(Sequence[StepResult]):
         self._raw.close()
 
     def to_pyvista(self, step: int | StepResult) -> Any:
-        """Return a step as a ``pyvista.UnstructuredGrid`` of the solid cells, with all fields and groups.
+        """Return a step, or that at a position, as a ``pyvista.UnstructuredGrid`` of the solid cells with fields and groups.
 
-        Parameters
-        ----------
-        step : int or StepResult
-            Position of a step, or a step of this mesh.
-
-        Raises
-        ------
-        FileError
-            If PyVista is not installed.
+        Raises FileError if PyVista is not installed.
         """
         try:
             import pyvista

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import csv
-import re
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.errors import CaseError, FileError, unknown
+from fastcontact.errors import CaseError, unknown
 from fastcontact.mesh.files.paths import PathLike, replacing
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import ordered_line
@@ -42,10 +40,7 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Tab
         ``stress_xx`` ..., ``von_mises``, ``von_mises_signed`` [pressure].
     """
     columns = {
-        "point": contact.points,
-        **_by_axis("", contact.coordinates),
-        "abscissa": contact.abscissa,
-        "radius": _radius(contact.coordinates),
+        **_places(contact.points, contact.coordinates, contact.abscissa),
         "gap": contact.gap,
         "pressure": contact.pressure,
         "multiplier": contact.multiplier,
@@ -81,14 +76,7 @@ def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None
         If there is no such group, or it is no open line.
     """
     line = ordered_line(mesh, group, start)
-    coordinates = mesh.points[line.points]
-    columns = {
-        "point": line.points,
-        **_by_axis("", coordinates),
-        "abscissa": line.abscissa,
-        "radius": _radius(coordinates),
-    }
-    return _table(columns | _fields(step, line.points))
+    return _table(_places(line.points, mesh.points[line.points], line.abscissa) | _fields(step, line.points))
 
 
 def with_column(table: Table, name: str, values: NDArray[Any]) -> Table:
@@ -99,7 +87,7 @@ def with_column(table: Table, name: str, values: NDArray[Any]) -> Table:
 def write_csv(path: PathLike, table: Table, units: Mapping[str, str] | None = None) -> None:
     """Write a table as comma-separated values (RFC 4180) with one header line.
 
-    Numbers are written so that `read_csv` returns the same bits.
+    Numbers are written with all their digits: whoever reads them gets the same bits.
 
     Parameters
     ----------
@@ -128,41 +116,6 @@ def write_csv(path: PathLike, table: Table, units: Mapping[str, str] | None = No
         writer.writerows(zip(*texts))
 
 
-def read_csv(path: PathLike) -> tuple[Table, dict[str, str]]:
-    """Read a table (m,) that `write_csv` wrote, and the units of the columns that have one.
-
-    Columns are int64, float64, bool or str, whichever fits their values.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be read, is empty, two columns have one name or one has none, or a line has another number of
-        values than the header.
-    """
-    try:
-        with open(Path(path), encoding="utf-8", newline="") as file:
-            lines = [line for line in csv.reader(file) if line]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise FileError(f"'{path}' cannot be read ({error}): name a CSV file in UTF-8") from error
-    if not lines:
-        raise FileError(f"'{path}' is empty: a CSV file starts with the names of its columns")
-    header, rows = lines[0], lines[1:]
-    for number, row in enumerate(rows, start=2):
-        if len(row) != len(header):
-            raise FileError(f"'{path}': line {number} has {len(row)} values, but the header names {len(header)}")
-    columns, units = {}, {}
-    for position, title in enumerate(header):
-        named = re.fullmatch(r"(.*) \[(.*)\]", title, flags=re.DOTALL)
-        name = named[1] if named else title
-        if not name or name in columns:
-            raise FileError(f"'{path}': column {position + 1} has {f'the name {name!r} again' if name else 'no name'}")
-        if named:
-            units[name] = named[2]
-        texts = [row[position] for row in rows]
-        columns[name] = _values(texts)
-    return _table(columns), units
-
-
 def _text(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
@@ -170,18 +123,6 @@ def _text(value: Any) -> str:
         text = f"{value:.17g}"
         return text if text.strip("-0123456789") else text + ".0"  # so that it stays a float
     return str(value)
-
-
-def _values(texts: list[str]) -> NDArray[Any]:
-    """Return the values of a column as the narrowest of bool, int64, float64, str that holds them all."""
-    if texts and set(texts) <= {"true", "false"}:
-        return np.array([text == "true" for text in texts])
-    for kind in (np.int64, np.float64):
-        try:
-            return np.array([kind(text) for text in texts], dtype=kind if texts else np.float64)
-        except (ValueError, OverflowError):
-            continue
-    return np.array(texts, dtype=np.str_)
 
 
 def _table(columns: Mapping[str, NDArray[Any]]) -> Table:
@@ -200,9 +141,11 @@ def _by_axis(prefix: str, vectors: NDArray[Any]) -> Columns:
     return {f"{prefix}{axis}": vectors[:, i] for i, axis in enumerate(AXES[: vectors.shape[1]])}
 
 
-def _radius(coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the distance from the axis: of x = 0 in 2D, of the y axis in 3D [length]."""
-    return np.hypot.reduce(coordinates[:, ::2], axis=1) if coordinates.shape[1] == 3 else np.abs(coordinates[:, 0])
+def _places(points: NDArray[Any], coordinates: NDArray[Any], abscissa: NDArray[Any]) -> Columns:
+    """Return where the nodes are; the radius is the distance from x = 0 in 2D, from the y axis in 3D."""
+    flat = coordinates.shape[1] == 2
+    radius = np.abs(coordinates[:, 0]) if flat else np.hypot.reduce(coordinates[:, ::2], axis=1)
+    return {"point": points, **_by_axis("", coordinates), "abscissa": abscissa, "radius": radius}
 
 
 def _fields(step: StepResult, points: NDArray[Any]) -> Columns:

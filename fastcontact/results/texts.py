@@ -19,10 +19,7 @@ REFERENCE = struct.Struct("<IQI")  # in a data set: length of the text, place of
 def read_text(dataset: Any, raw: Any) -> str:
     """Return the text in a data set of one text; `raw` is its open file, with addresses of eight bytes.
 
-    Raises
-    ------
-    ValueError
-        If it is no such data set, or damaged.
+    Raises ValueError if it is no such data set, or damaged.
     """
     import h5py
 

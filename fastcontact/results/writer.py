@@ -166,7 +166,7 @@ class ResultWriter:
             contents.append_tables(self._file, self._mesh, self.n_steps, step, self._pairs, self._notes)
             contents.set_restart(self._file, self.n_steps, restart)
             self._flush()
-            self._append_step_rows(step)
+            contents.append_rows(self._file, self._mesh, self.n_steps, step, self._cell_fields)
             self._flush()
             self._file["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(self.n_steps + 1))
             self._flush()
@@ -300,19 +300,13 @@ class ResultWriter:
         # Closed in between because Windows renames no open file; without locks viewers may follow.
         self._open()
 
-    def _append_step_rows(self, step: StepResult) -> None:
-        contents.append_rows(self._file, self._mesh, self.n_steps, step, self._cell_fields)
-
 
 def _steps_to_resume(
     path: Path, mesh: Mesh, kinematics: str, cell_fields: Sequence[str]
 ) -> tuple[list[StepResult], bool, str]:
     """Return the steps of the file at `path`, if there is one, whether its run came to its end, and its case file.
 
-    Raises
-    ------
-    FileError
-        If the file is no result file or damaged, or its steps cannot be followed by steps of this mesh.
+    Raises FileError if its steps cannot be followed by steps of this mesh.
     """
     if not path.exists() or not path.stat().st_size:
         return [], False, ""

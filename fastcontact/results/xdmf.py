@@ -10,11 +10,9 @@ from fastcontact.errors import FileError
 from fastcontact.mesh.files.paths import PathLike, checked_target, replacing
 from fastcontact.results import layout
 from fastcontact.results.reader import open_results
+from fastcontact.results.tables import STRESS_COMPONENTS
 
 Node = ElementTree.Element
-
-# XDMF orders the six components of a symmetric tensor otherwise than VTK, so each is a field of its own.
-STRESS_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 
 def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
@@ -101,7 +99,7 @@ def _fields(grid: Node, reference: str, n_points: int, number: int, n_steps: int
     for name, width in layout.POINT_FIELDS.items():
         address, rows = f"{reference}:/VTKHDF/PointData/{name}", n_points * n_steps
         parts = [(name, 0, width)]  # label, first column and number of columns of each field
-        if name == "stress":
+        if name == "stress":  # XDMF orders the components of a symmetric tensor otherwise than VTK: each is a field
             parts = [(f"stress_{component}", column, 1) for column, component in enumerate(STRESS_COMPONENTS)]
         for label, column, count in parts:
             kind = "Vector" if count == 3 else "Scalar"

@@ -14,7 +14,7 @@ import numpy as np
 
 HDF5 = (".med", ".rmed", ".vtkhdf", ".h5m", ".hmf", ".cgns")
 # Our own formats come more often than those of others.
-WEIGHTS = {".med": 16, ".rmed": 16, ".vtkhdf": 32, ".toml": 4, ".csv": 4}
+WEIGHTS = {".med": 16, ".rmed": 16, ".vtkhdf": 32, ".toml": 4}
 
 
 def kinds(seeds: dict[str, Path]) -> list[str]:

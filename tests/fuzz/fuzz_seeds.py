@@ -13,7 +13,6 @@ import numpy as np
 import fastcontact as fc
 from fastcontact.mesh.files.med import write_med_mesh
 from fastcontact.results.med import write_med_results
-from fastcontact.results.tables import contact_table, write_csv
 
 DATA = Path(__file__).resolve().parents[2] / "data"
 
@@ -111,8 +110,6 @@ def make_seeds(folder: Path) -> dict[str, Path]:
     with fc.ResultWriter(seeds["results.vtkhdf"], model) as out:
         for step in steps:
             out.write(step)
-    seeds["table.csv"] = folder / "table.csv"
-    write_csv(seeds["table.csv"], contact_table(steps[-1].contact["hertz"]), {"force_y": "N"})
     seeds |= {f"{path.stem}.toml": _case(path, folder) for path in sorted((DATA / "cases").glob("*.toml"))}
     return seeds | _foreign(folder)
 

@@ -26,7 +26,6 @@ HEADS = {
     ".vtk": b"# vtk DataFile Version 4.2\nx\nASCII\nDATASET UNSTRUCTURED_GRID\n",
     ".inp": b"*NODE\n1, 0.0, 0.0\n",
     ".xdmf": b'<Xdmf Version="3.0"><Domain><Grid>',
-    ".csv": b"a,b\n",
     ".toml": b"[mesh]\n",
 }
 

@@ -7,10 +7,11 @@ dimensions, the edges of a face in three.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact.errors import ContactError
@@ -26,23 +27,12 @@ MOST_RIDGES = 4
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Facets of one kind.
-
-    Attributes
-    ----------
-    element : elements.Element
-    numbers : ndarray of int (n,)
-        Cell numbers in the mesh.
-    nodes : ndarray of int (n, k)
-        Connectivity, normals pointing out.
-    corners : ndarray (n, k, dim)
-        Positions of the nodes [length].
-    """
+    """Facets of one kind."""
 
     element: elements.Element
-    numbers: Indices
-    nodes: Indices
-    corners: Array
+    numbers: Indices  # (n,): cell numbers in the mesh
+    nodes: Indices  # (n, k): connectivity, normals pointing out
+    corners: Array  # (n, k, dim): positions of the nodes [length]
 
     def ridges(self) -> tuple[Indices, Indices]:
         """Return the nodes at the beginning and at the end (n, r) of each ridge; for the ends of lines, twice the node."""
@@ -71,15 +61,45 @@ class Block:
         return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0), angle
 
 
-def oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
+class SurfaceFacets(NamedTuple):
+    """The facets of a rigid surface, their neighbours and their normals.
+
+    Smooth normals of facets are the mean over the facets at a node that turn from them by the crease at most. Those of points
+    are the mean over all facets there, not normalised; they tell in from out next to the point (Baerentzen and Aanaes,
+    2005). Both are weighted by the angles of the facets (Thuermer and Wuethrich, 1998).
+    """
+
+    blocks: list[Block]
+    beyond: Indices  # (n_facets, 4): the facet beyond each ridge, -1 where the surface ends
+    normals: list[Array]  # (n, k, dim) for each block: unit normals at the nodes [-]
+    smooth: list[Array]  # the same, of the smooth surface [-]
+    at_points: Array  # (n_points, dim): normals of points [-]
+    on_border: NDArray[np.bool_]  # (n_points,): whether the surface ends there
+
+
+def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> SurfaceFacets:
+    """Return the facets of a group, which count as a smooth surface where they meet at the angle `crease` [degrees] or less.
+
+    Raises ContactError if they are no surface that has one outside.
+    """
+    blocks = _oriented_blocks(mesh, group, flip)
+    beyond = _neighbours(blocks, group)
+    own = [block.normals() for block in blocks]
+    smooth, at_points = _smooth_normals(blocks, own, crease)
+    on_border, first = np.zeros(len(at_points), bool), 0
+    for block in blocks:
+        ends = block.ridges()
+        open_ = beyond[first : first + len(block.nodes), : ends[0].shape[1]] < 0
+        for end in ends:
+            on_border[end[open_]] = True
+        first += len(block.nodes)
+    return SurfaceFacets(blocks, beyond, [normals for normals, _ in own], smooth, at_points, on_border)
+
+
+def _oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
     """Return the facets of a group as the mesh orients them, or the other way round with `flip`.
 
     Facets on the outside of solid cells look out of these, whatever their own order of nodes.
-
-    Raises
-    ------
-    ContactError
-        If the group holds no facets, or a facet has no area.
     """
     rows = mesh.split(mesh.cell_groups[group]) if mesh.cells_of(group, dim=mesh.dim - 1) else {}
     rows = {name: found for name, found in rows.items() if elements.get(name).dim == mesh.dim - 1}
@@ -100,7 +120,7 @@ def oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
         flat = np.flatnonzero(lengths.min(axis=1) == 0.0)
         if len(flat):
             raise ContactError(
-                f"{described(blocks, blocks[-1], int(flat[0]))} of the rigid surface '{group}' has no area, or none at "
+                f"{_described(blocks[-1:], int(flat[0]))} of the rigid surface '{group}' has no area, or none at "
                 "one of its nodes: remove it or repair the mesh there"
             )
     return blocks
@@ -119,20 +139,21 @@ def _out_of_solids(nodes: NDArray[np.int32], outer: NDArray[np.int32] | None) ->
     return np.where((at >= 0)[:, None], outer[at], nodes)
 
 
-def described(blocks: list[Block], block: Block, row: int) -> str:
+def _described(blocks: list[Block], facet: int) -> str:
     """Return number, kind and place of a facet, in words."""
-    middle = block.corners[row, : block.element.n_corners].mean(axis=0)
+    for block in blocks:
+        if facet < len(block.nodes):
+            break
+        facet -= len(block.nodes)
+    middle = block.corners[facet, : block.element.n_corners].mean(axis=0)
     place = ", ".join(f"{x:.6g}" for x in middle)
-    return f"facet {block.numbers[row]} ({block.element.name} near ({place}))"
+    return f"facet {block.numbers[facet]} ({block.element.name} near ({place}))"
 
 
-def neighbours(blocks: list[Block], group: str) -> Indices:
+def _neighbours(blocks: list[Block], group: str) -> Indices:
     """Return the facet beyond each ridge (n_facets, 4), -1 where the surface ends.
 
-    Raises
-    ------
-    ContactError
-        If the surface branches, or neighbours look to different sides; the message names a facet.
+    Raises ContactError, which names a facet, if the surface branches or neighbours look to different sides.
     """
     facet, ridge, key, sign = _ridge_table(blocks)
     order = np.argsort(key, kind="stable")
@@ -142,7 +163,7 @@ def neighbours(blocks: list[Block], group: str) -> Indices:
     if (count > 2).any():
         at = facet[first[np.argmax(count > 2)]]
         raise ContactError(
-            f"{_named(blocks, at)} of the rigid surface '{group}' shares an edge with more than one other facet: a "
+            f"{_described(blocks, at)} of the rigid surface '{group}' shares an edge with more than one other facet: a "
             "surface must not branch, so split it into several groups"
         )
     one = first[count == 2]
@@ -179,42 +200,15 @@ def _check_orientation(
     size = np.bincount(part)
     bad = int(np.flatnonzero(~consistent)[0])
     pair = sorted((int(one[bad]), int(other[bad])), key=lambda facet: (size[part[facet]], facet))
+    numbers = np.concatenate([block.numbers for block in blocks])
     raise ContactError(
-        f"{_named(blocks, pair[0])} of the rigid surface '{group}' looks to the other side than its neighbour facet "
-        f"{_number(blocks, pair[1])}: turn it, so that all normals point out of the obstacle"
+        f"{_described(blocks, pair[0])} of the rigid surface '{group}' looks to the other side than its neighbour facet "
+        f"{numbers[pair[1]]}: turn it, so that all normals point out of the obstacle"
     )
 
 
-def _number(blocks: list[Block], facet: int) -> int:
-    return int(np.concatenate([block.numbers for block in blocks])[facet])
-
-
-def _named(blocks: list[Block], facet: int) -> str:
-    for block in blocks:
-        if facet < len(block.nodes):
-            return described(blocks, block, facet)
-        facet -= len(block.nodes)
-    raise AssertionError("unreachable: facets are numbered through the blocks")
-
-
-def smooth_normals(blocks: list[Block], crease: float) -> tuple[list[Array], Array]:
-    """Return normals of facets and of points, both weighted by the facets' angles there (Thuermer and Wuethrich, 1998).
-
-    Parameters
-    ----------
-    blocks : list of Block
-    crease : float
-        Angle up to which facets count as a smooth surface [degrees].
-
-    Returns
-    -------
-    list of ndarray (n, k, dim)
-        Unit normals at the nodes of each facet: the mean over the facets there that turn from it by `crease` at most.
-    ndarray (n_points, dim)
-        The mean over all facets at a point, not normalised; it tells in from out next to the point (Baerentzen and
-        Aanaes, 2005).
-    """
-    own = [block.normals() for block in blocks]
+def _smooth_normals(blocks: list[Block], own: list[tuple[Array, Array]], crease: float) -> tuple[list[Array], Array]:
+    """Return the smooth normals of facets and those of points, from the `own` normals of facets and their angles."""
     dim = own[0][0].shape[2]
     node = np.concatenate([block.nodes.ravel() for block in blocks])
     normal = np.concatenate([found.reshape(-1, dim) for found, _ in own])
@@ -234,11 +228,7 @@ def smooth_normals(blocks: list[Block], crease: float) -> tuple[list[Array], Arr
 
 def _pairs_at_nodes(node: Indices) -> tuple[Indices, Indices]:
     """Return all pairs (i, j), i = j among them, of entries with the same node."""
-    order = np.argsort(node, kind="stable")
-    first = np.flatnonzero(np.r_[True, np.diff(node[order]) != 0])
-    count = np.diff(np.r_[first, len(node)])
-    reach, start = np.repeat(count, count), np.repeat(first, count)
-    i = np.repeat(np.arange(len(node)), reach)
-    begin = np.concatenate([[0], np.cumsum(reach)[:-1]])
-    j = np.arange(len(i)) - np.repeat(begin, reach) + np.repeat(start, reach)
-    return order[i], order[j]
+    at = csr_array((np.ones(len(node)), node, np.arange(len(node) + 1)))
+    pairs = at @ at.T
+    pairs.sort_indices()
+    return pairs.nonzero()

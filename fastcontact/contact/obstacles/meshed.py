@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.contact.obstacles._facets import Block, neighbours, oriented_blocks, smooth_normals
+from fastcontact.contact.obstacles._facets import Block, SurfaceFacets, surface_facets
 from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import Mesh
@@ -65,37 +65,17 @@ class MeshedSurface:
     group: str
     flip: bool = False
     crease: float = 30.0
-    _blocks: list[Block] = field(init=False, repr=False)
-    _neighbours: Indices = field(init=False, repr=False)
-    _smooth: list[Array] = field(init=False, repr=False)
-    _own: list[Array] = field(init=False, repr=False)
-    _at_points: Array = field(init=False, repr=False)
-    _on_border: NDArray[np.bool_] = field(init=False, repr=False)
+    _facets: SurfaceFacets = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.crease <= 180.0:
             raise ContactError(
                 f"crease = {self.crease} of the rigid surface '{self.group}' must lie in 0 to 180 degrees"
             )
-        blocks = oriented_blocks(self.mesh, self.group, self.flip)
-        beyond = neighbours(blocks, self.group)
-        smooth, at_points = smooth_normals(blocks, self.crease)
-        on_border, first = np.zeros(len(at_points), bool), 0
-        for block in blocks:
-            ends = block.ridges()
-            open_ = beyond[first : first + len(block.nodes), : ends[0].shape[1]] < 0
-            for end in ends:
-                on_border[end[open_]] = True
-            first += len(block.nodes)
-        values = {
-            "_blocks": blocks, "_neighbours": beyond, "_smooth": smooth, "_at_points": at_points,
-            "_own": [block.normals()[0] for block in blocks], "_on_border": on_border,
-        }  # fmt: skip
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+        object.__setattr__(self, "_facets", surface_facets(self.mesh, self.group, self.flip, self.crease))
 
     def __repr__(self) -> str:
-        return f"MeshedSurface('{self.group}', {len(self._neighbours)} facets)"
+        return f"MeshedSurface('{self.group}', {len(self._facets.beyond)} facets)"
 
     def check_apart(self, mesh: Mesh) -> None:
         """Raise ContactError if the surface is part of `mesh` and hangs on solid cells there."""
@@ -119,10 +99,11 @@ class MeshedSurface:
             raise ContactError(
                 f"the rigid surface '{self.group}' has {dim} dimensions, but the model has {points.shape[1]}"
             )
-        found = closest_of_kinds(points, [block.corners for block in self._blocks])
+        found = closest_of_kinds(points, [block.corners for block in self._facets.blocks])
         sense, smooth, on_ridge, on_border = self._frames(found)
         apart = points - found.position
-        size = self._sizes(found.facet)
+        extents = [np.linalg.norm(np.ptp(block.corners, axis=1), axis=1) for block in self._facets.blocks]
+        size = np.concatenate(extents)[found.facet]
         touching = found.distance <= TOUCHING * size
         outside = np.einsum("nd,nd->n", apart, sense) >= 0
         distance = np.where(outside, found.distance, -found.distance)
@@ -137,10 +118,6 @@ class MeshedSurface:
         nothing = on_border & (aside > BEYOND * size) & (aside > LEAN * height)
         return np.where(nothing, np.inf, distance), normal
 
-    def _sizes(self, facet: Indices) -> Array:
-        sizes = [np.linalg.norm(np.ptp(block.corners, axis=1), axis=1) for block in self._blocks]
-        return np.asarray(np.concatenate(sizes)[facet])
-
     def _frames(self, found: Closest) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
         """Return, at projections, a vector that tells in from out (n, dim), smooth normals, what is on a ridge or border.
 
@@ -149,8 +126,8 @@ class MeshedSurface:
         """
         sense, smooth = found.normal.copy(), np.empty_like(found.normal)
         on_ridge, on_border = np.zeros(len(sense), bool), np.zeros(len(sense), bool)
-        first = 0
-        for block, normals in zip(self._blocks, self._smooth, strict=True):
+        facets, first = self._facets, 0
+        for block, normals in zip(facets.blocks, facets.smooth, strict=True):
             mine = np.flatnonzero((found.facet >= first) & (found.facet < first + len(block.nodes)))
             rows, xi = found.facet[mine] - first, found.xi[mine]
             mean = np.einsum("nk,nkd->nd", block.element.shape(xi), normals[rows])
@@ -158,10 +135,10 @@ class MeshedSurface:
             corner, edge = _place(block, xi)
             at = np.flatnonzero(corner >= 0)
             node = block.nodes[rows[at], corner[at]]
-            sense[mine[at]], on_border[mine[at]] = self._at_points[node], self._on_border[node]
+            sense[mine[at]], on_border[mine[at]] = facets.at_points[node], facets.on_border[node]
             at = np.flatnonzero(edge >= 0)
             sense[mine[at]] += self._across(block, first, rows[at], edge[at], xi[at])
-            on_border[mine[at]] = self._neighbours[first + rows[at], edge[at]] < 0
+            on_border[mine[at]] = facets.beyond[first + rows[at], edge[at]] < 0
             on_ridge[mine] = (corner >= 0) | (edge >= 0)
             first += len(block.nodes)
         return sense, smooth, on_ridge, on_border
@@ -171,10 +148,10 @@ class MeshedSurface:
         ends = np.array(block.element.edges)[edge]
         a, b = block.element.nodes[ends[:, 0]], block.element.nodes[ends[:, 1]]
         along = np.linalg.norm(xi - a, axis=1) / np.linalg.norm(b - a, axis=1)
-        beyond = self._neighbours[first + rows, edge]
+        beyond = self._facets.beyond[first + rows, edge]
         found = np.zeros((len(rows), self.mesh.dim))
         start = 0
-        for other, normals in zip(self._blocks, self._own, strict=True):
+        for other, normals in zip(self._facets.blocks, self._facets.normals, strict=True):
             mine = np.flatnonzero((beyond >= start) & (beyond < start + len(other.nodes)))
             facet = beyond[mine] - start
             for weight, end in ((1.0 - along, ends[:, 0]), (along, ends[:, 1])):

@@ -14,18 +14,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class RigidSide:
-    """A rigid obstacle that may move; where it stands is part of the configuration.
+    """A rigid obstacle that may move; where it stands is part of the configuration."""
 
-    Attributes
-    ----------
-    obstacle : Obstacle
-        Its shape, where it stands at rest.
-    motion : ndarray (dim,)
-        Its displacement where the multiplier of its history is 1 [length].
-    """
-
-    obstacle: Obstacle
-    motion: Array
+    obstacle: Obstacle  # where it stands at rest
+    motion: Array  # (dim,): its displacement where the multiplier of its history is 1 [length]
 
     @property
     def points(self) -> NDArray[np.int32]:

@@ -22,47 +22,24 @@ TOGETHER = 16
 
 
 class Closest(NamedTuple):
-    """Projections of points on their closest facets.
+    """Projections of n points on their closest facets.
 
-    Attributes
-    ----------
-    facet : ndarray of int (n,)
-        Row of the facet; of equally close ones the first.
-    xi : ndarray (n, dim - 1)
-        Reference coordinates of the projection [-].
-    normal : ndarray (n, dim)
-        Unit normal of the facet there: to the right of a line's direction, towards the side from which a face's nodes
-        run counter-clockwise [-].
-    overhang : ndarray (n,)
-        How far a point stands out beyond the end of its facet, in facet lengths; 0 within [-].
-    position : ndarray (n, dim)
-        The projection [length].
-    distance : ndarray (n,)
-        Distance to it [length].
+    Normals point to the right of a line's direction, and to the side from which a face's nodes run counter-clockwise.
     """
 
-    facet: NDArray[np.intp]
-    xi: Array
-    normal: Array
-    overhang: Array
-    position: Array
-    distance: Array
+    facet: NDArray[np.intp]  # (n,): row of the facet; of equally close ones the first
+    xi: Array  # (n, dim - 1): reference coordinates of the projection [-]
+    normal: Array  # (n, dim): unit normal of the facet there [-]
+    overhang: Array  # (n,): how far the point stands out beyond the end of its facet, in facet lengths; 0 within [-]
+    position: Array  # (n, dim): the projection [length]
+    distance: Array  # (n,): distance to it [length]
 
 
 def closest(points: Array, corners: Array) -> Closest:
-    """Project points on the closest of many facets of one kind.
+    """Project `points` (n, dim) [length] on the closest of many facets of one kind, or raise ContactError if that fails.
 
-    Parameters
-    ----------
-    points : ndarray (n, dim)
-        Coordinates [length].
-    corners : ndarray (n_facets, n_nodes, dim)
-        Nodes of the facets [length]: lines of 2 or 3 nodes in 2D; triangles of 3 or 6 and quadrangles of 4, 8 or 9 in 3D.
-
-    Raises
-    ------
-    ContactError
-        If a point is not finite, or the projection on a folded or collapsed facet does not converge (3D).
+    `corners` (n_facets, n_nodes, dim) [length] are the nodes of the facets: lines of 2 or 3 nodes in 2D; triangles of 3 or 6
+    and quadrangles of 4, 8 or 9 in 3D.
     """
     points, corners = np.ascontiguousarray(points), np.ascontiguousarray(corners)
     n, dim = points.shape
@@ -105,17 +82,13 @@ def _on_lines(points: Array, corners: Array, found: Closest) -> None:
 
 
 def _on_faces(points: Array, corners: Array, found: Closest) -> None:
-    n, m = corners.shape[:2]
-    table = tables(m)
+    n, kind = len(corners), tables(corners.shape[1])
     numbers, order = tree_order(corners[:, 0].copy()), tree_order(points, TOGETHER)
     midst = 0.5 * (corners.min(axis=0).min(axis=0) + corners.max(axis=0).max(axis=0))
     facets = Facets(corners[numbers], midst, np.empty(corners.shape), np.empty(n), np.empty(n))
     low, high = np.empty((n, 3)), np.empty((n, 3))
-    shared(
-        lambda part: facets_3d_kernels.prepare(facets, *part, table.to_terms, table.weights, low, high),
-        portions(n),
-    )
-    tree, domain = build(low, high), Domain(table.nodes, flat_triangles(m), table.sides)
+    shared(lambda part: facets_3d_kernels.prepare(facets, *part, kind.to_terms, kind.weights, low, high), portions(n))
+    tree, domain = build(low, high), Domain(kind.nodes, flat_triangles(len(kind.nodes)), kind.sides)
     shared(
         lambda part: search_3d_kernels.closest_facets(points, order, *part, facets, domain, numbers, tree, found),
         portions(len(points)),

@@ -37,35 +37,20 @@ _FLAT = {
 
 
 class Tables(NamedTuple):
-    """Constants of facets of m nodes.
+    """Constants of facets of m nodes, all [-]; `weights` bound what a term of unit size adds at most.
 
-    Attributes
-    ----------
-    nodes : ndarray (m, 2)
-        Reference coordinates [-].
-    sides : ndarray (n_sides, 3)
-        Rows (a, b, c) of a s + b t <= c on the facet [-].
-    to_terms : ndarray (m, m)
-        From nodes to coefficients of the terms [-].
-    weights : ndarray (3, m)
-        Most that each term of unit size adds to distance from the flat triangles, change of tangents, second derivative.
+    Its rows belong to the distance from the flat triangles, the change of the tangents, and the second derivative.
     """
 
-    nodes: Array
-    sides: Array
-    to_terms: Array
-    weights: Array
+    nodes: Array  # (m, 2): reference coordinates
+    sides: Array  # (n_sides, 3): rows (a, b, c) of a s + b t <= c on the facet
+    to_terms: Array  # (m, m): from nodes to coefficients of the terms
+    weights: Array  # (3, m)
 
 
 @cache
 def tables(n_nodes: int) -> Tables:
-    """Return the constants of facets of `n_nodes` nodes.
-
-    Raises
-    ------
-    ContactError
-        If there are no such facets.
-    """
+    """Return the constants of facets of `n_nodes` nodes, or raise ContactError if there are no such facets."""
     if n_nodes not in _NAMES:
         raise ContactError(f"there are no facets of {n_nodes} nodes in three dimensions: known are {sorted(_NAMES)}")
     nodes = elements.get(_NAMES[n_nodes]).nodes

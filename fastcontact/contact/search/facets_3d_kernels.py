@@ -13,20 +13,10 @@ FLAT = 1e-9
 
 @kernel
 def prepare(facets, begin, end, to_terms, weights, low, high):
-    """Fill all but the nodes and the midst of the facets `begin` to `end`.
+    """Fill all but the nodes and the midst of the facets `begin` to `end`, and their boxes `low`, `high` (n_facets, 3).
 
-    Parameters
-    ----------
-    facets : Facets
-        Filled in place.
-    begin, end : int
-    to_terms : (m, m)
-        From nodes to terms.
-    weights : (3, m)
-        For each term of unit size: how far it strays from flat triangles, how much it changes the tangents over the
-        domain, and its second derivative, all at most.
-    low, high : (n_facets, 3)
-        Boxes, filled in place: those of the nodes and, around curved sides, as much room as the facet strays at most.
+    These hold the nodes and, around curved sides, as much room as the facet strays at most. `to_terms` and `weights` are
+    those of `facet_tables.Tables`.
     """
     nodes, midst, terms, bend, convex = facets
     m = nodes.shape[1]

@@ -22,26 +22,15 @@ Array = NDArray[np.float64]
 class Facets(NamedTuple):
     """Facets of one kind, seen from a place in their midst: far from the origin, rounding would exceed STEP.
 
-    Attributes
-    ----------
-    nodes : ndarray (n_facets, m, 3)
-        Seen from the origin [length].
-    midst : ndarray (3,)
-        That place [length].
-    terms : ndarray (n_facets, m, 3)
-        Coefficients of the polynomials [length].
-    bend : ndarray (n_facets,)
-        How far a facet strays at most from the flat triangles between its nodes [length].
-    convex : ndarray (n_facets,)
-        Up to where a minimum of the distance is the only one: with four nodes the bound of `straight_3d_kernels.room`, with
-        more the square of a distance below which half the squared distance is convex on the domain [length^2].
+    `convex` tells up to where a minimum of the distance is the only one: with four nodes the bound of
+    `straight_3d_kernels.room`, with more the square of a distance below which half the squared distance is convex.
     """
 
-    nodes: Array
-    midst: Array
-    terms: Array
-    bend: Array
-    convex: Array
+    nodes: Array  # (n_facets, m, 3), seen from the origin [length]
+    midst: Array  # (3,): that place [length]
+    terms: Array  # (n_facets, m, 3): coefficients of the polynomials [length]
+    bend: Array  # (n_facets,): how far a facet strays at most from the flat triangles between its nodes [length]
+    convex: Array  # (n_facets,) [length^2]
 
 
 class Domain(NamedTuple):

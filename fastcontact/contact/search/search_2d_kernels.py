@@ -63,20 +63,11 @@ def _project(corners, f, x, y):
 
 @kernel
 def closest_facets(points, order, begin, end, corners, numbers, tree, found):
-    """Project points on their closest facets; of equally close facets on the one with the lowest number.
+    """Project points (n, 2) on their closest facets; of equally close facets on the one with the lowest number.
 
-    Parameters
-    ----------
-    points : (n, 2)
-    order : (n,)
-        Order in which points are taken: neighbours in space after each other.
-    begin, end : int
-        Range of that order to project.
-    corners : (n_facets, n_nodes, 2)
-    numbers, tree : (n_facets,), Tree
-        Numbers of these facets, which are in the order of the tree, before they were sorted.
-    found : Closest
-        Filled in place; facet -1 and distance NaN where a point is not finite.
+    Points are taken from `begin` to `end` of an `order` (n,) in which neighbours in space follow each other. Facets are in
+    the order of the tree; `numbers` (n_facets,) are those before they were sorted. `found` is filled in place, with facet
+    -1 and distance NaN where a point is not finite.
     """
     stack, squares, leaves = np.empty(DEPTH, np.int64), np.empty(DEPTH), len(tree.low) // 2
     for k in range(begin, end):

@@ -16,20 +16,10 @@ ROUNDING = 1.0 + 1e-14
 
 @kernel
 def closest_facets(points, order, begin, end, facets, domain, numbers, tree, found):
-    """Project points on their closest facets; of facets that meet in the closest point the one with the lowest number.
+    """Project points (n, 3) on their closest facets; of facets that meet in the closest point the one with the lowest number.
 
-    Parameters
-    ----------
-    points : (n, 3)
-    order : (n,)
-        Order in which points are taken: neighbours in space after each other.
-    begin, end : int
-        Range of that order to project.
-    facets, domain : Facets, Domain
-    numbers, tree : (n_facets,), Tree
-        Numbers of these facets, which are in the order of the tree, before they were sorted.
-    found : Closest
-        Filled in place. Where a projection fails, the distance is NaN; where a point is not finite, the facet is -1, too.
+    Arguments are as for `search_2d_kernels.closest_facets`. Where a projection fails, the distance is NaN; where a point is
+    not finite, the facet is -1, too.
     """
     stack, squares, leaves = np.empty(DEPTH, np.int64), np.empty(DEPTH), len(tree.low) // 2
     midst = facets.midst[0], facets.midst[1], facets.midst[2]

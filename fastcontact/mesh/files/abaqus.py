@@ -12,15 +12,11 @@ NUMBERS_A_LINE = 8
 
 
 def check_readable(path: Path) -> None:
-    """Refuse files of which meshio would silently lose points or members of sets.
-
-    Raises
-    ------
-    FileError
-        If the file includes another one, a set is defined in several places, sets of elements are given to some
-        *ELEMENT sections only, or there are several sections of nodes.
-    """
-    lines = _lines(path)
+    """Refuse files of which meshio would silently lose points or members of sets."""
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError as error:
+        raise FileError(f"cannot read '{path}': {error}") from error
     if any(line.partition(",")[0].replace("*", "").strip().upper() == "INCLUDE" for line in lines):
         raise FileError(f"'{path}' includes another file, which is not read: copy its lines in place of *INCLUDE")
     sections = [_keyword(line) for line in lines if line.startswith("*") and not line.startswith("**")]
@@ -44,13 +40,6 @@ def check_readable(path: Path) -> None:
         )
 
 
-def _lines(path: Path) -> list[str]:
-    try:
-        return path.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError as error:
-        raise FileError(f"cannot read '{path}': {error}") from error
-
-
 def _keyword(line: str) -> tuple[str, dict[str, str]]:
     first, *rest = line.lstrip("*").split(",")
     pairs = (word.partition("=") for word in rest)
@@ -58,13 +47,7 @@ def _keyword(line: str) -> tuple[str, dict[str, str]]:
 
 
 def append_cell_sets(path: Path, mesh: Mesh) -> None:
-    """Append the groups of cells, each once; meshio writes one *ELSET for each element of a group.
-
-    Raises
-    ------
-    FileError
-        If a group has a name that Abaqus cannot take.
-    """
+    """Append the groups of cells, each once; meshio writes one *ELSET for each element of a group."""
     for name in mesh.group_names:
         if any(character in name for character in ",=*\n") or name != name.strip():
             raise FileError(f"group name '{name}' holds a blank or a sign that Abaqus files cannot take: rename it")

@@ -32,20 +32,12 @@ class Block:
 
 
 def build_mesh(
-    points: NDArray[Any],
-    blocks: Iterable[Block],
-    point_groups: Mapping[str, NDArray[Any]],
-    names: Iterable[str] = (),
+    points: NDArray[Any], blocks: Iterable[Block], point_groups: Mapping[str, NDArray[Any]], names: Iterable[str] = ()
 ) -> Mesh:
     """Return one Mesh of all blocks, with `points` (n_points, 2 or 3) [length].
 
     Blocks of the same kind are joined, groups of vertex cells become groups of points, `names` without any cell become
     empty groups, and a flat mesh in 3D coordinates becomes a 2D one.
-
-    Raises
-    ------
-    MeshError
-        If there is no cell, the points are no numbers, or the Mesh is not valid.
     """
     try:
         places = np.asarray(points, np.float64)
@@ -81,13 +73,9 @@ def merged(blocks: Iterable[Block]) -> list[Block]:
     by_kind: dict[str, list[Block]] = {}
     for block in blocks:
         by_kind.setdefault(block.kind, []).append(block)
-    return [_joined(parts) for parts in by_kind.values()]
-
-
-def _joined(parts: list[Block]) -> Block:
-    if len(parts) == 1:
-        return parts[0]
-    return Block(parts[0].kind, np.concatenate([part.nodes for part in parts]), _numbered(parts))
+    return [
+        Block(kind, np.concatenate([part.nodes for part in parts]), _numbered(parts)) for kind, parts in by_kind.items()
+    ]
 
 
 def without_duplicates(block: Block) -> Block:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,27 +27,14 @@ DEEPEST = 64
 PLAIN_KINDS = "iufS"
 
 
-def is_hdf5(path: Path) -> bool:
-    """Return whether a file is an HDF5 file."""
-    import h5py
-
-    return bool(h5py.is_hdf5(path))
-
-
 @contextmanager
 def opened(path: PathLike) -> Iterator[Any]:
-    """Open an HDF5 file for reading, for the length of a block.
-
-    Raises
-    ------
-    FileError
-        If the file is missing, is not HDF5, is refused by `check_contents`, or turns out damaged inside the block.
-    """
+    """Open an HDF5 file for reading, for the length of a block; damage that shows inside the block becomes a FileError."""
     import h5py
 
     found = existing_file(path)
     try:
-        if not is_hdf5(found):
+        if not h5py.is_hdf5(found):
             raise FileError(f"'{path}' is not an HDF5 file: check that it is complete and has the right suffix")
         with h5py.File(found, "r") as file:
             check_contents(file, path)
@@ -62,11 +48,8 @@ def opened(path: PathLike) -> Iterator[Any]:
 def check_contents(file: Any, path: PathLike) -> None:
     """Look through an open HDF5 file before anything in it is read.
 
-    Raises
-    ------
-    FileError
-        If a link or the values of a data set lead to another file, a data set needs a foreign filter or more memory than a
-        file of this size can mean, or groups stand too deep or in a circle.
+    Raises FileError if a link or the values of a data set lead to another file, a data set needs a foreign filter or more
+    memory than a file of this size can mean, or groups stand too deep or in a circle.
     """
     from h5py import h5d, h5g, h5o
     from h5py.h5l import TYPE_HARD, TYPE_SOFT
@@ -124,13 +107,7 @@ def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> None
 
 
 def values(group: Any, name: str) -> NDArray[Any]:
-    """Return a data set of `group` as an array of numbers or of strings of fixed length.
-
-    Raises
-    ------
-    FileError
-        If it is missing, or holds neither.
-    """
+    """Return a data set of `group` as an array of numbers or of strings of fixed length, or raise FileError."""
     import h5py
 
     where = f"'{group.name}/{name}' of '{group.file.filename}'"
@@ -143,15 +120,7 @@ def values(group: Any, name: str) -> NDArray[Any]:
 
 
 def attribute(item: Any, name: str, default: Any = None) -> Any:
-    """Return an attribute of a group or a data set, a number or a string of fixed length.
-
-    Raises
-    ------
-    KeyError
-        If it is missing and there is no `default`.
-    FileError
-        If it is of another kind.
-    """
+    """Return an attribute of a group or a data set, a number or a string of fixed length; FileError if it is another kind."""
     if name not in item.attrs and default is not None:
         return default
     if item.attrs.get_id(name).dtype.base.kind not in PLAIN_KINDS:

@@ -15,17 +15,10 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import FileError, MeshError, unknown
 from fastcontact.mesh import elements
+from fastcontact.mesh.files import med_families
 from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_known
 from fastcontact.mesh.files.hdf5 import attribute, opened, values
-from fastcontact.mesh.files.med_families import (
-    Families,
-    checked_name,
-    decoded,
-    families_of,
-    members,
-    read_families,
-    write_families,
-)
+from fastcontact.mesh.files.med_families import Families, checked_name, decoded
 from fastcontact.mesh.files.paths import PathLike, replacing
 from fastcontact.mesh.mesh import Mesh
 
@@ -56,38 +49,20 @@ class MedContent(NamedTuple):
     n_vertices: int
 
 
-def read_med_mesh(path: PathLike, mesh_name: str | None = None) -> Mesh:
+def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
     """Read a mesh with its groups, cells oriented as they are in the file.
 
     Of several meshes the one called `mesh_name` is read, of several time steps of a mesh the first one.
-
-    Raises
-    ------
-    FileError
-        If the file is missing, not HDF5, damaged, linked to others, or does not hold exactly the mesh meant.
-    MeshError
-        If the mesh has no cells, is a structured grid, or has a kind of cells that fastcontact does not know.
     """
-    return read_med(path, mesh_name).mesh
-
-
-def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
-    """Read a mesh with its name and version; parameters and errors as in `read_med_mesh`."""
     with opened(path) as file:
         name = _chosen_mesh(file, path, mesh_name)
-        group = file["ENS_MAA"][name]
         try:
-            mesh, n_vertices = _read_mesh(file, group)
+            mesh, n_vertices = _read_mesh(file, file["ENS_MAA"][name])
         except MeshError as error:
             raise MeshError(f"mesh '{name}' of '{path}': {error}") from None
-        return MedContent(mesh, name, _version(file), n_vertices)
-
-
-def _version(file: Any) -> str:
-    if "INFOS_GENERALES" not in file:
-        return ""
-    info = file["INFOS_GENERALES"]
-    return ".".join(str(int(attribute(info, key))) for key in ("MAJ", "MIN", "REL") if key in info.attrs)
+        info = file.get("INFOS_GENERALES", file)
+        version = [str(int(attribute(info, key))) for key in ("MAJ", "MIN", "REL") if key in info.attrs]
+        return MedContent(mesh, name, ".".join(version), n_vertices)
 
 
 def _chosen_mesh(file: Any, path: PathLike, mesh_name: str | None) -> str:
@@ -111,7 +86,7 @@ def _read_mesh(file: Any, group: Any) -> tuple[Mesh, int]:
     points = _read_points(step, group)
     name = group.name.rsplit("/", 1)[-1]
     folders = [folder for folder in (group.get("FAS"), file.get(f"FAS/{name}")) if folder is not None]
-    families = {number: names for folder in folders for number, names in read_families(folder).items()}
+    families = {number: names for folder in folders for number, names in med_families.read_families(folder).items()}
     blocks = list(_read_blocks(step, families))
     point_groups: dict[str, Any] = dict.fromkeys(_group_names(families, +1), ())
     point_groups.update(_members(step["NOE"], len(points), families))
@@ -168,7 +143,8 @@ def _read_blocks(step: Any, families: Families) -> Iterator[Block]:
         if "NOD" not in entry:
             raise MeshError(f"its {code} cells have no nodal connectivity: write the mesh with nodal connectivity")
         nodes = _read_nodes(entry, code)
-        yield Block(_kind(code), nodes, _members(entry, len(nodes), families))
+        kind = VERTEX if code == "PO1" else elements.BY_MED[code].name
+        yield Block(kind, nodes, _members(entry, len(nodes), families))
 
 
 def _members(entry: Any, count: int, families: Families) -> dict[str, NDArray[np.intp]]:
@@ -177,11 +153,7 @@ def _members(entry: Any, count: int, families: Families) -> dict[str, NDArray[np
     numbers = values(entry, "FAM")
     if numbers.shape != (count,):
         raise MeshError(f"it has {numbers.size} family numbers for {count} cells or nodes: write it anew")
-    return members(numbers, families)
-
-
-def _kind(code: str) -> str:
-    return VERTEX if code == "PO1" else elements.BY_MED[code].name
+    return med_families.members(numbers, families)
 
 
 def _cell_count(entry: Any) -> int:
@@ -203,12 +175,7 @@ def _read_nodes(entry: Any, code: str) -> NDArray[Any]:
 def write_med_mesh(path: PathLike, mesh: Mesh, *, mesh_name: str = "mesh") -> None:
     """Write a mesh with all its groups; the file appears only when it is complete.
 
-    A reader gets the elements in alphabetical order of their MED codes. `mesh_name` may have 64 bytes.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be written or a name is too long for MED (80 bytes for groups).
+    A reader gets the elements in alphabetical order of their MED codes. Names may have 64 bytes, of groups 80.
     """
     with new_file(path, mesh) as file:
         add_mesh(file, mesh, mesh_name)
@@ -268,17 +235,17 @@ def add_mesh(file: Any, mesh: Mesh, mesh_name: str) -> None:
 
 
 def _write_points(step: Any, mesh: Mesh, folder: Any) -> None:
-    numbers, families = families_of(mesh.point_groups, mesh.n_points, +1)
+    numbers, families = med_families.families_of(mesh.point_groups, mesh.n_points, +1)
     points = step.create_group("NOE")
     _set(points, CGT=1, CGS=1, PFL=NO_PROFILE)
     _write_array(points, "COO", mesh.points.T, mesh.n_points)
     _write_array(points, "FAM", numbers, mesh.n_points)
     if families:
-        write_families(folder.create_group("NOEUD"), families)
+        med_families.write_families(folder.create_group("NOEUD"), families)
 
 
 def _write_cells(step: Any, mesh: Mesh, folder: Any) -> None:
-    numbers, families = families_of(mesh.cell_groups, mesh.n_cells, -1)
+    numbers, families = med_families.families_of(mesh.cell_groups, mesh.n_cells, -1)
     cells = step.create_group("MAI")
     _set(cells, CGT=1)
     for name, start in mesh.offsets.items():
@@ -290,7 +257,7 @@ def _write_cells(step: Any, mesh: Mesh, folder: Any) -> None:
         _write_array(entry, "NOD", block.T + np.int32(1), len(block))
         _write_array(entry, "FAM", numbers[start : start + len(block)], len(block))
     if families:
-        write_families(folder.create_group("ELEME"), families)
+        med_families.write_families(folder.create_group("ELEME"), families)
 
 
 def _write_array(group: Any, name: str, array: NDArray[Any], count: int) -> None:
@@ -351,18 +318,17 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
             raise FileError(f"field '{field}' of '{path}' has no values at nodes in the layout of MED 3 or 4")
         instants.sort(key=_order)
         times = np.array([attribute(entry, "PDT") for entry in instants], np.float64)
-        n_points = _field_size(file, group, instants)
         n_components = int(attribute(group, "NCO"))
+        n_points = _field_size(file, group, instants, n_components)
         return times, np.stack([_read_instant(file, entry["NOE"], n_points, n_components) for entry in instants])
 
 
-def _field_size(file: Any, group: Any, instants: list[Any]) -> int:
+def _field_size(file: Any, group: Any, instants: list[Any], n_components: int) -> int:
     """Return the number of points of the field's mesh, or of the field where the mesh is in another file."""
     name = decoded(bytes(attribute(group, "MAI")))
     if f"ENS_MAA/{name}" in file:
         mesh = file[f"ENS_MAA/{name}"]
         return len(_read_points(_first_step(mesh), mesh))
-    n_components = int(attribute(group, "NCO"))
     return max(values(profile, "CO").size // n_components for entry in instants for profile in entry["NOE"].values())
 
 

@@ -22,13 +22,7 @@ Families = dict[int, tuple[str, ...]]
 
 
 def checked_name(kind: str, name: str, size: int) -> bytes:
-    """Return a name as MED stores it.
-
-    Raises
-    ------
-    FileError
-        If it is empty, too long, or would not come back the same.
-    """
+    """Return a name as MED stores it, or raise FileError if it is empty, too long, or would not come back the same."""
     encoded = name.encode("utf-8")
     if not encoded or len(encoded) > size:
         raise FileError(f"{kind} name '{name}' has {len(encoded)} bytes, and MED takes 1 to {size}: rename it")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from types import MappingProxyType
 
 from fastcontact.errors import FileError
@@ -123,7 +122,7 @@ def write_mesh(path: PathLike, mesh: Mesh) -> None:
     FastcontactWarning
         If the format cannot hold all groups.
     """
-    target = Path(checked_target(path))
+    target = checked_target(path)
     if target.suffix.lower() in MED_SUFFIXES:
         med.write_med_mesh(target, mesh)
         return

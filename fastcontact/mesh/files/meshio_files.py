@@ -44,13 +44,9 @@ HDF5_FORMATS = ("cgns", "h5m", "hmf", "exodus")
 # Cells that meshio gets in another order than ours: our node k is its node NODE_ORDER[format][element][k]. It mirrors
 # the linear wedge of VTK, as old documents of VTK want and VTK 9.7 does not, and leaves Gmsh's wedge of 18 nodes alone.
 Orders = Mapping[str, tuple[int, ...]]
-_WEDGE_OF_VTK: Orders = {"wedge6": elements.get("wedge6").reversed}
-_WEDGE_OF_GMSH: Orders = {"wedge18": (0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16)}
 NODE_ORDER: dict[str, Orders] = {
-    "vtk": _WEDGE_OF_VTK,
-    "vtu": _WEDGE_OF_VTK,
-    "gmsh": _WEDGE_OF_GMSH,
-    "gmsh22": _WEDGE_OF_GMSH,
+    **{key: {"wedge6": elements.get("wedge6").reversed} for key in ("vtk", "vtu")},
+    **{key: {"wedge18": (0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16)} for key in ("gmsh", "gmsh22")},
 }
 
 # How much of what meshio says goes into a message.
@@ -106,15 +102,7 @@ def _format(path: Path, writing: bool) -> str:
 
 
 def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
-    """Return a mesh with its groups, the format, and the numbers of cells left out as vertices and as duplicates.
-
-    Raises
-    ------
-    FileError
-        If meshio cannot read the file, or would read its groups wrongly.
-    MeshError
-        If the mesh has no cells or a kind of cells that fastcontact does not know.
-    """
+    """Return a mesh with its groups, the format, and the numbers of cells left out as vertices and as duplicates."""
     file_format = _format(path, writing=False)
     _check_before(path, file_format)
     found = read_in_process(path, file_format)
@@ -139,9 +127,11 @@ def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
 
 def _check_before(path: Path, file_format: str) -> None:
     """Refuse files that lead meshio to other files, or of which it would lose something."""
+    import h5py
+
     if file_format == "abaqus":
         abaqus.check_readable(path)
-    elif file_format in HDF5_FORMATS and (file_format != "exodus" or hdf5.is_hdf5(path)):
+    elif file_format in HDF5_FORMATS and (file_format != "exodus" or h5py.is_hdf5(path)):
         with hdf5.opened(path):
             pass
     elif file_format == "xdmf":
@@ -230,13 +220,7 @@ def _point_groups(found: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
 
 
 def write(path: Path, temporary: Path, mesh: Mesh) -> None:
-    """Write a mesh to `temporary` in the format of `path`'s suffix.
-
-    Raises
-    ------
-    FileError
-        If meshio cannot write the mesh in this format, or would leave out cells.
-    """
+    """Write a mesh to `temporary` in the format of `path`'s suffix, or raise FileError if that would leave out cells."""
     meshio = library()
     file_format = _format(path, writing=True)
     if file_format in ("tetgen", "svg"):

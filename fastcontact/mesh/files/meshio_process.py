@@ -48,19 +48,7 @@ def library() -> Any:
 
 
 def read_in_process(path: Path, file_format: str) -> dict[str, Any]:
-    """Read a file in a child process.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-    file_format : str
-        meshio's name of the format.
-
-    Returns
-    -------
-    dict
-        What `plain_content` returns, or ``{"error": reason}`` if the child was stopped by one of its limits.
-    """
+    """Return what `plain_content` returns in a child process, or ``{"error": reason}`` if one of its limits stopped it."""
     interpreter = Path(sys.executable or "").name.lower()
     if getattr(sys, "frozen", False) or not ("python" in interpreter or "pypy" in interpreter):
         return plain_content(path, file_format)
@@ -96,15 +84,12 @@ def _answer(done: subprocess.CompletedProcess[bytes], seconds: float) -> dict[st
 
 
 def plain_content(path: Path, file_format: str) -> dict[str, Any]:
-    """Read a file and return what a mesh takes from it as plain data; meshio neither prints nor ends the process.
+    """Read a file in a format, by meshio's name, as plain data; meshio neither prints nor ends the process.
 
-    Returns
-    -------
-    dict
-        ``points``, an array (n_points, 2 or 3) [length]; ``cells``, a list of kind, number of cells and connectivity
-        (n_cells, n_nodes); ``cell_data`` and ``point_data``, the arrays that mean groups; ``cell_sets``, ``point_sets``,
-        ``field_data``; ``said``, what meshio would have printed. Arrays that hold no numbers are None. If meshio cannot
-        read the file, only ``error``, the reason.
+    Found are ``points``, an array (n_points, 2 or 3) [length]; ``cells``, a list of kind, number of cells and connectivity
+    (n_cells, n_nodes); ``cell_data`` and ``point_data``, the arrays that mean groups; ``cell_sets``, ``point_sets``,
+    ``field_data``; ``said``, what meshio would have printed. Arrays that hold no numbers are None. If meshio cannot read
+    the file, only ``error``, the reason.
     """
     said = io.StringIO()
     try:

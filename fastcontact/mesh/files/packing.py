@@ -28,12 +28,9 @@ def packed(data: Any) -> NDArray[np.uint8]:
 
 
 def unpacked(values: NDArray[np.uint8]) -> Any:
-    """Return what `packed` was given, from its bytes (n,); bytes beyond its end do not matter.
+    """Return what `packed` was given, from its bytes (n,), of which those beyond its end do not matter.
 
-    Raises
-    ------
-    ValueError
-        If the bytes are not whole, or not from `packed`.
+    Raises ValueError if the bytes are not whole, or not from `packed`.
     """
     raw = np.ascontiguousarray(values, np.uint8).data
     line, found, _ = bytes(raw[:200]).partition(b"\n")
@@ -64,15 +61,14 @@ def _without_arrays(data: Any, arrays: io.BytesIO) -> Any:
 def _with_arrays(data: Any, raw: memoryview) -> Any:
     if isinstance(data, dict):
         if _ARRAY in data:
-            place, kind, shape = data[_ARRAY]
-            return _array(place, kind, shape, raw)
+            return _array(raw, *data[_ARRAY])
         return {key: _with_arrays(value, raw) for key, value in data.items()}
     if isinstance(data, list):
         return [_with_arrays(value, raw) for value in data]
     return data
 
 
-def _array(place: int, kind: str, shape: list[int], raw: memoryview) -> NDArray[Any]:
+def _array(raw: memoryview, place: int, kind: str, shape: list[int]) -> NDArray[Any]:
     dtype = np.dtype(kind)
     if dtype.kind not in _KINDS:
         raise ValueError(f"an array of {kind} is none of ours")

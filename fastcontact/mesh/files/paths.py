@@ -14,13 +14,7 @@ PathLike = str | os.PathLike[str]
 
 
 def existing_file(path: PathLike) -> Path:
-    """Return `path` as a Path.
-
-    Raises
-    ------
-    FileError
-        If there is no such file, or if it is a folder.
-    """
+    """Return `path` as a Path, or raise FileError if there is no such file or it is no plain one."""
     found = Path(path)
     try:
         found.stat()
@@ -41,13 +35,7 @@ def existing_file(path: PathLike) -> Path:
 
 
 def checked_target(path: PathLike) -> Path:
-    """Return the real path to write to; links are followed, so that the file they name is written.
-
-    Raises
-    ------
-    FileError
-        If the folder is missing, the path is no plain file, or nothing may be written there.
-    """
+    """Return the real path to write to, that of the file which a link names, or raise FileError if it cannot be written."""
     target = Path(os.path.realpath(os.fspath(path)))
     try:
         if target.is_dir():
@@ -73,10 +61,7 @@ def _may_write(path: Path) -> bool:
 def replacing(path: PathLike) -> Iterator[Path]:
     """Give a temporary path beside `path` to write to, which takes its place on success and is removed after a failure.
 
-    Raises
-    ------
-    FileError
-        If the folder is missing, `path` is a folder, or the operating system refuses to write.
+    What the operating system refuses becomes a FileError.
     """
     target = checked_target(path)
     # The suffix stays last, because writers choose the format by it.

@@ -15,13 +15,7 @@ UNITS: Units = {"length": "mm", "force": "N", "pressure": "MPa"}
 
 
 def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None = None) -> Any:
-    """Return `ax`, or new axes in a figure of their own, ``projection="3d"`` for solids.
-
-    Raises
-    ------
-    FastcontactError
-        If matplotlib is not installed.
-    """
+    """Return `ax`, or new axes in a figure of their own, ``projection="3d"`` for solids."""
     if ax is not None:
         return ax
     try:
@@ -32,10 +26,3 @@ def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None 
     figure = Figure(figsize=size, layout="constrained", dpi=150)
     FigureCanvasAgg(figure)
     return figure.add_subplot(projection=projection)
-
-
-def name_axes(ax: Axes, x: str, y: str, title: str) -> None:
-    """Write the names of both axes and the title."""
-    ax.set_xlabel(x)
-    ax.set_ylabel(y)
-    ax.set_title(title)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNITS, Units, name_axes, new_axes
+from fastcontact.results.plot._axes import UNITS, Units, new_axes
 from fastcontact.results.step import StepResult
 
 if TYPE_CHECKING:
@@ -69,20 +69,15 @@ def axis_stress(
         axes.plot(fine, von_mises(exact), style, color="C2", lw=1.0)
         axes.plot([], [], f"k{style}", lw=1.0, label=label)
     title = title or f"Stresses on the axis, load factor {step.load_factor:g}"
-    name_axes(axes, f"depth under the surface [{units['length']}]", f"stress [{units['pressure']}]", title)
+    depth_name, stress_name = f"depth under the surface [{units['length']}]", f"stress [{units['pressure']}]"
+    axes.set(xlabel=depth_name, ylabel=stress_name, title=title)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
     return axes
 
 
 def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, NDArray[np.int64], Array]:
-    """Return depth (n,) [length], side (n,), 1 above and -1 below the surface, and stress (n, 4) of the axis nodes.
-
-    Raises
-    ------
-    FastcontactError
-        If the mesh is three-dimensional or has no nodes on the axis.
-    """
+    """Return depth (n,) [length], side (n,), 1 above and -1 below the surface, and stress (n, 4) of the axis nodes."""
     if mesh.dim != 2:
         raise FastcontactError("stresses along the axis are for meshes in two dimensions: probe points in three")
     contact = step.contact[pair]

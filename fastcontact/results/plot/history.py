@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fastcontact.errors import FastcontactError
-from fastcontact.results.plot._axes import UNITS, Units, name_axes, new_axes
+from fastcontact.results.plot._axes import UNITS, Units, new_axes
 from fastcontact.results.step import StepResult
 
 if TYPE_CHECKING:
@@ -58,9 +58,9 @@ def history(
         curves = [law.at_approach(d) for d in fine]
         upper.plot(fine, [c.force for c in curves], "k-", lw=1, label="Hertz, equal approach")
         lower.plot(fine, [c.radius for c in curves], "k-", lw=1, label="Hertz, equal approach")
-    name_axes(upper, "", f"contact force [{units['force']}]", title or f"Contact '{pair}' over the load")
+    upper.set(ylabel=f"contact force [{units['force']}]", title=title or f"Contact '{pair}' over the load")
     along = f"approach [{units['length']}]" if approach else "load factor"
-    name_axes(lower, along, f"contact radius [{units['length']}]", "")
+    lower.set(xlabel=along, ylabel=f"contact radius [{units['length']}]")
     for ax in axes:
         ax.grid(alpha=0.3)
         ax.legend()
@@ -101,8 +101,8 @@ def contact_zones(
         axes.annotate(str(int(contact.active.sum())), (step.load_factor, 1.0), fontsize=7, **place)
     reach = y[closed].max(initial=0.0)
     axes.set_ylim(0.0, 1.5 * reach if 0.0 < 1.5 * reach < y.max() else None)
-    axes.set_xlabel("load factor (above: closed nodes)")
-    axes.set_ylabel(f"distance along the secondary surface [{units['length']}]")
+    distance = f"distance along the secondary surface [{units['length']}]"
+    axes.set(xlabel="load factor (above: closed nodes)", ylabel=distance)
     axes.set_title(title or f"Contact '{pair}' over the load", pad=16)
     axes.legend(loc="upper left", fontsize=8)
     return axes

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.results.plot._axes import UNITS, Units, name_axes, new_axes
+from fastcontact.results.plot._axes import UNITS, Units, new_axes
 from fastcontact.results.step import ContactResult
 
 if TYPE_CHECKING:
@@ -63,8 +63,7 @@ def pressure_profile(
     if np.isfinite(inside) and np.isfinite(outside):
         ax.axvspan(inside, outside, color="tab:blue", alpha=0.15, lw=0, label=f"edge: {inside:.2f} to {outside:.2f}")
     x_name, y_name = f"distance from the axis [{units['length']}]", f"contact pressure [{units['pressure']}]"
-    name_axes(ax, x_name, y_name, title or f"Contact '{contact.name}'")
-    ax.set_xlim(0.0, reach)
+    ax.set(xlabel=x_name, ylabel=y_name, title=title or f"Contact '{contact.name}'", xlim=(0.0, reach))
     ax.set_ylim(bottom=0.0)
     ax.grid(alpha=0.3)
     ax.legend()

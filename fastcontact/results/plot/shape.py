@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.contact.search.closest import flat_triangles
+from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNITS, Units, name_axes, new_axes
+from fastcontact.results.plot._axes import UNITS, Units, new_axes
 from fastcontact.results.plot.solid import MOST_EDGES, draw_solid
 from fastcontact.results.step import StepResult
 
@@ -68,10 +68,8 @@ def deformed_shape(
     axes.plot(*([x] for x in place[top]), "o", mfc="none", mec="red", ms=9, mew=1.5, label=label, zorder=10)
     axes.figure.colorbar(field, ax=axes, label=f"von Mises stress [{units['pressure']}]", shrink=0.6 if solid else 0.8)
     axes.set_aspect("equal")
-    title = title or f"Deformed shape (displacements x {scale:g}), load factor {step.load_factor:g}"
-    name_axes(axes, f"x [{units['length']}]", f"y [{units['length']}]", title)
-    if solid:
-        axes.set_zlabel(f"z [{units['length']}]")
+    axes.set_title(title or f"Deformed shape (displacements x {scale:g}), load factor {step.load_factor:g}")
+    axes.set(**{f"{axis}label": f"{axis} [{units['length']}]" for axis in "xyz"[: mesh.dim]})
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.02 if solid else -0.09 if ax is not None else _below(both)))
     return axes
 

@@ -31,14 +31,15 @@ def draw_solid(ax: Any, mesh: Mesh, place: Array, values: Array, edges: bool | N
     from matplotlib.colors import Normalize
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    eye = _eye(*view)
+    height, direction = np.radians(view)
+    eye = np.array([np.cos(height) * np.cos(direction), np.cos(height) * np.sin(direction), np.sin(height)])
     pieces, colours, outlines = [], [], []
     outer = outer_facets(mesh)
     for name, facets in outer.items():
         corners = place[facets]
         flat = flat_triangles(facets.shape[1])
-        normal = _vector_area(corners[:, flat]).sum(axis=1)
-        seen = normal @ eye > 0
+        a, b, c = np.moveaxis(corners[:, flat], -2, 0)
+        seen = np.cross(b - a, c - a).sum(axis=1) @ eye > 0
         weights = _cut(CUTS if elements.get(name).order == 1 else 1)
         triangles = np.einsum("pcw,ftwd->ftpcd", weights, corners[seen][:, flat])
         pieces.append(triangles.reshape(-1, 3, 3))
@@ -61,18 +62,6 @@ def draw_solid(ax: Any, mesh: Mesh, place: Array, values: Array, edges: bool | N
     for setter, low, high in zip((ax.set_xlim, ax.set_ylim, ax.set_zlim), place.min(axis=0), place.max(axis=0)):
         setter(low, high)
     return ScalarMappable(norm, "viridis")
-
-
-def _eye(height: float, direction: float) -> Array:
-    """Return the unit vector towards the eye."""
-    h, d = np.radians([height, direction])
-    return np.array([np.cos(h) * np.cos(d), np.cos(h) * np.sin(d), np.sin(h)])
-
-
-def _vector_area(triangles: Array) -> Array:
-    """Return the vector areas (..., 3) of triangles (..., 3, 3) [length^2]."""
-    a, b, c = np.moveaxis(triangles, -2, 0)
-    return np.asarray(0.5 * np.cross(b - a, c - a))
 
 
 def _cut(n: int) -> Array:

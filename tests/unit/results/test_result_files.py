@@ -21,6 +21,7 @@ from fastcontact import topology
 from fastcontact.errors import FileError, ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.results import contents
 from fastcontact.results.reader import open_results
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.writer import ResultWriter
@@ -433,7 +434,7 @@ def test_a_step_interrupted_half_way_can_be_written_again(path: Path, monkeypatc
     with ResultWriter(path, MESH) as out:
         out.write(step_result(0))
         with monkeypatch.context() as patch:
-            patch.setattr(out, "_append_step_rows", lambda step: (_ for _ in ()).throw(KeyboardInterrupt))
+            patch.setattr(contents, "append_rows", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
             with pytest.raises(KeyboardInterrupt):
                 out.write(step_result(4))
         assert len(open_results(path)) == 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +19,6 @@ from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.tables import (
     contact_table,
     line_table,
-    read_csv,
     with_column,
     write_csv,
 )
@@ -145,6 +145,18 @@ def assert_same_table(found: np.ndarray, expected: np.ndarray) -> None:
             assert np.signbit(found[name])[number].tolist() == np.signbit(expected[name])[number].tolist(), name
 
 
+def read_csv(path: Path, kinds: np.dtype[Any]) -> tuple[np.ndarray, dict[str, str]]:
+    """Return the table in a file, its columns of these kinds, and the units in its header."""
+    with open(path, encoding="utf-8", newline="") as file:
+        header, *rows = csv.reader(file)
+    titles = [title.removesuffix("]").partition(" [") for title in header]
+    assert tuple(name for name, _, _ in titles) == kinds.names
+    table = np.empty(len(rows), kinds)
+    for name, column in zip(kinds.names, zip(*rows)):
+        table[name] = [text == "true" for text in column] if kinds[name].kind == "b" else column
+    return table, {name: unit for name, _, unit in titles if unit}
+
+
 def test_tables_come_back_from_csv(tmp_path: Path) -> None:
     step, path = step_result(2), tmp_path / "table.csv"
     units = {"x": "mm", "pressure": "MPa", "force_x": "N, full circle"}
@@ -155,7 +167,7 @@ def test_tables_come_back_from_csv(tmp_path: Path) -> None:
     ):
         of_table = {name: unit for name, unit in units.items() if name in table.dtype.names}
         write_csv(path, table, of_table)
-        found, found_units = read_csv(path)
+        found, found_units = read_csv(path, table.dtype)
         assert_same_table(found, table)
         assert found_units == of_table
 
@@ -166,7 +178,7 @@ def test_csv_loses_no_bit(values: np.ndarray, tmp_path_factory: pytest.TempPathF
     path = tmp_path_factory.getbasetemp() / "bits.csv"
     table = np.array(list(zip(values, range(len(values)))), dtype=[("a", float), ("b", np.int64)])
     write_csv(path, table)
-    assert_same_table(read_csv(path)[0], table)
+    assert_same_table(read_csv(path, table.dtype)[0], table)
 
 
 def test_csv_is_what_the_standard_says(tmp_path: Path) -> None:
@@ -188,14 +200,3 @@ def test_csv_messages(tmp_path: Path) -> None:
     assert not path.exists()
     with pytest.raises(FileError, match="does not exist: create it"):
         write_csv(tmp_path / "nowhere" / "t.csv", table)
-    with pytest.raises(FileError, match="cannot be read"):
-        read_csv(path)
-    path.write_text("")
-    with pytest.raises(FileError, match="is empty"):
-        read_csv(path)
-    path.write_text("a,b\n1,2\n3\n")
-    with pytest.raises(FileError, match="line 3 has 1 values, but the header names 2"):
-        read_csv(path)
-    path.write_bytes(b"a\n\xff\n")
-    with pytest.raises(FileError, match="UTF-8"):
-        read_csv(path)

@@ -18,7 +18,6 @@ from fastcontact.cases.case import read_case
 from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh.files import meshio_process
 from fastcontact.mesh.files.med import write_med_mesh
-from fastcontact.results.tables import read_csv
 
 HEAP = b"GCOL\x01\0\0\0"
 
@@ -155,17 +154,6 @@ def test_unknown_kinds_of_cells_are_listed_in_short(tmp_path):
     with pytest.raises(MeshError, match=r"0 cells of kind kind 0000, .* 1988 kinds more, which fastcontact") as caught:
         fc.read_mesh(path)
     assert len(str(caught.value)) < 1000
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [("a,,b\n1,2,3\n", "column 2 has no name"), ("a,b,a\n1,2,3\n", "column 3 has the name 'a' again")],
-)
-def test_tables_whose_columns_have_no_names_of_their_own(tmp_path, text, message):
-    path = tmp_path / "table.csv"
-    path.write_text(text)
-    with pytest.raises(FileError, match=message):
-        read_csv(path)
 
 
 @pytest.mark.parametrize("tail", ["", ",", ")", "x"])

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from fastcontact.errors import FastcontactWarning, FileError, MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.files import med
-from fastcontact.mesh.files.med import read_med_field, read_med_mesh, write_med_mesh
+from fastcontact.mesh.files.med import read_med, read_med_field, write_med_mesh
 from fastcontact.mesh.files.mesh_files import read_mesh_report
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.med import write_med_results
@@ -211,7 +211,7 @@ def test_reads_what_medcoupling_writes(tmp_path, write):
     mc = pytest.importorskip("medcoupling", reason="medcoupling is not installed")
     path = tmp_path / "plate.med"
     points = written_by_medcoupling(mc, path, write)
-    mesh = read_med_mesh(path)
+    mesh = read_med(path).mesh
     np.testing.assert_array_equal(mesh.points, points)
     assert {name: block.tolist() for name, block in mesh.cells.items()} == {
         "tri3": [[1, 4, 2]], "quad4": [[0, 1, 2, 3]], "line2": [[0, 1], [1, 4]],
@@ -330,19 +330,19 @@ def meshes(draw):
 @given(mesh=meshes())
 def test_any_mesh_comes_back_the_same(tmp_path, mesh):
     write_med_mesh(tmp_path / "any.med", mesh)
-    assert_same(read_med_mesh(tmp_path / "any.med"), mesh)
+    assert_same(read_med(tmp_path / "any.med").mesh, mesh)
 
 
 def test_every_flat_element_comes_back_the_same(tmp_path):
     write_med_mesh(tmp_path / "all.med", all_elements())
-    assert_same(read_med_mesh(tmp_path / "all.med"), all_elements())
+    assert_same(read_med(tmp_path / "all.med").mesh, all_elements())
 
 
 def test_other_node_order_is_undone_on_reading(tmp_path, monkeypatch):
     order = (0, 3, 2, 1, 7, 6, 5, 4)
     monkeypatch.setitem(med.NODE_ORDER, "QU8", order)
     write_med_mesh(tmp_path / "order.med", all_elements())
-    assert_same(read_med_mesh(tmp_path / "order.med"), all_elements())
+    assert_same(read_med(tmp_path / "order.med").mesh, all_elements())
     ours = all_elements().cells["quad8"]
     with h5py.File(tmp_path / "order.med") as file:
         theirs = next(iter(file["ENS_MAA/mesh"].values()))["MAI/QU8/NOD"][()].reshape(8, 2).T - 1
@@ -440,7 +440,7 @@ def test_reads_med_2_as_the_med_library_converts_it(tmp_path):
     assert code == 0, said
     with h5py.File(tmp_path / "new.med") as file:
         assert file["INFOS_GENERALES"].attrs["MAJ"] >= 3
-    assert_same(read_med_mesh(tmp_path / "new.med"), read_med_mesh(tmp_path / "old.med"))
+    assert_same(read_med(tmp_path / "new.med").mesh, read_med(tmp_path / "old.med").mesh)
 
 
 def test_first_of_several_time_steps_is_read(tmp_path):
@@ -453,7 +453,7 @@ def test_first_of_several_time_steps_is_read(tmp_path):
         later = mesh[f"{1:020d}{-1:020d}"]
         later.attrs["NDT"] = 1
         later["NOE/COO"][...] += 100.0
-    assert_same(read_med_mesh(path), all_elements())
+    assert_same(read_med(path).mesh, all_elements())
 
 
 def test_numbers_and_families_may_be_absent(tmp_path):
@@ -464,7 +464,7 @@ def test_numbers_and_families_may_be_absent(tmp_path):
         step = next(iter(file["ENS_MAA/mesh"].values()))
         for entry in [step["NOE"], *step["MAI"].values()]:
             del entry["FAM"]
-    mesh = read_med_mesh(path)
+    mesh = read_med(path).mesh
     assert mesh.group_names == []
     np.testing.assert_array_equal(mesh.cells["tri6"], all_elements().cells["tri6"])
 
@@ -472,7 +472,7 @@ def test_numbers_and_families_may_be_absent(tmp_path):
 def test_flat_mesh_in_space_becomes_a_plane_one(tmp_path):
     mesh = all_elements()
     write_med_mesh(tmp_path / "flat.med", mesh.replace(points=np.pad(mesh.points, [(0, 0), (0, 1)])))
-    assert_same(read_med_mesh(tmp_path / "flat.med"), mesh)
+    assert_same(read_med(tmp_path / "flat.med").mesh, mesh)
 
 
 def add_vertices(path, points, family):
@@ -501,7 +501,7 @@ def test_points_lost_from_a_mixed_group_are_counted(tmp_path):
     write_med_mesh(path, Mesh([[0, 0], [1, 0], [0, 1], [5, 5]], {"tri3": [[0, 1, 2]]}, {"mixed": [0]}))
     add_vertices(path, [0, 3], family=-1)
     with pytest.warns(FastcontactWarning, match="'mixed'.* 1 points"):
-        assert read_med_mesh(path).cell_groups["mixed"].tolist() == [0]
+        assert read_med(path).mesh.cell_groups["mixed"].tolist() == [0]
 
 
 # Errors -------------------------------------------------------------------------------------------
@@ -509,12 +509,12 @@ def test_points_lost_from_a_mixed_group_are_counted(tmp_path):
 
 def test_missing_file_folder_and_other_formats(tmp_path):
     with pytest.raises(FileError, match=r"no file '.*none\.med'"):
-        read_med_mesh(tmp_path / "none.med")
+        read_med(tmp_path / "none.med")
     with pytest.raises(FileError, match="is a folder"):
-        read_med_mesh(tmp_path)
+        read_med(tmp_path)
     (tmp_path / "text.med").write_text("not HDF5")
     with pytest.raises(FileError, match=r"text\.med' is not an HDF5 file"):
-        read_med_mesh(tmp_path / "text.med")
+        read_med(tmp_path / "text.med")
 
 
 def test_no_mesh_and_two_meshes(tmp_path):
@@ -522,15 +522,15 @@ def test_no_mesh_and_two_meshes(tmp_path):
     with h5py.File(path, "w"):
         pass
     with pytest.raises(FileError, match="holds no MED mesh"):
-        read_med_mesh(path)
+        read_med(path)
     write_med_mesh(path, all_elements(), mesh_name="upper")
     with h5py.File(path, "a") as file:
         file.copy("ENS_MAA/upper", "ENS_MAA/lower")
     with pytest.raises(FileError, match=r"2 meshes \('lower', 'upper'\): say which one with mesh_name"):
-        read_med_mesh(path)
+        read_med(path)
     with pytest.raises(FileError, match="unknown mesh 'uper': did you mean 'upper'"):
-        read_med_mesh(path, mesh_name="uper")
-    assert_same(read_med_mesh(path, mesh_name="upper"), all_elements())
+        read_med(path, mesh_name="uper")
+    assert_same(read_med(path, mesh_name="upper").mesh, all_elements())
 
 
 def test_unknown_kinds_are_named_and_counted(tmp_path):
@@ -541,7 +541,7 @@ def test_unknown_kinds_are_named_and_counted(tmp_path):
         cells.move("TR6", "TR7")
         cells.create_dataset("POG/INN", data=[1, 4, 8, 13])
     with pytest.raises(MeshError, match=r"3 cells of kind POG, 2 cells of kind TR7.*use only.* SE2"):
-        read_med_mesh(path)
+        read_med(path)
 
 
 @pytest.mark.parametrize(
@@ -554,7 +554,7 @@ def test_meshes_of_another_kind(tmp_path, attribute, value, message):
     with h5py.File(path, "a") as file:
         file["ENS_MAA/mesh"].attrs[attribute] = value
     with pytest.raises(MeshError, match=f"mesh 'mesh' of .*{message}"):
-        read_med_mesh(path)
+        read_med(path)
 
 
 @pytest.mark.parametrize(
@@ -582,7 +582,7 @@ def test_damage_is_named(tmp_path, where, values, message):
             step[where] = np.asarray(values)
             step[where].attrs.update(attributes)
     with pytest.raises((FileError, MeshError), match=message):
-        read_med_mesh(path)
+        read_med(path)
 
 
 def test_truncated_file_is_named(tmp_path):
@@ -590,7 +590,7 @@ def test_truncated_file_is_named(tmp_path):
     write_med_mesh(path, all_elements())
     path.write_bytes(path.read_bytes()[:-2000])
     with pytest.raises(FileError, match=r"cut\.med', it is damaged"):
-        read_med_mesh(path)
+        read_med(path)
 
 
 def test_family_that_is_not_described_is_counted(tmp_path):
@@ -599,7 +599,7 @@ def test_family_that_is_not_described_is_counted(tmp_path):
     with h5py.File(path, "a") as file:
         next(iter(file["ENS_MAA/mesh"].values()))["NOE/FAM"][:3] = 77
     with pytest.warns(FastcontactWarning, match="3 cells or points belong to family 77"):
-        read_med_mesh(path)
+        read_med(path)
 
 
 def test_links_out_of_the_file_are_refused(tmp_path):
@@ -608,7 +608,7 @@ def test_links_out_of_the_file_are_refused(tmp_path):
         file.create_group("ENS_MAA")["mesh"] = h5py.ExternalLink("target.med", "/ENS_MAA/mesh")
         file["soft"] = h5py.SoftLink("/ENS_MAA/mesh")
     with pytest.raises(FileError, match="refers to another file at '/ENS_MAA/mesh'"):
-        read_med_mesh(tmp_path / "linked.med")
+        read_med(tmp_path / "linked.med")
 
 
 def test_values_in_another_file_are_refused(tmp_path):
@@ -626,7 +626,7 @@ def test_values_in_another_file_are_refused(tmp_path):
                 layout[:] = h5py.VirtualSource(str(tmp_path / "other.h5"), "x", 140)
                 points.create_virtual_dataset("COO", layout)
         with pytest.raises(FileError, match=r"COO' of .* stores its values in another file"):
-            read_med_mesh(path)
+            read_med(path)
 
 
 def test_soft_links_inside_the_file_are_followed(tmp_path):
@@ -635,7 +635,7 @@ def test_soft_links_inside_the_file_are_followed(tmp_path):
     with h5py.File(path, "a") as file:
         file.move("ENS_MAA/mesh", "elsewhere")
         file["ENS_MAA/mesh"] = h5py.SoftLink("/elsewhere")
-    assert read_med_mesh(path).n_points == 70
+    assert read_med(path).mesh.n_points == 70
 
 
 @pytest.mark.parametrize(
