@@ -85,17 +85,7 @@ def turn(beta, z, p):
 
 
 @kernel
-def _scaled_part(factor, a, b, low, high):
-    for i in range(low, high):
-        b[i] = factor * a[i]
-
-
-@parallel_kernel
 def scaled(factor, a, b):
     """Fill `b` with ``factor a``, in the precision of b."""
-    n = a.shape[0]
-    if n <= ALONE * CHUNK:
-        _scaled_part(factor, a, b, 0, n)
-        return
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        _scaled_part(factor, a, b, c * CHUNK, min(n, (c + 1) * CHUNK))
+    for i in range(a.shape[0]):
+        b[i] = factor * a[i]

@@ -191,12 +191,11 @@ class Hierarchy:
             A.indptr, A.indices, A.exact, level.inverse, aggregate, tentative.ravel(), omega, indptr, blocks, A.rows, cols
         )  # fmt: skip
         del tentative, T
-        index = galerkin_kernels.transposed(indptr, columns, n_coarse)
         P = BlockMatrix(indptr, columns, blocks, A.rows, cols)
+        start, origin, slot = index = by_columns(P, n_coarse)
         coarse = product(A, P, index)
-        R = BlockMatrix(index[0], index[1], np.empty_like(P.data), cols, A.rows)
-        galerkin_kernels.transpose_blocks(index[2], P.data, R.data, A.rows, cols)
-        return P, R, coarse, coarse_modes
+        turned = np.ascontiguousarray(blocks.reshape(-1, size, n_modes)[slot].transpose(0, 2, 1))
+        return P, BlockMatrix(start, origin, turned.ravel(), cols, A.rows), coarse, coarse_modes
 
     def __repr__(self) -> str:
         sizes = " -> ".join(str(level.n) for level in self.levels)
@@ -255,8 +254,15 @@ class Hierarchy:
             level.relax(level.r, *factor)
 
 
+def by_columns(P: BlockMatrix, n: int) -> tuple[Indices, Indices, Indices]:
+    """Return where the blocks of each of n block columns begin, their rows, ascending, and their numbers."""
+    numbers = np.arange(len(P.indices), dtype=np.int32)
+    found = csr_matrix((numbers, P.indices, P.indptr), shape=(len(P.indptr) - 1, n)).tocsc()
+    return found.indptr, found.indices, found.data
+
+
 def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Indices, Indices, Indices]) -> BlockMatrix:
-    """Return ``P.T A P`` for a symmetric A; `index` from `galerkin_kernels.transposed`."""
+    """Return ``P.T A P`` for a symmetric A; `index` from `by_columns`."""
     n_coarse = len(index[0]) - 1
     count, near = np.zeros(n_coarse, np.int32), np.zeros(n_coarse, np.int32)
     galerkin_kernels.count_galerkin(A.indptr, A.indices, P.indptr, P.indices, index[0], index[1], count, near)
