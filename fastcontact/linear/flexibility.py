@@ -50,11 +50,6 @@ class FlexibilityColumns:
         self._dofs, self._values = dofs, values
         self._place[dofs] = np.arange(len(dofs))
 
-    def of(self, dofs: Indices) -> Array:
-        """Return ``K^-1`` at the rows and columns `dofs` (k,), shape (k, k) [length / force]."""
-        place = self._places(dofs)
-        return self._values[np.ix_(place, place)]
-
     def of_rows(self, R: csr_array) -> Array:
         """Return ``R K^-1 R.T`` (m, m) [length / force] for sparse rows R (m, n)."""
         used = R.data != 0.0
