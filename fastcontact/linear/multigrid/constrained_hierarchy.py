@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array
 
 from fastcontact.linear.elimination.elimination import Elimination
-from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
+from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.hierarchy import Hierarchy, Level
-from fastcontact.linear.multigrid.matrix import BlockMatrix
+from fastcontact.linear.multigrid.matrix import BlockMatrix, diagonal_blocks
 
 Array = NDArray[np.float64]
 Values = NDArray[Any]
@@ -98,7 +98,7 @@ class ConstrainedHierarchy:
         """Set the inverses of the diagonal blocks of `nodes`, and remember what they were."""
         size = len(level.A.rows)
         blocks = level.diagonal.reshape(-1, size**2)[nodes].astype(float).ravel()
-        blocks += galerkin_kernels.diagonal_blocks(change.indptr, change.indices, change.data.ravel(), size)
+        blocks += diagonal_blocks(change.indptr, change.indices, change.data, size)
         inverse = np.empty(blocks.size, level.inverse.dtype)
         cycle_kernels.invert_blocks(blocks, size, inverse)
         every = level.inverse.reshape(-1, size**2)

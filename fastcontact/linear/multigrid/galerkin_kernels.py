@@ -41,20 +41,6 @@ def graph(indptr, indices, data, size):
 
 
 @kernel
-def diagonal_blocks(indptr, indices, data, size):
-    """Return the diagonal blocks (n * size * size,)."""
-    n = indptr.shape[0] - 1
-    square = size * size
-    out = np.zeros(n * square, data.dtype)
-    for i in range(n):
-        for k in range(indptr[i], indptr[i + 1]):
-            if indices[k] == i:
-                for e in range(square):
-                    out[i * square + e] += data[k * square + e]
-    return out
-
-
-@kernel
 def _aggregates_of(i, indptr, indices, aggregate, found):
     """Fill `found` with the aggregates of node i and its neighbours, ascending; return their number."""
     count = 0

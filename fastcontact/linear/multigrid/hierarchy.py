@@ -22,7 +22,7 @@ from scipy.sparse import csr_matrix
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
 from fastcontact.linear.multigrid.coarse import Coarse
-from fastcontact.linear.multigrid.matrix import BlockMatrix
+from fastcontact.linear.multigrid.matrix import BlockMatrix, diagonal_blocks
 
 Array = NDArray[np.float64]
 Values = NDArray[Any]
@@ -155,7 +155,7 @@ class Hierarchy:
     def _level(self, A: BlockMatrix) -> Level:
         size = len(A.rows)
         own = BlockMatrix(A.indptr, A.indices, A.data.astype(self.dtype, copy=False), A.rows, A.cols)
-        diagonal = galerkin_kernels.diagonal_blocks(A.indptr, A.indices, own.data, size)
+        diagonal = diagonal_blocks(A.indptr, A.indices, own.data, size)
         inverse = np.empty_like(diagonal)
         cycle_kernels.invert_blocks(diagonal, size, inverse)
         level = Level(own, diagonal, inverse, 1.0)
