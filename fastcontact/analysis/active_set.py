@@ -60,7 +60,9 @@ def solve(
     while True:
         may_leave = constraints.normal_compliance is None and len(left) < EARLY and active.tobytes() not in left
         watch = _Watch(signs, active) if may_leave else None
-        u, forces = _under(loaded, constraints, active, accuracy, guess, watch)
+        rows, compliance = np.flatnonzero(active), constraints.normal_compliance
+        C = None if compliance is None else compliance.block(rows)
+        u, forces = loaded.solve(constraints.B[rows], -constraints.gap0[rows], C, guess, watch, accuracy.residual)
         guess = u
         if watch is not None and watch.wanted is not None:
             left.add(active.tobytes())
@@ -73,17 +75,6 @@ def solve(
         one_by_one = one_by_one or found.wanted.tobytes() in seen
         active = _first_changed(active, found.wanted) if one_by_one else found.wanted
         iteration += 1
-
-
-def _under(
-    loaded: Loaded, constraints: Constraints, active: Mask, accuracy: Accuracy, guess: Array | None,
-    watch: _Watch | None,
-) -> tuple[Array, Array]:  # fmt: skip
-    """Return the unknowns (n,) and the multipliers of the active constraints, which hold as equations."""
-    rows = np.flatnonzero(active)
-    compliance = constraints.normal_compliance
-    C = compliance.block(rows) if compliance is not None else None
-    return loaded.solve(constraints.B[rows], -constraints.gap0[rows], C, guess, watch, accuracy.residual)
 
 
 def _first_changed(active: Mask, wanted: Mask) -> Mask:

@@ -1,8 +1,7 @@
 r"""Mortar contact in the plane with a pressure field, integrated exactly over the pieces where two facets face each other.
 
-The gap between facets that do not match has a kink wherever a node of the primary side stands opposite. Here every
-secondary facet is cut there, in each pairing, and every piece gets Gauss points of its own (Puso and Laursen, 2004;
-Popp, Gee and Wall, 2009). A uniform pressure then passes between meshes that do not match without error, which neither
+Every secondary facet is cut in each pairing, see `_cut_lines`, and every piece gets Gauss points of its own (Puso and
+Laursen, 2004). A uniform pressure then passes between meshes that do not match without error, which neither
 node-to-segment nor quadrature over whole facets achieves. Pieces that face nothing carry nothing, and the pressure field
 is projected over the rest: where the primary surface ends inside a facet, the pressure ends there too.
 

@@ -10,7 +10,7 @@ from scipy.sparse import bsr_array, csc_array, csr_array
 
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
 from fastcontact.linear.factors.known_loads import KnownLoads
-from fastcontact.linear.flexibility import FlexibilityColumns, balanced, multipliers, reduced, symmetric
+from fastcontact.linear.flexibility import FlexibilityColumns, balanced, multipliers, symmetric
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 
 Array = NDArray[np.float64]
@@ -155,7 +155,7 @@ class LoadedFactor:
 
     def flexibility(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
-        return R @ self._free, reduced(self._solver.columns, R)
+        return R @ self._free, self._solver.columns.of_rows(R)
 
     def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         """See `Loaded`."""

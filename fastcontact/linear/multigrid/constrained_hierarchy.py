@@ -6,7 +6,7 @@ products near the pivots change. The changes are stored beside the matrices of t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,25 +20,9 @@ from fastcontact.linear.multigrid.matrix import BlockMatrix, diagonal_blocks
 
 Array = NDArray[np.float64]
 Values = NDArray[Any]
-Indices = NDArray[np.int32]
 Nodes = NDArray[np.intp]
 # Sum of the weights with which a pivot may follow others before the spectrum of the finest level is estimated again.
 WEIGHT = 4.0
-
-
-@dataclass(eq=False)
-class MatrixChange:
-    """A symmetric matrix that is added to the rows `nodes` of a level: blocks size x size, columns of all nodes."""
-
-    nodes: Nodes
-    indptr: Indices
-    indices: Indices
-    data: Values
-    size: int
-
-    def subtract(self, x: Values, r: Values) -> None:
-        """Subtract the product with `x` (n,) from `r` (n,)."""
-        cycle_kernels.subtract_rows(self.nodes, self.indptr, self.indices, self.data, x, r, self.size)
 
 
 class ConstrainedHierarchy:
@@ -83,8 +67,8 @@ class ConstrainedHierarchy:
                 return
             self._change_diagonal(level, nodes, change)
             if level is not top:
-                columns, size = nodes[change.indices].astype(np.int32), change.blocksize[0]
-                level.change = MatrixChange(nodes, change.indptr, columns, change.data.astype(kind).ravel(), size)
+                columns = nodes[change.indices].astype(np.int32)
+                level.change = nodes, change.indptr, columns, change.data.astype(kind).ravel()
             nodes, change = _coarser(nodes, change, level.P)
 
     def _undo(self) -> None:

@@ -53,8 +53,9 @@ class Level:
         Prolongator and its transpose; None on the coarsest level.
     eliminated : Elimination or None
         Equations, on the finest level: weights in the precision of the cycle, the same for forces.
-    change : MatrixChange or None
-        What eliminated equations add to the matrix, on coarser levels.
+    change : tuple of ndarray, or None
+        What eliminated equations add to the matrix, on coarser levels: the block rows that change (k,), and the change on
+        them as `indptr`, `indices` and `data` of a `BlockMatrix`.
     b, x, r, d : ndarray (n,)
         Right-hand side, iterate, residual and step of the cycle.
     """
@@ -66,7 +67,7 @@ class Level:
     P: BlockMatrix | None = None
     R: BlockMatrix | None = None
     eliminated: Elimination | None = None
-    change: Any = None
+    change: tuple[Values, ...] | None = None
     b: Values = field(init=False)
     x: Values = field(init=False)
     r: Values = field(init=False)
@@ -98,7 +99,7 @@ class Level:
         if self.eliminated is not None:
             self.eliminated.move_forces(r)
         elif self.change is not None:
-            self.change.subtract(x, r)
+            cycle_kernels.subtract_rows(*self.change, x, r, len(self.A.rows))
 
     def correct(self, coarse: Values) -> None:
         """Add the correction of the next coarser level."""
