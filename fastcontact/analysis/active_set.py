@@ -60,7 +60,9 @@ def solve(
     while True:
         may_leave = constraints.normal_compliance is None and len(left) < EARLY and active.tobytes() not in left
         watch = _Watch(signs, active) if may_leave else None
-        u, forces = _under(loaded, constraints, active, accuracy, guess, watch)
+        rows, compliance = np.flatnonzero(active), constraints.normal_compliance
+        C = None if compliance is None else compliance.block(rows)
+        u, forces = loaded.solve(constraints.B[rows], -constraints.gap0[rows], C, guess, watch, accuracy.residual)
         guess = u
         if watch is not None and watch.wanted is not None:
             left.add(active.tobytes())
@@ -73,17 +75,6 @@ def solve(
         one_by_one = one_by_one or found.wanted.tobytes() in seen
         active = _first_changed(active, found.wanted) if one_by_one else found.wanted
         iteration += 1
-
-
-def _under(
-    loaded: Loaded, constraints: Constraints, active: Mask, accuracy: Accuracy, guess: Array | None,
-    watch: _Watch | None,
-) -> tuple[Array, Array]:  # fmt: skip
-    """Return the unknowns (n,) and the multipliers of the active constraints, which hold as equations."""
-    rows = np.flatnonzero(active)
-    compliance = constraints.normal_compliance
-    C = compliance.block(rows) if compliance is not None else None
-    return loaded.solve(constraints.B[rows], -constraints.gap0[rows], C, guess, watch, accuracy.residual)
 
 
 def _first_changed(active: Mask, wanted: Mask) -> Mask:
@@ -103,30 +94,21 @@ class _Signs:
         none = np.zeros(len(constraints), bool)
         self.equations: Mask = none if constraints.equality is None else self.usable & constraints.equality
 
-    def of(self, u: Array, forces: Array, active: Mask, iteration: int) -> Equilibrium:
-        """Return the solution with unknowns (n,) and forces of the active constraints, with the set it wants."""
+    def of(self, u: Array, forces: Array, active: Mask, iteration: int, error: float = 0.0) -> Equilibrium:
+        """Return the solution with unknowns (n,) and forces of the active constraints, with the set it wants.
+
+        Signs within errors of relative size `error`, those of an unfinished solution, do not count.
+        """
         multiplier = np.zeros(len(active))
         multiplier[active] = forces
         gap = self._constraints.gap0 + self._constraints.B @ u
         compliance = self._constraints.normal_compliance
         if compliance is not None:
             gap += compliance.apply(multiplier)
-        pull = self._accuracy.multiplier * np.abs(forces).max(initial=0.0)
-        wanted = self._wanted(multiplier, gap, active, pull, self._accuracy.gap)
+        pull = max(self._accuracy.multiplier, error) * np.abs(forces).max(initial=0.0)
+        penetration = max(self._accuracy.gap, error * np.abs(u).max(initial=0.0)) if error else self._accuracy.gap
+        wanted = np.where(active, multiplier > -pull, gap < -penetration) & self.usable | self.equations
         return Equilibrium(u, multiplier, gap, active, wanted, iteration)
-
-    def unfinished(self, u: Array, forces: Array, active: Mask, error: float) -> Mask:
-        """Return the set that an unfinished solution with errors of relative size `error` asks for."""
-        multiplier = np.zeros(len(active))
-        multiplier[active] = forces
-        gap = self._constraints.gap0 + self._constraints.B @ u
-        pull = max(self._accuracy.multiplier, error) * float(np.abs(forces).max(initial=0.0))
-        return self._wanted(
-            multiplier, gap, active, pull, max(self._accuracy.gap, error * float(np.abs(u).max(initial=0.0)))
-        )
-
-    def _wanted(self, multiplier: Array, gap: Array, active: Mask, pull: float, penetration: float) -> Mask:
-        return np.where(active, multiplier > -pull, gap < -penetration) & self.usable | self.equations
 
 
 class _Watch:
@@ -144,6 +126,6 @@ class _Watch:
 
     def __call__(self, u: Array, forces: Array, error: float) -> bool:
         """Return whether the signs ask for another set; errors of relative size `error` do not count."""
-        wanted = self._signs.unfinished(u, forces, self._active, error)
-        self.wanted = None if np.array_equal(wanted, self._active) else wanted
+        found = self._signs.of(u, forces, self._active, 0, error)
+        self.wanted = None if found.settled else found.wanted
         return self.wanted is not None

@@ -140,7 +140,7 @@ def contact_result(
     if part.tied is not None:  # as the bodies lay at rest
         normal = pair.nodal_gap(replace(at, displacement=np.zeros_like(at.displacement)))[1]
     along = _along_the_surface(part, solution, rows, normal, pressure)
-    forces = _nodal_forces(part, multiplier, along.force).reshape(-1, dim)[points]
+    forces = part.force(multiplier, along.force).reshape(-1, dim)[points]
     total = forces.sum(axis=0)
     if pair.axisymmetric:
         total[0] = 0.0  # radial forces cancel over the full circle
@@ -193,14 +193,6 @@ def _along_the_surface(
         float(-(tangential * slip).sum()),
         tangential,
     )
-
-
-def _nodal_forces(part: Constraints, multiplier: Array, tangential: Array | None) -> Array:
-    """Return the nodal contact forces (n_dofs,) of a pair, with friction if there are tangential forces (m, k)."""
-    forces = part.B.T @ multiplier
-    for rows, along in zip(part.tangents, () if tangential is None else tangential.T):
-        forces = forces + rows.T @ along
-    return np.asarray(forces)
 
 
 def _closed_nodes(

@@ -34,15 +34,18 @@ class NodalField(Protocol):
         ...
 
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
-        """Return the nodes in contact (n_nodes,) for active constraints (m,), nodal gaps [length], pressures [pressure]."""
-        ...
+        """Return the nodes in contact (n_nodes,) for active constraints (m,), nodal gaps [length], pressures [pressure].
+
+        Those of active constraints, unless a formulation has more or fewer than one a node.
+        """
+        return active
 
     def initially_active(self, gap: Array, pressure: Array) -> Mask | None:
         """Return the set (m,) to start from, from gaps (m,) [length] and the last nodal pressures (n_nodes,) [pressure].
 
         None where constraints are the same in every pairing: then the last set is better.
         """
-        ...
+        return None
 
 
 class Tied(Protocol):

@@ -51,3 +51,22 @@ class Projection:
     def field(self, multiplier: Array) -> Array:
         """Return the independent values (k,) of the multiplier field [pressure] for point forces (m,) [force]."""
         return np.zeros(self.P.shape[1]) if self.mass is None else self.mass.solve(self.P.T @ multiplier)
+
+    def compliant(self, columns: NDArray[np.intp]) -> Array:
+        r"""Return a factor Z (m, h) of what dropping `columns` of the multiplier field adds to the compliance C.
+
+        At supported nodes, as on an axis or in a plane of symmetry, the slip of a facet has one nodal value less than its
+        multiplier field: a field that alternates from node to node and dies out along the surface does no work on any slip,
+        and nothing would determine it. Such fields are made compliant, as those are that the multiplier field cannot
+        represent: the shear at the supported node then vanishes, as symmetry requires.
+
+        With E the unit vectors of the columns and :math:`M = P^T W P` that is
+        :math:`Z Z^T = P M^{-1} E (E^T M^{-1} E)^{-1} E^T M^{-1} P^T / \rho`.
+        """
+        if self.mass is None:
+            return np.zeros((self.P.shape[0], 0))
+        unit = np.zeros((self.P.shape[1], len(columns)))
+        unit[columns, np.arange(len(columns))] = 1.0
+        inverse = self.mass.solve(unit)
+        lower = np.linalg.cholesky(inverse[columns])
+        return np.asarray(np.linalg.solve(lower, (self.P @ inverse).T).T) / np.sqrt(self.rho)

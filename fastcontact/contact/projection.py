@@ -83,24 +83,30 @@ def nodal_normals(side: Surface, coordinates: Array) -> Array:
     """
     total = np.zeros((len(side.points), coordinates.shape[1]))
     for block in side.blocks:
-        np.add.at(total, block.local, _facet_normals(block, coordinates[block.facets]))
+        np.add.at(total, block.local, _angles(block, coordinates)[:, :, None] * facet_normals(block, coordinates))
     return total / np.linalg.norm(total, axis=1, keepdims=True)
 
 
-def _facet_normals(block: FacetBlock, corners: Array) -> Array:
-    """Return the unit normals at the nodes of facets (n_facets, n_nodes, dim), in 3D times their angles there."""
+def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
+    """Return the unit normals (n_facets, n_nodes, dim) of facets at their own nodes."""
     element = elements.get(block.element)
-    tangent = np.einsum("akj,fkd->fadj", element.gradient(element.nodes), corners)
+    tangent = np.einsum("akj,fkd->fadj", element.gradient(element.nodes), coordinates[block.facets])
     if element.dim == 1:
         normal = np.stack([tangent[..., 1, 0], -tangent[..., 0, 0]], axis=2)
-        return normal / np.linalg.norm(normal, axis=2, keepdims=True)
-    normal = np.cross(tangent[..., 0], tangent[..., 1])
-    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
-    for corner in range(element.n_corners):
+    else:
+        normal = np.cross(tangent[..., 0], tangent[..., 1])
+    return normal / np.linalg.norm(normal, axis=2, keepdims=True)
+
+
+def _angles(block: FacetBlock, coordinates: Array) -> Array:
+    """Return the angles of facets at their corners (n_facets, n_nodes); 1 at other nodes, and on lines."""
+    element, corners = elements.get(block.element), coordinates[block.facets]
+    angle = np.ones(block.facets.shape)
+    for corner in range(element.n_corners if element.dim == 2 else 0):
         sides = [corners[:, b if a == corner else a] - corners[:, corner] for a, b in element.edges if corner in (a, b)]
         sine = np.linalg.norm(np.cross(sides[0], sides[1]), axis=1)
-        normal[:, corner] *= np.arctan2(sine, np.einsum("fd,fd->f", sides[0], sides[1]))[:, None]
-    return normal
+        angle[:, corner] = np.arctan2(sine, np.einsum("fd,fd->f", sides[0], sides[1]))
+    return angle
 
 
 def interpolated(normals: Array, at: Places) -> Array:

@@ -9,7 +9,7 @@ import pkgutil
 
 from fastcontact.errors import ModelError, unknown
 from fastcontact.linear import solvers
-from fastcontact.linear.protocol import Counters, FrictionTerms, LinearSolver, Loaded, LoadedNonsymmetric
+from fastcontact.linear.protocol import LinearSolver
 
 log = logging.getLogger("fastcontact")
 # Solvers that need a package which is not among the dependencies, and the extra that brings it.
@@ -69,6 +69,3 @@ def chosen(dim: int, n_dofs: int, columns: bool = False) -> tuple[str, str]:
     if n_dofs <= limit:
         return "direct", f"for {n_dofs} unknowns in {dim}D a factorisation is cheapest (up to {limit})"
     return "amg", f"for {n_dofs} unknowns in {dim}D a factorisation is dearer than multigrid (beyond {limit})"
-
-
-__all__ = ["SOLVERS", "Counters", "FrictionTerms", "LinearSolver", "Loaded", "LoadedNonsymmetric", "make"]

@@ -50,18 +50,13 @@ class FlexibilityColumns:
         self._dofs, self._values = dofs, values
         self._place[dofs] = np.arange(len(dofs))
 
-    def of(self, dofs: Indices) -> Array:
-        """Return ``K^-1`` at the rows and columns `dofs` (k,), shape (k, k) [length / force]."""
-        place = self._places(dofs)
-        return self._values[np.ix_(place, place)]
-
     def of_rows(self, R: csr_array) -> Array:
         """Return ``R K^-1 R.T`` (m, m) [length / force] for sparse rows R (m, n)."""
         used = R.data != 0.0
         place = self._places(R.indices[used])
         starts = np.concatenate([[0], np.cumsum(used)])[R.indptr]
         rows = csr_array((R.data[used], place, starts), shape=(R.shape[0], len(self._dofs)))
-        return np.asarray(rows @ (rows @ self._values).T)
+        return symmetric(np.asarray(rows @ (rows @ self._values).T))
 
     def ask_again(self, asked: Iterable[Indices]) -> None:
         """Solve for what the columns of another solver were asked for, in its order; see `asked`."""
@@ -98,14 +93,9 @@ def symmetric(flexibility: Array) -> Array:
     return 0.5 * (flexibility + flexibility.T)
 
 
-def reduced(columns: FlexibilityColumns, R: csr_array) -> Array:
-    """Return ``R K^-1 R.T`` (m, m) [length / force]."""
-    return symmetric(columns.of_rows(R))
-
-
 def multipliers(columns: FlexibilityColumns, B: csr_array, wanted: Array, C: Array | None) -> Array:
     """Return the multipliers (m,) [force] with ``(B K^-1 B.T + C) multiplier = wanted`` (m,) [length]; C may be None."""
-    return balanced(reduced(columns, B), wanted, C)
+    return balanced(columns.of_rows(B), wanted, C)
 
 
 def balanced(flexibility: Array, wanted: Array, C: Array | None) -> Array:

@@ -131,8 +131,6 @@ class LinearSolver(Protocol):
     ----------
     tolerance : float
         Relative accuracy of the solutions [-].
-    condenses : bool
-        Whether, as prepared, the solver has K condensed to the `involved` unknowns.
     counters : Counters
     error : float
         By how much solutions for nearly the same right-hand side may differ, in units of their largest component, however
@@ -142,15 +140,19 @@ class LinearSolver(Protocol):
     """
 
     tolerance: float
-    condenses: bool
     counters: Counters
-    error: float
-    gave_up: str
+    error: float = 0.0
+    gave_up: str = ""
 
     @property
     def iterative(self) -> bool:
         """Whether less accurate solutions cost less."""
         ...
+
+    @property
+    def condenses(self) -> bool:
+        """Whether, as prepared, the solver has K condensed to the `involved` unknowns."""
+        return False
 
     def prepare(
         self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, release: bool = False
@@ -182,7 +184,7 @@ class LinearSolver(Protocol):
 
     def snapshot(self) -> Any:
         """Return what later solutions owe to the loads so far: part of the state of an analysis; None for nothing."""
-        ...
+        return None
 
     def put_back(self, snapshot: Any) -> None:
         """Continue from a `snapshot` of this solver; None for the beginning."""

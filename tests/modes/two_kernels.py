@@ -11,11 +11,11 @@ logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(levelname)s
 from fastcontact._jit import norms_kernels  # noqa: E402 - the log listens before kernels are declared
 from fastcontact.linear.krylov import krylov_kernels  # noqa: E402
 
-a, b = np.arange(40.0), np.empty(40)
-krylov_kernels.scaled(2.0, a, b)
-stats = [kernel.stats for kernel in (krylov_kernels.scaled, norms_kernels.largest_difference)]
+a, b = np.arange(40.0), np.arange(40.0)
+krylov_kernels.turn(2.0, a, b)
+stats = [kernel.stats for kernel in (krylov_kernels.turn, norms_kernels.largest_difference)]
 found = {
-    "right": norms_kernels.largest_difference(2.0 * a, b) == 0.0,
+    "right": norms_kernels.largest_difference(3.0 * a, b) == 0.0,
     "hits": sum(sum(s.cache_hits.values()) for s in stats),
     "misses": sum(sum(s.cache_misses.values()) for s in stats),
 }

@@ -10,20 +10,17 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lstsq
 from scipy.sparse import csr_array, vstack
 
+from fastcontact.analysis.friction import coulomb, eliminated
 from fastcontact.analysis.friction.slip_directions import aligning, idle, own_compliance
 from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
-
-if TYPE_CHECKING:
-    from fastcontact.analysis.friction import coulomb
 
 log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
@@ -85,8 +82,6 @@ def _eliminated(
     forces: Array | None,
 ) -> FrictionalEquilibrium | None:
     """Solve without the flexibility of the constraints, see `eliminated`; None where that fails."""
-    from fastcontact.analysis.friction import eliminated
-
     usable = constraints.usable
     solved = eliminated.solve(loaded, constraints, closed & usable, accuracy, u, forces)
     if solved is None:
@@ -151,8 +146,6 @@ def _coulomb(
     F: Array, free: Array, friction: Array, closed: Mask, equality: Mask, start: Array | None
 ) -> coulomb.Forces:
     """Solve the problem on the compliance F, from which constraints that are equations are eliminated first."""
-    from fastcontact.analysis.friction import coulomb
-
     if not equality.any():
         return coulomb.solve(F, free, friction, closed, start)
     index = np.arange(free.size).reshape(free.shape)

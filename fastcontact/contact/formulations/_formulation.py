@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints
-from fastcontact.contact.formulations._supported_nodes import supported_nodes
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair, rows_along, tangents
@@ -145,18 +144,25 @@ class Formulation(ABC):
         return Constraints(B, gap0, positions, compliance, along, directions, friction, drift)
 
     def supported_along(self, axis: int, candidates: Candidates, pairing: Pairing) -> NDArray[np.bool_]:
-        """Return which secondary nodes (n_nodes,) supports keep from slipping along an axis; see `_supported_nodes`."""
+        """Return which secondary nodes (n_nodes,) supports keep from slipping along an axis; see `Projection.compliant`."""
         m = len(self.secondary.points)
         if self.supported is None or not self.supported[self.secondary.points, axis].any():
             return np.zeros(m, bool)
         supported = self.supported[:, axis]
         opposite = np.ones(m, bool)
-        if isinstance(self.primary, Surface):
+        if isinstance(self.primary, Surface):  # only nodes that face such nodes of the other side
             rows = np.flatnonzero(pairing.paired)
             facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
             rows = rows[supported[facing.nodes].any(axis=1)]
             opposite = np.isin(self.secondary.points, candidates.nodes[rows][candidates.shape[rows] != 0.0])
-        return supported_nodes(self.secondary, supported[self.secondary.points], opposite)
+        return self.without_whole_facets(supported[self.secondary.points] & opposite)
+
+    def without_whole_facets(self, nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return secondary `nodes` (n_nodes,) without those of facets all of whose nodes are among them."""
+        found = nodes.copy()
+        whole = [block.local[nodes[block.local].all(axis=1)].ravel() for block in self.secondary.blocks]
+        found[np.concatenate(whole)] = False
+        return found
 
     def _closing_slip(
         self, candidates: Candidates, pairing: Pairing, directions: tuple[Array, ...], at: Configuration

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.contact.surface import FacetBlock
-from fastcontact.mesh import elements
 
 Array = NDArray[np.float64]
 
@@ -46,14 +45,3 @@ class Overlap:
 
     mass: list[Array]
     couplings: list[Coupling]
-
-
-def normals_of(block: FacetBlock, coordinates: Array) -> Array:
-    """Return the unit normals (n_facets, n_nodes, dim) of facets at their own nodes."""
-    element = elements.get(block.element)
-    tangent = np.einsum("akj,fkd->fadj", element.gradient(element.nodes), coordinates[block.facets])
-    if element.dim == 1:
-        normal = np.stack([tangent[..., 1, 0], -tangent[..., 0, 0]], axis=2)
-    else:
-        normal = np.cross(tangent[..., 0], tangent[..., 1])
-    return normal / np.linalg.norm(normal, axis=2, keepdims=True)

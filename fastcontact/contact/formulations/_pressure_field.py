@@ -25,13 +25,13 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import coo_array, csr_array, diags_array
+from scipy.sparse.linalg import splu
 
 from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.field_projection import Projection
 from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.formulations._supported_nodes import compliant
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.errors import ContactError
 
@@ -40,7 +40,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class PressureField:
+class PressureField(NodalField):
     """A pressure field with values at the secondary nodes; see `constraints.NodalField`.
 
     Attributes
@@ -63,6 +63,17 @@ class PressureField:
     around: NDArray[np.intp]
     renewed: bool
 
+    @classmethod
+    def of_points(
+        cls, P: csr_array, areas: Array, rho: float, field: tuple[csr_array, NDArray[np.intp]],
+        around: NDArray[np.intp], renewed: bool,
+    ) -> PressureField:  # fmt: skip
+        """Return the field of points with shape functions P (m, n_nodes); `field` are `nodes` and `independent`."""
+        nodes, independent = field
+        P = csr_array(P @ nodes)
+        mass = splu((P.T @ diags_array(areas) @ P).tocsc()) if len(independent) else None
+        return cls(Projection(P, areas, rho, mass), nodes, independent, around, renewed)
+
     @property
     def areas(self) -> Array:
         """Areas (m,) of the integration points; infinite for those that take no part [area]."""
@@ -84,6 +95,12 @@ class PressureField:
             return None
         field = self.projection.P @ pressure[self.independent]
         return (self.projection.areas > 0) & (field - self.projection.rho * gap > 0)
+
+
+def shapes_at(shape: Array, local: NDArray[np.intp], n_nodes: int) -> csr_array:
+    """Return the shape functions (m, n_nodes) of all nodes at points, from those (m, n) of the nodes `local` (m, n)."""
+    row = np.broadcast_to(np.arange(len(shape))[:, None], shape.shape)
+    return coo_array((shape.ravel(), (row.ravel(), local.ravel())), shape=(len(shape), n_nodes)).tocsr()
 
 
 @dataclass(eq=False)
@@ -121,6 +138,6 @@ class PressureFieldFormulation(Formulation):
         for axis in range(directions[0].shape[1]):
             columns = np.flatnonzero(self.supported_along(axis, candidates, pairing)[field.independent])
             if len(columns):
-                Z = compliant(field.projection, columns)
+                Z = field.projection.compliant(columns)
                 factors.append(np.stack([along[:, axis, None] * Z for along in (normals(directions), *directions)]))
         return np.concatenate(factors, axis=2) if factors else None

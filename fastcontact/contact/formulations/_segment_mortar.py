@@ -1,8 +1,7 @@
 r"""Mortar contact in the plane with a pressure field, integrated exactly over the pieces where two facets face each other.
 
-The gap between facets that do not match has a kink wherever a node of the primary side stands opposite. Here every
-secondary facet is cut there, in each pairing, and every piece gets Gauss points of its own (Puso and Laursen, 2004;
-Popp, Gee and Wall, 2009). A uniform pressure then passes between meshes that do not match without error, which neither
+Every secondary facet is cut in each pairing, see `_cut_lines`, and every piece gets Gauss points of its own (Puso and
+Laursen, 2004). A uniform pressure then passes between meshes that do not match without error, which neither
 node-to-segment nor quadrature over whole facets achieves. Pieces that face nothing carry nothing, and the pressure field
 is projected over the rest: where the primary surface ends inside a facet, the pressure ends there too.
 
@@ -16,14 +15,12 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array, diags_array
-from scipy.sparse.linalg import splu
+from scipy.sparse import csr_array
 
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
-from fastcontact.contact.field_projection import Projection
 from fastcontact.contact.formulations._cut_lines import line_points
-from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
+from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation, shapes_at
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.pair_options import spread
 from fastcontact.contact.pairing import Candidates, Pairing, pair
@@ -83,15 +80,11 @@ class SegmentMortar(PressureFieldFormulation):
 
     def _pressure_field(self, facet: NDArray[np.intp], shape: Array, area: Array) -> PressureField:
         """Set up the pressure field on the nodes of facets that take part, from points (m,), shapes (m, n), areas (m,)."""
-        column = self.secondary.local[facet]
-        row = np.broadcast_to(np.arange(len(shape))[:, None], shape.shape)
-        size = (len(shape), len(self.secondary.points))
-        P = coo_array((shape.ravel(), (row.ravel(), column.ravel())), shape=size).tocsr()
-        seen = np.zeros(size[1], bool)
+        column, m = self.secondary.local[facet], len(self.secondary.points)
+        seen = np.zeros(m, bool)
         seen[column[area > 0]] = True
         excluded = self.options.excluded_nodes(self.secondary)
         independent = np.flatnonzero(seen & ~excluded)
         nodes = csr_array(spread(self.secondary, excluded, independent)[:, independent])
-        P = csr_array(P @ nodes)
-        mass = splu((P.T @ diags_array(area) @ P).tocsc()) if len(independent) else None
-        return PressureField(Projection(P, area, self._rho, mass), nodes, independent, column, renewed=True)
+        P = shapes_at(shape, column, m)
+        return PressureField.of_points(P, area, self._rho, (nodes, independent), column, renewed=True)

@@ -20,16 +20,16 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._cut_faces import face_overlap
 from fastcontact.contact.formulations._cut_lines import line_overlap
 from fastcontact.contact.formulations._dual_basis import COVERED, dual_functions, positive
 from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.formulations._overlap import Overlap, normals_of
+from fastcontact.contact.formulations._overlap import Overlap
 from fastcontact.contact.formulations._rows import Entries, rows_of, scaled
 from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.pairing import Candidates, tangents_by_axes
-from fastcontact.contact.projection import nodal_normals
+from fastcontact.contact.projection import facet_normals, nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh import elements
@@ -159,10 +159,7 @@ class WeightedMortar(Formulation):
         """Return the nodes (m,) supported along an axis, without those of facets whose nodes are all supported."""
         if self.supported is None:
             return np.zeros(len(self.secondary.points), bool)
-        found: Mask = self.supported[self.secondary.points, axis].copy()
-        whole = [block.local[found[block.local].all(axis=1)].ravel() for block in self.secondary.blocks]
-        found[np.concatenate(whole)] = False
-        return found
+        return self.without_whole_facets(self.supported[self.secondary.points, axis])
 
     def _along(self, direction: Array, sliding: list[csr_array]) -> csr_array:
         """Return rows (m, n_dofs) of the slip along a tangent (m, dim); none where supports hold most of it."""
@@ -230,7 +227,7 @@ class WeightedMortar(Formulation):
             if self.normals == "averaged":
                 normals = averaged[coupling.primary.local[theirs]]
             else:
-                normals = normals_of(coupling.primary, deformed)[theirs]
+                normals = facet_normals(coupling.primary, deformed)[theirs]
             faced = coupling.integrals @ normals
             np.add.at(mean, coupling.secondary.local[ours], tests[coupling.secondary.element] @ faced)
         length = np.linalg.norm(mean, axis=1, keepdims=True)
@@ -250,7 +247,7 @@ class WeightedMortar(Formulation):
 
 
 @dataclass(frozen=True, eq=False)
-class WeightedPressures:
+class WeightedPressures(NodalField):
     """Pressures of weighted gaps at the nodes; see `constraints.NodalField`.
 
     Attributes
@@ -275,7 +272,3 @@ class WeightedPressures:
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
         """Return the active nodes, and mid nodes without a multiplier that have a pressure."""
         return active | (pressure > 0)
-
-    def initially_active(self, gap: Array, pressure: Array) -> Mask | None:
-        """Return None: there is one gap per node in every pairing."""
-        return None

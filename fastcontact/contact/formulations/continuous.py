@@ -10,13 +10,11 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array, diags_array, eye_array
-from scipy.sparse.linalg import splu
+from scipy.sparse import csr_array, diags_array, eye_array
 
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
-from fastcontact.contact.field_projection import Projection
-from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
+from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation, shapes_at
 from fastcontact.contact.integration import facet_measure, fine_rule, gauss_rule
 from fastcontact.contact.pair_options import spread
 from fastcontact.contact.pairing import Candidates, filled_up, pair
@@ -68,18 +66,10 @@ class Continuous(PressureFieldFormulation):
         self._candidates = Candidates(filled_up(nodes), filled_up(shapes))
         rho = self.augmentation * self.modulus / shortest
         areas_of_points = np.where(self.options.out(self._candidates), 0.0, np.concatenate(areas))
-        self._field = self._pressure_field(filled_up(local), areas_of_points, float(rho))
-
-    def _pressure_field(self, local: NDArray[np.intp], areas: Array, rho: float) -> PressureField:
-        """Set up the pressure field and its compliance; `local` (m, n) are the nodes of each point's facet."""
-        shape = self._candidates.shape
-        row = np.broadcast_to(np.arange(len(shape))[:, None], shape.shape)
-        size = (len(shape), len(self.secondary.points))
-        P = coo_array((shape.ravel(), (row.ravel(), local.ravel())), shape=size).tocsr()
-        nodes, independent = self._determined(P, areas)
-        P = P @ nodes
-        mass = splu((P.T @ diags_array(areas) @ P).tocsc())
-        return PressureField(Projection(csr_array(P), areas, rho, mass), nodes, independent, local, renewed=False)
+        around = filled_up(local)
+        P = shapes_at(self._candidates.shape, around, len(self.secondary.points))
+        field = self._determined(P, areas_of_points)
+        self._field = PressureField.of_points(P, areas_of_points, float(rho), field, around, renewed=False)
 
     def _rule(self, element: str) -> quadrature.Rule:
         if self.integration not in RULES:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import SuperLU, splu
 
 from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.integration import fine_rule, mass_matrix, nodal_areas
 from fastcontact.contact.pairing import Candidates, pair
@@ -72,7 +72,7 @@ class NodeToSegment(Formulation):
 
 
 @dataclass(frozen=True, eq=False)
-class NodalForces:
+class NodalForces(NodalField):
     """Pressures from the contact forces of the nodes; see `constraints.NodalField`.
 
     Attributes
@@ -90,14 +90,6 @@ class NodalForces:
     def pressure(self, force: Array) -> Array:
         """Return nodal forces over nodal areas; on quadratic facets, solve with the mass matrix of the surface instead."""
         return force / self.areas if self.mass is None else self.mass.solve(force)
-
-    def closed_nodes(self, active: NDArray[np.bool_], gap: Array, pressure: Array) -> NDArray[np.bool_]:
-        """Return the active constraints: there is one per node."""
-        return active
-
-    def initially_active(self, gap: Array, pressure: Array) -> NDArray[np.bool_] | None:
-        """Return None: there is one constraint per node in every pairing."""
-        return None
 
 
 FORMULATION = NodeToSegment

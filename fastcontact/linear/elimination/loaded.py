@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.elimination.pivot_order import RepeatedError
-from fastcontact.linear.flexibility import multipliers, reduced
+from fastcontact.linear.flexibility import multipliers
 from fastcontact.linear.protocol import Monitor
 
 log = logging.getLogger("fastcontact")
@@ -59,7 +59,7 @@ class LoadedIteration:
 
     def flexibility(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
-        return R @ self._free, reduced(self._solver.columns, R)
+        return R @ self._free, self._solver.columns.of_rows(R)
 
     def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         """See `Loaded`."""

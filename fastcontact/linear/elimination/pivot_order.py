@@ -14,7 +14,6 @@ from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.csgraph import connected_components, min_weight_full_bipartite_matching
 
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.elimination import pivot_order_kernels
 
 Indices = NDArray[np.intp]
 # An unknown is taken as pivot where its entry is at least this part of the largest one of the equation.
@@ -70,10 +69,45 @@ def chosen(B: csr_array, groups: Indices | None = None) -> tuple[Indices, csr_ar
 
 
 def of_groups(B: csr_array, groups: Indices) -> Indices | None:
-    """Return the unknown (m,) of each row among those of its group alone; None where there are too few."""
-    pivots, (present, group) = np.empty(B.shape[0], np.intp), np.unique(groups, return_inverse=True)
-    failed = pivot_order_kernels.choose(B.indptr, B.indices, B.data, group, len(present), B.shape[1], SMALLEST, pivots)
-    return None if failed else pivots
+    """Return the unknown (m,) of each row among those of its group alone; None where there are too few.
+
+    Complete pivoting in each group, in all of them at once; a pivot is at least SMALLEST of the largest entry of its row.
+    """
+    m, n = B.shape
+    group, row = np.unique(groups, return_inverse=True)[1], np.repeat(np.arange(m), np.diff(B.indptr))
+    lowest, highest = np.full(n, m), np.full(n, -1)
+    np.minimum.at(lowest, B.indices, group[row])
+    np.maximum.at(highest, B.indices, group[row])
+    own = np.flatnonzero(lowest[B.indices] == highest[B.indices])
+    if not len(own):
+        return None
+    found = B.indices[np.sort(own[np.unique(B.indices[own], return_index=True)[1]])]
+    line, column = _place_in_group(group), np.zeros(n, np.intp)
+    column[found] = _place_in_group(lowest[found])
+    table = np.zeros((group.max() + 1, line.max() + 1, column.max() + 1))
+    table[group[row[own]], line[row[own]], column[B.indices[own]]] = B.data[own]
+    equation, unknown = np.zeros(table.shape[:2], np.intp), np.zeros((len(table), table.shape[2]), np.intp)
+    equation[group, line], unknown[lowest[found], column[found]] = np.arange(m), found
+    count, largest, pivots = np.bincount(group), abs(B).max(axis=1).toarray().ravel(), np.empty(m, np.intp)
+    for made in range(table.shape[1]):
+        left = np.flatnonzero(count > made)
+        r, c = np.divmod(np.abs(table[left]).reshape(len(left), -1).argmax(axis=1), table.shape[2])
+        i, pivot = equation[left, r], table[left, r, c]
+        if not ((np.abs(pivot) >= SMALLEST * largest[i]) & (pivot != 0.0)).all():
+            return None
+        pivots[i] = unknown[left, c]
+        # The row of the pivot becomes zero, too: it is not found again.
+        factor = table[left, :, c] / pivot[:, None]
+        table[left] -= factor[:, :, None] * table[left, r][:, None]
+    return pivots
+
+
+def _place_in_group(group: Indices) -> Indices:
+    """Return how many earlier entries have the same number, for each entry of `group`."""
+    order = np.argsort(group, kind="stable")
+    place = np.empty(len(group), np.intp)
+    place[order] = np.arange(len(group)) - np.searchsorted(group[order], group[order])
+    return place
 
 
 def layered(B: csr_array, smallest: float = SMALLEST, layers: int = MOST_LAYERS) -> tuple[Indices, csr_array] | None:

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array
 
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
-from fastcontact.linear.factors.condensed_problem import CondensedProblem
 from fastcontact.linear.factors.known_loads import KnownLoads
-from fastcontact.linear.flexibility import FlexibilityColumns, multipliers, reduced
-from fastcontact.linear.protocol import Counters, Monitor
+from fastcontact.linear.flexibility import FlexibilityColumns, balanced, multipliers, symmetric
+from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -23,7 +22,7 @@ ROUND_OFF = 1e-14
 MARGIN = 10.0
 
 
-class FactorSolver:
+class FactorSolver(LinearSolver):
     """A direct solver; sub-classes factorise and solve.
 
     Where a sub-class gives factors with the unknowns last that equations may involve, their flexibility is the inverse of
@@ -38,8 +37,6 @@ class FactorSolver:
 
     name: str
     iterative = False
-    gave_up = ""
-    error = 0.0
 
     def __init__(self, tolerance: float = 1e-14) -> None:
         self.tolerance = ROUND_OFF  # whatever was asked
@@ -52,13 +49,7 @@ class FactorSolver:
         return f"{type(self).__name__}({f'{self.n} unknowns' if self.n else 'not prepared'})"
 
     def _factorise(self, K: csc_array) -> None:
-        """Factorise K (n, n) in any order.
-
-        Raises
-        ------
-        ModelError
-            If K is singular.
-        """
+        """Factorise K (n, n) in any order, or raise ModelError if it is singular."""
         raise NotImplementedError
 
     def _solve(self, F: Array) -> Array:
@@ -66,13 +57,7 @@ class FactorSolver:
         raise NotImplementedError
 
     def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors | None:
-        """Factorise K (n, n) with the unknowns `last` (m,) last; None where nothing is gained by that.
-
-        Raises
-        ------
-        ModelError
-            If K is singular.
-        """
+        """Factorise K (n, n), as `_factorise`, with the unknowns `last` (m,) last; None where nothing is gained by that."""
         raise NotImplementedError
 
     def prepare(
@@ -170,7 +155,7 @@ class LoadedFactor:
 
     def flexibility(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
-        return R @ self._free, reduced(self._solver.columns, R)
+        return R @ self._free, self._solver.columns.of_rows(R)
 
     def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
         """See `Loaded`."""
@@ -199,3 +184,45 @@ class LoadedFactor:
         if last is None or np.count_nonzero(force) != np.count_nonzero(force[last]):
             return None
         return np.asarray(self._solver.inverse @ force[last])
+
+
+class CondensedProblem:
+    """K condensed to the k contact unknowns by a dense inverse; see `linear.protocol.Loaded`. Vectors are theirs.
+
+    Parameters
+    ----------
+    inverse : ndarray (k, k)
+        Rows and columns of ``K^-1``, symmetric [length / force].
+    free : ndarray (k,)
+        Displacement without equations [length].
+    """
+
+    def __init__(self, inverse: Array, free: Array) -> None:
+        self._inverse, self._free = inverse, free
+
+    def solve(
+        self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """See `Loaded`."""
+        if B.shape[0] == 0:
+            return self._free, np.empty(0)
+        moved = B @ self._inverse
+        multiplier = balanced(symmetric(B @ moved.T), c - B @ self._free, C)
+        return self._free + multiplier @ moved, multiplier
+
+    def flexibility(self, R: csr_array) -> tuple[Array, Array]:
+        """See `Loaded`."""
+        return R @ self._free, symmetric(R @ (R @ self._inverse).T)
+
+    def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
+        """See `Loaded`."""
+        return np.asarray(self._free + self._inverse @ force)
+
+    def full_solution(self, force: Array, u: Array | None = None) -> Array:
+        """See `Loaded`."""
+        return self.involved_solution(force, None)
+
+    def condensed(self) -> CondensedProblem:
+        """See `Loaded`."""
+        return self

@@ -6,8 +6,6 @@ from numba import prange
 from fastcontact._jit.decorators import kernel, parallel_kernel
 
 CHUNK = 4096
-# Chunks up to which waking another thread costs more than it saves.
-ALONE = 4
 
 
 @kernel
@@ -37,12 +35,8 @@ def _total(sums):
 def dot(a, b, sums):
     """Return the dot product of `a` and `b` (n,); `sums` (ceil(n / CHUNK),) is work space."""
     n = a.shape[0]
-    if sums.shape[0] <= ALONE:
-        for c in range(sums.shape[0]):
-            sums[c] = _dot(a, b, c * CHUNK, min(n, (c + 1) * CHUNK))
-    else:
-        for c in prange(sums.shape[0]):
-            sums[c] = _dot(a, b, c * CHUNK, min(n, (c + 1) * CHUNK))
+    for c in prange(sums.shape[0]):
+        sums[c] = _dot(a, b, c * CHUNK, min(n, (c + 1) * CHUNK))
     return _total(sums)
 
 
@@ -58,44 +52,20 @@ def _advance_part(alpha, p, q, x, r, low, high):
 def advance(alpha, p, q, x, r, sums):
     """Step ``x += alpha p``, ``r -= alpha q`` and return the square of the norm of r."""
     n = x.shape[0]
-    if sums.shape[0] <= ALONE:
-        for c in range(sums.shape[0]):
-            sums[c] = _advance_part(alpha, p, q, x, r, c * CHUNK, min(n, (c + 1) * CHUNK))
-    else:
-        for c in prange(sums.shape[0]):
-            sums[c] = _advance_part(alpha, p, q, x, r, c * CHUNK, min(n, (c + 1) * CHUNK))
+    for c in prange(sums.shape[0]):
+        sums[c] = _advance_part(alpha, p, q, x, r, c * CHUNK, min(n, (c + 1) * CHUNK))
     return _total(sums)
-
-
-@kernel
-def _turn_part(beta, z, p, low, high):
-    for i in range(low, high):
-        p[i] = z[i] + beta * p[i]
 
 
 @parallel_kernel
 def turn(beta, z, p):
     """Turn the search direction: ``p = z + beta p``."""
-    n = p.shape[0]
-    if n <= ALONE * CHUNK:
-        _turn_part(beta, z, p, 0, n)
-        return
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        _turn_part(beta, z, p, c * CHUNK, min(n, (c + 1) * CHUNK))
+    for i in prange(p.shape[0]):
+        p[i] = z[i] + beta * p[i]
 
 
 @kernel
-def _scaled_part(factor, a, b, low, high):
-    for i in range(low, high):
-        b[i] = factor * a[i]
-
-
-@parallel_kernel
 def scaled(factor, a, b):
     """Fill `b` with ``factor a``, in the precision of b."""
-    n = a.shape[0]
-    if n <= ALONE * CHUNK:
-        _scaled_part(factor, a, b, 0, n)
-        return
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        _scaled_part(factor, a, b, c * CHUNK, min(n, (c + 1) * CHUNK))
+    for i in range(a.shape[0]):
+        b[i] = factor * a[i]

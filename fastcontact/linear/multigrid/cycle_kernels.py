@@ -57,19 +57,6 @@ def multiply(indptr, indices, numbers, x, factor, share, z, y, rows, cols):
         _multiply(c * CHUNK, min(n, (c + 1) * CHUNK), indptr, indices, numbers, x, factor, share, z, y, rows, cols)
 
 
-@parallel_kernel
-def row_sums(indptr, indices, data, x, size, out):
-    """Fill `out` (n,) with ``|A| |x|``, blocks size x size: the size of the numbers that cancel each other in ``A x``."""
-    for i in prange(indptr.shape[0] - 1):
-        for a in range(size):
-            s = 0.0
-            for k in range(indptr[i], indptr[i + 1]):
-                at, j = (k * size + a) * size, indices[k] * size
-                for b in range(size):
-                    s += abs(data[at + b] * x[j + b])
-            out[i * size + a] = s
-
-
 @kernel
 def _relax(low, high, inverse, r, first, second, d, x, rows, begin):
     m = len(rows)

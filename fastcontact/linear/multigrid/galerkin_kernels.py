@@ -41,49 +41,6 @@ def graph(indptr, indices, data, size):
 
 
 @kernel
-def diagonal_blocks(indptr, indices, data, size):
-    """Return the diagonal blocks (n * size * size,)."""
-    n = indptr.shape[0] - 1
-    square = size * size
-    out = np.zeros(n * square, data.dtype)
-    for i in range(n):
-        for k in range(indptr[i], indptr[i + 1]):
-            if indices[k] == i:
-                for e in range(square):
-                    out[i * square + e] += data[k * square + e]
-    return out
-
-
-@kernel
-def transposed(indptr, indices, n_columns):
-    """Return (start, origin, slot): the blocks of each column, their rows and their numbers, rows ascending."""
-    start = np.zeros(n_columns + 1, np.int32)
-    for k in range(indices.shape[0]):
-        start[indices[k] + 1] += 1
-    for c in range(n_columns):
-        start[c + 1] += start[c]
-    place = start[:-1].copy()
-    origin, slot = np.empty(indices.shape[0], np.int32), np.empty(indices.shape[0], np.int32)
-    for i in range(indptr.shape[0] - 1):
-        for k in range(indptr[i], indptr[i + 1]):
-            at = place[indices[k]]
-            origin[at], slot[at] = i, k
-            place[indices[k]] += 1
-    return start, origin, slot
-
-
-@parallel_kernel
-def transpose_blocks(slot, data, out, rows, cols):
-    """Fill `out` with the transposed blocks ``data[slot]``, in the precision of `out`; blocks are rows x cols."""
-    m, n = len(rows), len(cols)
-    for c in prange((slot.shape[0] + CHUNK - 1) // CHUNK):
-        for k in range(c * CHUNK, min(slot.shape[0], (c + 1) * CHUNK)):
-            for a in range(m):
-                for b in range(n):
-                    out[(k * n + b) * m + a] = data[(slot[k] * m + a) * n + b]
-
-
-@kernel
 def _aggregates_of(i, indptr, indices, aggregate, found):
     """Fill `found` with the aggregates of node i and its neighbours, ascending; return their number."""
     count = 0

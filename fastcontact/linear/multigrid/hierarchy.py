@@ -22,7 +22,7 @@ from scipy.sparse import csr_matrix
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
 from fastcontact.linear.multigrid.coarse import Coarse
-from fastcontact.linear.multigrid.matrix import BlockMatrix
+from fastcontact.linear.multigrid.matrix import BlockMatrix, diagonal_blocks
 
 Array = NDArray[np.float64]
 Values = NDArray[Any]
@@ -53,8 +53,9 @@ class Level:
         Prolongator and its transpose; None on the coarsest level.
     eliminated : Elimination or None
         Equations, on the finest level: weights in the precision of the cycle, the same for forces.
-    change : MatrixChange or None
-        What eliminated equations add to the matrix, on coarser levels.
+    change : tuple of ndarray, or None
+        What eliminated equations add to the matrix, on coarser levels: the block rows that change (k,), and the change on
+        them as `indptr`, `indices` and `data` of a `BlockMatrix`.
     b, x, r, d : ndarray (n,)
         Right-hand side, iterate, residual and step of the cycle.
     """
@@ -66,7 +67,7 @@ class Level:
     P: BlockMatrix | None = None
     R: BlockMatrix | None = None
     eliminated: Elimination | None = None
-    change: Any = None
+    change: tuple[Values, ...] | None = None
     b: Values = field(init=False)
     x: Values = field(init=False)
     r: Values = field(init=False)
@@ -98,7 +99,7 @@ class Level:
         if self.eliminated is not None:
             self.eliminated.move_forces(r)
         elif self.change is not None:
-            self.change.subtract(x, r)
+            cycle_kernels.subtract_rows(*self.change, x, r, len(self.A.rows))
 
     def correct(self, coarse: Values) -> None:
         """Add the correction of the next coarser level."""
@@ -155,7 +156,7 @@ class Hierarchy:
     def _level(self, A: BlockMatrix) -> Level:
         size = len(A.rows)
         own = BlockMatrix(A.indptr, A.indices, A.data.astype(self.dtype, copy=False), A.rows, A.cols)
-        diagonal = galerkin_kernels.diagonal_blocks(A.indptr, A.indices, own.data, size)
+        diagonal = diagonal_blocks(A.indptr, A.indices, own.data, size)
         inverse = np.empty_like(diagonal)
         cycle_kernels.invert_blocks(diagonal, size, inverse)
         level = Level(own, diagonal, inverse, 1.0)
@@ -191,12 +192,11 @@ class Hierarchy:
             A.indptr, A.indices, A.exact, level.inverse, aggregate, tentative.ravel(), omega, indptr, blocks, A.rows, cols
         )  # fmt: skip
         del tentative, T
-        index = galerkin_kernels.transposed(indptr, columns, n_coarse)
         P = BlockMatrix(indptr, columns, blocks, A.rows, cols)
+        start, origin, slot = index = by_columns(P, n_coarse)
         coarse = product(A, P, index)
-        R = BlockMatrix(index[0], index[1], np.empty_like(P.data), cols, A.rows)
-        galerkin_kernels.transpose_blocks(index[2], P.data, R.data, A.rows, cols)
-        return P, R, coarse, coarse_modes
+        turned = np.ascontiguousarray(blocks.reshape(-1, size, n_modes)[slot].transpose(0, 2, 1))
+        return P, BlockMatrix(start, origin, turned.ravel(), cols, A.rows), coarse, coarse_modes
 
     def __repr__(self) -> str:
         sizes = " -> ".join(str(level.n) for level in self.levels)
@@ -255,8 +255,15 @@ class Hierarchy:
             level.relax(level.r, *factor)
 
 
+def by_columns(P: BlockMatrix, n: int) -> tuple[Indices, Indices, Indices]:
+    """Return where the blocks of each of n block columns begin, their rows, ascending, and their numbers."""
+    numbers = np.arange(len(P.indices), dtype=np.int32)
+    found = csr_matrix((numbers, P.indices, P.indptr), shape=(len(P.indptr) - 1, n)).tocsc()
+    return found.indptr, found.indices, found.data
+
+
 def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Indices, Indices, Indices]) -> BlockMatrix:
-    """Return ``P.T A P`` for a symmetric A; `index` from `galerkin_kernels.transposed`."""
+    """Return ``P.T A P`` for a symmetric A; `index` from `by_columns`."""
     n_coarse = len(index[0]) - 1
     count, near = np.zeros(n_coarse, np.int32), np.zeros(n_coarse, np.int32)
     galerkin_kernels.count_galerkin(A.indptr, A.indices, P.indptr, P.indices, index[0], index[1], count, near)

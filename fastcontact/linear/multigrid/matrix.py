@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 
-from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels, split_matrix_kernels
+from fastcontact.linear.multigrid import cycle_kernels, split_matrix_kernels
 
 Array = NDArray[np.float64]
 Values = NDArray[Any]
@@ -72,13 +72,13 @@ class BlockMatrix:
     def diagonal_blocks(self) -> Array:
         """Return the diagonal blocks (n_rows, size, size) of a square matrix, in double precision."""
         size = len(self.rows)
-        parts = [galerkin_kernels.diagonal_blocks(self.indptr, self.indices, part, size) for part in self.exact]
+        parts = [diagonal_blocks(self.indptr, self.indices, part, size) for part in self.exact]
         return np.sum([part.astype(float) for part in parts], axis=0).reshape(-1, size, size)
 
     def largest_row_sum(self, u: Array) -> float:
         """Return the largest entry of ``|A| |u|`` of a square matrix, from its high part."""
-        out = np.empty(len(u))
-        cycle_kernels.row_sums(self.indptr, self.indices, self.data, u, len(self.rows), out)
+        size, out = BlockMatrix(self.indptr, self.indices, np.abs(self.data), self.rows, self.cols), np.empty(len(u))
+        size.multiply(np.abs(u), out)
         return float(out.max(initial=0.0))
 
     def to_scipy(self) -> bsr_array:
@@ -86,6 +86,14 @@ class BlockMatrix:
         size = len(self.rows)
         data = np.sum([part.astype(float) for part in self.exact], axis=0).reshape(-1, size, size)
         return bsr_array((data, self.indices, self.indptr), shape=2 * ((len(self.indptr) - 1) * size,))
+
+
+def diagonal_blocks(indptr: Indices, indices: Indices, data: Values, size: int) -> Values:
+    """Return the diagonal blocks (n * size * size,) of a square matrix in canonical format, zero where there is none."""
+    row = np.repeat(np.arange(len(indptr) - 1, dtype=np.int32), np.diff(indptr))
+    own, out = np.flatnonzero(indices == row), np.zeros((len(indptr) - 1, size * size), data.dtype)
+    out[row[own]] = data.reshape(-1, size * size)[own]
+    return out.ravel()
 
 
 def block_matrix(K: bsr_array) -> BlockMatrix:

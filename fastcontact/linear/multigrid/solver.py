@@ -82,9 +82,8 @@ class Multigrid:
         check_threads()
         self.hierarchy = Hierarchy(self.K.scaled, rigid_modes)
         self._constrained = ConstrainedHierarchy(self.hierarchy, self.K.scaled)
-        self._equations: Elimination | None = (
-            None  # the equations that hold, and those that the hierarchy was changed for
-        )
+        # The equations that hold, and those that the hierarchy was changed for.
+        self._equations: Elimination | None = None
         self._hierarchy_equations: Elimination | None = None
         self.counters.setups += 1
 

@@ -20,7 +20,7 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.multigrid.solver import Multigrid, StallError
-from fastcontact.linear.protocol import FrictionTerms, Loaded, Product
+from fastcontact.linear.protocol import FrictionTerms, LinearSolver, Loaded, Product
 from fastcontact.linear.solvers.direct import Direct
 
 log = logging.getLogger("fastcontact")
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 FACTORS_UP_TO = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
 
 
-class Amg(Multigrid):
+class Amg(Multigrid, LinearSolver):
     """See `Multigrid` for parameters.
 
     Attributes
@@ -41,8 +41,6 @@ class Amg(Multigrid):
     """
 
     name = "amg"
-    condenses = False
-    error = 0.0
 
     def __init__(self, tolerance: float = 1e-10, precision: str = "single") -> None:
         super().__init__(tolerance, precision)
@@ -72,13 +70,6 @@ class Amg(Multigrid):
     def load(self, f: Array) -> Loaded:
         """Return the prepared matrix with right-hand side `f` (n,)."""
         return _Loaded(self, f)
-
-    def snapshot(self) -> Any:
-        """See `LinearSolver.snapshot`: nothing, for the hierarchy improves and never depends on the loads."""
-        return None
-
-    def put_back(self, snapshot: Any) -> None:
-        """See `LinearSolver.put_back`."""
 
     def memory(self) -> dict[str, Any]:
         """See `LinearSolver.memory`: equations and bounds of the hierarchy, columns of K^-1. Result files hold these keys."""

@@ -18,7 +18,7 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.flexibility import FlexibilityColumns
-from fastcontact.linear.protocol import Counters, Monitor
+from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 
 Array = NDArray[np.float64]
 MAX_ITERATIONS = 1000
@@ -26,7 +26,7 @@ MAX_ITERATIONS = 1000
 OPTIONS: dict[str, Any] = {"strength": ("symmetric", {"theta": 0.0}), "max_coarse": 200}
 
 
-class Pyamg:
+class Pyamg(LinearSolver):
     """See `linear.protocol.LinearSolver`.
 
     Parameters
@@ -37,9 +37,6 @@ class Pyamg:
 
     name = "pyamg"
     iterative = True
-    condenses = False
-    error = 0.0
-    gave_up = ""
 
     def __init__(self, tolerance: float = 1e-10) -> None:
         self.tolerance, self.counters = tolerance, Counters()
@@ -121,12 +118,6 @@ class Pyamg:
     def load(self, f: Array) -> LoadedIteration:
         """Return the prepared matrix with right-hand side `f` (n,)."""
         return LoadedIteration(self, f)
-
-    def snapshot(self) -> None:
-        """See `LinearSolver.snapshot`: nothing."""
-
-    def put_back(self, snapshot: Any) -> None:
-        """See `LinearSolver.put_back`."""
 
     def memory(self) -> dict[str, Any]:
         """See `LinearSolver.memory`: columns of ``K^-1`` asked for."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from fastcontact.linear.elimination import pivot_order_kernels
+from fastcontact.linear.elimination import pivot_order
 from fastcontact.linear.elimination.elimination import eliminate
 
 
@@ -22,8 +22,7 @@ def grouped(rng, n=60, groups=6):
 @pytest.mark.parametrize("seed", range(5))
 def test_pivots_of_groups_are_their_own_and_well_conditioned(seed):
     B, label = grouped(np.random.default_rng(seed))
-    pivots = np.empty(len(label), np.int64)
-    assert pivot_order_kernels.choose(B.indptr, B.indices, B.data, label, 6, B.shape[1], 0.25, pivots) == 0
+    pivots = pivot_order.of_groups(B, label)
     assert len(set(pivots)) == len(pivots)
     taken = np.abs(B[:, pivots].toarray()) > 0
     assert not taken[label[:, None] != label[None]].any()
@@ -39,9 +38,8 @@ def test_pivots_of_groups_are_their_own_and_well_conditioned(seed):
 
 def test_groups_without_unknowns_of_their_own_are_told():
     B = csr_array(np.ones((2, 3)))
-    assert pivot_order_kernels.choose(B.indptr, B.indices, B.data, np.arange(2), 2, 3, 0.25, np.empty(2, np.int64)) == 1
-    same_group = np.zeros(2, np.int64)  # two equal equations
-    assert pivot_order_kernels.choose(B.indptr, B.indices, B.data, same_group, 1, 3, 0.25, np.empty(2, np.int64)) == 1
+    assert pivot_order.of_groups(B, np.arange(2)) is None
+    assert pivot_order.of_groups(B, np.zeros(2, np.intp)) is None  # two equal equations of one group
 
 
 def test_forces_move_along_the_rows_that_multipliers_act_through():

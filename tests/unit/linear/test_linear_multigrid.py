@@ -15,10 +15,10 @@ from fastcontact.errors import ModelError
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.krylov import krylov_kernels
 from fastcontact.linear.krylov.iterations import ConjugateGradients
-from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
+from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.coarse import Coarse
 from fastcontact.linear.multigrid.constrained_hierarchy import ConstrainedHierarchy
-from fastcontact.linear.multigrid.hierarchy import Hierarchy, chebyshev, largest_eigenvalue, product
+from fastcontact.linear.multigrid.hierarchy import Hierarchy, by_columns, chebyshev, largest_eigenvalue, product
 from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.solvers.amg import Amg
 from fastcontact.linear.solvers.pyamg import Pyamg
@@ -165,7 +165,7 @@ def test_a_galerkin_product_of_other_blocks():
     A.sort_indices()
     P, _ = random_blocks(2, 3, 40, 12, seed=5)
     own = matrix_of(P)
-    result = product(matrix_of(A), own, galerkin_kernels.transposed(own.indptr, own.indices, 12))
+    result = product(matrix_of(A), own, by_columns(own, 12))
     expected = (P.T @ A @ P).toarray()
     assert np.abs(scipy_of(result).toarray() - expected).max() < 1e-12 * np.abs(expected).max()
 
