@@ -1,1 +1,1 @@
-"""The analysis of a model: load steps, contact geometry, active set, friction, restart."""
+"""The analysis of a model. Start reading in `load_step`: one load step from its loads to its result."""

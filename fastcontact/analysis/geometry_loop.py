@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import Anderson
+from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_moves, nearest_nodes
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.inequalities import Step, solve_inequalities
 from fastcontact.analysis.iterate import Iterate, initially_active, pair_surfaces
-from fastcontact.analysis.messages import active_set_cycles, geometry_moves, nearest_nodes
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.tolerances import PATIENT_UPDATES, Tolerances

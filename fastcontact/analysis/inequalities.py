@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from fastcontact.analysis import active_set
 from fastcontact.analysis.active_dofs import ActiveDofs, constraints_on_unknowns
-from fastcontact.analysis.friction import friction
+from fastcontact.analysis.convergence_messages import no_contact_stops, not_balanced
+from fastcontact.analysis.friction import solve as friction
 from fastcontact.analysis.iterate import Iterate
-from fastcontact.analysis.messages import no_contact_stops, not_balanced
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.state import State

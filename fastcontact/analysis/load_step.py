@@ -1,6 +1,6 @@
-"""One load step: predict, settle the contact geometry, balance, recover. This page is the place to begin reading.
+"""One load step: prepare, settle the contact geometry, balance, recover. Start reading the code here.
 
-The loads of a step are prescribed displacements and forces. The contact geometry is settled first: the surfaces are paired
+The loads of a step are prescribed displacements and balanced. The contact geometry is settled first: the surfaces are paired
 on the deformed configuration, the inequalities of contact are solved, and both are repeated until the displacement stands
 still. The contact forces are then known; all displacements, the reactions and the stresses follow from them.
 """
@@ -37,7 +37,7 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     ----------
     problem : Problem
     state : State
-        At the end of the step before; it stays as it is.
+        At the end of the step before; it is not modified.
     index : int
         Number of the step, 1 for the first one.
     instant : float
@@ -51,20 +51,20 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     load = problem.load_at(instant)
     loaded = with_loads(problem, state, load)
     solved_before = problem.solver.counters.iterations
-    start, expected = predict(problem, state, load, loaded)
+    start, expected = prepare_start(problem, state, load, loaded)
     settled = settle(problem, start, load, loaded, expected) if problem.pairs else None
-    u, contact_force = displace(problem, start, load, loaded, settled)
-    forces = balance(problem, u, contact_force, load.force, start.largest_force)
+    u, contact_force = solve_displacements(problem, start, load, loaded, settled)
+    balanced = balance(problem, u, contact_force, load.force, start.largest_force)
     if settled is not None:
-        settled.iterate.history[-1]["residual"] = forces.relative
-    forces.check(index, problem.criteria.relative, settled.iterate.history if settled is not None else ())
+        settled.iterate.history[-1]["residual"] = balanced.relative
+    balanced.check(index, problem.criteria.relative, settled.iterate.history if settled is not None else ())
     iterations = counted(settled, problem.solver.counters.iterations - solved_before)
-    end = replace(start, u=u, largest_force=forces.largest, obstacles=problem.obstacles_at(load, u))
+    end = replace(start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u))
     end, contact = (end, {}) if settled is None else after_contact(problem, start, load, settled, end)
     if problem.bodies is not None and end.rigid is not None:
         iterations["regularised"] = problem.bodies.report(end.rigid, end.largest_work)
     end = replace(end, solver=problem.solver.snapshot())
-    return end, recover(problem, end, contact, forces.reaction, iterations, (index, instant))
+    return end, recover(problem, end, contact, balanced.reaction, iterations, (index, instant))
 
 
 def with_loads(problem: Problem, state: State, load: StepLoad) -> Loaded:
@@ -73,7 +73,7 @@ def with_loads(problem: Problem, state: State, load: StepLoad) -> Loaded:
     return problem.solver.load(problem.system.right(load.force, load.lift))
 
 
-def predict(problem: Problem, state: State, load: StepLoad, loaded: Loaded) -> tuple[State, float]:
+def prepare_start(problem: Problem, state: State, load: StepLoad, loaded: Loaded) -> tuple[State, float]:
     """Return the state from which the step starts, and the displacement to expect [length].
 
     The latter matters in the first step if forces alone act: nothing else tells how large displacements will be.
@@ -83,7 +83,7 @@ def predict(problem: Problem, state: State, load: StepLoad, loaded: Loaded) -> t
     if problem.pairs and load.force.any() and not (state.u.any() or load.lift.any()):
         expected = largest(loaded.full_solution(zero))
     if problem.pairs and problem.model.springs:
-        # Weak springs alone would let bodies move far; contact takes that back, but not its round-off.
+        # Without contact, bodies on weak springs move far; gaps keep round-off of that size.
         alone = largest(loaded.full_solution(zero))
         round_off = max(round_off, 16 * np.finfo(float).eps * alone)
     if problem.bodies is not None:
@@ -104,7 +104,7 @@ def settle(problem: Problem, start: State, load: StepLoad, loaded: Loaded, expec
     return settle_geometry(step, start.extrapolation, expected)
 
 
-def displace(
+def solve_displacements(
     problem: Problem, start: State, load: StepLoad, loaded: Loaded, settled: SettledContact | None
 ) -> tuple[Array, Array]:
     """Return all displacements [length] and the contact forces [force], both (n_dofs,)."""
@@ -123,7 +123,7 @@ def displace(
 def after_contact(
     problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State
 ) -> tuple[State, dict[str, ContactResult]]:
-    """Return the end of the step with what contact leaves to later steps, and the results of all contact pairs."""
+    """Return the end of the step with the contact data that later steps need, and the results of all contact pairs."""
     end = replace(
         end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
         unsettled=settled.unsettled, first_contact=first_contacts(problem, start, load, end.u),

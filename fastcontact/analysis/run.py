@@ -13,8 +13,8 @@ from fastcontact.analysis.problem import Problem, prepare
 from fastcontact.analysis.result_warnings import result_warnings
 from fastcontact.errors import warn
 from fastcontact.model.model import Model
+from fastcontact.model.model_warnings import model_warnings
 from fastcontact.model.ramp import Ramp, linear_ramp
-from fastcontact.model.warnings import model_warnings
 from fastcontact.results.step import StepResult
 
 
@@ -64,8 +64,8 @@ def solve(
     Warns
     -----
     FastcontactWarning
-        At the beginning about the model (`model.warnings`), at the end about the result (`analysis.result_warnings`): what
-        is doubtful, with its number. The results of the first and of the last step keep the texts.
+        At the beginning about the model (`model.model_warnings`), at the end about the result (`analysis.result_warnings`):
+        what is doubtful, with the value that shows it. The results of the first and of the last step keep the texts.
     """
     steps = list(resume)
     for step in solve_steps(

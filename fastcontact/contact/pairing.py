@@ -58,7 +58,7 @@ class Pairing:
     xi : ndarray (n, dim - 1)
         Reference coordinates of the projection.
     normal : ndarray (n, dim)
-        Unit outward normal of the primary facet there.
+        Unit outward normal there: of the primary facet, or interpolated between the nodal means of the facets.
     paired : ndarray of bool (n,)
         False where a candidate stands out beyond the end of the primary surface.
     offset : ndarray (n,), optional

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, eye_array, vstack
 
 from fastcontact.contact.constraints import Constraints, NodalField
-from fastcontact.contact.field_projection import Projection
+from fastcontact.contact.multiplier_field import Projection
 
 Array = NDArray[np.float64]
 # Entries of a row below this fraction of the largest are rounding errors of a projection that ends at a node.

@@ -33,8 +33,7 @@ class ContactResult:
         Contact pressure, >= 0 in compression, per reference area; negative only where tied or bilateral contact pulls
         [pressure].
     multiplier : ndarray (m,)
-        What the formulation solves for: nodal contact force (node-to-segment) [force], or nodal value of the
-        pressure field (continuous) [pressure].
+        The pressure that the formulation finds at the nodes, before open nodes and tension count as zero [pressure].
     force_vectors : ndarray (m, dim)
         Contact force on each secondary node; axisymmetric: over the full circle [force].
     normal : ndarray (m, dim)

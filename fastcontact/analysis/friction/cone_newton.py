@@ -16,6 +16,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.analysis.friction.coulomb_law import Law
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 # Residual of a solution over the largest force.
@@ -69,45 +71,6 @@ class Linearised(Protocol):
         in three dimensions turns with it.
         """
         ...
-
-
-@dataclass(frozen=True, eq=False)
-class Law:
-    """The inequalities.
-
-    Attributes
-    ----------
-    mu : ndarray (m,)
-    equality : ndarray of bool (m,), optional
-        Constraints that are equations: closed whatever their force.
-    """
-
-    mu: Array
-    equality: Mask | None = None
-
-    def trial(self, y: Array, gaps: Array) -> tuple[Array, Array, Array, Array]:
-        """Return n - g, t - s, the length of the latter and the radius of the disc."""
-        n, t = y[0] - gaps[0], y[1:] - gaps[1:]
-        return n, t, np.sqrt((t * t).sum(axis=0)), self.mu * np.maximum(n, 0.0)
-
-    def residual(self, y: Array, gaps: Array) -> Array:
-        """Return the left-hand sides (1 + k, m) of the equations."""
-        n, t, reach, radius = self.trial(y, gaps)
-        inside = np.divide(radius, reach, out=np.ones_like(reach), where=reach > radius)
-        pushed = np.maximum(n, 0.0) if self.equality is None else np.where(self.equality, n, np.maximum(n, 0.0))
-        return np.vstack([y[0] - pushed, y[1:] - t * inside])
-
-    def state(self, y: Array, gaps: Array) -> tuple[Mask, Mask]:
-        """Return which constraints are closed, and which of those stick."""
-        n, _, reach, radius = self.trial(y, gaps)
-        closed = n > 0 if self.equality is None else (n > 0) | self.equality
-        return closed, (n > 0) & (reach <= radius) & (self.mu > 0)
-
-    def slide(self, y: Array, gaps: Array, sliding: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Return the directions (k, q) in which constraints `sliding` (q,) slide, and how much of a turn t follows (q,)."""
-        _, t, reach, radius = self.trial(y, gaps)
-        along = np.maximum(reach[sliding], 1e-300)
-        return t[:, sliding] / along, np.minimum(radius[sliding] / along, 1.0)
 
 
 def newton(problem: Linearised, y: Array, gaps: Array, exact: float = EXACT, patience: int | None = None) -> Forces:

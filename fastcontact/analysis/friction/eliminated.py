@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, vstack
 
-from fastcontact.analysis.friction.cone_newton import EXACT, Forces, Law, newton
+from fastcontact.analysis.friction.cone_newton import EXACT, Forces, newton
+from fastcontact.analysis.friction.coulomb_law import Law
 from fastcontact.analysis.friction.slip_directions import aligning, idle
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.contact.constraints import Constraints

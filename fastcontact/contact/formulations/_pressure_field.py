@@ -30,8 +30,8 @@ from scipy.sparse.linalg import splu
 
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
-from fastcontact.contact.field_projection import Projection
 from fastcontact.contact.formulations._formulation import Formulation
+from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.errors import ContactError
 

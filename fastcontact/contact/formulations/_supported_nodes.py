@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.contact.field_projection import Projection
+from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.surface import Surface
 
 Array = NDArray[np.float64]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fastcontact.analysis.friction import cone_newton, coulomb
+from fastcontact.analysis.friction import cone_newton, dense
 
 
 def residual(F, free, mu, y):
@@ -39,7 +39,7 @@ def problem(rng, most_friction):
 
 
 def solved(F, free, mu, closed=None):
-    return coulomb.solve(F, free, mu, np.zeros(len(mu), bool) if closed is None else closed)
+    return dense.solve(F, free, mu, np.zeros(len(mu), bool) if closed is None else closed)
 
 
 @settings(max_examples=60, deadline=None)
@@ -140,7 +140,7 @@ def test_constraints_that_repeat_each_other_share_the_force():
 def test_each_of_the_later_methods_solves_by_itself(monkeypatch, patience, swept):
     # Without sweeps Newton or pivots must do; with one Newton iteration a start, sweeps or pivots must.
     monkeypatch.setattr(cone_newton, "PATIENCE", patience)
-    monkeypatch.setattr(coulomb, "SWEPT", swept)
+    monkeypatch.setattr(dense, "SWEPT", swept)
     rng = np.random.default_rng(23)
     for _ in range(100):
         m = rng.integers(1, 9)

@@ -6,10 +6,11 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 import fastcontact as fc
-from fastcontact.analysis.friction import cone_newton, coulomb, friction
+from fastcontact.analysis.friction import cone_newton, dense
+from fastcontact.analysis.friction import solve as friction
 from fastcontact.analysis.friction.slip_directions import aligning, idle, own_compliance
 from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.field_projection import Projection
+from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import normals, tangents
 
 
@@ -82,8 +83,8 @@ def test_tangents_turn_to_the_slip_that_supports_leave():
 
 def test_what_does_not_settle_is_told_with_its_numbers(monkeypatch):
     monkeypatch.setattr(cone_newton, "PATIENCE", 0)
-    monkeypatch.setattr(coulomb, "SWEPT", ())
-    monkeypatch.setattr(coulomb, "LARGEST", 0)
+    monkeypatch.setattr(dense, "SWEPT", ())
+    monkeypatch.setattr(dense, "LARGEST", 0)
     mesh = fc.generate.block_on_block(divisions_lower=(6, 2), divisions_upper=(3, 3))
     model = fc.Model(mesh, "plane_strain")
     model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))

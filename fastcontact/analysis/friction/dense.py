@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.analysis.friction import lemke_kernels, sweep_kernels
-from fastcontact.analysis.friction.cone_newton import Forces, Law, newton
+from fastcontact.analysis.friction.cone_newton import Forces, newton
+from fastcontact.analysis.friction.coulomb_law import Law
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

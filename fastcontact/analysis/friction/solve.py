@@ -2,7 +2,7 @@
 
 With normal forces n >= 0 and tangential forces t of all constraints as unknowns, gaps and slips of the step are
 ``(g, s) = (g, s)_free + F (n, t)`` with ``F = R K^-1 R.T + C``, R the normal and tangential rows and C the compliance of
-the constraints themselves. `coulomb` solves that: stick holds the slip of the step at zero exactly, slip returns to the
+the constraints themselves. `dense` solves that: stick holds the slip of the step at zero exactly, slip returns to the
 cone exactly.
 """
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lstsq
 from scipy.sparse import csr_array, vstack
 
-from fastcontact.analysis.friction import coulomb, eliminated
+from fastcontact.analysis.friction import dense, eliminated
 from fastcontact.analysis.friction.slip_directions import aligning, idle, own_compliance
 from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium
 from fastcontact.contact.constraints import Constraints
@@ -115,7 +115,7 @@ def _among(
         F[still], F[:, still], free.ravel()[still] = 0.0, 0.0, 0.0
         F[still, still] = np.diag(F).max()
     equations = np.zeros(len(rows), bool) if constraints.equality is None else constraints.equality[rows]
-    found = _coulomb(F, free, constraints.coefficients[rows], closed[rows], equations, start)
+    found = _on_flexibility(F, free, constraints.coefficients[rows], closed[rows], equations, start)
     y, relative = found.y, found.gaps
     if Q is not None:
         y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)
@@ -142,19 +142,19 @@ def _add_compliance(F: Array, constraints: Constraints, rows: NDArray[np.intp]) 
         F[np.arange(len(rows)), np.arange(len(rows))] += constraints.softness[rows]
 
 
-def _coulomb(
+def _on_flexibility(
     F: Array, free: Array, friction: Array, closed: Mask, equality: Mask, start: Array | None
-) -> coulomb.Forces:
+) -> dense.Forces:
     """Solve the problem on the compliance F, from which constraints that are equations are eliminated first."""
     if not equality.any():
-        return coulomb.solve(F, free, friction, closed, start)
+        return dense.solve(F, free, friction, closed, start)
     index = np.arange(free.size).reshape(free.shape)
     h, r = index[0, equality], index[:, ~equality].ravel()
     give = lstsq(F[np.ix_(h, h)], np.column_stack([F[np.ix_(h, r)], free.ravel()[h]]))[0]
     rest = free.ravel()[r] - F[np.ix_(r, h)] @ give[:, -1]
     remaining = F[np.ix_(r, r)] - F[np.ix_(r, h)] @ give[:, :-1]
     start = None if start is None else start[:, ~equality]
-    found = coulomb.solve(remaining, rest.reshape(len(free), -1), friction[~equality], closed[~equality], start)
+    found = dense.solve(remaining, rest.reshape(len(free), -1), friction[~equality], closed[~equality], start)
     y, gaps = np.zeros(free.shape), np.zeros(free.shape)
     y[:, ~equality], gaps[:, ~equality] = found.y, found.gaps
     y[0, equality] = -(give[:, -1] + give[:, :-1] @ found.y.ravel())

@@ -1,0 +1,54 @@
+"""The friction law: unilateral contact and Coulomb's cone, for forces and gaps in units of each constraint's own stiffness.
+
+Another law begins here. Its tangential force is also used where a sliding constraint is linearised: `dense._step`,
+`eliminated.Eliminated`, and in the fallbacks `sweep_kernels` and `dense._on_edges`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """Unilateral contact with Coulomb friction, as equations.
+
+    Attributes
+    ----------
+    mu : ndarray (m,)
+    equality : ndarray of bool (m,), optional
+        Constraints that are equations: closed whatever their force.
+    """
+
+    mu: Array
+    equality: Mask | None = None
+
+    def trial(self, y: Array, gaps: Array) -> tuple[Array, Array, Array, Array]:
+        """Return n - g, t - s, the length of the latter and the radius of the disc."""
+        n, t = y[0] - gaps[0], y[1:] - gaps[1:]
+        return n, t, np.sqrt((t * t).sum(axis=0)), self.mu * np.maximum(n, 0.0)
+
+    def residual(self, y: Array, gaps: Array) -> Array:
+        """Return the left-hand sides (1 + k, m) of the equations."""
+        n, t, reach, radius = self.trial(y, gaps)
+        inside = np.divide(radius, reach, out=np.ones_like(reach), where=reach > radius)
+        pushed = np.maximum(n, 0.0) if self.equality is None else np.where(self.equality, n, np.maximum(n, 0.0))
+        return np.vstack([y[0] - pushed, y[1:] - t * inside])
+
+    def state(self, y: Array, gaps: Array) -> tuple[Mask, Mask]:
+        """Return which constraints are closed, and which of those stick."""
+        n, _, reach, radius = self.trial(y, gaps)
+        closed = n > 0 if self.equality is None else (n > 0) | self.equality
+        return closed, (n > 0) & (reach <= radius) & (self.mu > 0)
+
+    def slide(self, y: Array, gaps: Array, sliding: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Return the directions (k, q) in which constraints `sliding` (q,) slide, and how much of a turn t follows (q,)."""
+        _, t, reach, radius = self.trial(y, gaps)
+        along = np.maximum(reach[sliding], 1e-300)
+        return t[:, sliding] / along, np.minimum(radius[sliding] / along, 1.0)
