@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 from fastcontact._jit.norms_kernels import largest
+from fastcontact.elasticity import system_kernels
 from fastcontact.elasticity.relations import Elimination, Relation, eliminate, stacked_rows
 from fastcontact.errors import ModelError
 from fastcontact.linear.multigrid.matrix import block_matrix
@@ -232,30 +233,22 @@ def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
         What K was, minus `matrix`: few numbers.
     """
     K = _with_diagonal(K)
-    size, diagonal = np.arange(K.blocksize[0]), K.diagonal()
+    diagonal = K.diagonal()
     kept = np.where(diagonal > 0, diagonal, diagonal.max(initial=1.0))
-    supported = fixed.reshape(-1, len(size))
-    node, block_row = np.asarray(supported.any(axis=1)), _block_rows(K)
-    near = np.flatnonzero(node[block_row] | node[K.indices])
-    row = block_row[near, None, None] * len(size) + size[:, None]
-    column = K.indices[near, None, None] * len(size) + size
-    out, blocks = np.logical_or(fixed[row], fixed[column]), K.data[near]
-    stays = np.where(row == column, kept[row], 0.0)
-    taken = np.where(out, blocks - stays, 0.0)
-    K.data[near] = np.where(out, stays, blocks)
-    r, b, c = np.nonzero(taken)
-    place = row[r, b, 0], column[r, 0, c]
-    return K, csr_array((taken[r, b, c], place), shape=K.shape)
-
-
-def _block_rows(K: bsr_array) -> NDArray[np.int32]:
-    """Return the block row of every block."""
-    return np.repeat(np.arange(len(K.indptr) - 1, dtype=np.int32), np.diff(K.indptr))
+    supported = fixed.reshape(-1, K.blocksize[0])
+    given = K.indptr, K.indices, K.data, supported, supported.any(axis=1), kept
+    start = np.empty(K.shape[0] + 1, np.int32)
+    system_kernels.take_out(*given, start, np.empty(0, np.int32), np.empty(0))
+    columns, taken = np.empty(start[-1], np.int32), np.empty(start[-1])
+    if len(taken):
+        system_kernels.take_out(*given, start, columns, taken)
+    return K, csr_array((taken, columns, start), shape=K.shape)
 
 
 def _with_diagonal(K: bsr_array) -> bsr_array:
     """Return K with a block on the diagonal of every block row, zero where there was none."""
-    present, block_row = np.zeros(len(K.indptr) - 1, bool), _block_rows(K)
+    present = np.zeros(len(K.indptr) - 1, bool)
+    block_row = np.repeat(np.arange(len(present)), np.diff(K.indptr))
     present[block_row[block_row == K.indices]] = True
     missing = np.flatnonzero(~present)
     if not len(missing):

@@ -84,8 +84,12 @@ class BlockMatrix:
     def to_scipy(self) -> bsr_array:
         """Return a square matrix as SciPy's, in double precision."""
         size = len(self.rows)
-        data = np.sum([part.astype(float) for part in self.exact], axis=0).reshape(-1, size, size)
-        return bsr_array((data, self.indices, self.indptr), shape=2 * ((len(self.indptr) - 1) * size,))
+        data = self.exact[0].astype(float)
+        for part in self.exact[1:]:
+            data += part
+        return bsr_array(
+            (data.reshape(-1, size, size), self.indices, self.indptr), shape=2 * ((len(self.indptr) - 1) * size,)
+        )
 
 
 def diagonal_blocks(indptr: Indices, indices: Indices, data: Values, size: int) -> Values:
