@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.contact.constraints import Constraints
-from fastcontact.elasticity.system import System
+from fastcontact.elasticity.constrained_system import System
 from fastcontact.linear.protocol import Loaded
 
 Array = NDArray[np.float64]

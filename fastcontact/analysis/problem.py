@@ -17,9 +17,9 @@ from fastcontact.analysis.unsupported_bodies import UnsupportedBodies
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.elasticity.constrained_system import System
 from fastcontact.elasticity.springs import stiffened
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
-from fastcontact.elasticity.system import System
 from fastcontact.linear import choice
 from fastcontact.linear.protocol import LinearSolver
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles

@@ -21,7 +21,7 @@ from scipy.linalg import qr
 from scipy.sparse import bsr_array
 
 from fastcontact.analysis.solution import Solution
-from fastcontact.elasticity.system import System
+from fastcontact.elasticity.constrained_system import System
 from fastcontact.model.rigid_motions import FreeMotions
 
 Array = NDArray[np.float64]

@@ -22,6 +22,7 @@ from fastcontact.contact.obstacles import MeshedSurface, Obstacle
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
+from fastcontact.elasticity.constrained_system import ConstrainedMotion
 from fastcontact.elasticity.loads import (
     BodyForce,
     Load,
@@ -38,7 +39,6 @@ from fastcontact.elasticity.loads import (
 from fastcontact.elasticity.materials import KINEMATICS, LinearElastic
 from fastcontact.elasticity.relations import Relation, stacked_rows
 from fastcontact.elasticity.springs import Springs, between, grounded, stacked
-from fastcontact.elasticity.system import ConstrainedMotion
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells

@@ -22,7 +22,7 @@ from fastcontact.cli import _study, bench, cases
 from fastcontact.cli._outputs import check_outputs
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import _cut_faces
-from fastcontact.elasticity.system import System
+from fastcontact.elasticity.constrained_system import System
 from fastcontact.linear.elimination import pivot_order
 from fastcontact.linear.multigrid import solver
 from fastcontact.linear.solvers import amg

@@ -1,9 +1,8 @@
 """A multigrid hierarchy of smoothed aggregation and its V-cycle, on compiled block kernels.
 
 Neighbouring nodes are gathered into aggregates, each of which moves like a rigid body at first. One step of block Jacobi
-smooths these motions (Vanek, Mandel and Brezina, 1996), and the coarse matrix is the Galerkin product. The smoother is the
-Chebyshev iteration for the upper part of the spectrum of ``D^-1 A``, D the diagonal blocks (Adams, Brezina, Hu and Tuminaro,
-2003): unlike Gauss-Seidel it gives the same bits for any number of threads.
+smooths these motions (Vanek, Mandel and Brezina, 1996), and the coarse matrix is the Galerkin product. The smoother of the
+levels is a Chebyshev iteration (`smoother`).
 
 Two functions are pyamg's: `standard_aggregation` gathers the nodes and `fit_candidates` makes an orthonormal basis of the
 rigid motions of each aggregate. Everything else is ours. `linear.solvers.pyamg` is pyamg's own multigrid, to compare with.
@@ -12,119 +11,23 @@ rigid motions of each aggregate. Everything else is ours. `linear.solvers.pyamg`
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 from scipy.sparse import csr_matrix
 
-from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
 from fastcontact.linear.multigrid.coarse import Coarse
+from fastcontact.linear.multigrid.level import Level
 from fastcontact.linear.multigrid.matrix import BlockMatrix, diagonal_blocks
+from fastcontact.linear.multigrid.smoother import DEGREE, SAFETY, chebyshev, largest_eigenvalue
 
 Array = NDArray[np.float64]
-Values = NDArray[Any]
 Indices = NDArray[np.int32]
 
 # The coarsest level has at most so many unknowns, or a level fewer than this part of the unknowns of the one above.
 COARSEST = 200
 STAGNANT = 0.7
-# Lanczos steps for the largest eigenvalue, what is added to their estimate, and the part of the spectrum smoothed.
-LANCZOS_STEPS = 8
-SAFETY = 1.08
-SMOOTHED = 1 / 24
-DEGREE = 3
-
-
-@dataclass(eq=False)
-class Level:
-    """A matrix of the hierarchy with its smoother, the way to the next coarser one, and work space.
-
-    Attributes
-    ----------
-    A : BlockMatrix
-    diagonal, inverse : ndarray (n_nodes * size * size,)
-        Diagonal blocks, and their inverses as the smoother takes them.
-    bound : float
-        Upper bound of the eigenvalues of ``D^-1 A``.
-    P, R : BlockMatrix or None
-        Prolongator and its transpose; None on the coarsest level.
-    eliminated : Elimination or None
-        Equations, on the finest level: weights in the precision of the cycle, the same for forces.
-    change : tuple of ndarray, or None
-        What eliminated equations add to the matrix, on coarser levels: the block rows that change (k,), and the change on
-        them as `indptr`, `indices` and `data` of a `BlockMatrix`.
-    b, x, r, d : ndarray (n,)
-        Right-hand side, iterate, residual and step of the cycle.
-    """
-
-    A: BlockMatrix
-    diagonal: Values
-    inverse: Values
-    bound: float
-    P: BlockMatrix | None = None
-    R: BlockMatrix | None = None
-    eliminated: Elimination | None = None
-    change: tuple[Values, ...] | None = None
-    b: Values = field(init=False)
-    x: Values = field(init=False)
-    r: Values = field(init=False)
-    d: Values = field(init=False)
-
-    def __post_init__(self) -> None:
-        n = (len(self.A.indptr) - 1) * len(self.A.rows)
-        self.b, self.x, self.r, self.d = (np.zeros(n, self.A.data.dtype) for _ in range(4))
-
-    @property
-    def n(self) -> int:
-        """Number of unknowns."""
-        return len(self.b)
-
-    def relax(self, r: Values, first: float, second: float, begin: bool = False) -> None:
-        """Make a Chebyshev step: see `cycle_kernels.relax`."""
-        kind = r.dtype.type
-        cycle_kernels.relax(self.inverse, r, kind(first), kind(second), self.d, self.x, self.A.rows, begin)
-        if self.eliminated is not None:
-            self.eliminated.complete(self.x)
-
-    def residual(self) -> None:
-        """Fill `r` with ``b - A x``."""
-        self.subtract_product(self.x, self.b, self.r)
-
-    def subtract_product(self, x: Values, b: Values, r: Values) -> None:
-        """Fill `r` with ``b - A x``, eliminated equations included."""
-        self.A.combine(-1.0, x, 1.0, b, r)
-        if self.eliminated is not None:
-            self.eliminated.move_forces(r)
-        elif self.change is not None:
-            cycle_kernels.subtract_rows(*self.change, x, r, len(self.A.rows))
-
-    def correct(self, coarse: Values) -> None:
-        """Add the correction of the next coarser level."""
-        assert self.P is not None
-        self.P.combine(1.0, coarse, 1.0, self.x, self.x)
-        if self.eliminated is not None:
-            self.eliminated.complete(self.x)
-
-    @property
-    def nbytes(self) -> int:
-        """Memory [bytes]."""
-        own = self.A.nbytes + self.diagonal.nbytes + self.inverse.nbytes + 4 * self.b.nbytes
-        return own + sum(A.nbytes for A in (self.P, self.R) if A is not None)
-
-
-def chebyshev(bound: float, degree: int) -> list[tuple[float, float]]:
-    """Return the factors (of the last step, of the residual) of a Chebyshev iteration for [SMOOTHED bound, bound]."""
-    centre, half = 0.5 * (1 + SMOOTHED) * bound, 0.5 * (1 - SMOOTHED) * bound
-    factors = [(0.0, 1.0 / centre)]
-    rho = half / centre
-    for _ in range(1, degree):
-        new = 1.0 / (2.0 * centre / half - rho)
-        factors.append((new * rho, 2.0 * new / half))
-        rho = new
-    return factors
 
 
 class Hierarchy:
@@ -275,37 +178,3 @@ def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Indices, Indices, Indic
         columns, out, P.rows, P.cols,
     )  # fmt: skip
     return BlockMatrix(indptr, columns, out, P.cols, P.cols)
-
-
-def largest_eigenvalue(level: Level) -> float:
-    """Return an estimate, from below, of the largest eigenvalue of ``D^-1 A`` from the Lanczos process.
-
-    The process is that behind conjugate gradients with preconditioner D (Golub and Van Loan, section 11.3).
-    """
-    r = np.random.default_rng(0).normal(size=level.n).astype(level.b.dtype)
-    z, q, p = np.empty_like(r), np.empty_like(r), np.zeros_like(r)
-    scratch, zero = np.empty_like(r), np.zeros_like(r)
-    if level.eliminated is not None:
-        level.eliminated.move_forces(r)
-    diagonal, beside = [], []
-    old_alpha, beta, rz = 1.0, 0.0, 0.0
-    kind = r.dtype.type
-    for step in range(min(LANCZOS_STEPS, level.n)):
-        cycle_kernels.relax(level.inverse, r, kind(0), kind(1), scratch, z, level.A.rows, True)
-        if level.eliminated is not None:
-            level.eliminated.complete(z)
-        new = float(r @ z)
-        if not new > 1e-12 * abs(rz):
-            break
-        beta = new / rz if step else 0.0
-        rz = new
-        p = z + kind(beta) * p
-        level.subtract_product(p, zero, q)
-        q *= -1
-        alpha = rz / float(p @ q)
-        diagonal.append(1 / alpha + beta / old_alpha)
-        beside.append(np.sqrt(beta) / old_alpha)
-        r -= kind(alpha) * q
-        old_alpha = alpha
-    T = np.diag(diagonal) + np.diag(beside[1:], 1) + np.diag(beside[1:], -1)
-    return float(np.linalg.eigvalsh(T).max()) if diagonal else 1.0

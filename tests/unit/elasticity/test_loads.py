@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_array
 
 import fastcontact as fc
+from fastcontact.elasticity.constrained_system import ConstrainedMotion
 from fastcontact.elasticity.relations import eliminate
-from fastcontact.elasticity.system import ConstrainedMotion
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.topology import outer_facets
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse import bsr_array
 
-from fastcontact.elasticity.system import supports_apart
+from fastcontact.elasticity.constrained_system import supports_apart
 
 
 def matrix(rng, n, size):

@@ -9,8 +9,8 @@ import pytest
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 import fastcontact as fc
+from fastcontact.elasticity.constrained_system import supports_apart
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
-from fastcontact.elasticity.system import supports_apart
 from fastcontact.errors import ModelError
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.krylov import krylov_kernels
@@ -18,8 +18,9 @@ from fastcontact.linear.krylov.iterations import ConjugateGradients
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.coarse import Coarse
 from fastcontact.linear.multigrid.constrained_hierarchy import ConstrainedHierarchy
-from fastcontact.linear.multigrid.hierarchy import Hierarchy, by_columns, chebyshev, largest_eigenvalue, product
+from fastcontact.linear.multigrid.hierarchy import Hierarchy, by_columns, product
 from fastcontact.linear.multigrid.matrix import BlockMatrix
+from fastcontact.linear.multigrid.smoother import chebyshev, largest_eigenvalue
 from fastcontact.linear.solvers.amg import Amg
 from fastcontact.linear.solvers.pyamg import Pyamg
 

@@ -8,8 +8,8 @@ from stepping import Stepping
 
 import fastcontact as fc
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.elasticity.constrained_system import supports_apart
 from fastcontact.elasticity.stiffness import stiffness
-from fastcontact.elasticity.system import supports_apart
 from fastcontact.linear import choice as linear
 from fastcontact.linear.cholesky import triangular_kernels
 from fastcontact.linear.cholesky.factorisation import fill_reducing, reordered
