@@ -1,0 +1,92 @@
+"""A level of the multigrid hierarchy: a matrix, its smoother, the way to the next coarser level, and work space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.linear.elimination.elimination import Elimination
+from fastcontact.linear.multigrid import cycle_kernels
+from fastcontact.linear.multigrid.matrix import BlockMatrix
+
+Values = NDArray[Any]
+
+
+@dataclass(eq=False)
+class Level:
+    """A matrix of the hierarchy with its smoother, the way to the next coarser one, and work space.
+
+    Attributes
+    ----------
+    A : BlockMatrix
+    diagonal, inverse : ndarray (n_nodes * size * size,)
+        Diagonal blocks, and their inverses as the smoother takes them.
+    bound : float
+        Upper bound of the eigenvalues of ``D^-1 A``.
+    P, R : BlockMatrix or None
+        Prolongator and its transpose; None on the coarsest level.
+    eliminated : Elimination or None
+        Equations, on the finest level: weights in the precision of the cycle, the same for forces.
+    change : tuple of ndarray, or None
+        What eliminated equations add to the matrix, on coarser levels: the block rows that change (k,), and the change on
+        them as `indptr`, `indices` and `data` of a `BlockMatrix`.
+    b, x, r, d : ndarray (n,)
+        Right-hand side, iterate, residual and step of the cycle.
+    """
+
+    A: BlockMatrix
+    diagonal: Values
+    inverse: Values
+    bound: float
+    P: BlockMatrix | None = None
+    R: BlockMatrix | None = None
+    eliminated: Elimination | None = None
+    change: tuple[Values, ...] | None = None
+    b: Values = field(init=False)
+    x: Values = field(init=False)
+    r: Values = field(init=False)
+    d: Values = field(init=False)
+
+    def __post_init__(self) -> None:
+        n = (len(self.A.indptr) - 1) * len(self.A.rows)
+        self.b, self.x, self.r, self.d = (np.zeros(n, self.A.data.dtype) for _ in range(4))
+
+    @property
+    def n(self) -> int:
+        """Number of unknowns."""
+        return len(self.b)
+
+    def relax(self, r: Values, first: float, second: float, begin: bool = False) -> None:
+        """Make a Chebyshev step: see `cycle_kernels.relax`."""
+        kind = r.dtype.type
+        cycle_kernels.relax(self.inverse, r, kind(first), kind(second), self.d, self.x, self.A.rows, begin)
+        if self.eliminated is not None:
+            self.eliminated.complete(self.x)
+
+    def residual(self) -> None:
+        """Fill `r` with ``b - A x``."""
+        self.subtract_product(self.x, self.b, self.r)
+
+    def subtract_product(self, x: Values, b: Values, r: Values) -> None:
+        """Fill `r` with ``b - A x``, eliminated equations included."""
+        self.A.combine(-1.0, x, 1.0, b, r)
+        if self.eliminated is not None:
+            self.eliminated.move_forces(r)
+        elif self.change is not None:
+            cycle_kernels.subtract_rows(*self.change, x, r, len(self.A.rows))
+
+    def correct(self, coarse: Values) -> None:
+        """Add the correction of the next coarser level."""
+        assert self.P is not None
+        self.P.combine(1.0, coarse, 1.0, self.x, self.x)
+        if self.eliminated is not None:
+            self.eliminated.complete(self.x)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory [bytes]."""
+        own = self.A.nbytes + self.diagonal.nbytes + self.inverse.nbytes + 4 * self.b.nbytes
+        return own + sum(A.nbytes for A in (self.P, self.R) if A is not None)
