@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,6 +21,11 @@ from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, linear_ramp
+
+LARGEST = 1 << 23  # of a case file [bytes]
+# The parser takes a time that grows with the square of the parts of a dotted key.
+PARTS = 50
+LONG_KEY = re.compile(rf"""(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{PARTS},}}""")
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,14 +81,7 @@ def read_case(path: str | Path) -> Case:
         If its mesh or model is wrong.
     """
     path = case_path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise CaseError(f"cannot read the case file '{path}': {_unreadable(path, error)}") from error
-    try:
-        data = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # tomllib's own error, and those of numbers too long, tables too deep
-        raise CaseError(f"the case file '{path}' is not valid TOML: {error}") from error
+    text, data = _parsed(path)
     try:
         return build_case(data, name=path.stem, folder=path.parent, text=text)
     except CaseError as error:
@@ -91,6 +90,40 @@ def read_case(path: str | Path) -> Case:
         # A value that passed all checks by key: Python's own message is all there is.
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         raise CaseError(f"{path}: a value is of the wrong kind or size ({reason}): see the ready cases") from error
+
+
+def files_of_case(path: str | Path) -> list[Path]:
+    """Return a case file and the files of meshes that it names; raises CaseError if it cannot be read."""
+    path = case_path(path)
+    found, waiting = [path], [_parsed(path)[1]]
+    while waiting:
+        for key, value in waiting.pop().items():
+            if key == "file" and isinstance(value, str):
+                found.append(path.parent / value)
+            tables = value if isinstance(value, list) else [value]
+            waiting += [table for table in tables if isinstance(table, dict)]
+    return found
+
+
+def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
+    """Return the text of a case file, and its data."""
+    try:
+        if path.stat().st_size > LARGEST:
+            raise CaseError(
+                f"the case file '{path}' is larger than {LARGEST >> 20} MB: put its mesh into a file of its own"
+            )
+        text = path.read_text(encoding="utf-8-sig")  # editors of Windows begin texts with a byte order mark
+    except (OSError, UnicodeDecodeError) as error:
+        raise CaseError(f"cannot read the case file '{path}': {_unreadable(path, error)}") from error
+    if found := LONG_KEY.search(text):
+        line = text.count("\n", 0, found.start()) + 1
+        raise CaseError(
+            f"the case file '{path}' has a key of more than {PARTS} parts in line {line}: no key is that long"
+        )
+    try:
+        return text, tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # tomllib's own error, and those of numbers too long, tables too deep
+        raise CaseError(f"the case file '{path}' is not valid TOML: {error}") from error
 
 
 def _unreadable(path: Path, error: Exception) -> str:

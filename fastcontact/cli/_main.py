@@ -16,9 +16,19 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fastcontact._version import __version__
+from fastcontact.cli._terminal import add_loudness, encodable, printable, say
 from fastcontact.errors import ConvergenceError, FastcontactError
 
 log = logging.getLogger("fastcontact")
+
+
+class _Printable(logging.StreamHandler[Any]):
+    """A handler that shows characters that steer a terminal, which names from files may hold."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the line to write; on a terminal it takes the place of the progress bar."""
+        line = encodable(printable(super().format(record)), self.stream)
+        return f"\r\x1b[K{line}" if sys.stderr.isatty() else line
 
 
 class Parser(argparse.ArgumentParser):
@@ -41,9 +51,7 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
         if command not in names or command == name:  # those of some commands take long to collect
             module.arguments(sub)
             sub.set_defaults(run=module.run)
-            loudness = sub.add_mutually_exclusive_group()
-            loudness.add_argument("-v", "--verbose", action="store_true", help="say what is being done and why")
-            loudness.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors and warnings")
+            add_loudness(sub, default=False)
     return top
 
 
@@ -52,22 +60,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         given = sys.argv[1:] if argv is None else list(argv)
         arguments = parser(given[0] if given else None).parse_args(given)
-        handler = logging.StreamHandler()
-        # On a terminal a line takes the place of the progress bar.
-        handler.setFormatter(logging.Formatter("\r\x1b[K%(message)s" if sys.stderr.isatty() else "%(message)s"))
+        handler = _Printable()
         log.handlers[:] = [handler]
         log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
         return int(arguments.run(arguments) or 0)
     except ConvergenceError as error:
-        print("\n".join([f"no convergence: {error}", *history_lines(error.history), *_notes(error)]), file=sys.stderr)
+        say("\n".join([f"no convergence: {error}", *history_lines(error.history), *_notes(error)]), error=True)
         return 2
     except FastcontactError as error:
-        print(f"error: {error}", file=sys.stderr)
+        say(f"error: {error}", error=True)
         return 1
     except BrokenPipeError:
         return 1
     except KeyboardInterrupt as error:
-        print("\n".join(["interrupted", *_notes(error)]), file=sys.stderr)
+        say("\n".join(["interrupted", *_notes(error)]), error=True)
         return 130  # as shells have it
 
 

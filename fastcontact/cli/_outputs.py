@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,14 @@ from fastcontact.results.step import ContactResult, StepResult
 
 
 def check_outputs(
-    read: str | os.PathLike[str],
+    read: Iterable[str | os.PathLike[str] | None],
     files: Iterable[str | os.PathLike[str] | None],
     pictures: Iterable[str | os.PathLike[str] | None] = (),
 ) -> None:
-    """Refuse files that could not be written, or would replace the one to `read`; None means no file.
+    """Refuse files that could not be written, or would replace one to `read` or another output; None means no file.
+
+    Every command that writes calls this before it opens anything. Files are told apart by what they are, not by name: a
+    link to a file is that file.
 
     Raises FileError if a folder is missing or write-protected, a path is a folder, the file to read or that of another
     output, or a picture of no known format; FastcontactError if there is no matplotlib.
@@ -26,18 +30,28 @@ def check_outputs(
     from fastcontact.mesh.files.paths import checked_target
 
     drawn = [str(path) for path in pictures if path]
-    source, seen = Path(os.path.realpath(read)), set()
+    sources = {_identity(Path(os.path.realpath(path))) for path in read if path}
+    seen: set[object] = set()
     for path in [*(str(path) for path in files if path), *drawn]:
         if Path(path).is_char_device() or Path(path).is_fifo():  # such as /dev/stdout
             continue
-        target = checked_target(path)
-        if target == source:
+        identity = _identity(checked_target(path))
+        if identity in sources:
             raise FileError(f"'{path}' is what this command reads: name another file to write")
-        if target in seen:
+        if identity in seen:
             raise FileError(f"two outputs are to be written to '{path}': name another file for one of them")
-        seen.add(target)
+        seen.add(identity)
     if drawn:
         _check_formats(drawn)
+
+
+def _identity(path: Path) -> object:
+    """Return device and number of a file, the same for all its names; of a file to come its path."""
+    try:
+        found = path.stat()
+    except OSError:
+        return path
+    return found.st_dev, found.st_ino
 
 
 def _check_formats(paths: list[str]) -> None:
@@ -52,11 +66,9 @@ def _check_formats(paths: list[str]) -> None:
 
 
 def write_text(path: str, content: str) -> None:
-    """Write a text file; raises FileError if it cannot be written."""
-    try:
-        Path(path).write_text(content, encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot write '{path}': {error.strerror}") from error
+    """Write a text file, whole or not at all; raises FileError if it cannot be written."""
+    with _target(path) as target:
+        target.write_text(content, encoding="utf-8")
 
 
 def write_json(path: str, numbers: Any, indent: int = 2) -> None:
@@ -67,9 +79,22 @@ def write_json(path: str, numbers: Any, indent: int = 2) -> None:
 def save(axes: Any, path: str) -> None:
     """Write the figure of `axes` to `path`; raises FileError if it cannot be written or its format is unknown."""
     try:
-        axes.figure.savefig(path)
-    except (OSError, ValueError) as error:
+        with _target(path) as target:
+            axes.figure.savefig(target)
+    except ValueError as error:
         raise FileError(f"cannot write the picture '{path}': {error}") from error
+
+
+@contextlib.contextmanager
+def _target(path: str) -> Iterator[Path]:
+    """Give the path to write to: beside a file, whose place it takes when all is written, or a device such as /dev/stdout."""
+    from fastcontact.mesh.files.paths import replacing
+
+    if Path(path).is_char_device() or Path(path).is_fifo():
+        yield Path(path)
+        return
+    with replacing(path) as temporary:
+        yield temporary
 
 
 def profile_picture(case: Any, step: StepResult, path: str) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 from fastcontact.cli._outputs import check_outputs, save, write_json, write_text
 from fastcontact.cli._progress import Runs
+from fastcontact.cli._terminal import say
 from fastcontact.errors import CaseError, FastcontactError
 
 
@@ -30,9 +31,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--store", metavar="DIR", help="folder of finished runs: started again, these are not redone")
 
 
-def check_targets(options: argparse.Namespace) -> None:
+def check_targets(options: argparse.Namespace, *also: str | None) -> None:
     """Refuse files that cannot be written, before anything runs; raises like `check_outputs`."""
-    check_outputs(options.case, [options.json, options.csv, options.html], [options.png])
+    from fastcontact.cases.case import files_of_case
+
+    check_outputs(files_of_case(options.case), [options.json, options.csv, options.html, *also], [options.png])
 
 
 def names(text: str | None) -> list[str] | None:
@@ -108,9 +111,9 @@ def report(
     if options.html:
         write_text(options.html, result.html())
     for text in failures:
-        print(f"warning: {text}", file=sys.stderr)
+        say(f"warning: {text}", error=True)
     if not options.quiet:
-        print("\n".join(result.lines()))
+        say("\n".join(result.lines()))
         written = [path for path in (options.json, options.csv, options.png, options.html, *also) if path]
-        print(f"wrote {', '.join(written)}" if written else f"nothing written: {hint}")
+        say(f"wrote {', '.join(written)}" if written else f"nothing written: {hint}")
     return 2 if failures else 0

@@ -9,7 +9,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from fastcontact.cli._outputs import write_json
+from fastcontact.cli._outputs import check_outputs, write_json
+from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError, FileError
 
 HELP = "run the benchmarks of the checkout"
@@ -45,6 +46,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the benchmarks, print the table, write the files of the options."""
     if any(size < 1 for size in [*(options.sizes or ()), *([] if options.dofs is None else [options.dofs])]):
         raise FastcontactError("--sizes and --dofs must be positive: give about how many unknowns the problem has")
+    check_outputs([options.compare], [options.json])
     if options.problem or options.dofs:
         return _contact(options)
     subjects, timing, table = map(suite, ("subjects", "timing", "table"))
@@ -56,11 +58,11 @@ def run(options: argparse.Namespace) -> int:
         sizes = subject.SIZES[:1] if options.smallest else options.sizes or subject.SIZES
         for size in sizes:
             if show:
-                print(f"{name} {size} ...", file=sys.stderr)
+                say(f"{name} {size} ...", error=True)
             found = timing.measured(subject, size, 1 if options.smallest else 3)
             results.setdefault(name, []).append(found)
     if not options.quiet:
-        print("\n".join(table.lines(results, before)))
+        say("\n".join(table.lines(results, before)))
     if options.json:
         write_json(options.json, {"environment": table.environment(), "results": results}, indent=1)
     if options.png:
@@ -75,7 +77,7 @@ def _contact(options: argparse.Namespace) -> int:
     chosen = {key: value for key, value in given.items() if value is not None}
     found = suite("subjects").load("contact").detailed(options.problem, options.dofs, **chosen)
     if not options.quiet:
-        print(json.dumps(found, indent=1))
+        say(json.dumps(found, indent=1))
     if options.json:
         write_json(options.json, found, indent=1)
     return 0

@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError, FileError
 
 HELP = "list the ready cases; print one, or copy it to change it"
@@ -30,12 +31,12 @@ def run(options: argparse.Namespace) -> int:
     if options.copy:
         written = copied(shipped_case(options.copy), Path(options.output or f"{options.copy}.toml"))
         if not options.quiet:
-            print(f"wrote {', '.join(map(str, written))}")
+            say(f"wrote {', '.join(map(str, written))}")
     elif options.name:
-        print(shipped_case(options.name).read_text(encoding="utf-8"), end="")
+        say(shipped_case(options.name).read_text(encoding="utf-8").rstrip("\n"))
     elif not options.quiet:
-        print("\n".join(line for path in shipped_cases().values() for line in _lines(path)))
-        print("solve one with: fastcontact run NAME")
+        say("\n".join(line for path in shipped_cases().values() for line in _lines(path)))
+        say("solve one with: fastcontact run NAME")
     return 0
 
 
@@ -56,6 +57,8 @@ def _lines(path: Path) -> list[str]:
 
 def copied(case: Path, target: Path) -> list[Path]:
     """Copy a case file, and beside it the mesh file it reads, if any; refuse to overwrite."""
+    from fastcontact.mesh.files.paths import replacing
+
     text = case.read_text(encoding="utf-8")
     mesh: dict[str, Any] = tomllib.loads(text).get("mesh", {})
     files = {target: text.encode()}
@@ -67,8 +70,6 @@ def copied(case: Path, target: Path) -> list[Path]:
         if path.exists():
             raise FileError(f"'{path}' exists already: name another file with -o, or remove it first")
     for path, content in files.items():
-        try:
-            path.write_bytes(content)
-        except OSError as error:
-            raise FileError(f"cannot write '{path}': {error.strerror}") from error
+        with replacing(path) as temporary:
+            temporary.write_bytes(content)
     return list(files)

@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the study, write the files of the options, print tables and sentences; 2 if a run failed."""
     from fastcontact.studies.convergence import convergence_study
 
-    _study.check_targets(options)
+    _study.check_targets(options, options.output)
     if options.adaptive:
         return _adaptive(options)
     elements, formulations, quantities = map(_study.names, (options.elements, options.formulations, options.quantities))

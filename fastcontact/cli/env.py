@@ -7,6 +7,7 @@ import os
 import time
 import warnings
 
+from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactWarning
 
 HELP = "show versions, threads and the cache folder of compiled kernels"
@@ -24,16 +25,16 @@ def run(options: argparse.Namespace) -> int:
     from fastcontact.elasticity import element_2d_kernels
 
     for name, version in summary.versions().items():
-        print(f"{name:<12} {version}")
-    print(f"{'threads':<12} {_jit.threads()} of {os.cpu_count()}")
+        say(f"{name:<12} {version}")
+    say(f"{'threads':<12} {_jit.threads()} of {os.cpu_count()}")
     cache = getattr(element_2d_kernels.add_stiffness, "_cache", None)
-    print(f"{'cache':<12} {getattr(cache, 'cache_path', 'none: kernels compile in every process')}")
+    say(f"{'cache':<12} {getattr(cache, 'cache_path', 'none: kernels compile in every process')}")
     if options.warmup:
         started = time.perf_counter()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FastcontactWarning)  # the results are not used
             _warm_up()
-        print(f"{'warm-up':<12} {time.perf_counter() - started:.1f} s")
+        say(f"{'warm-up':<12} {time.perf_counter() - started:.1f} s")
     return 0
 
 

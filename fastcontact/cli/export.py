@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from fastcontact.cli._outputs import check_outputs
+from fastcontact.cli._terminal import say
 from fastcontact.errors import CaseError
 
 HELP = "export a result file: MED with fields (Salome, ParaVis) or an XDMF sidecar (old ParaView)"
@@ -20,6 +22,7 @@ def run(options: argparse.Namespace) -> int:
     """Write the files of the options."""
     if not (options.med or options.xdmf):
         raise CaseError("nothing to export: give --med FILE or --xdmf FILE")
+    check_outputs([options.file], [options.med, options.xdmf])
     if options.med:
         from fastcontact.results.med import write_med_results
         from fastcontact.results.reader import open_results
@@ -31,5 +34,5 @@ def run(options: argparse.Namespace) -> int:
 
         write_xdmf(options.file, options.xdmf)
     if not options.quiet:
-        print(f"wrote {', '.join(path for path in (options.med, options.xdmf) if path)}")
+        say(f"wrote {', '.join(path for path in (options.med, options.xdmf) if path)}")
     return 0

@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from fastcontact.cli._terminal import say
+
 HELP = "show what a mesh or result file holds: groups, sizes, steps, iterations, versions"
 
 
@@ -20,13 +22,13 @@ def run(options: argparse.Namespace) -> int:
         from fastcontact.results.reader import open_results
 
         with open_results(options.file) as results:
-            print("\n".join([*_mesh_lines(results.mesh), *_result_lines(results)]))
+            say("\n".join([*_mesh_lines(results.mesh), *_result_lines(results)]))
         return 0
     from fastcontact.mesh.files.mesh_files import read_mesh_report
     from fastcontact.mesh.quality import quality
 
     mesh, report = read_mesh_report(options.file)
-    print("\n".join([str(report), *_mesh_lines(mesh), str(quality(mesh))]))
+    say("\n".join([str(report), *_mesh_lines(mesh), str(quality(mesh))]))
     return 0
 
 

@@ -8,6 +8,9 @@ import typing
 from collections.abc import Callable
 from typing import Any
 
+from fastcontact.cli._outputs import check_outputs
+from fastcontact.cli._terminal import add_loudness, say
+
 HELP = "make a mesh with named groups and report its quality"
 
 
@@ -24,6 +27,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         )
         for parameter in inspect.signature(make).parameters.values():
             sub.add_argument(f"--{parameter.name.replace('_', '-')}", dest=parameter.name, **_option(make, parameter))
+        add_loudness(sub, default=argparse.SUPPRESS)  # what stands before the name of the generator holds
 
 
 class _Raw(argparse.RawDescriptionHelpFormatter):
@@ -52,13 +56,14 @@ def run(options: argparse.Namespace) -> int:
     from fastcontact.mesh.generate import GENERATORS
     from fastcontact.mesh.quality import quality
 
+    check_outputs((), [options.output])
     make = GENERATORS[options.generator]
     names = inspect.signature(make).parameters
     given = {name: value for name, value in vars(options).items() if name in names}
     mesh = make(**{name: tuple(value) if isinstance(value, list) else value for name, value in given.items()})
     write_mesh(options.output, mesh)
     if not options.quiet:
-        print(quality(mesh))
-        print(f"groups: {', '.join(mesh.group_names)}")
-        print(f"wrote {options.output}")
+        say(quality(mesh))
+        say(f"groups: {', '.join(mesh.group_names)}")
+        say(f"wrote {options.output}")
     return 0

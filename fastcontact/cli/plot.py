@@ -6,7 +6,8 @@ import argparse
 from typing import Any
 
 from fastcontact.cli import _results
-from fastcontact.cli._outputs import save
+from fastcontact.cli._outputs import check_outputs, save
+from fastcontact.cli._terminal import say
 from fastcontact.errors import CaseError
 
 HELP = "plot the deformed mesh with its von Mises stress, or force and radius over the load"
@@ -34,6 +35,7 @@ def run(options: argparse.Namespace) -> int:
 
     if not (options.png or options.view):
         raise CaseError("name the picture to write with --png FILE, or ask for a window with --view")
+    check_outputs([options.file], (), [options.png])
     with open_results(options.file) as results:
         step = _results.chosen_step(results, options.step)
         case = _results.case_data(results)
@@ -42,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
             return 0
         save(_drawn(options, results, step, case), options.png)
     if not options.quiet:
-        print(f"wrote {options.png}")
+        say(f"wrote {options.png}")
     return 0
 
 

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from fastcontact.cli import _results
-from fastcontact.cli._outputs import draw_profile
+from fastcontact.cli._outputs import check_outputs, draw_profile
 from fastcontact.cli._results import pressure_curves
+from fastcontact.cli._terminal import say
 
 HELP = "pressure along the contact line against theory: CSV, XMGRACE .agr, PNG"
 
@@ -27,6 +28,7 @@ def run(options: argparse.Namespace) -> int:
     from fastcontact.results.reader import open_results
     from fastcontact.results.tables import contact_table, with_column, write_csv
 
+    check_outputs([options.file], [options.csv, options.agr], [options.png])
     with open_results(options.file) as results:
         step = _results.chosen_step(results, options.step)
         name = _results.chosen_contact(step, options.contact)
@@ -47,16 +49,16 @@ def run(options: argparse.Namespace) -> int:
     if not written:
         _print(table)
     elif not options.quiet:
-        print(f"wrote {', '.join(written)}")
+        say(f"wrote {', '.join(written)}")
     return 0
 
 
 def _print(table: Any) -> None:
     names = [name for name in table.dtype.names if name in ("point", "x", "y", "gap", "pressure", "active")]
     names += [name for name in table.dtype.names if name.startswith("pressure_")]
-    print("  ".join(f"{name:>14}" for name in names))
+    say("  ".join(f"{name:>14}" for name in names))
     for row in table:
-        print("  ".join(f"{row[name]:>14.6g}" for name in names))
+        say("  ".join(f"{row[name]:>14.6g}" for name in names))
 
 
 def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theories: dict[str, Any]) -> None:

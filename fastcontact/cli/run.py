@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
 from fastcontact.cli._progress import Progress
+from fastcontact.cli._terminal import say
 from fastcontact.errors import CaseError, ConvergenceError, FastcontactWarning, ModelError
 
 if TYPE_CHECKING:
@@ -46,14 +47,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Solve, write, print the summary."""
     from fastcontact.cases import summary
-    from fastcontact.cases.case import read_case
+    from fastcontact.cases.case import files_of_case, read_case
 
     started = time.perf_counter()
     if options.threads is not None:
         _set_threads(options.threads)
     case = read_case(options.case)
     output = Path(options.output or f"{case.name}.vtkhdf")
-    check_outputs(options.case, [output, options.json], [options.plot])
+    check_outputs(files_of_case(options.case), [output, options.json], [options.plot])
     read = time.perf_counter()
     case.model.check(case.ramp)  # a wrong model must not replace the results of a right one
     with _warnings_shown() as caught:
@@ -67,10 +68,10 @@ def run(options: argparse.Namespace) -> int:
         profile_picture(case, last, options.plot)
     for text in texts:
         if text not in caught:  # of the steps that were there already
-            print(f"warning: {text}", file=sys.stderr)
+            say(f"warning: {text}", error=True)
     if not options.quiet:
-        print("\n".join(summary.lines(numbers)))
-        print("  " + _written(output, len(done), len(steps), [path for path in (options.json, options.plot) if path]))
+        say("\n".join(summary.lines(numbers)))
+        say("  " + _written(output, len(done), len(steps), [path for path in (options.json, options.plot) if path]))
     return 0
 
 

@@ -18,24 +18,23 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
 
+from fastcontact.mesh.files.hdf5_driver import DriverFile
+
 # Where HDF5 begins its superblock, the nodes of its indices and its tables of names.
 SUPERBLOCK, NODE, NAMES = b"\x89HDF\r\n\x1a\n", b"TREE", b"SNOD"
 
 
-class CommittedFile:
+class CommittedFile(DriverFile):
     """An existing HDF5 file, with the methods that `h5py.File` calls; writes wait for `flush`.
 
-    HDF5 cannot be stopped half way by an exception. An error while it reads or flushes is kept in `failure`, and from then on
-    nothing is written: the file stays as the last good write has left it. Nor is anything written once `ours` is False,
-    because another program has written to the file. `end` is where the contents end; the file may take more room.
+    After an error nothing is written: the file stays as the last good write has left it. Nor is anything written once `ours`
+    is False, because another program has written to the file. `end` is where the contents end; the file may take more room.
     """
 
     def __init__(self, path: Path) -> None:
-        self._file = open(path, "r+b", buffering=0)  # noqa: SIM115
-        self._position = 0
+        super().__init__(path)
         self._pending: dict[int, bytes] = {}
         self.ours = True
-        self.failure: BaseException | None = None
         self._head = self._read_head()
         self.end = self._contents()
         self._starts, self._ends = [0], [self.end]  # of what has been written, in order and apart
@@ -55,61 +54,22 @@ class CommittedFile:
         self.ours = self.ours and self._read_head() == self._head
         return self.ours
 
-    def check(self) -> None:
-        """Raise the first error, if there was one."""
-        if self.failure is not None:
-            raise self.failure
-
     @property
     def writable(self) -> bool:
         """Whether nothing has gone wrong and nobody else has written to the file."""
         return self.ours and self.failure is None
 
-    def fileno(self) -> int:
-        """Return the descriptor of the file."""
-        return self._file.fileno()
-
-    def tell(self) -> int:
-        """Return the position."""
-        return self._position
-
-    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Set the position from the start, from itself or from the end."""
-        base = {os.SEEK_SET: 0, os.SEEK_CUR: self._position, os.SEEK_END: self._size()}[whence]
-        self._position = base + offset
-        return self._position
-
     def _size(self) -> int:
         waiting = max((place + len(data) for place, data in self._pending.items()), default=0)
-        return max(os.fstat(self.fileno()).st_size, waiting)
-
-    def readinto(self, buffer: memoryview) -> int:
-        """Fill a buffer from the position on, pending writes included; zeros beyond the end."""
-        size, start = len(buffer), self._position
-        data = bytearray(size)
-        try:
-            self._get(start, data)
-        except BaseException as error:
-            self._fail(error)
-        for place, waiting in self._pending.items():
-            first, last = max(place, start), min(place + len(waiting), start + size)
-            if first < last:
-                data[first - start : last - start] = waiting[first - place : last - place]
-        buffer[:] = data
-        self._position += size
-        return size
+        return max(super()._size(), waiting)
 
     def _get(self, start: int, data: bytearray) -> None:
-        self._file.seek(start)
-        view = memoryview(data)
-        while view and (count := self._file.readinto(view)):
-            view = view[count:]
-
-    def read(self, size: int) -> bytes:
-        """Return `size` bytes; see `readinto`."""
-        buffer = bytearray(size)
-        self.readinto(memoryview(buffer))
-        return bytes(buffer)
+        super()._get(start, data)
+        end = start + len(data)
+        for place, waiting in self._pending.items():
+            first, last = max(place, start), min(place + len(waiting), end)
+            if first < last:
+                data[first - start : last - start] = waiting[first - place : last - place]
 
     def write(self, data: bytes) -> int:
         """Keep data for the position; later data replace earlier ones."""
@@ -137,11 +97,6 @@ class CommittedFile:
                 self._commit()
         except BaseException as error:
             self._fail(error)
-
-    def _fail(self, error: BaseException) -> None:
-        """Keep the first error, without its frames, which would keep objects of HDF5 open."""
-        error = error.with_traceback(None)  # the later ones, too: they may be the same object
-        self.failure = self.failure or error
 
     def _commit(self) -> None:
         waiting = sorted(self._pending.items(), key=lambda entry: self._turn(*entry))
@@ -172,12 +127,6 @@ class CommittedFile:
         if first < last:
             start, end = min(start, self._starts[first]), max(end, self._ends[last - 1])
         self._starts[first:last], self._ends[first:last] = [start], [end]
-
-    def _put(self, place: int, data: bytes) -> None:
-        self._file.seek(place)
-        view = memoryview(data)
-        while view:
-            view = view[self._file.write(view) :]
 
     def close(self) -> None:
         """Cut the file behind its contents and wait until it is on the disk; a second call does nothing."""

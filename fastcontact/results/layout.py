@@ -181,7 +181,10 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
     n, dim = mesh.n_points, mesh.dim
     expected = {"displacement": (n, dim), "reaction": (n, dim), "stress": (n, 4 if dim == 2 else 6)}
     for name, shape in {**expected, "von_mises": (n,), "von_mises_signed": (n,)}.items():
-        found = np.shape(getattr(step, name))
+        field = getattr(step, name)
+        if np.ma.isMaskedArray(field):
+            raise FileError(f"step {step.index}: {name} is a masked array, and files keep no masks: fill it first")
+        found = np.shape(field)
         if found != shape:
             raise FileError(f"step {step.index}: {name} has shape {found}, but the mesh of the file needs {shape}")
     for name, contact in step.contact.items():

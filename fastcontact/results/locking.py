@@ -6,6 +6,7 @@ import contextlib
 import errno
 import os
 import shutil
+import stat
 import sys
 from pathlib import Path
 from typing import IO, Any
@@ -45,7 +46,7 @@ class PathLock:
     def __init__(self, target: Path) -> None:
         self.path = target.with_name(f".{target.name}.lock")
         while True:
-            file = open(self.path, "a+b", buffering=0)  # noqa: SIM115
+            file = _own_file(self.path)
             if not _lock(file):
                 file.seek(0)
                 holder = file.read().decode("ascii", "replace").strip() or "unknown"
@@ -72,6 +73,21 @@ class PathLock:
         with contextlib.suppress(OSError):  # Windows keeps open files: the empty lock file stays, harmless
             self.path.unlink()
         self._file.close()
+
+
+def _own_file(path: Path) -> IO[Any]:
+    """Open a file, made if there is none; raises FileError for a link or another's file, which writing would change."""
+    try:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
+    except OSError as error:
+        if error.errno != errno.ELOOP:
+            raise
+        raise FileError(f"'{path}' is a link, but a lock must be a file of its own: remove it") from error
+    found = os.fstat(descriptor)
+    if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1 or (hasattr(os, "getuid") and found.st_uid != os.getuid()):
+        os.close(descriptor)
+        raise FileError(f"'{path}' is no plain file of yours, as a lock must be: remove it or write to another folder")
+    return os.fdopen(descriptor, "r+b", buffering=0)
 
 
 def _lock(file: IO[Any]) -> bool:

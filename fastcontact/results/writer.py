@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 
 from fastcontact.errors import ConvergenceError, FileError, ModelError
+from fastcontact.mesh.files.hdf5_driver import new_hdf5
 from fastcontact.mesh.files.packing import packed
-from fastcontact.mesh.files.paths import PathLike, checked_target
+from fastcontact.mesh.files.paths import PathLike, checked_target, replacing
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import contents, layout
 from fastcontact.results.committed_file import CommittedFile, uninterrupted
@@ -105,6 +106,7 @@ class ResultWriter:
         self._file: Any = None
         self._committed: Any = None
         self._closed = self._ended = False
+        self._last: tuple[int, Any] = (0, None)  # index and case of the last step
         self._notes: dict[str, str] = {}  # of the next step: the case file, if another one is resumed
         self._left: tuple[int, ...] | None = None
         with self._explained("begun"):
@@ -125,7 +127,7 @@ class ResultWriter:
         self.done, self._ended, old_case = _steps_to_resume(self.path, self._mesh, kinematics, self._cell_fields)
         self.n_steps = len(self.done)
         if self.done:
-            self._left = left
+            self._left, self._last = left, (self.done[-1].index, _case_of(self.done[-1]))
             self._notes = {"case": case_text} if case_text not in ("", old_case) else {}
 
     def __enter__(self) -> ResultWriter:
@@ -152,11 +154,13 @@ class ResultWriter:
         Raises
         ------
         FileError
-            If the file is closed, the step does not fit the mesh, or the disk takes no more.
+            If the file is closed, the step does not follow those before it, belongs to another case or does not fit the
+            mesh, or the disk takes no more.
         """
         if self._closed:
             raise FileError(f"'{self.path}' is closed: write steps before close, or inside the with block")
         layout.check_step(self._mesh, step, self._cell_fields)
+        self._check_next(step)
         with self._explained(f"written at step {step.index}"):
             self._open()
             self._check_in_place()
@@ -171,6 +175,17 @@ class ResultWriter:
             self._file["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(self.n_steps + 1))
             self._flush()
             self.n_steps += 1
+            self._last = step.index, _case_of(step)
+
+    def _check_next(self, step: StepResult) -> None:
+        """Refuse a step that is there already, comes too late, or was computed for another case than those before."""
+        index, case = self._last
+        if step.index <= index:
+            raise FileError(f"step {step.index} cannot be written after step {index}: write each step once, in order")
+        if None not in (case, _case_of(step)) and case != _case_of(step):
+            raise FileError(
+                f"step {step.index} belongs to another case than step {index}: write it to a file of its own"
+            )
 
     def close(self, log: Any = None, warnings: Iterable[str] = ()) -> None:
         """Finish the file; a second call does nothing.
@@ -283,20 +298,13 @@ class ResultWriter:
 
     def _begin(self, kinematics: str, case_text: str) -> None:
         """Write all but the steps under another name, then put it in the place of the old file."""
-        import h5py
-
-        temporary = self.path.with_name(f".{self.path.name}.tmp")
-        try:
-            with open(temporary, "wb") as probe:
+        with replacing(self.path) as temporary:
+            with open(temporary, "r+b") as probe:
                 size = contents.header_size(self._mesh) + len(case_text) + MARGIN
                 reserve(probe.fileno(), temporary.parent, 0, size)
-            with h5py.File(temporary, "w", locking=False) as file:
+            with new_hdf5(temporary) as file:
                 contents.write_geometry(file, self._mesh, self._cell_fields)
                 contents.write_own(file, self._mesh, kinematics, case_text)
-            os.replace(temporary, self.path)
-        finally:
-            with contextlib.suppress(OSError):
-                temporary.unlink()
         # Closed in between because Windows renames no open file; without locks viewers may follow.
         self._open()
 
@@ -329,6 +337,11 @@ def _steps_to_resume(
                 f"for the same ones, {begin_anew}"
             )
         return list(old), old.complete, old.case_text
+
+
+def _case_of(step: StepResult) -> Any:
+    """Return what tells the parts of the case that a step was computed for; None where it does not say."""
+    return (step.restart or {}).get("case", {}).get("parts")
 
 
 def _same_mesh(one: Mesh, other: Mesh) -> bool:

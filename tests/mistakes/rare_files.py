@@ -181,7 +181,7 @@ CALLS = [
     ("figures of benchmarks on a full disk", lambda patch: full(patch, write_json), fc.errors.FileError, r"cannot write 'a\.json': .*No space left on device"),
     ("a summary on a full disk", lambda patch: full(patch, write_json), fc.errors.FileError, r"cannot write 'a\.json': No space left on device"),
     ("a mesh from a pipe", pipe, fc.errors.FileError, r"pipe\.med' is a device or a pipe: name a plain file"),
-    ("a file that was never made", vanished, fc.errors.FileError, r"a\.txt' cannot be written: No such file or directory"),
+    ("a file that was never made", vanished, fc.errors.FileError, r"a\.txt' cannot be written \(No such file or directory\)"),
     ("an Abaqus file that cannot be read", lambda folder: abaqus.check_readable(folder), fc.errors.FileError, r"cannot read '.*': .*Is a directory"),
     ("coordinates in words", lambda: build_mesh([["a", "b"]], [], {}), fc.MeshError, r"its coordinates are no numbers: check that the file is complete"),
     ("an HDF5 file with groups in a circle", lambda folder: opened(folder, circle), fc.errors.FileError, r"spoilt\.h5' has groups in a circle or too deep, at '.*': write it anew"),

@@ -18,6 +18,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.files import med_families
 from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_known
 from fastcontact.mesh.files.hdf5 import attribute, opened, values
+from fastcontact.mesh.files.hdf5_driver import new_hdf5
 from fastcontact.mesh.files.med_families import Families, checked_name, decoded
 from fastcontact.mesh.files.paths import PathLike, replacing
 from fastcontact.mesh.mesh import Mesh
@@ -184,10 +185,8 @@ def write_med_mesh(path: PathLike, mesh: Mesh, *, mesh_name: str = "mesh") -> No
 @contextmanager
 def new_file(path: PathLike, mesh: Mesh) -> Iterator[Any]:
     """Open a new MED file that takes its place when all is written; `mesh` tells which version it needs."""
-    import h5py
-
     version = 4 if "wedge18" in mesh.cells else 3
-    with replacing(path) as temporary, _in_order(version >= 4), h5py.File(temporary, "w") as file:
+    with replacing(path) as temporary, _in_order(version >= 4), new_hdf5(temporary) as file:
         _set(file.create_group("INFOS_GENERALES"), MAJ=version, MIN=0, REL=0)
         yield file
 

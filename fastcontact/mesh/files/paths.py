@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import secrets
 from collections.abc import Iterator
@@ -59,18 +60,38 @@ def _may_write(path: Path) -> bool:
 
 @contextlib.contextmanager
 def replacing(path: PathLike) -> Iterator[Path]:
-    """Give a temporary path beside `path` to write to, which takes its place on success and is removed after a failure.
+    """Give an empty file beside `path` to write to, which takes its place on success and is removed after a failure.
 
-    What the operating system refuses becomes a FileError.
+    Its name cannot be guessed and it is a new file, so that no link put there beforehand is followed. When it takes its
+    place it is on the disk. What the operating system refuses becomes a FileError.
     """
     target = checked_target(path)
     # The suffix stays last, because writers choose the format by it.
-    temporary = target.with_name(f".{target.stem[:100]}.{os.getpid()}-{secrets.token_hex(4)}{target.suffix}")
+    temporary = target.with_name(f".{target.stem[:100]}.{secrets.token_hex(12)}{target.suffix}")
     try:
+        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
         yield temporary
+        _synchronise(temporary)
         os.replace(temporary, target)
+        _synchronise(target.parent)
     except OSError as error:
-        raise FileError(f"'{target}' cannot be written: {error.strerror or error}") from error
+        raise FileError(
+            f"'{target}' cannot be written ({error.strerror or error}): see whether the disk is full or the folder protected"
+        ) from error
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def _synchronise(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk; nothing is done where folders cannot be opened."""
+    if path.is_dir() and os.name == "nt":
+        return
+    descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # of file systems without it
+            raise
+    finally:
+        os.close(descriptor)

@@ -273,7 +273,7 @@ def test_a_file_whose_case_is_no_toml_is_shown_without_theory(solved, tmp_path, 
 
 
 def test_a_reader_that_goes_away_is_no_error_of_ours(monkeypatch):
-    def gone(*_):
+    def gone(*_, **__):
         raise BrokenPipeError
 
     monkeypatch.setattr("builtins.print", gone)

@@ -269,8 +269,7 @@ def test_a_full_disk_stops_the_run_before_anything_is_replaced(whole, small_disk
         other.write(bytes(shutil.disk_usage(small_disk).free))
     assert run(case, path) == 1
     assert only_line(capsys.readouterr().err) == (
-        f"error: '{path}' cannot be begun (No space left on device), 0 steps are complete: see whether the disk is full "
-        "or the folder protected"
+        f"error: '{path}' cannot be written (No space left on device): see whether the disk is full or the folder protected"
     )
     assert path.read_bytes() == before
     assert_same(path, steps)

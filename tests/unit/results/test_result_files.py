@@ -89,6 +89,11 @@ def contact_result(number: int, name: str, formulation: str, mesh: Mesh = MESH) 
     )
 
 
+def nth_step(number: int) -> StepResult:
+    """One of many steps, whose history stays short."""
+    return dataclasses.replace(step_result(number % 5), index=number + 1, load_factor=(number + 1) / 7.0)
+
+
 def step_result(number: int, mesh: Mesh = MESH, pairs: dict[str, str] = PAIRS) -> StepResult:
     random, n, dim = np.random.default_rng(number), mesh.n_points, mesh.dim
     history = [{"residual": 10.0**-i / 3.0, "active": i, "closed": bool(i % 2)} for i in range(number)]
@@ -447,18 +452,20 @@ def test_a_step_interrupted_half_way_can_be_written_again(path: Path, monkeypatc
 KILLED = """
     import os, random, signal, sys, time
     sys.path.insert(0, sys.argv[1])
-    from test_result_files import MESH, ResultWriter, step_result
+    from test_result_files import MESH, ResultWriter, nth_step
     for trial in range(10):
         path = f"{sys.argv[2]}/killed{trial}.vtkhdf"
-        acknowledged = os.open(path + ".count", os.O_CREAT | os.O_WRONLY)
+        acknowledged = os.open(path + ".count", os.O_CREAT | os.O_RDWR)
         child = os.fork()
         if child == 0:
             out, number = ResultWriter(path, MESH), 0
             while True:
-                out.write(step_result(number % 5))
+                out.write(nth_step(number))
                 os.write(acknowledged, b".")
                 number += 1
-        time.sleep(0.03 + 0.02 * trial + 0.02 * random.random())
+        while os.fstat(acknowledged).st_size < 2 * trial:  # steps, whatever time they take
+            time.sleep(0.001)
+        time.sleep(0.02 * random.random())
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
 """
@@ -478,7 +485,7 @@ def test_kill_9_costs_no_finished_step(tmp_path: Path) -> None:
         with open_results(path) as results:
             assert finished <= len(results) <= finished + 1
             for number, step in enumerate(results):
-                assert_same(step, step_result(number % 5), f"trial {trial}, step {number}")
+                assert_same(step, nth_step(number), f"trial {trial}, step {number}")
         total += finished
         write(path, 1)  # the dead writer's lock does not bar the way
     assert total > 10, "the writers must have come to write something"
@@ -487,12 +494,12 @@ def test_kill_9_costs_no_finished_step(tmp_path: Path) -> None:
 FULL = """
     import resource, signal, sys
     sys.path.insert(0, sys.argv[1])
-    from test_result_files import MESH, ResultWriter, step_result
+    from test_result_files import MESH, ResultWriter, nth_step
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
     with ResultWriter(sys.argv[2], MESH) as out:
         for number in range(1000):
-            out.write(step_result(number % 5))
+            out.write(nth_step(number))
 """
 
 
@@ -508,7 +515,7 @@ def test_a_full_disk_costs_no_finished_step(path: Path) -> None:
     assert f"{len(results)} steps are complete" in last
     assert len(results) > 3
     for number, step in enumerate(results):
-        assert_same(step, step_result(number % 5))
+        assert_same(step, nth_step(number))
 
 
 def test_an_old_file_stays_until_the_new_one_is_begun(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -519,7 +526,7 @@ def test_an_old_file_stays_until_the_new_one_is_begun(path: Path, monkeypatch: p
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("fastcontact.results.contents.write_own", fail)
-    with pytest.raises(FileError, match=r"cannot be begun \(No space left on device\)"):
+    with pytest.raises(FileError, match=r"cannot be written \(No space left on device\)"):
         ResultWriter(path, MESH)
     assert path.read_bytes() == before
     assert os.listdir(path.parent) == [path.name]

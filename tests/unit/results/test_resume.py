@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_result_files import MESH, assert_same, step_result
+from test_result_files import MESH, assert_same, nth_step, step_result
 
 import fastcontact as fc
 from fastcontact import ConvergenceError, FileError, ModelError, ResultWriter, open_results
@@ -68,7 +68,7 @@ def recorded(path: Path, n_steps: int, monkeypatch: pytest.MonkeyPatch) -> tuple
     with ResultWriter(path, MESH) as out:
         shutil.copy(path, path.with_name("crashed.vtkhdf"))
         for number in range(n_steps):
-            out.write(step_result(number % 5))
+            out.write(nth_step(number))
             ends.append(len(writes))
     return writes, ends
 
@@ -96,8 +96,8 @@ def test_every_write_may_be_the_last_one(
                     {0, len(results) // 2, *range(max(len(results) - 8, 0), len(results), 2)} if len(results) else ()
                 )
                 for which in several:
-                    assert_same(results[which], step_result(which % 5), f"write {number}, step {which}")
-                expected = [step_result(which % 5).load_factor for which in range(len(results))]
+                    assert_same(results[which], nth_step(which), f"write {number}, step {which}")
+                expected = [nth_step(which).load_factor for which in range(len(results))]
                 assert list(results.load_factors) == expected
                 assert list(results._file["VTKHDF/Steps/Values"][: len(results)]) == expected
 

@@ -1,0 +1,96 @@
+"""Run commands on a disk that fails at one call after the other. Started with the library of `disk.c` preloaded.
+
+Arguments: folder to work in, folder of the files to start from, number of faults a command (0: at every call), commands as
+JSON. Each command runs in a child of its own, on a fresh copy of the files. Prints one JSON line a fault: command, call,
+error, whether it is the only one, exit code or minus the signal, what was printed as error, and the names of the files left.
+The children come from a parent that has run no kernel, since threads do not survive a fork.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import json
+import os
+import shutil
+import sys
+from pathlib import Path
+
+from fastcontact.cli import main
+
+DISK = ctypes.CDLL(None)
+ERRORS = (errno.EIO, errno.ENOSPC)
+
+
+def run(command: list[str], work: Path, source: Path, call: int, error: int, once: bool) -> dict[str, object]:
+    """Run a command in a child and return what came of it; `call` -1 lets nothing fail."""
+    folder = work / "files"
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(source, folder)
+    said, counts = work / "said.txt", work / "calls.txt"
+    child = os.fork()
+    if child == 0:
+        os.chdir(folder)
+        os.dup2(os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        DISK.disk_fails(os.fsencode(folder), call, error, once)
+        code = main(command)
+        counts.write_text(str(DISK.disk_calls()))
+        os._exit(code)
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    shutil.rmtree(work / "left", ignore_errors=True)
+    return {
+        "command": command,
+        "call": call,
+        "error": error,
+        "once": once,
+        "code": status,
+        "said": said.read_text(),
+        "files": sorted(os.listdir(folder)),
+        "calls": int(counts.read_text()) if counts.exists() else 0,
+    }
+
+
+def spread(total: int, count: int) -> list[int]:
+    """Return `count` calls of `total`, the first and the last among them; all of them for 0."""
+    if not count or count >= total:
+        return list(range(total))
+    return sorted({round(k * (total - 1) / (count - 1)) for k in range(count)})
+
+
+def main_loop() -> None:
+    work, source, count = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
+    for command in json.loads(sys.argv[4]):
+        whole = run(command, work, source, -1, 0, False)
+        print(json.dumps(whole), flush=True)
+        for number, call in enumerate(spread(int(str(whole["calls"])), count)):
+            (work / "calls.txt").unlink(missing_ok=True)
+            found = run(command, work, source, call, ERRORS[number % 2], bool(number % 3))
+            found["intact"] = intact(work / "files", source)
+            print(json.dumps(found), flush=True)
+
+
+def intact(folder: Path, source: Path) -> list[str]:
+    """Return what is wrong with the files that a command has left: inputs changed, results that cannot be read."""
+    from fastcontact.results.reader import open_results
+
+    wrong = [f"{path.name} is gone" for path in source.iterdir() if not (folder / path.name).exists()]
+    for path in folder.iterdir():
+        old = source / path.name
+        if path.name.startswith("."):
+            wrong.append(f"{path.name} was left")
+        elif old.exists() and path.read_bytes() == old.read_bytes():
+            continue
+        elif path.suffix == ".vtkhdf":
+            try:
+                with open_results(path) as results:
+                    [step.displacement for step in results]
+            except Exception as error:
+                wrong.append(f"{path.name}: {error}")
+        elif not path.stat().st_size:
+            wrong.append(f"{path.name} is empty")
+    return wrong
+
+
+if __name__ == "__main__":
+    main_loop()

@@ -1,0 +1,56 @@
+"""Whatever call of whatever command a disk refuses: one line, exit code 1, nothing lost, nothing left behind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import disk_faults
+import pytest
+
+from fastcontact.cli import main
+
+COMMANDS = [
+    ["run", "case.toml", "-o", "case.vtkhdf", "-q", "--json", "case.json"],
+    ["run", "case.toml", "-o", "case.vtkhdf", "-q", "--resume"],
+    ["export", "old.vtkhdf", "--med", "old.med", "-q"],
+    ["export", "old.vtkhdf", "--xdmf", "old.xdmf", "-q"],
+    ["profile", "old.vtkhdf", "--csv", "old.csv", "--agr", "old.agr", "-q"],
+    ["profile", "old.vtkhdf", "--png", "old.png", "-q"],
+    ["mesh", "half-spheres", "--size", "10", "-o", "old.med", "-q"],
+    ["mesh", "half-spheres", "--size", "10", "-o", "new.msh", "-q"],
+    ["cases", "--copy", "forma04a", "-o", "copy.toml", "-q"],
+]
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    built = disk_faults.build(tmp_path_factory.mktemp("library"))
+    if built is None:
+        pytest.skip("needs Linux and a C compiler")
+    return built
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A case with its mesh, results of a run, and files that commands replace."""
+    folder = tmp_path_factory.mktemp("source")
+    case = folder / "case.toml"
+    mesh = ["mesh", "half-spheres", "--element", "tri3", "--size", "6", "-o", str(folder / "coarse.med"), "-q"]
+    assert main(mesh) == 0
+    assert main(["cases", "--copy", "forma04a", "-o", str(case), "-q"]) == 0
+    (folder / "forma04a.med").unlink()
+    text = case.read_text(encoding="utf-8").replace("forma04a.med", "coarse.med")
+    case.write_text(text.replace("steps = 20", "steps = 2"), encoding="utf-8")
+    assert main(["run", str(case), "-o", str(folder / "old.vtkhdf"), "-q"]) == 0
+    (folder / "old.med").write_bytes((folder / "coarse.med").read_bytes())
+    for name in ("old.csv", "old.agr", "old.xdmf", "old.png"):
+        (folder / name).write_text("old\n")
+    return folder
+
+
+@pytest.mark.parametrize("count", [5, pytest.param(0, marks=pytest.mark.slow)], ids=["few", "every"])
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: "-".join(command[:1] + command[-2:]))
+def test_a_disk_that_fails_ends_a_command_with_one_line(command, count, library, source, tmp_path):
+    faults = disk_faults.found(library, tmp_path, source, [command], count)
+    assert len(faults) > 2
+    assert [text for fault in faults for text in disk_faults.complaints(fault)] == []

@@ -1,0 +1,149 @@
+"""No command replaces what it reads, or one of its outputs by another; no output is left half written."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+from pathlib import Path
+
+import matplotlib as mpl
+import pytest
+
+from fastcontact.cli import main
+from fastcontact.cli._main import parser
+from fastcontact.cli._terminal import printable
+
+mpl.use("Agg")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A result file, a case file and the mesh that it reads."""
+    folder = tmp_path_factory.mktemp("outputs")
+    case = folder / "case.toml"
+    mesh = ["mesh", "half-spheres", "--element", "tri3", "--size", "5", "-o", str(folder / "coarse.med"), "-q"]
+    assert main(mesh) == 0
+    assert main(["cases", "--copy", "forma04a", "-o", str(case), "-q"]) == 0
+    (folder / "forma04a.med").unlink()
+    text = case.read_text(encoding="utf-8").replace("forma04a.med", "coarse.med")
+    case.write_text(text.replace("steps = 20", "steps = 1"), encoding="utf-8")
+    assert main(["run", str(case), "-o", str(folder / "case.vtkhdf"), "-q"]) == 0
+    return folder
+
+
+@pytest.fixture
+def files(folder: Path, tmp_path: Path) -> Path:
+    shutil.copytree(folder, tmp_path / "files")
+    return tmp_path / "files"
+
+
+# Of each command that writes: its arguments with one source, and its options for files.
+WRITERS = {
+    "profile": (["profile", "case.vtkhdf"], ["--csv", "--agr", "--png"], ["case.vtkhdf"]),
+    "plot": (["plot", "case.vtkhdf"], ["--png"], ["case.vtkhdf"]),
+    "export": (["export", "case.vtkhdf"], ["--med", "--xdmf"], ["case.vtkhdf"]),
+    "run": (["run", "case.toml"], ["-o", "--json", "--plot"], ["case.toml", "coarse.med"]),
+    "converge": (["converge", "case.toml"], ["--json", "--csv", "--png", "--html", "-o"], ["case.toml", "coarse.med"]),
+    "sweep": (
+        ["sweep", "case.toml", "--set", "material[0].E=1,2"],
+        ["--json", "--csv", "--png", "--html"],
+        ["case.toml", "coarse.med"],
+    ),
+}
+
+
+OVERWRITING = [
+    (command, option, source)
+    for command, options, sources in WRITERS.values()
+    for option in options
+    for source in sources
+]
+
+
+@pytest.mark.parametrize("by", ["name", "symbolic link", "hard link", "other spelling"])
+@pytest.mark.parametrize(("command", "option", "source"), OVERWRITING)
+def test_no_command_replaces_what_it_reads(command, option, source, by, files, monkeypatch, capsys):
+    monkeypatch.chdir(files)
+    target = {"name": source, "other spelling": f"../files/{source}"}.get(by, f"link{Path(source).suffix}")
+    if by == "symbolic link":
+        os.symlink(source, target)
+    elif by == "hard link":
+        os.link(source, target)
+    before = {path: path.read_bytes() for path in files.iterdir()}
+    assert main([*command, option, target]) == 1
+    assert f"'{target}' is what this command reads" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in files.iterdir()} == before
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_two_outputs_need_two_files(name, files, monkeypatch, capsys):
+    monkeypatch.chdir(files)
+    command, options, _ = WRITERS[name]
+    if len(options) < 2:
+        pytest.skip("one output")
+    assert main([*command, options[0], "both.png", options[1], "both.png"]) == 1
+    assert "two outputs are to be written to 'both.png'" in capsys.readouterr().err
+    assert not Path("both.png").exists()
+
+
+def test_every_option_that_names_a_file_is_tried_here() -> None:
+    """A new output must come under the rule, too: this test names it until it does."""
+    reads = {("bench", "--compare"), ("cases", "--output")}  # a copy replaces nothing
+    known = {(name, option) for name, (_, options, _) in WRITERS.items() for option in options}
+    others = {
+        ("bench", "--json"),
+        ("bench", "--png"),
+        ("mesh", "--output"),
+    }  # which read nothing that they could replace
+    found = set()
+    commands = next(action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+    for name, sub in commands.choices.items():
+        for action in sub._actions:
+            output = "--output" in action.option_strings
+            if output or (action.option_strings and action.metavar in ("FILE", "PNG", "FOLDER")):
+                found.add((name, "-o" if output and name in WRITERS else action.option_strings[-1]))
+    assert found - reads - others <= known
+
+
+def test_an_output_that_fails_leaves_nothing(files, monkeypatch, capsys):
+    """Neither a part of a picture, nor a hidden file; the file that was there stays."""
+    monkeypatch.chdir(files)
+    Path("old.png").write_bytes(b"old")
+    names = sorted(os.listdir())
+
+    def fail(self, path, *_, **__):
+        Path(path).write_bytes(b"half a pict")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", fail)
+    assert main(["profile", "case.vtkhdf", "--png", "old.png"]) == 1
+    assert "No space left on device" in capsys.readouterr().err
+    assert Path("old.png").read_bytes() == b"old"
+    assert sorted(os.listdir()) == names
+
+
+def test_names_of_files_steer_no_terminal(files, monkeypatch, capsys):
+    """A group may be called anything: what clears a screen or turns the direction of writing is shown as text."""
+    assert printable("\x1b[2Jgone\u202e\n") == "\\x1b[2Jgone\\u202e\n"
+    case = files / "case.toml"
+    case.write_text(case.read_text().replace('title = "', 'title = "\\u001b[31m\\u202e', 1))
+    assert main(["run", str(case), "-o", str(files / "other.vtkhdf")]) == 0
+    out = capsys.readouterr().out
+    assert "\\x1b[31m\\u202e" in out
+    assert "\x1b" not in out
+    assert "\u202e" not in out
+
+
+def test_a_title_that_the_terminal_cannot_show_ends_no_run(files, monkeypatch):
+    import io
+    import sys
+
+    stream = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr(sys, "stdout", stream)
+    case = files / "case.toml"
+    text = case.read_text(encoding="utf-8")
+    case.write_text(text.replace('title = "', 'title = "Kugel \u2300 \u00e4', 1), encoding="utf-8")
+    assert main(["run", str(case), "-o", str(files / "other.vtkhdf")]) == 0
+    stream.flush()
+    assert b"Kugel \\u2300 \\xe4" in stream.buffer.getvalue()
