@@ -3,8 +3,32 @@
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Callable
+from functools import cache
 from typing import Any
+
+
+def is_trusted(kernel: Any) -> bool:
+    """Return whether nobody but the owner of this process and root can write to the folder of a kernel's cache.
+
+    What lies there is run. Groups of their own, which many systems give to each user, are no others.
+    """
+    folder = getattr(getattr(kernel, "_cache", None), "cache_path", None)
+    return folder is None or not hasattr(os, "getuid") or (_is_own(folder) and _keeps_names(os.path.dirname(folder)))
+
+
+@cache
+def _is_own(folder: str) -> bool:
+    found = os.stat(folder)
+    shared = found.st_mode & stat.S_IWOTH or (found.st_mode & stat.S_IWGRP and found.st_gid not in (0, os.getgid()))
+    return found.st_uid in (0, os.getuid()) and not shared
+
+
+@cache
+def _keeps_names(folder: str) -> bool:
+    """Return whether others cannot put a folder of theirs in the place of one inside `folder`."""
+    return bool(os.stat(folder).st_mode & stat.S_ISVTX) or _is_own(folder)
 
 
 def watch_files(kernel: Any, function: Callable[..., Any]) -> Any:

@@ -56,15 +56,19 @@ def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = 
     options: dict[str, Any] = {"fastmath": fastmath, "parallel": parallel, "nogil": True, "error_model": "numpy"}
     options["inline"] = inline
     try:
-        return cache.watch_files(numba.njit(cache=True, **options)(function), function)
+        cached = numba.njit(cache=True, **options)(function)
+        if cache.is_trusted(cached):
+            return cache.watch_files(cached, function)
+        reason = f"others may write to the folder of compiled kernels, {cached.stats.cache_path}"
     except RuntimeError as error:  # numba: "cannot cache function ...: no locator available for file ..."
         if "cannot cache" not in str(error):
             raise
-        global _cache_reported
-        if not _cache_reported:
-            _cache_reported = True
-            log.info("no writable folder for compiled kernels (set NUMBA_CACHE_DIR): compiling in every process")
-        return numba.njit(cache=False, **options)(function)
+        reason = "no writable folder for compiled kernels"
+    global _cache_reported
+    if not _cache_reported:
+        _cache_reported = True
+        log.info("%s (set NUMBA_CACHE_DIR to one of your own): compiling in every process", reason)
+    return numba.njit(cache=False, **options)(function)
 
 
 def _notice_fork() -> None:

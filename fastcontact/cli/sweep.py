@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from functools import partial
 from typing import Any
 
@@ -36,7 +37,11 @@ def run(options: argparse.Namespace) -> int:
     from fastcontact.studies.sweep import parameter_sweep
 
     _study.check_targets(options)
-    wanted = dict(values(text) for text in options.set)
+    wanted: dict[str, list[Any]] = {}
+    for name, listed in map(values, options.set):
+        if name in wanted:
+            raise CaseError(f"--set {name} is given twice: give all its values at once, as in {name}=1,2,5")
+        wanted[name] = listed
     given = {"element": options.element, "formulation": options.formulation, "level": options.level}
     sweep = _study.finished(options, partial(parameter_sweep, options.case, wanted, **given))
     return _study.report(options, sweep, "--png FILE makes a picture", [text for _, text in sweep.failed])
@@ -53,15 +58,20 @@ def values(text: str) -> tuple[str, list[Any]]:
 
 
 def _range(text: str, parts: list[str]) -> list[float]:
+    from fastcontact.studies.affordable import check_runs
+
     logarithmic = parts[-1] == "log"
     try:
         first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
         if len(parts) != 3 + logarithmic or count < 1 or (logarithmic and first * last <= 0):
             raise ValueError
+        if not (math.isfinite(first) and math.isfinite(last)):
+            raise ValueError
     except (ValueError, IndexError):
         raise CaseError(
             f"--set '{text}': a range is FIRST:LAST:COUNT or FIRST:LAST:COUNT:log, for example approach=0.004:4:7:log"
         ) from None
+    check_runs(count)
     spread = np.geomspace if logarithmic else np.linspace
     return [float(value) for value in spread(first, last, count)]
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from fastcontact.cases.case import Case, read_case
 from fastcontact.errors import CaseError, unknown
+from fastcontact.studies.affordable import check_levels, check_runs
 from fastcontact.studies.convergence_report import Study
 from fastcontact.studies.execute import Progress, Result, raise_first, run_all
 from fastcontact.studies.fit import Limit, fit_limit
@@ -68,6 +69,8 @@ def convergence_study(
         raise CaseError(f"levels = {levels} must be at least 1; a limit takes 3")
     chosen = settings(case)
     members = combinations(chosen, elements, formulations)
+    check_runs(levels * len(members))
+    check_levels(case, chosen, members, levels)
     jobs = [level_job(case, chosen, member, level) for level in range(levels) for member in members]
     results = run_all(jobs, executor=executor, workers=workers, store=store, on_progress=on_progress)
     return gathered(case, jobs, results, [*chosen.quantities, *quantities])

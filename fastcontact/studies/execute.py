@@ -6,6 +6,8 @@ import contextlib
 import json
 import multiprocessing
 import os
+import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -155,9 +157,9 @@ def on_processes(count: int, jobs: Sequence[Job], rest: list[int]) -> Iterator[t
 def started_pool(count: int) -> ProcessPoolExecutor:
     """Return a pool of processes of which one has answered; raises FastcontactError if none can start."""
     # Forked children of a process with OpenMP threads die, so workers are spawned.
-    pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"))
+    pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), initializer=end_with_parent)
     try:
-        with _one_thread():
+        with _worker_settings():
             pool.submit(os.getpid).result()
     except BrokenProcessPool as error:
         raise FastcontactError(
@@ -189,7 +191,7 @@ def on_executor(executor: Executor, jobs: Sequence[Job], rest: list[int]) -> Ite
     """Run on any executor and yield number and result of each job as it ends; cancel the others if one raises."""
     futures: dict[Future[Result], int] = {}
     try:
-        with _one_thread():
+        with _worker_settings():
             # The largest first, so that none keeps the others waiting at the end.
             for index in sorted(rest, key=lambda index: -jobs[index].size):
                 futures[executor.submit(run, jobs[index], 1)] = index
@@ -201,14 +203,33 @@ def on_executor(executor: Executor, jobs: Sequence[Job], rest: list[int]) -> Ite
         raise
 
 
+def end_with_parent() -> None:
+    """Let this process end as soon as the one that started it has ended, however that came."""
+    parent = multiprocessing.parent_process()
+
+    def wait() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
 @contextlib.contextmanager
-def _one_thread() -> Iterator[None]:
-    """Let processes started inside the block have one thread each, by environment variables that are put back."""
+def _worker_settings() -> Iterator[None]:
+    """Let processes started inside the block have one thread each, and leave Ctrl-C to this one.
+
+    A terminal sends it to all of them, and each would print where it was interrupted.
+    """
     before = {name: os.environ.get(name) for name in _ONE_THREAD}
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    masks = hasattr(signal, "pthread_sigmask")
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masks else None
     try:
         yield
     finally:
+        if blocked is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
         for name, old in before.items():
             os.environ.pop(name, None)
             if old is not None:

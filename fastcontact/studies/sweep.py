@@ -6,10 +6,12 @@ import itertools
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
+from math import prod
 from pathlib import Path
 
 from fastcontact.cases.case import Case, build_case, read_case
 from fastcontact.errors import CaseError
+from fastcontact.studies.affordable import check_runs
 from fastcontact.studies.case_parameters import substituted
 from fastcontact.studies.execute import Progress, raise_first, run_all
 from fastcontact.studies.job import Job, fields_of, job_of
@@ -62,6 +64,7 @@ def parameter_sweep(
     case = case if isinstance(case, Case) else read_case(case)
     if not parameters or not all(len(values) for values in parameters.values()):
         raise CaseError("a sweep needs at least one parameter with at least one value")
+    check_runs(prod(len(values) for values in parameters.values()))
     choices = [dict(zip(parameters, values, strict=True)) for values in itertools.product(*parameters.values())]
     jobs = [_job(case, choice, element, formulation, level) for choice in choices]
     # An unknown key would make every run fail.

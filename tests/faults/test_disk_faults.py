@@ -48,7 +48,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("count", [5, pytest.param(0, marks=pytest.mark.slow)], ids=["few", "every"])
+@pytest.mark.parametrize("count", [3, pytest.param(0, marks=pytest.mark.slow)], ids=["few", "every"])
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: "-".join(command[:1] + command[-2:]))
 def test_a_disk_that_fails_ends_a_command_with_one_line(command, count, library, source, tmp_path):
     faults = disk_faults.found(library, tmp_path, source, [command], count)

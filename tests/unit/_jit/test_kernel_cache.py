@@ -54,3 +54,23 @@ def written(tmp_path):
 
 def test_a_kernel_on_disk_can_be_called_by_one_that_is_compiled(written):
     assert answers(written, f"import callee; callee.part(1.0); {ASK}") == ["20.0", "0"]
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs owners and modes of files")
+@pytest.mark.parametrize(
+    ("inside", "mode", "used"), [(True, 0o777, False), (False, 0o777, False), (False, 0o1777, True)]
+)
+def test_a_cache_that_others_may_write_to_is_not_used(written, inside, mode, used):
+    """What lies in a cache is run: somebody else could have put it there. A sticky folder keeps the names of each owner."""
+    cache = written / "cache"
+    for folder in (path for path in cache.rglob("*") if path.is_dir()) if inside else [cache]:
+        folder.chmod(mode)
+    question = (
+        f"import logging; logging.basicConfig(level=20); {ASK.replace('caller', 'callee').replace('whole', 'part')}"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache), "NUMBA_DISABLE_JIT": "0"}
+    done = subprocess.run(
+        [sys.executable, "-c", question], capture_output=True, text=True, check=True, env=environment, cwd=written
+    )
+    assert done.stdout.split() == ["2.0", "1" if used else "0"]
+    assert ("others may write to the folder of compiled kernels" in done.stderr) != used
