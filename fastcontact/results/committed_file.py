@@ -5,6 +5,9 @@ that leads beyond the end of the file or has lost entries, and with them steps t
 memory until HDF5 flushes, and then done in an order in which each is harmless: first new places, to which nothing leads yet;
 the superblock with the end of the file; nodes of indices from the root down, so that entries are in their new node before
 they leave the old one; all else; tables of names last (HDF5 File Format Specification 3.0, sections II.A and III.A).
+
+That helps when a process ends, not when the power does: a disk keeps no order. `synchronised` writes are kept in a journal
+until they are done.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from pathlib import Path
 from types import FrameType
 
 from fastcontact.mesh.files.hdf5_driver import DriverFile
+from fastcontact.results import journal
 
 # Where HDF5 begins its superblock, the nodes of its indices and its tables of names.
 SUPERBLOCK, NODE, NAMES = b"\x89HDF\r\n\x1a\n", b"TREE", b"SNOD"
@@ -29,14 +33,22 @@ class CommittedFile(DriverFile):
 
     After an error nothing is written: the file stays as the last good write has left it. Nor is anything written once `ours`
     is False, because another program has written to the file. `end` is where the contents end; the file may take more room.
+    While `synchronised` is True, what is flushed is on the disk, whole or not at all.
     """
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
+        self.synchronised = False
+        repeated = journal.found(self._file)  # of a writer that the power or a kill has stopped
+        for place, data in repeated:
+            self._put(place, data)
         self._pending: dict[int, bytes] = {}
         self.ours = True
         self._head = self._read_head()
         self.end = self._contents()
+        if repeated:
+            os.fsync(self.fileno())
+            self._cut(self.end)
         self._starts, self._ends = [0], [self.end]  # of what has been written, in order and apart
 
     def _contents(self) -> int:
@@ -65,11 +77,7 @@ class CommittedFile(DriverFile):
 
     def _get(self, start: int, data: bytearray) -> None:
         super()._get(start, data)
-        end = start + len(data)
-        for place, waiting in self._pending.items():
-            first, last = max(place, start), min(place + len(waiting), end)
-            if first < last:
-                data[first - start : last - start] = waiting[first - place : last - place]
+        journal.overlay(list(self._pending.items()), start, data)
 
     def write(self, data: bytes) -> int:
         """Keep data for the position; later data replace earlier ones."""
@@ -100,12 +108,30 @@ class CommittedFile(DriverFile):
 
     def _commit(self) -> None:
         waiting = sorted(self._pending.items(), key=lambda entry: self._turn(*entry))
+        if self.synchronised:
+            self._synchronise(waiting)
         for place, data in waiting:
             self._put(place, data)
+        if self.synchronised:
+            os.fsync(self.fileno())
         self._head = self._read_head()
         for place, data in waiting:
             self._note(place, place + len(data))
         self._pending.clear()
+
+    def _synchronise(self, waiting: list[journal.Write]) -> None:
+        """Have new places on the disk, and a journal of what changes old ones."""
+        new = [(place, data) for place, data in waiting if self._turn(place, data)[0] == 0]
+        for place, data in new:
+            self._put(place, data)
+        end = max([self.end, self._ends[-1], *(place + len(data) for place, data in new)])
+        log = journal.packed(new, waiting[len(new) :])
+        self._put(end, log)
+        self._cut(end + len(log))
+        os.fsync(self.fileno())
+
+    def _cut(self, size: int) -> None:
+        self._file.truncate(size)
 
     def _turn(self, place: int, data: bytes) -> tuple[int, int, int]:
         """Return by what writes are sorted: new places, superblock, nodes from the root down, all else, names."""
@@ -137,7 +163,7 @@ class CommittedFile(DriverFile):
                 self._head = self._read_head()
                 self.end = self._contents()
             if self.ours:
-                self._file.truncate(self.end)
+                self._cut(self.end)
                 os.fsync(self.fileno())
         finally:
             self._file.close()

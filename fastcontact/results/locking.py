@@ -75,6 +75,16 @@ class PathLock:
         self._file.close()
 
 
+def is_being_written(target: Path) -> bool:
+    """Return whether a writer holds the path."""
+    try:
+        file = open(target.with_name(f".{target.name}.lock"), "r+b", buffering=0)  # noqa: SIM115
+    except OSError:
+        return False
+    with file:
+        return not _lock(file)
+
+
 def _own_file(path: Path) -> IO[Any]:
     """Open a file, made if there is none; raises FileError for a link or another's file, which writing would change."""
     try:

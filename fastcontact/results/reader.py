@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,7 +19,8 @@ from fastcontact.mesh.files.hdf5 import check_contents
 from fastcontact.mesh.files.packing import unpacked
 from fastcontact.mesh.files.paths import PathLike, existing_file
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results import layout
+from fastcontact.results import journal, layout
+from fastcontact.results.locking import is_being_written
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.texts import read_text
 
@@ -78,7 +80,8 @@ class Results(Sequence[StepResult]):
         What stopped the run, empty if nothing did or nobody could write it down.
     """
 
-    def __init__(self, path: PathLike) -> None:
+    def __init__(self, path: PathLike, *, repeat: bool | None = None) -> None:
+        """`repeat`: whether to see writes that a power loss has kept from being done; not while a writer does them."""
         import h5py
 
         self.path: Path = existing_file(path)
@@ -87,7 +90,10 @@ class Results(Sequence[StepResult]):
         if not h5py.is_hdf5(self.path):
             raise FileError(f"'{path}' is no HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
         # A file object of our own: by its name HDF5 would return a file that this process has open, as it was then.
-        self._raw = open(path, "rb")  # noqa: SIM115
+        self._raw: Any = open(path, "rb")  # noqa: SIM115
+        writes = journal.found(self._raw) if not is_being_written(self.path) or repeat else []
+        if writes:
+            self._raw = io.BufferedReader(journal.Repeated(self._raw, writes))
         self._file: Any = None
         try:
             with self._explained():

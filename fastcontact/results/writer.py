@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import time
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -29,6 +30,8 @@ from fastcontact.results.reader import Results
 from fastcontact.results.step import StepResult
 from fastcontact.results.texts import read_text
 
+# A run that is shorter loses little with the power [s].
+SHORT = 10.0
 # Room for HDF5's own records [bytes].
 MARGIN = 1 << 19
 
@@ -56,6 +59,9 @@ class ResultWriter:
     resume : bool
         Whether to keep the steps of an existing file of this mesh and write after them. A file that is missing or holds no
         complete step is begun. The file is not changed before there is something to add.
+    synchronise : bool, optional
+        Whether each step is on the disk when `write` returns, so that it survives a loss of power; by default from ten
+        seconds after the file was begun, so that short runs are not slowed. Steps always survive the end of the process.
 
     Attributes
     ----------
@@ -90,6 +96,7 @@ class ResultWriter:
         overwrite: bool = True,
         cell_fields: Iterable[str] = (),
         resume: bool = False,
+        synchronise: bool | None = None,
     ) -> None:
         if not isinstance(mesh, Mesh):
             if not isinstance(getattr(mesh, "mesh", None), Mesh) or not hasattr(mesh, "kinematics"):
@@ -100,6 +107,7 @@ class ResultWriter:
         self.path = checked_target(path)
         self.n_steps = 0
         self.done: list[StepResult] = []
+        self._synchronise, self._started = synchronise, time.monotonic()
         self._cell_fields = _checked_names(cell_fields, mesh)
         self._mesh: Mesh = mesh
         self._pairs: dict[str, Any] = {}
@@ -164,14 +172,16 @@ class ResultWriter:
         with self._explained(f"written at step {step.index}"):
             self._open()
             self._check_in_place()
+            self._committed.synchronised = self._is_synchronised()
             restart = packed({"step": self.n_steps, "restart": step.restart})
-            self._reserve(contents.step_size(self._mesh, step) + restart.nbytes)
+            room = contents.step_size(self._mesh, step) + restart.nbytes
+            self._reserve(2 * room if self._committed.synchronised else room)
             contents.append_fields(self._file, self._mesh, self.n_steps, step, self._cell_fields)
             contents.append_tables(self._file, self._mesh, self.n_steps, step, self._pairs, self._notes)
             contents.set_restart(self._file, self.n_steps, restart)
-            self._flush()
+            self._flush_part()
             contents.append_rows(self._file, self._mesh, self.n_steps, step, self._cell_fields)
-            self._flush()
+            self._flush_part()
             self._file["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(self.n_steps + 1))
             self._flush()
             self.n_steps += 1
@@ -274,6 +284,16 @@ class ResultWriter:
         self._file.flush()
         self._committed.check()
 
+    def _flush_part(self) -> None:
+        """Flush a part of a step, in the order in which its parts count; synchronised, a step is one part."""
+        if not self._committed.synchronised:
+            self._flush()
+
+    def _is_synchronised(self) -> bool:
+        if self._synchronise is None:
+            return time.monotonic() - self._started > SHORT
+        return self._synchronise
+
     def _reserve(self, size: int) -> None:
         reserve(self._committed.fileno(), self.path.parent, self._committed.end, size + MARGIN)
 
@@ -318,7 +338,7 @@ def _steps_to_resume(
     """
     if not path.exists() or not path.stat().st_size:
         return [], False, ""
-    with Results(path) as old:
+    with Results(path, repeat=True) as old:
         if not len(old):
             return [], False, ""
         begin_anew = "or start anew without resuming, which replaces the file"

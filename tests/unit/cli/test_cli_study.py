@@ -1,10 +1,15 @@
 """What commands of studies say on the way: progress on a terminal, interruptions, values of parameters."""
 
 import argparse
+import os
+import signal
+import subprocess
+import sys
+import time
 
 import pytest
 
-from fastcontact.cli import _study, sweep
+from fastcontact.cli import _study, main, sweep
 from fastcontact.cli._progress import Runs
 from fastcontact.studies.execute import Progress
 
@@ -60,3 +65,60 @@ def test_values_of_a_parameter(text, values):
     name, found = sweep.values(text)
     assert name == text.split("=")[0]
     assert found == pytest.approx(values) if isinstance(values[0], float) else found == values
+
+
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        (["converge", "forma04a", "--levels", "50"], "give at most"),
+        (["converge", "sphere-on-plane-3d", "--levels", "30"], "of memory, of which this machine has"),
+        (["sweep", "forma04a", "--set", "material[0].E=1:2:20000000"], "a study of 20000000 runs would not end"),
+        (["sweep", "forma04a", "--set", "material[0].E=1:1e400:3"], "a range is FIRST:LAST:COUNT"),
+        (
+            ["sweep", "forma04a", "--set", "material[0].E=1:2:5000", "--set", "material[0].nu=0.1:0.3:5000"],
+            "a study of 25000000 runs would not end",
+        ),
+        (["sweep", "forma04a", "--set", "material[0].E=1", "--set", "material[0].E=2"], "material[0].E is given twice"),
+    ],
+)
+def test_a_study_that_nobody_could_wait_for_is_refused_at_once(command, told, capsys):
+    assert main(command) == 1
+    line = capsys.readouterr().err
+    assert told in line
+    assert line.count("\n") == 1
+
+
+WORKING = """
+import os, sys, time
+from fastcontact.studies.execute import started_pool
+
+if __name__ == "__main__":
+    pool = started_pool(2)
+    print(*{pool.submit(os.getpid).result() for _ in range(20)}, flush=True)
+    running = [pool.submit(time.sleep, 600) for _ in range(2)]
+    time.sleep(600)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs signals")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_workers_end_with_their_parent(number, tmp_path):
+    script = tmp_path / "working.py"
+    script.write_text(WORKING)
+    with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True) as parent:
+        workers = [int(word) for word in parent.stdout.readline().split()]
+        assert workers
+        parent.send_signal(number)
+    deadline = time.monotonic() + 60
+    while left := [worker for worker in workers if is_running(worker)]:
+        assert time.monotonic() < deadline, f"{left} still run"
+        time.sleep(0.05)
+
+
+def is_running(process):
+    """Return whether a process is there and no mere entry of one that has ended."""
+    try:
+        with open(f"/proc/{process}/stat", encoding="ascii") as file:
+            return file.read().rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False

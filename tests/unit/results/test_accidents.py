@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import errno
 import gc
 import os
@@ -14,6 +15,7 @@ import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from test_result_files import MESH, assert_same, step_result
 
@@ -283,3 +285,49 @@ def test_other_threads_have_no_signals_to_wait_for(path: Path) -> None:
     thread.join()
     assert found == [signal.getsignal(signal.SIGINT)]
     assert_holds(path, 1)
+
+
+def test_each_step_is_written_once_and_in_order(path: Path) -> None:
+    with ResultWriter(path, MESH) as out:
+        out.write(step_result(1))
+        for number in (1, 0):
+            with pytest.raises(
+                FileError, match=f"step {number + 1} cannot be written after step 2: write each step once"
+            ):
+                out.write(step_result(number))
+        out.write(step_result(2))
+    with (
+        ResultWriter(path, MESH, resume=True) as out,
+        pytest.raises(FileError, match="step 3 cannot be written after step 3"),
+    ):
+        out.write(step_result(2))
+    assert [step.index for step in open_results(path)] == [2, 3]
+
+
+def test_steps_of_two_cases_need_two_files(path: Path) -> None:
+    one, other = ({"case": {"parts": {"model": digest}}} for digest in ("a", "b"))
+    with ResultWriter(path, MESH) as out:
+        out.write(dataclasses.replace(step_result(0), restart=one))
+        with pytest.raises(FileError, match="step 2 belongs to another case than step 1"):
+            out.write(dataclasses.replace(step_result(1), restart=other))
+        out.write(dataclasses.replace(step_result(1), restart=one))
+    assert len(open_results(path)) == 2
+
+
+def test_masks_are_not_lost_without_a_word(path: Path) -> None:
+    step = step_result(0)
+    masked = np.ma.masked_less(step.von_mises, 0.5)
+    with ResultWriter(path, MESH) as out, pytest.raises(FileError, match="von_mises is a masked array"):
+        out.write(dataclasses.replace(step, von_mises=masked))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs links")
+@pytest.mark.parametrize("link", [os.symlink, os.link], ids=["symbolic", "hard"])
+def test_a_lock_that_is_a_link_changes_nothing(path: Path, link: Callable[..., None]) -> None:
+    """Somebody else may have put it there, to have a file of ours overwritten."""
+    precious = path.with_name("precious")
+    precious.write_text("precious")
+    link(precious, path.with_name(f".{path.name}.lock"))
+    with pytest.raises(FileError, match="remove it"):
+        ResultWriter(path, MESH)
+    assert precious.read_text() == "precious"

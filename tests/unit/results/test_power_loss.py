@@ -1,0 +1,159 @@
+"""A loss of power: whatever part of the last writes is on the disk, the file opens with all steps that were acknowledged.
+
+The disk is simulated: what was written before the last synchronisation is there, of later writes any pages of 4 kB, and the
+file has any of the sizes that it has had since.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_result_files import MESH, assert_same, nth_step
+
+import fastcontact as fc
+from fastcontact import ResultWriter, open_results
+from fastcontact.results import committed_file, journal, writer
+
+PAGE = 4096
+
+
+@dataclass
+class Disk:
+    """What a file is made of: what is safe, and what came after it."""
+
+    safe: bytearray
+    writes: list[tuple[int, bytes]] = field(default_factory=list)
+    sizes: list[int] = field(default_factory=list)
+
+    def synchronise(self) -> None:
+        self.safe = self.state(np.ones(len(self.pieces()), bool), self.sizes[-1] if self.sizes else len(self.safe))
+        self.writes, self.sizes = [], []
+
+    def pieces(self) -> list[tuple[int, bytes]]:
+        found = []
+        for place, data in self.writes:
+            cuts = [place, *range(place + PAGE - place % PAGE, place + len(data), PAGE), place + len(data)]
+            found += [(a, data[a - place : b - place]) for a, b in pairwise(cuts)]
+        return found
+
+    def state(self, kept: np.ndarray, size: int) -> bytearray:
+        whole = bytearray(self.safe)
+        for (place, data), keep in zip(self.pieces(), kept, strict=True):
+            if keep:
+                whole.extend(bytes(max(place + len(data) - len(whole), 0)))
+                whole[place : place + len(data)] = data
+        whole.extend(bytes(max(size - len(whole), 0)))
+        return whole[:size]
+
+
+@pytest.fixture
+def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[list[tuple[str, object]], Path]:
+    """All that was done to a file that takes twelve steps, each on the disk when its writing ends; and the begun file."""
+    events: list[tuple[str, object]] = []
+    path, begun = tmp_path / "run.vtkhdf", tmp_path / "begun.vtkhdf"
+    real = committed_file.CommittedFile
+
+    class Watched(real):
+        def _put(self, place: int, data: bytes) -> None:
+            events.append(("write", (place, bytes(data))))
+            events.append(("size", max(os.fstat(self.fileno()).st_size, place + len(data))))
+            super()._put(place, data)
+
+        def _cut(self, size: int) -> None:
+            events.append(("size", size))
+            super()._cut(size)
+
+    def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
+        events.append(("size", max(os.fstat(descriptor).st_size, start + size)))
+        os.truncate(descriptor, max(os.fstat(descriptor).st_size, start + size))
+
+    fsync = os.fsync
+
+    def synchronise(descriptor: int) -> None:
+        events.append(("synchronise", None))
+        fsync(descriptor)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(writer, "CommittedFile", Watched)
+        with ResultWriter(path, MESH, synchronise=True) as out:
+            shutil.copy(path, begun)
+            patch.setattr(writer, "reserve", reserve)
+            patch.setattr(os, "fsync", synchronise)
+            events.clear()
+            for number in range(12):
+                out.write(nth_step(number))
+                events.append(("step", number + 1))
+    return events, begun
+
+
+def test_a_loss_of_power_costs_no_step(recorded, tmp_path: Path) -> None:
+    events, begun = recorded
+    random = np.random.default_rng(1)
+    disk, steps, tried, repeated = Disk(bytearray(begun.read_bytes())), 0, 0, 0
+    crashed = tmp_path / "crashed.vtkhdf"
+    for kind, what in events:
+        if kind == "write":
+            disk.writes.append(what)
+        elif kind == "size":
+            disk.sizes.append(what)
+        elif kind == "step":
+            steps = what
+        else:
+            for share in (0.0, 0.5, 0.95, 1.0) * 3:
+                kept = random.random(len(disk.pieces())) < share
+                crashed.write_bytes(disk.state(kept, int(random.choice([len(disk.safe), *disk.sizes]))))
+                tried += 1
+                with open(crashed, "rb") as file:
+                    repeated += bool(journal.found(file))
+                with open_results(crashed) as results:
+                    assert steps <= len(results) <= steps + 1
+                    for number in {0, len(results) // 2, len(results) - 1} if len(results) else ():
+                        assert_same(results[number], nth_step(number), f"step {number} of {len(results)}")
+            disk.synchronise()
+    assert tried > 250
+    assert repeated > 50
+
+
+def test_a_run_goes_on_after_a_loss_of_power(recorded, tmp_path: Path) -> None:
+    """The writer does again what the journal holds, and leaves a file that needs none."""
+    events, begun = recorded
+    disk, crashed = Disk(bytearray(begun.read_bytes())), tmp_path / "crashed.vtkhdf"
+    syncs = 0
+    for kind, what in events:
+        if kind == "write":
+            disk.writes.append(what)
+        elif kind == "size":
+            disk.sizes.append(what)
+        elif kind == "synchronise":
+            syncs += 1
+            if syncs == 10:  # the journal of step 5 is safe, its writes are not
+                break
+            disk.synchronise()
+    crashed.write_bytes(disk.safe)
+    with fc.ResultWriter(crashed, MESH, resume=True) as out:
+        assert len(out.done) == 5
+        for number in range(5, 7):
+            out.write(nth_step(number))
+    with open(crashed, "rb") as file:
+        assert not journal.found(file)
+    with open_results(crashed) as results:
+        assert len(results) == 7
+        for number, step in enumerate(results):
+            assert_same(step, nth_step(number))
+
+
+@pytest.mark.parametrize("damage", ["cut", "changed", "data", "none"])
+def test_a_journal_counts_whole_or_not_at_all(tmp_path: Path, damage: str) -> None:
+    writes = [(5, b"abc"), (40, b"")]
+    log = journal.packed([(0, b"contents")], writes)
+    path = tmp_path / "file"
+    data = b"CONTENTS" if damage == "data" else b"contents"
+    path.write_bytes(data + {"cut": log[:-1], "changed": log[:3] + b"x" + log[4:]}.get(damage, log))
+    with open(path, "rb") as file:
+        assert journal.found(file) == (writes if damage == "none" else [])
