@@ -96,10 +96,9 @@ class Hierarchy:
         )  # fmt: skip
         del tentative, T
         P = BlockMatrix(indptr, columns, blocks, A.rows, cols)
-        start, origin, slot = index = by_columns(P, n_coarse)
+        index = by_columns(P, n_coarse)
         coarse = product(A, P, index)
-        turned = np.ascontiguousarray(blocks.reshape(-1, size, n_modes)[slot].transpose(0, 2, 1))
-        return P, BlockMatrix(start, origin, turned.ravel(), cols, A.rows), coarse, coarse_modes
+        return P, transposed(P, index), coarse, coarse_modes
 
     def __repr__(self) -> str:
         sizes = " -> ".join(str(level.n) for level in self.levels)
@@ -163,6 +162,14 @@ def by_columns(P: BlockMatrix, n: int) -> tuple[Indices, Indices, Indices]:
     numbers = np.arange(len(P.indices), dtype=np.int32)
     found = csr_matrix((numbers, P.indices, P.indptr), shape=(len(P.indptr) - 1, n)).tocsc()
     return found.indptr, found.indices, found.data
+
+
+def transposed(P: BlockMatrix, index: tuple[Indices, Indices, Indices]) -> BlockMatrix:
+    """Return ``P.T``; `index` from `by_columns`."""
+    start, origin, slot = index
+    turned = np.empty_like(P.data)
+    galerkin_kernels.transpose_blocks(slot, P.data, turned, P.rows, P.cols)
+    return BlockMatrix(start, origin, turned, P.cols, P.rows)
 
 
 def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Indices, Indices, Indices]) -> BlockMatrix:
