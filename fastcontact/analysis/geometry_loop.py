@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NoReturn
 
 import numpy as np
@@ -87,7 +87,9 @@ class SettledContact:
         return self.constraints.force(self.solution.multiplier, getattr(self.solution, "tangential", None))
 
 
-def settle_geometry(step: Step, extrapolation: Extrapolation, expected: float) -> SettledContact:
+def settle_geometry(
+    step: Step, extrapolation: Extrapolation, expected: float, begun: Iterate | None = None
+) -> SettledContact:
     """Alternate between pairing the surfaces and solving their inequalities until both stand still.
 
     Parameters
@@ -96,13 +98,15 @@ def settle_geometry(step: Step, extrapolation: Extrapolation, expected: float) -
     extrapolation : Extrapolation
     expected : float
         Displacement to expect in the first step, if forces alone act [length].
+    begun : Iterate, optional
+        Where less accurate solutions have settled; by default the step begins where the last one ended.
 
     Raises
     ------
     ConvergenceError
         If the active set or the geometry does not settle.
     """
-    iterate = Iterate.of(step.state)
+    iterate = begun or Iterate.of(step.state)
     try:
         return _settle(step, iterate, extrapolation, expected)
     except ConvergenceError as error:
@@ -112,6 +116,8 @@ def settle_geometry(step: Step, extrapolation: Extrapolation, expected: float) -
 
 def _settle(step: Step, iterate: Iterate, extrapolation: Extrapolation, expected: float) -> SettledContact:
     problem, plan = step.problem, Plan.of(step.problem)
+    if iterate.history:  # nothing to extrapolate any more
+        plan = replace(plan, extrapolate=False)
     tolerances = Tolerances(problem.solver, problem.criteria, plan.extrapolate, step.state.gap_round_off, expected)
     mixing = _Mixing(Anderson(MIXED, step.dofs.compared, problem.solver.iterative))
     if plan.extrapolate:
