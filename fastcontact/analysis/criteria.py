@@ -26,7 +26,8 @@ class Criteria:
         How many times to re-pair on the deformed configuration after the first pairing of a step; None: until the
         displacement changes by less than `geometry` of its largest component.
     geometry : float
-        See `geometry_updates`; at most 0.01.
+        See `geometry_updates`; at most 0.01. Where round-off makes displacements scatter by more than that, a step ends as
+        soon as it shows, and ``iterations["scatter"]`` says by how much.
     keep_pairing : bool
         Keep the pairing of the undeformed bodies through all steps, with its normals and projections (REAC_GEOM =
         'SANS'); for small motions only. Without friction the state then does not depend on the steps that lead to it.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -96,19 +97,24 @@ def never_opening(
     found = dict(start.never_opening)
     for name, rows in settled.constraints.rows().items():
         if problem.pairs[name].options.kind == "bilateral_once_closed":
-            found[name] = settled.constraints.parts[name].positions, settled.solution.active[rows].copy()
+            part, closed = settled.constraints.parts[name], settled.solution.active[rows].copy()
+            if part.equality is not None:  # what stands beside the other side now may come back to it
+                closed |= part.equality
+            found[name] = part.positions, closed
     return found
 
 
 def counted(settled: SettledContact | None, linear_iterations: int) -> dict[str, Any]:
     """Return the work of a load step, see `StepResult.iterations`."""
     history = settled.iterate.history if settled is not None else []
-    return {
+    counts = {
         "geometry_updates": max(len(history) - 1, 0),
         "active_set_iterations": sum(entry["active_set_iterations"] for entry in history),
         "linear_iterations": linear_iterations,
         "history": history,
     }
+    scatter = None if settled is None else settled.scatter
+    return counts if scatter is None else {**counts, "scatter": dataclasses.asdict(scatter)}
 
 
 def contact_result(
@@ -204,7 +210,7 @@ def _closed_nodes(
     assert part.nodal is not None
     closed = part.nodal.closed_nodes(active, gap, pressure)
     for_good = pair.never_opening(pair.points[pair.secondary.points], at)
-    return closed if for_good is None else closed | for_good
+    return closed if for_good is None else closed | (for_good & np.isfinite(gap))
 
 
 def _nodal_shear(

@@ -81,6 +81,12 @@ def _loose(problem: Problem, last: StepResult) -> list[str]:
             f"the contact geometry counts as settled although the displacement still changed by {change:.1e} of its largest "
             f"component (Criteria.geometry = {criteria.geometry:g}): results are no more accurate than that"
         )
+    scatter = last.iterations.get("scatter")
+    if scatter is not None and scatter["force"] > criteria.relative:
+        found.append(
+            f"round-off makes contact forces scatter by {scatter['force']:.1e} of the largest one from update to update, and "
+            f"displacements by {scatter['displacement']:.1e}: results are no more accurate than that"
+        )
     if residual > LOOSE:
         found.append(
             f"forces are out of balance by {residual:.1e} of the largest force (Criteria.relative = {criteria.relative:g}): "

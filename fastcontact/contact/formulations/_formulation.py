@@ -22,6 +22,8 @@ from fastcontact.contact.tied import TiedPair, tied
 from fastcontact.errors import ContactError, unknown
 
 Array = NDArray[np.float64]
+# Vectors shorter than this have no direction; unit normals that differ by less are the same.
+TINY, ALIKE = 1e-300, 1e-9
 NORMALS = ("facet", "averaged")
 # Nodes on an axis or plane of symmetry stand out a little beyond facets that lean, in facet lengths.
 ON_SYMMETRY = 0.05
@@ -183,8 +185,9 @@ class Formulation(ABC):
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
         ours = np.einsum("nk,nkd->nd", shape, nodal_normals(self.secondary, deformed)[local[nodes]])
         theirs = interpolated(nodal_normals(self.primary, deformed), facing)
-        mean = theirs - ours / np.linalg.norm(ours, axis=1, keepdims=True)
-        mean /= np.linalg.norm(mean, axis=1, keepdims=True)
+        mean = theirs - ours / np.maximum(np.linalg.norm(ours, axis=1, keepdims=True), TINY)
+        length = np.linalg.norm(mean, axis=1, keepdims=True)
+        mean = np.divide(mean, length, out=np.zeros_like(mean), where=length > ALIKE)
         apart = np.einsum("nk,nkd->nd", shape, start[nodes])
         apart -= np.einsum("nk,nkd->nd", facing.shape, start[facing.nodes])
         opening = np.einsum("nd,nd->n", mean, apart)

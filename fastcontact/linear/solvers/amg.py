@@ -77,7 +77,7 @@ class Amg(Multigrid, LinearSolver):
     def improve(self, excess: float) -> bool:
         """See `LinearSolver.improve`: lower the tolerance, or let factors take over where round-off is near."""
         if self.instead is not None:
-            return False
+            return self.instead.improve(excess)
         if self._may_factorise and not self.tolerance > TIGHT * excess:
             self._factorise(
                 f"multigrid gave up and factors took over, which cost more time and memory: at its tolerance of "
