@@ -161,5 +161,6 @@ def after_contact(
         never_opening=never_opening(problem, start, settled),
     )  # fmt: skip
     results = contact_results(problem, start, load, settled, end)
-    touched = {name for name, found in results.items() if found.active.any()}
-    return replace(end, touched=end.touched | touched), results
+    touched = end.touched | {name for name, found in results.items() if found.active.any()}
+    met = {name: place for name, place in end.first_contact.items() if name in touched}
+    return replace(end, touched=touched, first_contact=met), results

@@ -207,10 +207,13 @@ class Formulation(ABC):
         first = close[np.argmin(np.linalg.norm(positions[close], axis=1))]
         return positions[first], normal[first]
 
-    def nodal_gap(self, at: Configuration, with_clearance: bool = True) -> tuple[Array, Array]:
+    def nodal_gap(
+        self, at: Configuration, with_clearance: bool = True, displacement: Array | None = None
+    ) -> tuple[Array, Array]:
         """Return the gaps (n_nodes,) of the secondary nodes [length], and the normals (n_nodes, dim) that they face [-].
 
-        Infinite where a node faces no primary facet. Clearances count unless they are left out.
+        Infinite where a node faces no primary facet. Clearances count unless they are left out. Where `displacement`
+        (n_points, dim) is given, the gaps are those that it leaves in the pairing of `at` [length].
         """
         nodes = Candidates(self.secondary.points[:, None], np.ones((len(self.secondary.points), 1)))
         deformed = self.points + at.displacement
@@ -219,4 +222,5 @@ class Formulation(ABC):
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
         if with_clearance:
             gap0 += self.options.added_gap(nodes, pairing, self.primary, self.points, at.clearance_factor)
-        return np.where(pairing.paired, gap0 + G @ at.displacement.ravel(), np.inf), pairing.normal
+        u = at.displacement if displacement is None else displacement
+        return np.where(pairing.paired, gap0 + G @ u.ravel(), np.inf), pairing.normal
