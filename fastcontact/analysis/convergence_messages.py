@@ -28,8 +28,8 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
         f"the contact geometry did not settle in {limit} updates: the displacement still changes by "
         f"{last['displacement_change']:.1e} of its largest component, most at "
         f"{_named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. Allow more "
-        f"(max_geometry_updates), use more load steps, a finer mesh on the primary side, {_smoother(problem)}or a "
-        "fixed number of updates"
+        f"(max_geometry_updates), use more load steps, a finer mesh on the primary side, {_smoother(problem)}a "
+        f"fixed number of updates, or accept larger changes (Criteria.geometry = {problem.criteria.geometry:g})"
     )
 
 

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 from fastcontact.errors import ModelError
 
+# Criteria beyond this are none: a state that misses them has nothing to do with the solution.
+LOOSEST = 1e-2
+
 
 @dataclass(frozen=True)
 class Criteria:
@@ -14,7 +17,8 @@ class Criteria:
     Parameters
     ----------
     relative : float
-        Largest out-of-balance force over the largest applied force, reaction or contact force (RESI_GLOB_RELA).
+        Largest out-of-balance force over the largest applied force, reaction or contact force (RESI_GLOB_RELA), at most
+        0.01. Where iterative linear solvers miss it, their tolerance is lowered or factors take over.
     absolute : float, optional
         Largest out-of-balance force [force] that is small enough by itself (RESI_GLOB_MAXI). Without forces a relative
         criterion is 0/0; then, and by default, the bound is the round-off of the internal forces.
@@ -22,7 +26,8 @@ class Criteria:
         How many times to re-pair on the deformed configuration after the first pairing of a step; None: until the
         displacement changes by less than `geometry` of its largest component.
     geometry : float
-        See `geometry_updates`.
+        See `geometry_updates`; at most 0.01. Where round-off makes displacements scatter by more than that, a step ends as
+        soon as it shows, and ``iterations["scatter"]`` says by how much.
     keep_pairing : bool
         Keep the pairing of the undeformed bodies through all steps, with its normals and projections (REAC_GEOM =
         'SANS'); for small motions only. Without friction the state then does not depend on the steps that lead to it.
@@ -44,8 +49,12 @@ class Criteria:
     max_halvings: int = 4
 
     def __post_init__(self) -> None:
-        if not self.relative > 0 or not self.geometry > 0:
-            raise ModelError("the convergence criteria `relative` and `geometry` must be positive")
+        for name in ("relative", "geometry"):
+            if not 0 < getattr(self, name) <= LOOSEST:
+                raise ModelError(
+                    f"the convergence criterion {name} = {getattr(self, name)} must be positive and at most {LOOSEST}: "
+                    "beyond that nothing has converged"
+                )
         if self.geometry_updates is not None and self.geometry_updates < 0:
             raise ModelError(f"geometry_updates = {self.geometry_updates} must be None or a whole number >= 0")
         for name, least in (("max_geometry_updates", 0), ("max_active_set_iterations", 1)):

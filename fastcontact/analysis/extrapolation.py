@@ -25,24 +25,21 @@ class Extrapolation:
     ----------
     ratio : float
         The present load increment in units of the last one; zero where there is nothing to extend.
-    loads : tuple of ndarray
-        The loads of the present and of the last two steps.
+    loads : tuple of tuples of ndarray
+        The loads of the present and of the last two steps: prescribed displacements [length] and forces [force].
     states : tuple of (ndarray (n,), dict of str to GapsAndForces)
         Displacements [length], and gaps and multipliers by pair, of the last two converged steps.
     """
 
     ratio: float = 0.0
-    loads: tuple[Array, ...] = ()
+    loads: tuple[tuple[Array, ...], ...] = ()
     states: tuple[tuple[Array, Mapping[str, GapsAndForces]], ...] = ()
 
     def to(self, *parts: Array) -> Extrapolation:
         """Return the extension to the loads of the next step: prescribed displacements and forces, each its own array."""
-        moved = next((part for part in parts if part.any()), parts[0])
-        loads, ratio = (*self.loads[-2:], moved.copy()), 0.0
-        if len(self.states) == 2 and len(loads) == 3 and len({len(load) for load in loads}) == 1:
-            now, last = loads[2] - loads[1], loads[1] - loads[0]
-            size = float(np.sum(last * last))
-            found = float(np.sum(now * last)) / size if size else 0.0
+        loads, ratio = (*self.loads[-2:], tuple(part.copy() for part in parts)), 0.0
+        if len(self.states) == 2 and len(loads) == 3:
+            found = next((r for r in map(_ratio, *loads) if r is not None), 0.0)
             ratio = found if 0.0 < found <= FARTHEST else 0.0
         return Extrapolation(ratio, loads, self.states)
 
@@ -74,7 +71,7 @@ class Extrapolation:
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, without the last displacements."""
         return {
-            "loads": [_sparse(load) for load in self.loads[-2:]],
+            "loads": [[_sparse(part) for part in load] for load in self.loads[-2:]],
             "before": self.states[0][0] if len(self.states) == 2 else None,
             "contact": [{name: list(both) for name, both in contact.items()} for _, contact in self.states],
         }
@@ -85,7 +82,16 @@ class Extrapolation:
         displacements = [u] if kept["before"] is None else [kept["before"], u]
         contacts = [{name: (both[0], both[1]) for name, both in contact.items()} for contact in kept["contact"]]
         states = tuple(zip(displacements, contacts)) if contacts else ()
-        return cls(0.0, tuple(_dense(load) for load in kept["loads"]), states)
+        # Earlier versions kept one array a step, of displacements or of forces: nobody knows which.
+        loads = tuple(tuple(map(_dense, load)) for load in kept["loads"] if isinstance(load, list))
+        return cls(0.0, loads, states)
+
+
+def _ratio(first: Array, second: Array, third: Array) -> float | None:
+    """Return the last increment (n,) of a load in units of the one before; None where that is zero."""
+    now, last = third - second, second - first
+    size = float(np.sum(last * last))
+    return float(np.sum(now * last)) / size if size else None
 
 
 def _sparse(values: Array) -> dict[str, Any]:

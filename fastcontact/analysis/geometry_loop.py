@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import logging
+from dataclasses import dataclass, replace
 from typing import NoReturn
 
 import numpy as np
@@ -15,11 +16,13 @@ from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.inequalities import Step, solve_inequalities
 from fastcontact.analysis.iterate import Iterate, initially_active, pair_surfaces
 from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.scatter import Scatter, Watch
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.tolerances import PATIENT_UPDATES, Tolerances
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.errors import ConvergenceError
 
+log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 # One active-set iteration per pairing is cheapest near the solution but may cycle; after so many, settle the set first.
@@ -74,12 +77,15 @@ class SettledContact:
     iterate : Iterate
     unsettled : (int, float), optional
         A fixed number of updates, and the relative change by the last one.
+    scatter : Scatter, optional
+        Of the last geometries, where round-off did not let them settle to the criterion.
     """
 
     constraints: StackedConstraints
     solution: Solution
     iterate: Iterate
     unsettled: tuple[int, float] | None = None
+    scatter: Scatter | None = None
 
     @property
     def force(self) -> Array:
@@ -87,7 +93,9 @@ class SettledContact:
         return self.constraints.force(self.solution.multiplier, getattr(self.solution, "tangential", None))
 
 
-def settle_geometry(step: Step, extrapolation: Extrapolation, expected: float) -> SettledContact:
+def settle_geometry(
+    step: Step, extrapolation: Extrapolation, expected: float, begun: Iterate | None = None
+) -> SettledContact:
     """Alternate between pairing the surfaces and solving their inequalities until both stand still.
 
     Parameters
@@ -96,13 +104,15 @@ def settle_geometry(step: Step, extrapolation: Extrapolation, expected: float) -
     extrapolation : Extrapolation
     expected : float
         Displacement to expect in the first step, if forces alone act [length].
+    begun : Iterate, optional
+        Where less accurate solutions have settled; by default the step begins where the last one ended.
 
     Raises
     ------
     ConvergenceError
         If the active set or the geometry does not settle.
     """
-    iterate = Iterate.of(step.state)
+    iterate = begun or Iterate.of(step.state)
     try:
         return _settle(step, iterate, extrapolation, expected)
     except ConvergenceError as error:
@@ -112,8 +122,10 @@ def settle_geometry(step: Step, extrapolation: Extrapolation, expected: float) -
 
 def _settle(step: Step, iterate: Iterate, extrapolation: Extrapolation, expected: float) -> SettledContact:
     problem, plan = step.problem, Plan.of(step.problem)
+    if iterate.history:  # nothing to extrapolate any more
+        plan = replace(plan, extrapolate=False)
     tolerances = Tolerances(problem.solver, problem.criteria, plan.extrapolate, step.state.gap_round_off, expected)
-    mixing = _Mixing(Anderson(MIXED, step.dofs.compared, problem.solver.iterative))
+    mixing, watch = _Mixing(Anderson(MIXED, step.dofs.compared, problem.solver.iterative)), Watch()
     if plan.extrapolate:
         iterate.u = extrapolation.displacement(iterate.u)
     for update in range(plan.limit + 1):
@@ -127,15 +139,22 @@ def _settle(step: Step, iterate: Iterate, extrapolation: Extrapolation, expected
             _raise_cycling(problem, constraints, solution, iterate)
         if not plan.until_settled:
             continue
-        if solution.settled and moved.change <= tolerances.enough(update, moved.size) and not tolerances.inexact:
-            return SettledContact(constraints, solution, iterate)
+        settled = SettledContact(constraints, solution, iterate)
+        if not solution.settled or tolerances.inexact:
+            watch.forget()
+        elif moved.change <= tolerances.enough(update, moved.size):
+            return settled
+        elif scatter := watch.seen(part, settled.force, moved.change, moved.size):
+            _log_scatter(scatter, problem.criteria.geometry)
+            return replace(settled, scatter=scatter)
         mixed = mixing.next(moved.before, part, solution, tolerances.inexact)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
         tolerances.tighten(moved.relative)
         if plan.extrapolate and update == PATIENT_UPDATES:
             # Nodes that flip between facets may do so for ever from one start and not from another.
-            iterate.u, iterate.active = step.state.u.copy(), dict(step.state.active)
+            iterate.begin_again(step.state)
             mixing.restart()
+            watch.forget()
     if plan.until_settled:
         changed = step.dofs.put(np.zeros_like(iterate.u), part - moved.before)
         raise ConvergenceError(geometry_moves(problem, iterate.history, changed, plan.limit), iterate.history)
@@ -173,6 +192,13 @@ def _move(step: Step, iterate: Iterate, constraints: StackedConstraints, solutio
         }
     )
     return moved
+
+
+def _log_scatter(scatter: Scatter, criterion: float) -> None:
+    log.info(
+        "the contact geometry settled as far as round-off allows: displacements scatter by %.1e of the largest one, contact "
+        "forces by %.1e (Criteria.geometry = %g)", scatter.displacement, scatter.force, criterion,
+    )  # fmt: skip
 
 
 def _raise_cycling(problem: Problem, constraints: StackedConstraints, solution: Solution, iterate: Iterate) -> NoReturn:

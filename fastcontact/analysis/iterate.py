@@ -52,6 +52,11 @@ class Iterate:
         """Return the iterate that a load step begins with."""
         return cls(state.u.copy(), dict(state.active), dict(state.pressure))
 
+    def begin_again(self, state: State) -> None:
+        """Go back to where the load step began; the history stays."""
+        self.u, self.active, self.pressure = state.u.copy(), dict(state.active), dict(state.pressure)
+        self.frictional = self.rigid = None
+
     def remember(self, constraints: StackedConstraints, solution: Solution) -> None:
         """Keep, by pair, which constraints the solution wants active, and its nodal pressures."""
         for name, rows in constraints.rows().items():

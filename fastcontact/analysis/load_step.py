@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 
 from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
-from fastcontact.analysis.balance import balance
+from fastcontact.analysis.balance import Balance, balance
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import Step
 from fastcontact.analysis.iterate import gaps_and_forces
@@ -49,15 +49,13 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
         If the step does not converge.
     """
     load = problem.load_at(instant)
-    loaded = with_loads(problem, state, load)
     solved_before = problem.solver.counters.iterations
+    loaded = with_loads(problem, state, load)
     start, expected = prepare_start(problem, state, load, loaded)
-    settled = settle(problem, start, load, loaded, expected) if problem.pairs else None
-    u, contact_force = solve_displacements(problem, start, load, loaded, settled)
-    balanced = balance(problem, u, contact_force, load.force, start.largest_force)
-    if settled is not None:
-        settled.iterate.history[-1]["residual"] = balanced.relative
-    balanced.check(index, problem.criteria.relative, settled.iterate.history if settled is not None else ())
+    settled, u, balanced = equilibrium(problem, start, load, loaded, expected)
+    while balanced.excess > 1.0 and problem.solver.improve(balanced.excess):
+        settled, u, balanced = equilibrium(problem, start, load, right_side(problem, load), expected, settled)
+    balanced.check(index, problem, settled.iterate.history if settled is not None else ())
     iterations = counted(settled, problem.solver.counters.iterations - solved_before)
     end = replace(start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u))
     end, contact = (end, {}) if settled is None else after_contact(problem, start, load, settled, end)
@@ -70,6 +68,11 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
 def with_loads(problem: Problem, state: State, load: StepLoad) -> Loaded:
     """Return the prepared matrix with the right-hand side of the step; the solver continues from the state."""
     problem.solver.put_back(state.solver)
+    return right_side(problem, load)
+
+
+def right_side(problem: Problem, load: StepLoad) -> Loaded:
+    """Return the prepared matrix with the right-hand side of the step."""
     return problem.solver.load(problem.system.right(load.force, load.lift))
 
 
@@ -97,11 +100,38 @@ def prepare_start(problem: Problem, state: State, load: StepLoad, loaded: Loaded
     return start, expected
 
 
-def settle(problem: Problem, start: State, load: StepLoad, loaded: Loaded, expected: float) -> SettledContact:
+def equilibrium(
+    problem: Problem,
+    start: State,
+    load: StepLoad,
+    loaded: Loaded,
+    expected: float,
+    before: SettledContact | None = None,
+) -> tuple[SettledContact | None, Array, Balance]:
+    """Return the settled contact, all displacements (n_dofs,) [length] and the balance of forces.
+
+    It begins where the contact `before` ended, which less accurate solutions have settled.
+    """
+    settled = settle(problem, start, load, loaded, expected, before) if problem.pairs else None
+    u, contact_force = solve_displacements(problem, start, load, loaded, settled)
+    balanced = balance(problem, u, contact_force, load.force, start.largest_force)
+    if settled is not None:
+        settled.iterate.history[-1]["residual"] = balanced.relative
+    return settled, u, balanced
+
+
+def settle(
+    problem: Problem,
+    start: State,
+    load: StepLoad,
+    loaded: Loaded,
+    expected: float,
+    before: SettledContact | None = None,
+) -> SettledContact:
     """Settle the contact geometry on the displacement components that contact depends on."""
     dofs = problem.dofs.for_step(start.u, load.lift)
     step = Step(problem, start, load, dofs.loaded(loaded), dofs)
-    return settle_geometry(step, start.extrapolation, expected)
+    return settle_geometry(step, start.extrapolation, expected, None if before is None else before.iterate)
 
 
 def solve_displacements(
@@ -131,5 +161,6 @@ def after_contact(
         never_opening=never_opening(problem, start, settled),
     )  # fmt: skip
     results = contact_results(problem, start, load, settled, end)
-    touched = {name for name, found in results.items() if found.active.any()}
-    return replace(end, touched=end.touched | touched), results
+    touched = end.touched | {name for name, found in results.items() if found.active.any()}
+    met = {name: place for name, place in end.first_contact.items() if name in touched}
+    return replace(end, touched=touched, first_contact=met), results

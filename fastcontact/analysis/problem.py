@@ -172,7 +172,8 @@ def prepare(
     """Assemble a model that was checked before, and prepare the linear solver; see `run.solve` for the parameters."""
     mesh, driven = model.mesh, model.force_driven
     solver = choice.make(
-        linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, tolerance=linear_tolerance, precision=linear_precision,
+        linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, precision=linear_precision,
+        tolerance=choice.tight_enough(linear_tolerance, criteria.relative),
         columns=not all(pair.eliminable for pair in model.contact),
     )  # fmt: skip
     supported, prescribed = model.prescribed_by_ramp()

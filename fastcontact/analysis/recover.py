@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -53,7 +54,10 @@ def recover(
 
 
 def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> dict[str, tuple[Array, Array]]:
-    """Return by contact pair in space where the bodies meet first [length], and the normal there; once found it stays."""
+    """Return by contact pair in space where the bodies meet first [length], and the normal there.
+
+    Once they have met it stays; until then it is where they would meet now, with obstacles and clearances as they are.
+    """
     if problem.model.mesh.dim == 2:
         return {}
     return {
@@ -80,10 +84,11 @@ def contact_results(
         At the end of the step; of it the displacements and the places of first contact are needed.
     """
     displacement = problem.displacement(end.u)
+    paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
     return {
         name: contact_result(
             name, problem.pairs[name], settled.constraints.parts[name], settled.solution, rows,
-            problem.configuration(name, start, load, displacement, end.u), end.first_contact.get(name),
+            problem.configuration(name, start, load, paired_at, end.u), end.first_contact.get(name), displacement,
         )
         for name, rows in settled.constraints.rows().items()
     }  # fmt: skip
@@ -96,24 +101,29 @@ def never_opening(
     found = dict(start.never_opening)
     for name, rows in settled.constraints.rows().items():
         if problem.pairs[name].options.kind == "bilateral_once_closed":
-            found[name] = settled.constraints.parts[name].positions, settled.solution.active[rows].copy()
+            part, closed = settled.constraints.parts[name], settled.solution.active[rows].copy()
+            if part.equality is not None:  # what stands beside the other side now may come back to it
+                closed |= part.equality
+            found[name] = part.positions, closed
     return found
 
 
 def counted(settled: SettledContact | None, linear_iterations: int) -> dict[str, Any]:
     """Return the work of a load step, see `StepResult.iterations`."""
     history = settled.iterate.history if settled is not None else []
-    return {
+    counts = {
         "geometry_updates": max(len(history) - 1, 0),
         "active_set_iterations": sum(entry["active_set_iterations"] for entry in history),
         "linear_iterations": linear_iterations,
         "history": history,
     }
+    scatter = None if settled is None else settled.scatter
+    return counts if scatter is None else {**counts, "scatter": dataclasses.asdict(scatter)}
 
 
 def contact_result(
     name: str, pair: Formulation, part: Constraints, solution: Solution, rows: slice, at: Configuration,
-    axis: tuple[Array, Array] | None = None,
+    axis: tuple[Array, Array] | None = None, displacement: Array | None = None,
 ) -> ContactResult:  # fmt: skip
     """Return the state of one pair at the end of a load step.
 
@@ -127,15 +137,17 @@ def contact_result(
         Of all pairs; those of this one are its `rows`.
     rows : slice
     at : Configuration
-        At the end of the step.
+        In which the sides are paired at the end of the step.
     axis : (ndarray (dim,), ndarray (dim,)), optional
         In space, where the bodies met first [length] and the normal there [-].
+    displacement : ndarray (n_points, dim), optional
+        That gaps are measured with, by default that of `at` [length].
     """
     points, dim = pair.secondary.points, pair.points.shape[1]
     multiplier, active = solution.multiplier[rows], solution.active[rows]
     excluded = pair.options.excluded_nodes(pair.secondary)
     pressure = np.where(excluded, 0.0, part.pressure(multiplier))
-    gap, normal = pair.nodal_gap(at)
+    gap, normal = pair.nodal_gap(at, displacement=displacement)
     closed = _closed_nodes(pair, part, active, gap, pressure, at) & ~excluded
     if part.tied is not None:  # as the bodies lay at rest
         normal = pair.nodal_gap(replace(at, displacement=np.zeros_like(at.displacement)))[1]
@@ -204,7 +216,7 @@ def _closed_nodes(
     assert part.nodal is not None
     closed = part.nodal.closed_nodes(active, gap, pressure)
     for_good = pair.never_opening(pair.points[pair.secondary.points], at)
-    return closed if for_good is None else closed | for_good
+    return closed if for_good is None else closed | (for_good & np.isfinite(gap))
 
 
 def _nodal_shear(

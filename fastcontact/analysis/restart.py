@@ -97,4 +97,4 @@ def _history(table: Sequence[Sequence[float]], end: float, other: Sequence[Seque
 
 def _kind(solver: Any) -> list[Any]:
     """Return what solvers that take each other's memory share."""
-    return [getattr(solver, "name", type(solver).__name__), solver.tolerance]
+    return [getattr(solver, "name", type(solver).__name__), solver.tolerance if solver.asked is None else solver.asked]

@@ -28,6 +28,8 @@ ROTATION = 0.3
 ACROSS = 4
 # Change of the displacement by the last of a fixed number of geometry updates, relative to its largest component.
 UNSETTLED = 1e-2
+# What criteria may leave, of the displacement or of the forces, before it is worth a warning.
+LOOSE = 1e-4
 
 
 def result_warnings(problem: Problem, state: State, last: StepResult) -> list[str]:
@@ -41,7 +43,7 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
         contact = last.contact[name]
         found += _deep(pair, contact, state.u) + _lost(name, contact, name in state.touched, loaded)
         found += _unresolved(name, pair, contact)
-    return found + _unsettled(state)
+    return found + _unsettled(state) + _loose(problem, last)
 
 
 def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> list[str]:
@@ -65,6 +67,32 @@ def _unsettled(state: State) -> list[str]:
         f"the contact geometry had not settled after the {update} updates asked for: the last one changed the displacement "
         f"by {change:.1%} of its largest component. Allow more geometry_updates, or leave them out"
     ]
+
+
+def _loose(problem: Problem, last: StepResult) -> list[str]:
+    """Return warnings where loose criteria let the last step end early."""
+    history, criteria = last.iterations["history"], problem.criteria
+    if not history:
+        return []
+    found, change, residual = [], history[-1]["displacement_change"], history[-1]["residual"]
+    until_settled = criteria.geometry_updates is None and not criteria.keep_pairing
+    if until_settled and change > LOOSE:
+        found.append(
+            f"the contact geometry counts as settled although the displacement still changed by {change:.1e} of its largest "
+            f"component (Criteria.geometry = {criteria.geometry:g}): results are no more accurate than that"
+        )
+    scatter = last.iterations.get("scatter")
+    if scatter is not None and scatter["force"] > criteria.relative:
+        found.append(
+            f"round-off makes contact forces scatter by {scatter['force']:.1e} of the largest one from update to update, and "
+            f"displacements by {scatter['displacement']:.1e}: results are no more accurate than that"
+        )
+    if residual > LOOSE:
+        found.append(
+            f"forces are out of balance by {residual:.1e} of the largest force (Criteria.relative = {criteria.relative:g}): "
+            "results are no more accurate than that"
+        )
+    return found
 
 
 def _interpenetration(problem: Problem, state: State) -> list[str]:

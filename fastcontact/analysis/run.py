@@ -12,6 +12,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.problem import Problem, prepare
 from fastcontact.analysis.result_warnings import result_warnings
 from fastcontact.errors import warn
+from fastcontact.linear.choice import check_tolerance
 from fastcontact.model.model import Model
 from fastcontact.model.model_warnings import model_warnings
 from fastcontact.model.ramp import Ramp, linear_ramp
@@ -39,7 +40,7 @@ def solve(
     linear_solver : str
         ``"direct"``, ``"cholmod"``, ``"amg"``, ``"pyamg"`` or ``"auto"``; see `linear.choice.make`.
     linear_tolerance : float
-        Relative residual of iterative linear solvers.
+        Relative residual of iterative linear solvers, at most 0.001; `Criteria.relative` where that is smaller.
     linear_precision : {"single", "double"}, optional
         Of the numbers inside the multigrid cycle, single by default; the solution is always in double precision.
     criteria : Criteria, optional
@@ -107,6 +108,7 @@ def solve_steps(
     ...     out.write(step)
     """
     ramp, criteria = ramp or linear_ramp(), criteria or Criteria()
+    check_tolerance(linear_tolerance)
     case = restart.identity(model, ramp, criteria)
     last = resume[-1] if len(resume) else None
     if last is not None:

@@ -77,6 +77,7 @@ class State:
                 "round_off": float(self.gap_round_off),
             },
             "obstacles": self.u[n_dofs:].copy(),
+            "touched": sorted(self.touched),
             "active": dict(self.active),
             "pressure": dict(self.pressure),
             "pairs": {
@@ -100,7 +101,7 @@ class State:
         displacement : ndarray (n_points, dim)
             At the end of the last step [length].
         touched : frozenset of str
-            Contact pairs that were closed at the end of a step.
+            Contact pairs that were closed at the end of a step, beside those that it knows itself.
         """
         u = np.concatenate([displacement.ravel(), kept["obstacles"]])
         pairs, numbers = kept["pairs"], kept["numbers"]
@@ -121,7 +122,7 @@ class State:
             else Extrapolation(),
             largest_force=numbers["largest_force"],
             largest_work=numbers["largest_work"],
-            touched=touched,
+            touched=touched.union(kept.get("touched", ())),
         )
 
 

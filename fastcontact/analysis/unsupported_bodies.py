@@ -30,6 +30,8 @@ SLACK = 1e-12
 # What is left when nothing improves any more counts as slack below this fraction.
 STAGNANT = 1e-8
 MAX_POSITIONS = 100
+# Lengths tried along one step.
+TRIALS = 10
 # A motion that resists less than this fraction of its spring does not resist.
 UNRESISTED = 1e-9
 
@@ -41,7 +43,7 @@ class RigidPosition:
     Attributes
     ----------
     state : Solution
-        For the springs at `position`; its iterations are those of all positions tried.
+        For the springs at `position`, or the first one that did not settle; its iterations are those of all positions tried.
     position : ndarray (k,)
         Rigid displacement at each spring [length].
     spring_force : ndarray (k,)
@@ -176,7 +178,7 @@ class UnsupportedBodies:
                 if search.left >= 0.5 * before and search.left <= tolerable:
                     break
         slack = search.settled and search.left <= tolerable
-        state = dataclasses.replace(search.state, iterations=search.iterations)
+        state = dataclasses.replace(search.unsettled or search.state, iterations=search.iterations)
         return RigidPosition(state, search.position, self.stiffness * search.elongation, search.positions, slack)
 
 
@@ -186,9 +188,14 @@ class _Search:
     def __init__(self, solve_at: Callable[[Array], Solution], dofs: NDArray[np.intp], start: Array) -> None:
         self._solve_at, self._dofs = solve_at, dofs
         self.positions = self.iterations = 0
-        self.settled = True
+        self.unsettled: Solution | None = None  # the first one whose inequalities do not hold
         self.position = start
         self.state, self.elongation = self._at(start)
+
+    @property
+    def settled(self) -> bool:
+        """Whether the contact problems of all positions so far have settled."""
+        return self.unsettled is None
 
     @property
     def left(self) -> float:
@@ -199,7 +206,8 @@ class _Search:
         state = self._solve_at(position)
         self.positions += 1
         self.iterations += state.iterations
-        self.settled = self.settled and state.settled
+        if self.unsettled is None and not state.settled:
+            self.unsettled = state
         return state, state.u[self._dofs]
 
     def differences(self, by: float) -> Array:
@@ -214,14 +222,14 @@ class _Search:
     def move(self, step: Array) -> None:
         """Go along `step`, less far where the elongations turn round."""
         slope, length = float(self.elongation @ step), 1.0
-        for _ in range(10):
-            state, elongation = self._at(self.position + length * step)
+        for _ in range(TRIALS):
+            position = self.position + length * step
+            state, elongation = self._at(position)
             there = float(elongation @ step)
             if there >= -0.5 * abs(slope):
                 break
             length *= min(max(slope / (slope - there), 0.1), 0.9)
-        self.position = self.position + length * step
-        self.state, self.elongation = state, elongation
+        self.position, self.state, self.elongation = position, state, elongation
 
 
 def _step(derivative: Array, elongation: Array) -> Array:

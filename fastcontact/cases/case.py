@@ -16,6 +16,7 @@ from fastcontact.cases.keys import NUMBER, RAMP, SOLVE, STUDY, TOP, UNITS, calle
 from fastcontact.cases.model_tables import build_model, points
 from fastcontact.cases.shipped import case_path
 from fastcontact.errors import CaseError, unknown
+from fastcontact.linear.choice import check_tolerance
 from fastcontact.mesh import generate
 from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.mesh import Mesh
@@ -153,6 +154,8 @@ def build_case(
             raise CaseError(f"the key '{key}' is missing")
     solve = data.get("solve", {})
     ramp = _ramp(data.get("ramp", {}))
+    tolerance = float(solve.get("linear_tolerance", 1e-10))
+    check_tolerance(tolerance)
     criteria = Criteria(**{key: value for key, value in solve.items() if not key.startswith("linear_")})
     theories, approach = _theories(data)
     mesh = _mesh(Path(folder), data["mesh"]) if mesh is None else mesh
@@ -167,7 +170,7 @@ def build_case(
         ramp=ramp,
         criteria=criteria,
         linear_solver=solve.get("linear_solver", "auto"),
-        linear_tolerance=float(solve.get("linear_tolerance", 1e-10)),
+        linear_tolerance=tolerance,
         probes=probes,
         theories=theories,
         checks=_checks(data, probes, theories),

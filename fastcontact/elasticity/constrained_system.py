@@ -42,15 +42,15 @@ class Stiffness:
             total += part @ u
         return total
 
-    def largest_row_sum(self, u: Array) -> float:
-        """Return the largest entry of ``|K| |u|``, added up over the parts: what cancels in ``K u``."""
-        return sum(_largest_row_sum(part, u) for part in self.parts)
+    def row_sums(self, u: Array) -> Array:
+        """Return ``|K| |u|``, shape (n,), added up over the parts: what cancels in ``K u`` [force]."""
+        return np.sum([_row_sums(part, u) for part in self.parts], axis=0)
 
 
-def _largest_row_sum(K: Any, u: Array) -> float:
+def _row_sums(K: Any, u: Array) -> Array:
     if isinstance(K, csr_array):
-        return float((abs(K) @ np.abs(u)).max(initial=0.0))
-    return float((block_matrix(K) if isinstance(K, bsr_array) else K).largest_row_sum(u))
+        return np.asarray(abs(K) @ np.abs(u))
+    return np.asarray((block_matrix(K) if isinstance(K, bsr_array) else K).row_sums(u))
 
 
 class System:

@@ -16,6 +16,8 @@ log = logging.getLogger("fastcontact")
 OPTIONAL = {"cholmod": ("kvxopt", "cholmod")}
 KNOWN = tuple(name for _, name, _ in pkgutil.iter_modules(solvers.__path__))
 SOLVERS = tuple(name for name in KNOWN if name not in OPTIONAL or importlib.util.find_spec(OPTIONAL[name][0]))
+# The largest relative residual with which a solution is one.
+LOOSEST = 1e-3
 # Above these sizes a multigrid solution is cheaper than a factorisation (measured, see bench/README.md). The second where
 # constraints need columns of K^-1, which factors give at once and multigrid one solution each.
 DIRECT_UP_TO = {2: 3_000_000, 3: 15_000}
@@ -36,7 +38,7 @@ def make(
     dim, n_dofs : int
         Dimension and number of unknowns, for ``"auto"``.
     tolerance : float
-        Relative residual of iterative solvers.
+        Relative residual of iterative solvers, at most 0.001.
     precision : {"single", "double"}, optional
         Of the multigrid cycle, single by default; direct solvers work in double precision always.
     columns : bool
@@ -46,10 +48,9 @@ def make(
     Raises
     ------
     ModelError
-        If there is no such solver, a package that it needs is missing, or the tolerance is no relative one.
+        If there is no such solver, a package that it needs is missing, or the tolerance makes no sense.
     """
-    if not 0.0 < tolerance < 1.0:
-        raise ModelError(f"the tolerance {tolerance} of the linear solver must lie between 0 and 1, such as 1e-10")
+    check_tolerance(tolerance)
     if name == "auto":
         name, reason = chosen(dim, n_dofs, columns)
         log.info("linear solver: %s, %s", name, reason)
@@ -61,6 +62,23 @@ def make(
     options = {} if precision is None or name != "amg" else {"precision": precision}
     solver: LinearSolver = importlib.import_module(f"{solvers.__name__}.{name}").SOLVER(tolerance, **options)
     return solver
+
+
+def check_tolerance(tolerance: float) -> None:
+    """Raise ModelError if a tolerance of linear solvers makes no sense."""
+    if not 0.0 < tolerance <= LOOSEST:
+        raise ModelError(
+            f"the tolerance {tolerance} of the linear solver must be positive and at most {LOOSEST}, such as 1e-10"
+        )
+
+
+def tight_enough(tolerance: float, relative: float) -> float:
+    """Return a `tolerance` that was checked, or the criterion on forces out of balance where that is smaller."""
+    check_tolerance(tolerance)
+    if tolerance > relative:
+        log.info("linear solver: the tolerance %.1e falls to %.1e, the criterion on balance", tolerance, relative)
+        return relative
+    return tolerance
 
 
 def chosen(dim: int, n_dofs: int, columns: bool = False) -> tuple[str, str]:

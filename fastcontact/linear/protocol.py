@@ -27,8 +27,8 @@ class Product(Protocol):
         """Return ``K u``, shape (n,) [force]."""
         ...
 
-    def largest_row_sum(self, u: Array) -> float:
-        """Return the largest entry of ``|K| |u|`` [force]."""
+    def row_sums(self, u: Array) -> Array:
+        """Return ``|K| |u|``, shape (n,) [force]."""
         ...
 
 
@@ -130,7 +130,9 @@ class LinearSolver(Protocol):
     Attributes
     ----------
     tolerance : float
-        Relative accuracy of the solutions [-].
+        Relative accuracy of the solutions [-]; `improve` may lower it.
+    asked : float, optional
+        The tolerance that was asked for, where `improve` has lowered it [-].
     counters : Counters
     error : float
         By how much solutions for nearly the same right-hand side may differ, in units of their largest component, however
@@ -141,6 +143,7 @@ class LinearSolver(Protocol):
 
     tolerance: float
     counters: Counters
+    asked: float | None = None
     error: float = 0.0
     gave_up: str = ""
 
@@ -189,6 +192,10 @@ class LinearSolver(Protocol):
     def put_back(self, snapshot: Any) -> None:
         """Continue from a `snapshot` of this solver; None for the beginning."""
         ...
+
+    def improve(self, excess: float) -> bool:
+        """Make later solutions more accurate, since they leave `excess` times what is allowed; False if there is no way."""
+        return False
 
     def memory(self) -> dict[str, Any]:
         """Return what the last digits of later solutions owe to earlier ones: plain numbers, strings and arrays."""

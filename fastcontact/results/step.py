@@ -125,7 +125,8 @@ class StepResult:
         By contact pair.
     iterations : dict
         ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``, ``history`` (list of dict). If contact
-        alone holds bodies, ``regularised``: their springs and the forces in them.
+        alone holds bodies, ``regularised``: their springs and the forces in them. If round-off kept the contact geometry
+        from settling to the criterion, ``scatter``: by how much ``displacement`` and contact ``force`` still vary [-].
     warnings : tuple of str
         Warnings of the step.
     cell_fields : dict of str to ndarray (n_solids,)

@@ -714,16 +714,22 @@ OPTIONS = [
         r"unknown linear solver 'direkt': did you mean 'direct'",
     ),
     Mistake(
-        "a tolerance above one",
+        "a tolerance that lets anything pass",
         lambda: solved(blocks(), linear_tolerance=10.0),
         fc.ModelError,
-        r"the tolerance 10\.0 of the linear solver must lie between 0 and 1, such as 1e-10",
+        r"the tolerance 10\.0 of the linear solver must be positive and at most 0\.001, such as 1e-10",
     ),
     Mistake(
         "a criterion of zero",
         lambda: fc.Criteria(relative=0.0),
         fc.ModelError,
-        r"the convergence criteria `relative` and `geometry` must be positive",
+        r"the convergence criterion relative = 0\.0 must be positive and at most 0\.01: beyond that nothing has converged",
+    ),
+    Mistake(
+        "a criterion that lets anything pass",
+        lambda: fc.Criteria(geometry=1e3),
+        fc.ModelError,
+        r"the convergence criterion geometry = 1000\.0 must be positive and at most 0\.01: beyond that nothing has converged",
     ),
     Mistake(
         "a negative limit of updates",

@@ -75,7 +75,8 @@ OTHERWISE = {
     ),
     "the number is taken as it is: the solution does not converge, or is wrong": (
         "friction is negative", "friction that is negative", "tolerance is negative", "a penalty of zero",
-        "theory with nu above a half", "size of a mesh is negative", "a tolerance above one", "a criterion of zero",
+        "theory with nu above a half", "size of a mesh is negative", "a tolerance that lets anything pass", "a criterion of zero",
+        "a criterion that lets anything pass",
         "a negative limit of updates", "a negative number of halvings", "a negative number of updates",
         "tied with a penalty",
     ),

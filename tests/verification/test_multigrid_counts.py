@@ -45,7 +45,8 @@ def sphere(size, formulation="node_to_segment"):
 
 
 def prepared(model, tolerance=1e-8, steps=1):
-    return Stepping(model, "amg", tolerance, Criteria(geometry=tolerance), fc.linear_ramp(steps))
+    criteria = Criteria(relative=100 * tolerance, geometry=tolerance)
+    return Stepping(model, "amg", tolerance, criteria, fc.linear_ramp(steps))
 
 
 def counted(analysis, work):

@@ -22,6 +22,8 @@ from fastcontact.contact.tied import TiedPair, tied
 from fastcontact.errors import ContactError, unknown
 
 Array = NDArray[np.float64]
+# Vectors shorter than this have no direction; unit normals that differ by less are the same.
+TINY, ALIKE = 1e-300, 1e-9
 NORMALS = ("facet", "averaged")
 # Nodes on an axis or plane of symmetry stand out a little beyond facets that lean, in facet lengths.
 ON_SYMMETRY = 0.05
@@ -183,8 +185,9 @@ class Formulation(ABC):
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
         ours = np.einsum("nk,nkd->nd", shape, nodal_normals(self.secondary, deformed)[local[nodes]])
         theirs = interpolated(nodal_normals(self.primary, deformed), facing)
-        mean = theirs - ours / np.linalg.norm(ours, axis=1, keepdims=True)
-        mean /= np.linalg.norm(mean, axis=1, keepdims=True)
+        mean = theirs - ours / np.maximum(np.linalg.norm(ours, axis=1, keepdims=True), TINY)
+        length = np.linalg.norm(mean, axis=1, keepdims=True)
+        mean = np.divide(mean, length, out=np.zeros_like(mean), where=length > ALIKE)
         apart = np.einsum("nk,nkd->nd", shape, start[nodes])
         apart -= np.einsum("nk,nkd->nd", facing.shape, start[facing.nodes])
         opening = np.einsum("nd,nd->n", mean, apart)
@@ -204,10 +207,13 @@ class Formulation(ABC):
         first = close[np.argmin(np.linalg.norm(positions[close], axis=1))]
         return positions[first], normal[first]
 
-    def nodal_gap(self, at: Configuration, with_clearance: bool = True) -> tuple[Array, Array]:
+    def nodal_gap(
+        self, at: Configuration, with_clearance: bool = True, displacement: Array | None = None
+    ) -> tuple[Array, Array]:
         """Return the gaps (n_nodes,) of the secondary nodes [length], and the normals (n_nodes, dim) that they face [-].
 
-        Infinite where a node faces no primary facet. Clearances count unless they are left out.
+        Infinite where a node faces no primary facet. Clearances count unless they are left out. Where `displacement`
+        (n_points, dim) is given, the gaps are those that it leaves in the pairing of `at` [length].
         """
         nodes = Candidates(self.secondary.points[:, None], np.ones((len(self.secondary.points), 1)))
         deformed = self.points + at.displacement
@@ -216,4 +222,5 @@ class Formulation(ABC):
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
         if with_clearance:
             gap0 += self.options.added_gap(nodes, pairing, self.primary, self.points, at.clearance_factor)
-        return np.where(pairing.paired, gap0 + G @ at.displacement.ravel(), np.inf), pairing.normal
+        u = at.displacement if displacement is None else displacement
+        return np.where(pairing.paired, gap0 + G @ u.ravel(), np.inf), pairing.normal

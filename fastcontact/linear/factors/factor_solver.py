@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from fastcontact.linear.factors.known_loads import KnownLoads
 from fastcontact.linear.flexibility import FlexibilityColumns, balanced, multipliers, symmetric
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 
+log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 # Beyond this many unknowns last, their dense block costs more than the solutions it saves.
@@ -71,6 +73,7 @@ class FactorSolver(LinearSolver):
             If K is singular.
         """
         self.n, self._factors, self.last = K.shape[0], None, None
+        self._K, self.refines = K, False
         if involved is not None and len(involved) <= LAST_UP_TO:
             self._factors = self._with_last(K, involved)
         self.error = 0.0
@@ -118,12 +121,29 @@ class FactorSolver(LinearSolver):
 
     def memory(self) -> dict[str, Any]:
         """See `LinearSolver.memory`: columns of ``K^-1`` asked for, and right-hand sides that others are made of."""
-        return {"asked": list(self.columns.asked), "loads": self.known_loads.memory()}
+        kept = {"asked": list(self.columns.asked), "loads": self.known_loads.memory()}
+        return {**kept, "refines": True} if self.refines else kept
 
     def remember(self, memory: dict[str, Any]) -> None:
         """See `LinearSolver.remember`."""
+        self.refines = memory.get("refines", False)
         self.columns.ask_again(memory["asked"])
         self.known_loads.remember(memory["loads"], self.n, self._solution)
+
+    def improve(self, excess: float) -> bool:
+        """See `LinearSolver.improve`: correct later solutions once by what they leave out of balance."""
+        if self.refines:
+            return False
+        log.info(
+            "linear solver: forces are out of balance by %.1e times what is allowed, solutions are refined", excess
+        )
+        self.refines = True
+        return True
+
+    def refined(self, f: Array) -> Array:
+        """Return ``K^-1 f``, shape (n,), corrected once."""
+        u = self.back_substitute(f)
+        return u + self.back_substitute(f - self._K @ u)
 
     def back_substitute(self, f: Array) -> Array:
         """Return ``K^-1 f``, shape (n,)."""
@@ -168,6 +188,8 @@ class LoadedFactor:
 
     def full_solution(self, force: Array, u: Array | None = None) -> Array:
         """See `Loaded`."""
+        if self._solver.refines:
+            return self._solver.refined(self._f + force)
         moved = self._moved(force)
         if moved is None:
             return self._solver.back_substitute(self._f + force)

@@ -75,11 +75,11 @@ class BlockMatrix:
         parts = [diagonal_blocks(self.indptr, self.indices, part, size) for part in self.exact]
         return np.sum([part.astype(float) for part in parts], axis=0).reshape(-1, size, size)
 
-    def largest_row_sum(self, u: Array) -> float:
-        """Return the largest entry of ``|A| |u|`` of a square matrix, from its high part."""
+    def row_sums(self, u: Array) -> Array:
+        """Return ``|A| |u|``, shape (n,), of a square matrix, from its high part."""
         out = np.empty(len(u))
         cycle_kernels.row_sums(self.indptr, self.indices, self.data, u, self.rows, out)
-        return float(out.max(initial=0.0))
+        return out
 
     def to_scipy(self) -> bsr_array:
         """Return a square matrix as SciPy's, in double precision."""
@@ -177,9 +177,9 @@ class ScaledMatrix:
         size = range(self.blocksize[0])
         return self.scaled.diagonal_blocks()[:, size, size].ravel() / self.unit
 
-    def largest_row_sum(self, u: Array) -> float:
-        """Return the largest entry of ``|K| |u|`` [force]."""
-        return self.scaled.largest_row_sum(u) / self.unit
+    def row_sums(self, u: Array) -> Array:
+        """Return ``|K| |u|``, shape (n,) [force]."""
+        return self.scaled.row_sums(u) / self.unit
 
 
 def _split(K: bsr_array, unit: float, release: bool) -> tuple[Values, Values]:

@@ -22,11 +22,14 @@ from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.multigrid.solver import Multigrid, StallError
 from fastcontact.linear.protocol import FrictionTerms, LinearSolver, Loaded, Product
 from fastcontact.linear.solvers.direct import Direct
+from fastcontact.linear.tightening import tighten
 
 log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
 # Unknowns up to which a factorisation replaces multigrid, by the number of components of a displacement.
 FACTORS_UP_TO = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
+# Where forces stay out of balance, the tolerance is lowered down to this; round-off leaves little below it.
+TIGHT = 1e-12
 
 
 class Amg(Multigrid, LinearSolver):
@@ -71,6 +74,18 @@ class Amg(Multigrid, LinearSolver):
         """Return the prepared matrix with right-hand side `f` (n,)."""
         return _Loaded(self, f)
 
+    def improve(self, excess: float) -> bool:
+        """See `LinearSolver.improve`: lower the tolerance, or let factors take over where round-off is near."""
+        if self.instead is not None:
+            return self.instead.improve(excess)
+        if self._may_factorise and not self.tolerance > TIGHT * excess:
+            self._factorise(
+                f"multigrid gave up and factors took over, which cost more time and memory: at its tolerance of "
+                f"{self.tolerance:.1e} it leaves forces out of balance by {excess:.1e} times what is allowed"
+            )
+            return True
+        return tighten(self, excess)
+
     def memory(self) -> dict[str, Any]:
         """See `LinearSolver.memory`: equations and bounds of the hierarchy, columns of K^-1. Result files hold these keys."""
         tied = None
@@ -78,12 +93,18 @@ class Amg(Multigrid, LinearSolver):
             rows = self._hierarchy_equations.weights
             arrays = (self._hierarchy_equations.pivots, rows.indptr, rows.indices, rows.data)
             tied = dict(zip(("pivots", "indptr", "indices", "data"), arrays, strict=True))
-        kept = {"precision": self.precision, "bounds": self.hierarchy.bounds, "asked": list(self.columns.asked)}
+        kept = {
+            "precision": self.precision,
+            "tolerance": self.tolerance,
+            "bounds": self.hierarchy.bounds,
+            "asked": list(self.columns.asked),
+        }
         instead = None if self.instead is None else {"why": self.gave_up, **self.instead.memory()}
         return {**kept, "tied": tied, "instead": instead}
 
     def remember(self, memory: dict[str, Any]) -> None:
         """See `LinearSolver.remember`."""
+        self.tolerance = memory.get("tolerance", self.tolerance)
         if memory.get("instead"):
             self._factorise(memory["instead"]["why"]).remember(memory["instead"])
             return
@@ -101,9 +122,13 @@ class Amg(Multigrid, LinearSolver):
         StallError
             If the matrix is too large for that.
         """
-        if self.K.shape[0] > FACTORS_UP_TO[self.K.blocksize[0]]:
+        if not self._may_factorise:
             raise stalled
         self._factorise(f"multigrid gave up and factors took over, which cost more time and memory: {stalled}")
+
+    @property
+    def _may_factorise(self) -> bool:
+        return bool(self.K.shape[0] <= FACTORS_UP_TO[self.K.blocksize[0]])
 
     def _factorise(self, why: str) -> Direct:
         log.warning("%s", why)

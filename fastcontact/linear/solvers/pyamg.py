@@ -19,6 +19,7 @@ from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.flexibility import FlexibilityColumns
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
+from fastcontact.linear.tightening import tighten
 
 Array = NDArray[np.float64]
 MAX_ITERATIONS = 1000
@@ -119,12 +120,17 @@ class Pyamg(LinearSolver):
         """Return the prepared matrix with right-hand side `f` (n,)."""
         return LoadedIteration(self, f)
 
+    def improve(self, excess: float) -> bool:
+        """See `LinearSolver.improve`."""
+        return tighten(self, excess)
+
     def memory(self) -> dict[str, Any]:
-        """See `LinearSolver.memory`: columns of ``K^-1`` asked for."""
-        return {"asked": list(self.columns.asked)}
+        """See `LinearSolver.memory`: columns of ``K^-1`` asked for, and the tolerance."""
+        return {"asked": list(self.columns.asked), "tolerance": self.tolerance}
 
     def remember(self, memory: dict[str, Any]) -> None:
         """See `LinearSolver.remember`."""
+        self.tolerance = memory.get("tolerance", self.tolerance)
         self.columns.ask_again(memory["asked"])
 
 

@@ -33,3 +33,26 @@ def test_the_first_two_steps_start_from_the_last_state():
     found = Extrapolation().to(np.ones(2)).converged(np.ones(2), {}).to(2.0 * np.ones(2))
     u = np.ones(2)
     assert found.displacement(u) is u
+
+
+def test_displacements_and_forces_are_each_compared_with_their_own():
+    """A step moved by forces, then steps moved by supports: lengths are not subtracted from forces."""
+    found = Extrapolation()
+    for lift, force in ((0.0, 1e6), (1e-3, 1e6)):
+        found = found.to(np.full(2, lift), np.full(2, force)).converged(np.ones(2), {})
+    found = found.to(np.full(2, 3e-3), np.full(2, 1e6))
+    assert found.ratio == pytest.approx(2.0)
+    constant = Extrapolation()
+    for force in (1.0, 2.0):
+        constant = constant.to(np.ones(2), np.full(2, force)).converged(np.ones(2), {})
+    assert constant.to(np.ones(2), np.full(2, 2.5)).ratio == pytest.approx(0.5)
+
+
+def test_what_a_file_keeps_is_what_was_there_and_earlier_files_tell_less():
+    found = after_two_steps()
+    u, loads = found.states[-1][0], (np.zeros(3), 3.0 * np.arange(3.0))
+    again = Extrapolation.from_dict(found.to_dict(), u)
+    assert again.to(*loads).ratio == found.to(*loads).ratio == 1.0
+    kept = found.to_dict()
+    kept["loads"] = [parts[1] for parts in kept["loads"]]
+    assert Extrapolation.from_dict(kept, u).to(*loads).ratio == 0.0

@@ -271,7 +271,6 @@ def test_a_step_without_its_state_is_refused():
 def test_all_that_a_step_changes_is_kept_or_set_anew():
     """A field that the state learns must be looked at here."""
     anew = {"rigid", "unsettled"}  # as a step begins
-    told = {"touched"}  # by the steps so far
     learnt = {"solver"}  # from what the solver remembers
     names = {"u": "obstacles", "gap_round_off": "numbers", "largest_force": "numbers", "largest_work": "numbers"}
     of_pairs = {"obstacles": "now", "never_opening": "closed", "first_contact": "first_contact"}
@@ -279,8 +278,20 @@ def test_all_that_a_step_changes_is_kept_or_set_anew():
     for field in fields(State):
         if field.name in of_pairs:
             assert of_pairs[field.name] in step.restart["pairs"]["hertz"]
-        elif field.name not in anew | told | learnt:
+        elif field.name not in anew | learnt:
             assert names.get(field.name, field.name) in step.restart, field.name
+
+
+def test_contact_that_was_lost_is_known_from_the_last_step_alone():
+    """A restart from the last step says that contact was there, as the whole analysis does."""
+    ramp = fc.Ramp((0.5, 1.0, 1.5), table=((0.0, 0.0), (0.5, 0.5), (1.0, -0.5), (1.5, -0.6)))
+    with pytest.warns(fc.FastcontactWarning, match="is lost at the end"):
+        fc.solve(spheres(), ramp)
+    shorter = fc.Ramp((0.5, 1.0), table=ramp.table)
+    with pytest.warns(fc.FastcontactWarning, match="is lost at the end"):
+        steps = fc.solve(spheres(), shorter)
+    with pytest.warns(fc.FastcontactWarning, match="is lost at the end"):
+        fc.solve(spheres(), ramp, resume=steps[-1:])
 
 
 def test_a_strengthened_multigrid_cycle_is_remembered():

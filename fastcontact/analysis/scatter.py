@@ -1,0 +1,92 @@
+"""The accuracy that a geometry loop can attain: where displacements only scatter, round-off decides, and the loop ends.
+
+How much round-off there is depends on the condition of the stiffness and of the constraints, which nothing tells beforehand;
+the last displacements show it. An iteration that still converges, however slowly, goes on in one direction: over a window
+its displacements lie as far apart as all changes together. Round-off goes to and fro: they lie hardly farther apart than one
+change.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact._jit.norms_kernels import largest, largest_difference
+
+Array = NDArray[np.float64]
+# Updates to look at, and how far apart their displacements may lie in units of the typical change: WINDOW in one direction.
+WINDOW, APART = 8, 4.0
+# What may scatter at most: displacements relative to the largest one, nodal contact forces relative to the largest one.
+DISPLACEMENT, FORCE = 1e-6, 1e-5
+# Changes that become smaller than this part of those at the beginning of the window still converge.
+DECLINE = 0.5
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """How far the last geometries of a load step lie apart.
+
+    Attributes
+    ----------
+    displacement : float
+        In units of the largest displacement [-].
+    force : float
+        Nodal contact forces, in units of the largest one [-].
+    """
+
+    displacement: float
+    force: float
+
+
+class Watch:
+    """Keeps the last displacements and contact forces, and says when they only scatter."""
+
+    def __init__(self) -> None:
+        self._parts: list[Array] = []
+        self._forces: list[Array] = []
+        self._changes: list[float] = []
+
+    def seen(self, part: Array, force: Array, change: float, size: float) -> Scatter | None:
+        """Take the displacements `part` (k,) [length] and contact forces (n,) [force] of an update; return their scatter.
+
+        Parameters
+        ----------
+        part, force : ndarray
+        change : float
+            By how much the displacements differ from those before [length].
+        size : float
+            Of the displacements [length].
+
+        Returns
+        -------
+        Scatter or None
+            None as long as the updates may still converge, or scatter by more than what is of no consequence.
+        """
+        if not change <= DISPLACEMENT * size:
+            self.forget()
+            return None
+        self._parts.append(part.copy())
+        self._forces.append(force.copy())
+        self._changes.append(change)
+        del self._parts[:-WINDOW], self._forces[:-WINDOW], self._changes[:-WINDOW]
+        if len(self._changes) < WINDOW:
+            return None
+        found = Scatter(_apart(self._parts) / size, _apart(self._forces) / (largest(force) or 1.0))
+        typical, half = float(np.median(self._changes)), WINDOW // 2
+        declining = np.median(self._changes[half:]) < DECLINE * np.median(self._changes[:half])
+        if declining or found.displacement * size > APART * typical:
+            return None
+        return found if found.displacement <= DISPLACEMENT and found.force <= FORCE else None
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self._parts.clear()
+        self._forces.clear()
+        self._changes.clear()
+
+
+def _apart(vectors: list[Array]) -> float:
+    """Return the largest difference of the last of some vectors from the others."""
+    return max(float(largest_difference(vectors[-1], other)) for other in vectors[:-1])

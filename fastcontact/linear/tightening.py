@@ -1,0 +1,25 @@
+"""Lower the tolerance of an iterative solver whose solutions leave forces out of balance."""
+
+from __future__ import annotations
+
+import logging
+
+from fastcontact.linear.protocol import LinearSolver
+
+log = logging.getLogger("fastcontact")
+# What solutions should leave of what is allowed, and the least relative residual to ask for: round-off leaves no less.
+LEFT, LEAST = 0.1, 1e-15
+
+
+def tighten(solver: LinearSolver, excess: float) -> bool:
+    """Lower the tolerance of `solver`, whose solutions leave `excess` times what is allowed; False at the least one."""
+    tolerance = max(solver.tolerance * LEFT / excess, LEAST)
+    if not tolerance < solver.tolerance:
+        return False
+    log.info(
+        "linear solver: forces are out of balance by %.1e times what is allowed, its tolerance falls from %.1e to %.1e",
+        excess, solver.tolerance, tolerance,
+    )  # fmt: skip
+    solver.asked = solver.tolerance if solver.asked is None else solver.asked
+    solver.tolerance = tolerance
+    return True

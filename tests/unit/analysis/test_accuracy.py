@@ -1,0 +1,162 @@
+"""The accuracy that is promised: forces balance to the criterion whatever the linear solver, or an error says why not."""
+
+import logging
+
+import numpy as np
+import pytest
+from stepping import Stepping
+
+import fastcontact as fc
+from fastcontact.analysis import restart
+from fastcontact.elasticity.stiffness import stiffness
+from fastcontact.mesh.generate import block
+
+DEPTH = 0.01
+# Newton, metres and pascal; or millimetres and pressures of one.
+UNITS = {"N-m": (2e11, 1e-3), "ones": (1.0, 1.0)}
+
+
+def stacked(ratio=1.0, friction=0.3, formulation="node_to_segment", dim=3, unit="ones", elements=3):
+    """One block on another, `ratio` times as stiff, pressed down by DEPTH and pushed aside."""
+    E, size = UNITS[unit]
+    axis = "xyz"[dim - 1]
+    if dim == 3:
+        low = fc.generate.box(
+            (1.2, 1.2, 0.5), (elements + 1, elements + 1, 2), "hex8", (-0.1, -0.1, -0.5), name="BLOCK"
+        )
+        up = fc.generate.box((1.0, 1.0, 0.5), (elements, elements, 2), "hex8", name="BLOCK")
+        bottom, top = "ZMIN", "ZMAX"
+    else:
+        low, up = block((1.2, 0.5), (elements + 1, 3), "quad4", (-0.1, -0.5)), block((1.0, 0.5), (elements, 3), "quad4")
+        bottom, top = "BOTTOM", "TOP"
+    low, up = (
+        fc.generate.renamed(mesh, {name: letter + name for name in mesh.group_names})
+        for letter, mesh in (("L_", low), ("U_", up))
+    )
+    mesh = fc.generate.union(low, up)
+    mesh = fc.Mesh(mesh.points * size, mesh.cells, mesh.cell_groups, mesh.point_groups)
+    model = fc.Model(mesh, "3d" if dim == 3 else "plane_strain")
+    model.add_material(fc.LinearElastic(E, 0.3), groups=["L_BLOCK"])
+    model.add_material(fc.LinearElastic(E * ratio, 0.3), groups=["U_BLOCK"])
+    model.fix("L_" + bottom, "xyz"[:dim])
+    moved = {"x": 0.2 * DEPTH * size, "y": 0.0, axis: -DEPTH * size}
+    model.prescribe("U_" + top, **moved)
+    model.add_contact("c", secondary="U_" + bottom, primary="L_" + top, formulation=formulation, friction=friction)
+    return model
+
+
+def solved(model, solver="direct", steps=1, **options):
+    return fc.solve(model, fc.linear_ramp(steps), linear_solver=solver, **options)[-1]
+
+
+def out_of_balance(model, step):
+    """Return the largest force that nothing balances, where the primary side is not, over the largest contact force."""
+    contact, mesh = step.contact["c"], model.mesh
+    K = stiffness(mesh, model.kinematics, *model.material_numbers())
+    rest = (K @ step.displacement.ravel()).reshape(mesh.points.shape)
+    rest[contact.points] -= contact.force_vectors
+    free = np.ones(len(rest), bool)
+    for held in (*(each.group for each in model.supports), model.contact[0].primary):
+        free[mesh.points_of(held)] = False
+    return np.abs(rest[free]).max() / np.abs(contact.force_vectors).max()
+
+
+@pytest.mark.filterwarnings("ignore:Young's moduli", "ignore:multigrid gave up", "ignore:.*across its radius")
+@pytest.mark.parametrize(
+    ("solver", "options"),
+    [
+        ("direct", {}),
+        ("amg", {}),
+        ("amg", {"unit": "N-m"}),
+        ("amg", {"friction": 0.0}),
+        ("amg", {"dim": 2, "formulation": "mortar"}),
+        ("amg", {"formulation": "continuous", "friction": 0.0}),
+        ("pyamg", {"dim": 2}),
+    ],
+)
+def test_soft_parts_balance_beside_parts_a_million_times_as_stiff(solver, options):
+    model = stacked(1e6, **options)
+    assert out_of_balance(model, solved(model, solver)) < 1e-6
+
+
+@pytest.mark.filterwarnings("ignore:Young's moduli", "ignore:.*across its radius")
+def test_factors_take_over_once_where_a_tolerance_near_round_off_would_be_needed(caplog):
+    with (
+        caplog.at_level(logging.WARNING, "fastcontact"),
+        pytest.warns(fc.FastcontactWarning, match="factors took over"),
+    ):
+        solved(stacked(1e8, friction=0.0, dim=2), "amg", steps=2)
+    assert sum("it leaves forces out of balance by" in record.message for record in caplog.records) == 1
+
+
+@pytest.mark.filterwarnings("ignore:Young's moduli", "ignore:multigrid gave up", "ignore:.*across its radius")
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+def test_what_round_off_does_not_allow_is_an_error_with_a_criterion_that_accepts_it(solver):
+    model = stacked(1e11, friction=0.0, dim=2)
+    with pytest.raises(fc.ConvergenceError, match=r"round-off leaves no less .* Criteria\(relative=(.*)\)") as caught:
+        solved(model, solver)
+    relative = float(str(caught.value).split("Criteria(relative=")[1].split(")")[0])
+    with pytest.warns(fc.FastcontactWarning, match=r"forces are out of balance by \d\.\de-04"):
+        accepted = solved(model, solver, criteria=fc.Criteria(relative=relative))
+    assert 1e-4 < out_of_balance(model, accepted) < relative
+
+
+@pytest.mark.filterwarnings("ignore:a displacement of")
+@pytest.mark.parametrize("solver", ["direct", "amg", "pyamg"])
+def test_bodies_that_only_move_have_no_forces_to_balance(solver):
+    model = stacked(friction=0.0, dim=2, unit="N-m")
+    moved = fc.Model(model.mesh, "plane_strain")
+    moved.add_material(fc.LinearElastic(2e11, 0.3))
+    for group in ("L_BOTTOM", "U_TOP"):
+        moved.prescribe(group, x=1.0, y=2.0)
+    step = solved(moved, solver)
+    assert np.abs(step.displacement - [1.0, 2.0]).max() < 1e-8
+
+
+@pytest.mark.filterwarnings("ignore:.*across its radius")
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
+@pytest.mark.parametrize(("solver", "dim"), [("amg", 3), ("pyamg", 2)])
+def test_a_loose_tolerance_of_the_linear_solver_costs_no_accuracy(solver, dim, tolerance, friction):
+    model = stacked(friction=friction, dim=dim)
+    expected, found = solved(model), solved(model, solver, linear_tolerance=tolerance)
+    assert out_of_balance(model, found) < 1e-6
+    np.testing.assert_allclose(
+        found.contact["c"].force, expected.contact["c"].force, atol=1e-5 * np.abs(expected.contact["c"].force).max()
+    )
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1e-10, 0.01, 0.5, 2.0, float("nan")])
+def test_senseless_tolerances_are_refused_before_anything_is_computed(tolerance, tmp_path):
+    with pytest.raises(fc.ModelError, match=r"must be positive and at most 0\.001"):
+        fc.solve_steps(stacked(dim=2), linear_tolerance=tolerance)
+    for name in ("relative", "geometry"):
+        with pytest.raises(fc.ModelError, match=rf"criterion {name} = .* must be positive and at most 0\.01"):
+            fc.Criteria(**{name: 10 * tolerance})
+
+
+def test_a_lowered_tolerance_is_remembered():
+    model = stacked(1e3, friction=0.0, dim=2)
+    analysis = Stepping(model, "pyamg", 1e-6, None, fc.linear_ramp(2))
+    assert analysis.problem.solver.improve(100.0)
+    analysis.step(1, 0.5)
+    kept = restart.taken(analysis.problem, analysis.state, {})
+    other = Stepping(model, "pyamg", 1e-6, None, fc.linear_ramp(2))
+    assert kept["solver"]["kind"] == restart.taken(other.problem, other.state, {})["solver"]["kind"]
+    other.problem.solver.remember(kept["solver"]["memory"])
+    assert other.problem.solver.tolerance == analysis.problem.solver.tolerance == pytest.approx(1e-9)
+
+
+@pytest.mark.parametrize("criteria", [{"geometry": 1e-2}, {"relative": 1e-2}])
+def test_what_loose_criteria_leave_is_told_with_its_number(criteria):
+    mesh = fc.generate.half_spheres("tri3", size=5.0)
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model.fix("A1A2", "x")
+    model.prescribe("A2B2", y=-2.0)
+    model.prescribe("A1B1", y=+2.0)
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2")
+    solver = "direct" if "geometry" in criteria else "pyamg"
+    text = "still changed by" if "geometry" in criteria else "forces are out of balance by"
+    with pytest.warns(fc.FastcontactWarning, match=text + r" \d\.\de-0[34]"):
+        solved(model, solver, linear_tolerance=1e-3, criteria=fc.Criteria(**criteria))

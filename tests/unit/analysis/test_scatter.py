@@ -1,0 +1,99 @@
+"""What a geometry loop can attain: slow convergence goes on, round-off ends it with a note, and the result is right."""
+
+import logging
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.analysis.scatter import WINDOW, Watch
+
+RNG = np.random.default_rng(5)
+
+
+def watched(parts, size=1.0, forces=None):
+    """Return the number of the update at which scatter is found, and the scatter."""
+    watch = Watch()
+    for k in range(1, len(parts)):
+        change = np.abs(parts[k] - parts[k - 1]).max()
+        force = np.ones(3) if forces is None else forces[k]
+        found = watch.seen(parts[k], force, change, size)
+        if found is not None:
+            return k, found
+    return None, None
+
+
+@pytest.mark.parametrize("level", [1e-13, 1e-10, 1e-8])
+def test_noise_is_found_soon_and_measured(level):
+    parts = 1.0 + level * RNG.normal(size=(40, 20))
+    k, found = watched(parts)
+    assert WINDOW <= k <= 3 * WINDOW
+    assert level < found.displacement < 10 * level
+    assert found.force == 0.0
+
+
+@pytest.mark.parametrize("rate", [0.5, 0.8, 0.9, 0.95, 0.99])
+def test_slow_convergence_is_no_noise(rate):
+    u = RNG.normal(size=20)
+    parts = [1.0 + 1e-7 * rate**k * u for k in range(60) if rate**k > 1e-7]
+    assert watched(parts)[0] is None
+
+
+@pytest.mark.parametrize(("level", "force"), [(1e-5, 0.0), (1e-9, 1e-3)])
+def test_what_matters_is_not_let_pass(level, force):
+    """Too large a scatter, of displacements or of contact forces, ends nothing."""
+    parts = 1.0 + level * RNG.normal(size=(40, 20))
+    assert watched(parts, forces=1.0 + force * RNG.normal(size=(40, 3)))[0] is None
+
+
+def side_by_side(element="tri6", unit=(1000.0, 1.0), **options):
+    mesh = fc.generate.block_on_block(element, divisions_lower=(3, 3), divisions_upper=(3, 2), shift=3.26)
+    mesh = fc.Mesh(mesh.points * unit[1], mesh.cells, mesh.cell_groups, mesh.point_groups)
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(unit[0], 0.3))
+    model.fix("LOWER_BOTTOM", "xy")
+    model.prescribe("UPPER_TOP", x=0.0, y=-0.05 * unit[1])
+    options = {"formulation": "mortar", "kind": "bilateral", **options}
+    model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
+    return model
+
+
+@pytest.mark.parametrize("unit", [(1000.0, 1.0), (2e11, 1e-3)], ids=["N-mm", "N-m"])
+@pytest.mark.parametrize("element", ["tri6", "quad8"])
+def test_round_off_ends_a_step_with_a_note_and_the_right_force(element, unit, caplog):
+    model = side_by_side(element, unit)
+    with caplog.at_level(logging.INFO, "fastcontact"):
+        (step,) = fc.solve(model, fc.linear_ramp(1))
+    scatter = step.iterations["scatter"]
+    assert 0.0 < scatter["displacement"] < 1e-7
+    assert scatter["force"] < 1e-6
+    assert f"scatter by {scatter['displacement']:.1e}" in caplog.text
+    assert step.iterations["geometry_updates"] < 25
+    (loose,) = fc.solve(model, fc.linear_ramp(1), criteria=fc.Criteria(geometry=1e-6))
+    assert "scatter" not in loose.iterations
+    np.testing.assert_allclose(step.contact["c"].force[1], loose.contact["c"].force[1], rtol=1e-5)
+
+
+def test_a_slender_bar_settles_and_contact_carries_its_load():
+    low = fc.generate.block((400.0, 2.0), (100, 2), "quad4", (0.0, -2.0))
+    up = fc.generate.block((400.0, 1.0), (133, 2))
+    mesh = fc.generate.union(
+        *(
+            fc.generate.renamed(m, {name: letter + name for name in m.group_names})
+            for m, letter in ((low, "L_"), (up, "U_"))
+        )
+    )
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(1e3, 0.3))
+    model.fix("L_BOTTOM", "xy")
+    model.fix("U_LEFT", "x")
+    model.add_body_force(["U_BLOCK"], y=-1e-3)
+    model.add_contact("c", secondary="U_BOTTOM", primary="L_TOP")
+    (step,) = fc.solve(model, fc.linear_ramp(1))
+    assert step.contact["c"].force[1] == pytest.approx(0.4, rel=1e-6)
+    assert step.iterations["geometry_updates"] < 25
+
+
+def test_a_geometry_that_does_not_settle_names_the_criterion():
+    with pytest.raises(fc.ConvergenceError, match=r"accept larger changes \(Criteria\.geometry = 1e-11\)"):
+        fc.solve(side_by_side(), fc.linear_ramp(1), criteria=fc.Criteria(max_geometry_updates=5, max_halvings=0))
