@@ -445,7 +445,28 @@ SUPPORTS = [
         fc.ModelError,
         r"prescribe\('LOWER_LEFT'\): unknown component 'z': known are x, y",
     ),
+    Mistake(
+        "a support that moves the axis of symmetry",
+        lambda: solved(on_axis(lambda model: model.prescribe("TOP", x=0.1))),
+        fc.ModelError,
+        r"x = 0\.1 is prescribed at point \d+ on the axis of symmetry, where the radial displacement is zero: leave the points at x = 0 out of the group",
+    ),
+    Mistake(
+        "a radial force on the axis of symmetry",
+        lambda: on_axis(lambda model: model.add_force("TOP_LEFT", x=1.0)),
+        fc.ModelError,
+        r"the nodal force on 'TOP_LEFT' has a radial component x at 1 points on the axis of symmetry \(first: point \d+\), where the circle that it acts along has no length: leave the points at x = 0 out",
+    ),
 ]
+
+
+def on_axis(add):
+    """A cylinder that stands on its bottom, with something wrong added."""
+    model = fc.Model(block((1.0, 1.0), (2, 2)), "axisymmetric")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("BOTTOM", "y")
+    add(model)
+    return model
 
 
 def sliding():
@@ -459,6 +480,12 @@ def contradicting():
     model = blocks()
     model.prescribe("UPPER_TOP", y=0.5)
     return model
+
+
+def pairs_overlap():
+    mesh = block_on_block()
+    model = blocks(mesh.with_groups(cells={"SOME": mesh.cell_groups["CONT_UPPER"][:1]}))
+    model.add_contact("some", secondary="SOME", primary="CONT_LOWER")
 
 
 CONTACT = [
@@ -497,6 +524,20 @@ CONTACT = [
         lambda: blocks().add_contact("again", secondary="CONT_LOWER", primary="CONT_UPPER"),
         fc.ContactError,
         r"contact 'again' joins 'CONT_LOWER' and 'CONT_UPPER', which contact 'pair' joins already: leave out one of the two",
+    ),
+    Mistake(
+        "two pairs over the same facets",
+        lambda: pairs_overlap(),
+        fc.ContactError,
+        r"contact 'some' joins facets of 'SOME' and 'CONT_LOWER' that contact 'pair' joins already: 'SOME' and 'CONT_UPPER' share facets with 2 nodes \(first: point \d+\), 'CONT_LOWER' and 'CONT_LOWER' share facets, too\. Leave out one of the two contacts, or make their groups apart",
+    ),
+    Mistake(
+        "the same obstacle twice",
+        lambda: with_obstacle(1.0).add_obstacle(
+            "again", secondary="TOP", obstacle=fc.obstacles.HalfSpace((2.0, 1.0), (0.0, -2.0)), motion={"y": -0.01}
+        ),
+        fc.ContactError,
+        r"contact 'again' presses facets of 'TOP' on the rigid obstacle on which contact 'plane' presses them already, with 3 nodes \(first: point \d+\): leave out one of the two",
     ),
     Mistake(
         "two pairs of one name",

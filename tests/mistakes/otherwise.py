@@ -24,6 +24,12 @@ OTHERWISE = {
         "two materials for one body in a case", "two materials for one group", "a material for all hides one of a group",
         "a key twice", "one pair twice in a case", "the same pair twice", "two pairs of one name",
     ),
+    "nothing is said: the pairs share the force at will, and each tells a part of the pressure": (
+        "two pairs over the same facets", "the same obstacle twice",
+    ),
+    "nothing is said: a hole opens along the axis, or its nodes pass through it": (
+        "a support that moves the axis of symmetry", "a radial force on the axis of symmetry",
+    ),
     "a division by zero: stresses that are infinite or not a number": ("nu is a half", "nu of 0.5 in a call"),
     "a stiffness that is not positive definite: a factorisation that fails, or a solution that makes no sense": (
         "nu above a half", "nu below -1", "E is negative", "a spring that pulls backwards",
