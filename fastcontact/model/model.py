@@ -580,7 +580,7 @@ class Model:
 
     @property
     def axis_nodes(self) -> NDArray[np.intp]:
-        """Nodes on the axis of an axisymmetric model, where x is held at zero without any support; none in others."""
+        """Nodes (k,) on the axis of an axisymmetric model, where x is held at zero without any support; none in others."""
         return axis_nodes(self.mesh) if self.kinematics == "axisymmetric" else np.empty(0, np.intp)
 
     def forces_by_ramp(self) -> dict[Table | None, Array]:
@@ -646,9 +646,8 @@ class Model:
         rows = [resisting(part)[0] @ motions.displacement for part in parts]
         works = [generalised(motions, force.ravel()) for force in forces]
         k = len(motions)
-        check_motions(
-            motions.combined(unstopped(np.vstack([*rows, np.empty((0, k))]), np.vstack([*works, np.empty((0, k))])))
-        )
+        gaps, driven_by = np.vstack([*rows, np.empty((0, k))]), np.vstack([*works, np.empty((0, k))])
+        check_motions(self.mesh, motions.combined(unstopped(gaps, driven_by)))
 
 
 def multiplier(own: Table | None, ramp: Ramp, instant: float) -> float:

@@ -87,6 +87,18 @@ def cracked():
     return model
 
 
+def hanging_together():
+    """A block on the corner of another one, whose common node was merged; only the lower one is held."""
+    mesh = generate.union(
+        generate.renamed(block((1.0, 1.0), (2, 2)), {"BLOCK": "A_BLOCK", "BOTTOM": "A_BOTTOM"}),
+        generate.renamed(block((1.0, 1.0), (2, 2), origin=(1.0, 1.0)), {"BLOCK": "B_BLOCK", "BOTTOM": "B_BOTTOM"}),
+    )
+    model = fc.Model(generate.merge_points(mesh, 1e-9), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("A_BOTTOM", "xy")
+    return model
+
+
 def with_materials(*given):
     model = blocks(materials=False)
     for E, nu, groups in given:
@@ -232,6 +244,12 @@ MESH = [
         lambda: solved(square_in_two()),
         fc.ModelError,
         r"3 rigid-body motions are not supported: body 'B': translation along x, .*rotation",
+    ),
+    Mistake(
+        "bodies that hang together at one node",
+        lambda: solved(hanging_together()),
+        fc.ModelError,
+        r"1 rigid-body motion is not supported: body number 1 \(around \[.*\]\), the part 'B_BLOCK' that hangs at point \d+ at \(1, 1\): .*rotation\. Fix or prescribe a displacement component that stops each, or let a load press the body against a contact\. Parts of bodies hang together at 1 nodes only \(first: point \d+ at \(1, 1\)\): merge whole facets there, or leave the parts separate and define the contact",
     ),
     Mistake(
         "a support on a node of no cell",

@@ -65,7 +65,7 @@ OTHERWISE = {
         "component that a plane mesh lacks", "a support in z of a plane model",
     ),
     "the job ends with an exit code of success, and displacements of 1e10 or not a number": (
-        "one body is not held", "no body is held",
+        "one body is not held", "no body is held", "bodies that hang together at one node",
     ),
     "nothing is said: the last one wins, or both are added up": ("supports contradict", "supports that contradict each other"),
     "nothing is said: no node is ever in contact, and the bodies pass through each other": (
