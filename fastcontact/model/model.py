@@ -54,7 +54,8 @@ from fastcontact.model.checks import (
 from fastcontact.model.contact_pair import ContactPair, Driving
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
-from fastcontact.model.ramp import History, Ramp, Table, table_of, table_value
+from fastcontact.model.prescribed_overlap import Supports, check_prescribed
+from fastcontact.model.ramp import History, Ramp, Table, combined, multiplier, table_of
 from fastcontact.model.repeated_pairs import check_repeated
 from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
 
@@ -613,8 +614,10 @@ class Model:
             check_ramps(named, ramp.instants)
         self._check_relations(fixed, prescribed, ramp or Ramp((1.0,)))
         check_supports(self.mesh, [(s.name, s.group) for s in self.supports], self._related())
-        for pair in self.contact:
-            check_penetration(pair.name, self.bind(pair))
+        bound = [(pair, self.bind(pair)) for pair in self.contact]
+        for pair, formulation in bound:
+            check_penetration(pair.name, formulation)
+        check_prescribed(bound, Supports(fixed, prescribed, ramp or Ramp((1.0,))))
         check_overlap(
             self.mesh, self.kinematics, [(p.secondary, p.primary) for p in self.contact if p.obstacle is None]
         )
@@ -648,13 +651,3 @@ class Model:
         k = len(motions)
         gaps, driven_by = np.vstack([*rows, np.empty((0, k))]), np.vstack([*works, np.empty((0, k))])
         check_motions(self.mesh, motions.combined(unstopped(gaps, driven_by)))
-
-
-def multiplier(own: Table | None, ramp: Ramp, instant: float) -> float:
-    """Return the multiplier of a load at `instant`: that of its own history, or else of the ramp."""
-    return ramp.value(instant) if own is None else table_value(own, instant)
-
-
-def combined(by_ramp: Mapping[Table | None, Array], ramp: Ramp, instant: float, shape: tuple[int, ...]) -> Array:
-    """Return the sum of the parts at `instant`, each times its multiplier."""
-    return sum((multiplier(own, ramp, instant) * part for own, part in by_ramp.items()), np.zeros(shape))

@@ -506,6 +506,20 @@ def pairs_overlap():
     model.add_contact("some", secondary="SOME", primary="CONT_LOWER")
 
 
+def pushed_into_each_other():
+    model = blocks(supports=False)
+    model.fix("CONT_LOWER", "xy")
+    model.fix("CONT_UPPER", "x")
+    model.prescribe("CONT_UPPER", y=-0.02)
+    return model
+
+
+def corner_pushed():
+    model = with_obstacle(1.0)
+    model.prescribe("LEFT", y=0.0)
+    return model
+
+
 CONTACT = [
     Mistake(
         "contact on the wrong face",
@@ -562,6 +576,18 @@ CONTACT = [
         lambda: blocks().add_contact("pair", secondary="UPPER_LEFT", primary="LOWER_RIGHT"),
         fc.ContactError,
         r"there is already a contact pair 'pair': names must differ",
+    ),
+    Mistake(
+        "supports that push one side into the other",
+        lambda: solved(pushed_into_each_other()),
+        fc.ModelError,
+        r"supports push 7 of the 7 nodes of 'CONT_UPPER' into 'CONT_LOWER', contact 'pair', by up to 0\.02 \(point \d+ at \(0, 0\), instant 1\): contact forces cannot change what supports prescribe; prescribe other values, or the displacement of nodes that are not in contact",
+    ),
+    Mistake(
+        "a support that pushes a corner into an obstacle",
+        lambda: solved(corner_pushed()),
+        fc.FastcontactWarning,
+        r"supports push 1 of the 3 nodes of 'TOP' into the rigid obstacle, contact 'plane', by up to 0\.01 \(point \d+ at \(0, 1\), instant 1\): contact forces cannot change what supports prescribe; leave these nodes out of the support, or out of the contact \('excluded'\)",
     ),
     Mistake(
         "a penetration larger than an element",

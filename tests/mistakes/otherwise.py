@@ -130,7 +130,8 @@ OTHERWISE = {
     ),
     "nothing is said: the bodies lie inside each other": (
         "a pair was forgotten", "bodies interpenetrate where no contact is defined",
-        "bodies overlap and no pair joins them",
+        "bodies overlap and no pair joins them", "supports that push one side into the other",
+        "a support that pushes a corner into an obstacle",
     ),
     "a singular matrix, or a body that flies away under springs that nobody asked for": ("bodies pulled apart by a force",),
     "nothing is said: springs that were added to make the matrix regular take part of the load": (
