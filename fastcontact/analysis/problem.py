@@ -23,8 +23,8 @@ from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.linear import choice
 from fastcontact.linear.protocol import LinearSolver
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
-from fastcontact.model.model import Model, combined, multiplier
-from fastcontact.model.ramp import Ramp, Table
+from fastcontact.model.model import Model
+from fastcontact.model.ramp import Ramp, Table, combined, multiplier
 from fastcontact.model.rigid_motions import free_motions
 
 Array = NDArray[np.float64]

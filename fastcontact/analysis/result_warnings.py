@@ -172,6 +172,11 @@ def _lost(name: str, contact: ContactResult, touched: bool, loaded: bool) -> lis
         return []
     facing = contact.gap[np.isfinite(contact.gap)]
     gap = f"the smallest gap is {facing.min():.4g}" if len(facing) else "no node faces the other side"
+    if len(facing) and facing.min() < 0.0 and not touched:
+        return [
+            f"contact '{name}' carries nothing although its sides penetrate by {-facing.min():.4g}: supports or relations "
+            "hold its nodes there; leave these nodes free, or out of the contact as 'excluded'"
+        ]
     if not touched:
         return [f"contact '{name}' never closed: {gap}. Check its sides and which way the loads push"]
     return [f"contact '{name}' is lost at the end, after it was closed: {gap}"] if loaded else []

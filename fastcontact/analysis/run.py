@@ -122,15 +122,15 @@ def solve_steps(
         linear_precision=linear_precision,
     )  # fmt: skip
     touched = frozenset(name for step in resume for name, found in step.contact.items() if found.active.any())
-    return _marched(model, prepared, instants, case, last, touched)
+    return _marched(model, ramp, prepared, instants, case, last, touched)
 
 
 def _marched(
-    model: Model, prepared: Callable[[Model], Problem], instants: list[float], case: dict[str, Any],
+    model: Model, ramp: Ramp, prepared: Callable[[Model], Problem], instants: list[float], case: dict[str, Any],
     last: StepResult | None, touched: frozenset[str],
 ) -> Iterator[StepResult]:  # fmt: skip
     """Yield the steps at `instants`, the first of them after `last`; `touched` are the pairs that closed before."""
-    doubtful = model_warnings(model)
+    doubtful = model_warnings(model, ramp)
     for text in doubtful if last is None else ():
         warn(text)
     problem = prepared(model)

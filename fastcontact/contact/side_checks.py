@@ -55,6 +55,19 @@ def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSid
         )
 
 
+def shared_facets(mesh: Mesh, group: str, other: str) -> NDArray[np.int32]:
+    """Return the nodes of the facets that two groups share, ascending; a facet may be in the mesh more than once."""
+    ours, theirs = mesh.cells_of(group, dim=mesh.dim - 1), mesh.cells_of(other, dim=mesh.dim - 1)
+    nodes = [np.empty(0, np.int32)]
+    for name in ours.keys() & theirs.keys():
+        found, count = np.unique(
+            np.concatenate([np.unique(np.sort(side[name], axis=1), axis=0) for side in (ours, theirs)]),
+            axis=0, return_counts=True,
+        )  # fmt: skip
+        nodes.append(found[count > 1].ravel())
+    return np.unique(np.concatenate(nodes))
+
+
 def _facet_frames(mesh: Mesh, side: Surface) -> tuple[Array, Array, Array]:
     """Return centres, unit normals and sizes of about SAMPLE facets of each kind of a surface, as if flat."""
     centres, normals, sizes = [], [], []

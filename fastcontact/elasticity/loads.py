@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.elasticity.symmetry_axis import axis_nodes
 from fastcontact.errors import ModelError, unknown
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.mesh import Mesh
@@ -161,6 +162,13 @@ class NodalForce(Load):
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         if not len(mesh.points_of(self.group)):
             raise ModelError(f"group '{self.group}' is empty: no force can act on it")
+        if kinematics == "axisymmetric" and 0 in self.components:
+            on_axis = np.intersect1d(mesh.points_of(self.group), axis_nodes(mesh))
+            if len(on_axis):
+                raise ModelError(
+                    f"{self.name} has a radial component x at {len(on_axis)} points on the axis of symmetry (first: point "
+                    f"{on_axis[0]}), where the circle that it acts along has no length: leave the points at x = 0 out"
+                )
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
         for axis, value in self.components.items():

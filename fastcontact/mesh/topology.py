@@ -99,7 +99,7 @@ def _direction(facets: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.column_stack([facets[rows, first], ahead, behind if count > 2 else first])
 
 
-def _remembered(function: Callable[[Mesh], Found]) -> Callable[[Mesh], Found]:
+def remembered(function: Callable[[Mesh], Found]) -> Callable[[Mesh], Found]:
     """Return `function`, computed once for every mesh: meshes do not change, and many parts of an analysis need it."""
     known: WeakKeyDictionary[Mesh, Found] = WeakKeyDictionary()
 
@@ -112,7 +112,7 @@ def _remembered(function: Callable[[Mesh], Found]) -> Callable[[Mesh], Found]:
     return remembered
 
 
-@_remembered
+@remembered
 def bodies(mesh: Mesh) -> tuple[int, NDArray[np.int32]]:
     """Return the number of bodies (sets of solid cells connected by nodes) and the body (n_points,) of each point.
 
@@ -135,25 +135,39 @@ def bodies(mesh: Mesh) -> tuple[int, NDArray[np.int32]]:
     return len(found), body
 
 
-@_remembered
 def outer_facets(mesh: Mesh) -> Mapping[str, Indices]:
     """Return by facet element the facets (n_facets, n_nodes) of exactly one solid cell, normals pointing outward."""
+    return _facets(mesh)[0]
+
+
+def cells_joined_by_facets(mesh: Mesh) -> NDArray[np.int32]:
+    """Return for each cell (n_cells,) of the mesh the lowest one that common facets join it to, from cell to cell.
+
+    Cells that are no solids stand for themselves.
+    """
+    return _facets(mesh)[1]
+
+
+@remembered
+def _facets(mesh: Mesh) -> tuple[Mapping[str, Indices], NDArray[np.int32]]:
+    """Return `outer_facets` and `cells_joined_by_facets`."""
     found: dict[str, list[Indices]] = {}
+    owners: dict[str, list[Indices]] = {}
     for name, block in mesh.solids.items():
-        element = elements.get(name)
+        element, numbers = elements.get(name), mesh.offsets[name] + np.arange(len(block), dtype=np.int32)
         for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
             found.setdefault(facet_element, []).append(block[:, list(facet)])
-    kept = {name: _single(np.concatenate(blocks), mesh.n_points) for name, blocks in found.items()}
-    return MappingProxyType({name: facets for name, facets in kept.items() if len(facets)})
-
-
-def _single(facets: Indices, n_points: int) -> Indices:
-    """Return the facets whose nodes no other facet has, in the order given."""
-    facets, alone = np.ascontiguousarray(facets), np.empty(len(facets), bool)
-    topology_kernels.alone(facets, n_points, alone)
-    kept = np.ascontiguousarray(facets[alone])
-    kept.setflags(write=False)
-    return kept
+            owners.setdefault(facet_element, []).append(numbers)
+    parent, kept = np.arange(sum(map(len, mesh.cells.values())), dtype=np.int32), {}
+    for name, blocks in found.items():
+        facets = np.ascontiguousarray(np.concatenate(blocks))
+        alone = np.empty(len(facets), bool)
+        topology_kernels.alone(facets, np.concatenate(owners[name]), mesh.n_points, alone, parent)
+        kept[name] = np.ascontiguousarray(facets[alone])
+        kept[name].setflags(write=False)
+    while not (parent[parent] == parent).all():
+        parent = parent[parent]
+    return MappingProxyType({name: facets for name, facets in kept.items() if len(facets)}), parent
 
 
 @dataclass(frozen=True, eq=False)

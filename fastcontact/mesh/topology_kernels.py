@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Facets of exactly one cell, found by sorting the facets by their nodes."""
+"""Facets of exactly one cell, and cells that facets join, found by sorting the facets by their nodes."""
 
 import numpy as np
 
@@ -31,8 +31,20 @@ def _same(keys, f, g):
 
 
 @kernel
-def alone(facets, n_points, found):
+def _root(parent, cell):
+    """Return the cell that stands for all that `cell` is joined to; the way there is halved for the next one."""
+    while parent[cell] != cell:
+        parent[cell] = parent[parent[cell]]
+        cell = parent[cell]
+    return cell
+
+
+@kernel
+def alone(facets, owner, n_points, found, parent):
     """Fill `found` (n_facets,) with whether no other one of the facets (n_facets, n_nodes) has the same nodes.
+
+    Cells, the `owner` (n_facets,) of each facet, that have facets with the same nodes are joined in the forest `parent`
+    (n_cells,), in place: the lower root becomes that of both.
 
     The facets are sorted by counting, by one node after the other, the lowest last. Facets with the same nodes then follow
     each other, in a time that does not depend on how many meet at a node.
@@ -55,3 +67,6 @@ def alone(facets, n_points, found):
     for k in range(n):
         beside = k > 0 and _same(keys, order[k], order[k - 1])
         found[order[k]] = not (beside or (k + 1 < n and _same(keys, order[k], order[k + 1])))
+        if beside:
+            one, two = _root(parent, owner[order[k]]), _root(parent, owner[order[k - 1]])
+            parent[max(one, two)] = min(one, two)

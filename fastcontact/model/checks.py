@@ -14,7 +14,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.body_overlap import penetration
 from fastcontact.model.ramp import Table
-from fastcontact.model.rigid_motions import FreeMotions, body_name
+from fastcontact.model.rigid_motions import FreeMotions, body_name, node_at
 
 if TYPE_CHECKING:
     from fastcontact.contact.formulations import Formulation
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def check_motions(motions: FreeMotions) -> None:
-    """Raise ModelError if bodies can move without deforming, naming bodies and motions."""
+def check_motions(mesh: Mesh, motions: FreeMotions) -> None:
+    """Raise ModelError if bodies, or parts of them at hinges, can move without deforming, naming bodies and motions."""
     if not len(motions):
         return
     total = len(motions)
@@ -31,6 +31,17 @@ def check_motions(motions: FreeMotions) -> None:
     raise ModelError(
         f"{total} rigid-body motion{'s are' if total > 1 else ' is'} not supported: {listing}. "
         "Fix or prescribe a displacement component that stops each, or let a load press the body against a contact"
+        f"{_hinges(mesh, motions)}"
+    )
+
+
+def _hinges(mesh: Mesh, motions: FreeMotions) -> str:
+    """Return what else helps where parts of bodies turn about nodes."""
+    if not len(motions.hinges):
+        return ""
+    return (
+        f". Parts of bodies hang together at {len(motions.hinges)} nodes only (first: {node_at(mesh, motions.hinges[0])}): "
+        "merge whole facets there, or leave the parts separate and define the contact"
     )
 
 

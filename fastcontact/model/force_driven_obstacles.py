@@ -124,7 +124,7 @@ class ForceDrivenObstacles:
             for dof in free.tolist()
         ]
         parts = np.asarray(block_diag(motions.parts, np.eye(len(free))), float)
-        return FreeMotions(displacement, parts, [*motions.labels, *labels])
+        return FreeMotions(displacement, parts, [*motions.labels, *labels], motions.hinges)
 
     def near_nullspace(self, modes: Array) -> Array:
         """Return displacements (n_dofs, k) that cost little energy: `modes`, translations first, and obstacles with them."""

@@ -39,6 +39,7 @@ from fastcontact.elasticity.loads import (
 from fastcontact.elasticity.materials import KINEMATICS, LinearElastic
 from fastcontact.elasticity.relations import Relation, stacked_rows
 from fastcontact.elasticity.springs import Springs, between, grounded, stacked
+from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
@@ -53,7 +54,9 @@ from fastcontact.model.checks import (
 from fastcontact.model.contact_pair import ContactPair, Driving
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
-from fastcontact.model.ramp import History, Ramp, Table, table_of, table_value
+from fastcontact.model.prescribed_overlap import Supports, check_prescribed
+from fastcontact.model.ramp import History, Ramp, Table, combined, multiplier, table_of
+from fastcontact.model.repeated_pairs import check_repeated
 from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
 
 Array = NDArray[np.float64]
@@ -92,7 +95,8 @@ class Model:
     ----------
     mesh : Mesh
     kinematics : str
-        ``"axisymmetric"`` (x is the radius, y the axis), ``"plane_strain"``, ``"plane_stress"`` or ``"3d"``.
+        ``"axisymmetric"`` (x is the radius, y the axis, on which x is held at zero without a support),
+        ``"plane_strain"``, ``"plane_stress"`` or ``"3d"``.
     case_text : str
         Text kept in result files beside the numbers, usually the case file.
 
@@ -456,11 +460,7 @@ class Model:
         if isinstance(bound.primary, RigidSide):
             check_obstacle(self.mesh, pair.name, bound.secondary, bound.primary)
         for other in self.contact:
-            if pair.primary and {pair.secondary, pair.primary} == {other.secondary, other.primary}:
-                raise ContactError(
-                    f"contact '{pair.name}' joins '{pair.secondary}' and '{pair.primary}', which contact '{other.name}' "
-                    "joins already: leave out one of the two"
-                )
+            check_repeated(self.mesh, pair, other)
         self.contact.append(pair)
 
     def bind(self, pair: ContactPair, supported: NDArray[np.bool_] | None = None) -> Formulation:
@@ -563,7 +563,26 @@ class Model:
             total = by_ramp.setdefault(support.ramp, np.zeros(self.mesh.points.shape))
             fixed[nodes, k], total[nodes[new], k] = True, values[new]
             owner.update({(int(node), k): support for node in nodes[new]})
+        self._hold_axis(fixed, by_ramp)
         return fixed, by_ramp
+
+    def _hold_axis(self, fixed: NDArray[np.bool_], by_ramp: Mapping[Table | None, Array]) -> None:
+        """Add the symmetry at the axis of an axisymmetric model to the supports, and refuse those that contradict it."""
+        axis = self.axis_nodes
+        for values in by_ramp.values():
+            off = axis[np.abs(values[axis, 0]) > ON_AXIS * np.abs(values).max()]
+            if len(off):
+                raise ModelError(
+                    f"x = {values[off[0], 0]:g} is prescribed at point {off[0]} on the axis of symmetry, where the radial "
+                    "displacement is zero: leave the points at x = 0 out of the group"
+                )
+            values[axis, 0] = 0.0
+        fixed[axis, 0] = True
+
+    @property
+    def axis_nodes(self) -> NDArray[np.intp]:
+        """Nodes (k,) on the axis of an axisymmetric model, where x is held at zero without any support; none in others."""
+        return axis_nodes(self.mesh) if self.kinematics == "axisymmetric" else np.empty(0, np.intp)
 
     def forces_by_ramp(self) -> dict[Table | None, Array]:
         """Return by history the nodal forces (n_points, dim) of all loads at multiplier 1 [force]."""
@@ -585,6 +604,7 @@ class Model:
         """Check the whole model, and its histories against `ramp`; `solve` does so before any numerics."""
         self.material_numbers()
         fixed, prescribed = self.prescribed_by_ramp()
+        self._tell_axis()
         forces = self.forces_by_ramp()
         if ramp is not None:
             items: list[Support | Load | Relation] = [*self.supports, *self.loads, *self.relations]
@@ -594,12 +614,21 @@ class Model:
             check_ramps(named, ramp.instants)
         self._check_relations(fixed, prescribed, ramp or Ramp((1.0,)))
         check_supports(self.mesh, [(s.name, s.group) for s in self.supports], self._related())
-        for pair in self.contact:
-            check_penetration(pair.name, self.bind(pair))
+        bound = [(pair, self.bind(pair)) for pair in self.contact]
+        for pair, formulation in bound:
+            check_penetration(pair.name, formulation)
+        check_prescribed(bound, Supports(fixed, prescribed, ramp or Ramp((1.0,))))
         check_overlap(
             self.mesh, self.kinematics, [(p.secondary, p.primary) for p in self.contact if p.obstacle is None]
         )
         self._check_motions(fixed, list(self.force_driven.forces(forces).values()))
+
+    def _tell_axis(self) -> None:
+        """Log what is held on the axis although no support names it."""
+        named = [self.mesh.points_of(support.group) for support in self.supports if support.component == 0]
+        held = np.setdiff1d(self.axis_nodes, np.concatenate(named)) if named else self.axis_nodes
+        if len(held):
+            log.info("axis of symmetry: x is held at zero at %d nodes with x = 0 (first: point %d)", len(held), held[0])
 
     def _check_relations(self, fixed: NDArray[np.bool_], prescribed: Mapping[Table | None, Array], ramp: Ramp) -> None:
         if not self.relations:
@@ -620,16 +649,5 @@ class Model:
         rows = [resisting(part)[0] @ motions.displacement for part in parts]
         works = [generalised(motions, force.ravel()) for force in forces]
         k = len(motions)
-        check_motions(
-            motions.combined(unstopped(np.vstack([*rows, np.empty((0, k))]), np.vstack([*works, np.empty((0, k))])))
-        )
-
-
-def multiplier(own: Table | None, ramp: Ramp, instant: float) -> float:
-    """Return the multiplier of a load at `instant`: that of its own history, or else of the ramp."""
-    return ramp.value(instant) if own is None else table_value(own, instant)
-
-
-def combined(by_ramp: Mapping[Table | None, Array], ramp: Ramp, instant: float, shape: tuple[int, ...]) -> Array:
-    """Return the sum of the parts at `instant`, each times its multiplier."""
-    return sum((multiplier(own, ramp, instant) * part for own, part in by_ramp.items()), np.zeros(shape))
+        gaps, driven_by = np.vstack([*rows, np.empty((0, k))]), np.vstack([*works, np.empty((0, k))])
+        check_motions(self.mesh, motions.combined(unstopped(gaps, driven_by)))

@@ -18,6 +18,8 @@ from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.elements import Element
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import poorest_cell
+from fastcontact.model.prescribed_overlap import Supports, prescribed_overlap_warnings
+from fastcontact.model.ramp import Ramp
 
 if TYPE_CHECKING:
     from fastcontact.model.model import Model
@@ -46,11 +48,19 @@ MIXED = np.array([0x1E3779B97F4A7C15, 0x3F58476D1CE4E5B9, 0x14D049BB133111EB], n
 
 
 @on_one_blas_thread
-def model_warnings(model: Model) -> list[str]:
-    """Return the warnings about a model that `Model.check` has found complete."""
+def model_warnings(model: Model, ramp: Ramp) -> list[str]:
+    """Return the warnings about a model that `Model.check` has found complete, for an analysis along a ramp."""
     found = _moduli(model) + _named_units(model) + _proportions(model)
     found += [text for text in (poorest_cell(model.mesh), _coincident(model)) if text]
+    found += _prescribed_overlaps(model, ramp)
     return found + _stiffness(model.mesh) + [text for load in model.loads for text in _load_integral(model, load)]
+
+
+def _prescribed_overlaps(model: Model, ramp: Ramp) -> list[str]:
+    """Return a warning for each contact with nodes that supports alone bring into its other side."""
+    fixed, by_ramp = model.prescribed_by_ramp()
+    supported = [pair for pair in model.contact if fixed[model.mesh.points_of(pair.secondary)].any()]
+    return prescribed_overlap_warnings([(p, model.bind(p)) for p in supported], Supports(fixed, by_ramp, ramp))
 
 
 def _moduli(model: Model) -> list[str]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fastcontact.errors import ModelError
 
+Array = NDArray[np.float64]
 # Points (instant, multiplier of the loads) of a piecewise linear function.
 Table = tuple[tuple[float, float], ...]
 # Largest number of equal steps; more are probably a typing error.
@@ -102,3 +104,13 @@ def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:
     if not end > 0:
         raise ModelError(f"the ramp must end at a positive load factor, not {end}")
     return Ramp(tuple(end * (i + 1) / int(steps) for i in range(int(steps))), ((0.0, 0.0), (end, 1.0)))
+
+
+def multiplier(own: Table | None, ramp: Ramp, instant: float) -> float:
+    """Return the multiplier of a load at `instant`: that of its own history, or else of the ramp."""
+    return ramp.value(instant) if own is None else table_value(own, instant)
+
+
+def combined(by_ramp: Mapping[Table | None, Array], ramp: Ramp, instant: float, shape: tuple[int, ...]) -> Array:
+    """Return the sum of the parts at `instant`, each times its multiplier."""
+    return sum((multiplier(own, ramp, instant) * part for own, part in by_ramp.items()), np.zeros(shape))

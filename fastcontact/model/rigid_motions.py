@@ -6,7 +6,7 @@ then lie inside the cone of the contact forces (Fichera, 1964; Lions and Stampac
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,9 @@ from scipy.sparse import csr_array, vstack
 
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.stiffness import rigid_modes
+from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.rigid_parts import RigidParts, rigid_parts
 from fastcontact.mesh.topology import bodies
 
 Array = NDArray[np.float64]
@@ -30,6 +32,8 @@ MODE_NAMES = {
 ZERO = 1e-8
 # A motion that contact does not stop within so many times the size of the model is not stopped at all.
 FAR = 1e3
+# A mesh of more motions of parts between hinges is no structure that anybody meant.
+MANY = 1500
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,19 +41,21 @@ class FreeMotions:
     """Independent motions without deformation that supports and relations allow.
 
     The `displacement` (n_dofs, k) of all points has about 1 as largest entry of a column; `parts` (p, k) are the same motions
-    as combinations of elementary ones, and `labels` body and name of each of those.
+    as combinations of elementary ones, and `labels` body and name of each of those. `hinges` (m,) are the nodes at which
+    parts of bodies hang together, one or several in line.
     """
 
     displacement: Array
     parts: Array
     labels: list[tuple[str, str]]
+    hinges: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
 
     def __len__(self) -> int:
         return self.displacement.shape[1]
 
     def combined(self, coefficients: Array) -> FreeMotions:
         """Return the motions ``displacement @ coefficients``, coefficients (k, j)."""
-        return FreeMotions(self.displacement @ coefficients, self.parts @ coefficients, self.labels)
+        return replace(self, displacement=self.displacement @ coefficients, parts=self.parts @ coefficients)
 
     def names(self) -> list[str]:
         """Return a description of each motion: bodies and elementary motions that it mixes."""
@@ -71,49 +77,110 @@ class FreeMotions:
         return [(body, " with ".join(motions)) for body, motions in mixed.items()]
 
 
-def body_name(mesh: Mesh, body: NDArray[np.int32], number: int) -> str:
-    """Return a name for a body: a cell group whose solid cells are all of it, or its number."""
+def body_name(mesh: Mesh, body: NDArray[np.integer], number: int) -> str:
+    """Return a name for a body, given that of each point: a cell group whose solid cells are all of it, or its number."""
     members = np.flatnonzero(body == number)
+    return _group_of(mesh, members) or f"number {number + 1} (around {mesh.points[members].mean(axis=0)})"
+
+
+def _group_of(mesh: Mesh, members: NDArray[np.intp]) -> str:
+    """Return the name of the cell group whose solid cells have the nodes `members`, empty if there is none."""
     for group in mesh.cell_groups:
         blocks = mesh.cells_of(group, dim=mesh.dim)
-        if blocks:
-            nodes = np.unique(np.concatenate([block.ravel() for block in blocks.values()]))
-            if np.array_equal(nodes, members):
-                return f"'{group}'"
-    return f"number {number + 1} (around {mesh.points[members].mean(axis=0)})"
+        if blocks and np.array_equal(np.unique(np.concatenate([block.ravel() for block in blocks.values()])), members):
+            return f"'{group}'"
+    return ""
 
 
 def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array | None = None) -> FreeMotions:
     """Return the motions without deformation that the supports `fixed` (n_points, dim) and the relations allow.
 
-    `relations` (m, n_dofs) are rows R with ``R u = 0``; points of no body move freely where relations name them.
+    Bodies move as a whole; parts of a body that hang together at single nodes turn about those. `relations` (m, n_dofs) are
+    rows R with ``R u = 0``; points of no body move freely where relations name them.
     """
     dofs = mesh.n_points * mesh.dim
-    columns, parts, labels = [], [], []
-    count, body = bodies(mesh)
-    for number in range(count):
-        members = np.flatnonzero(body == number)
-        modes = rigid_modes(mesh.points[members], kinematics)
-        modes = modes / np.abs(modes).max(axis=0)
-        free = _null_space(modes[fixed[members].ravel()])  # combinations of the body's modes that no support stops
-        if free.shape[1]:
-            own = np.zeros((mesh.n_points, mesh.dim, free.shape[1]))
-            own[members] = (modes @ free).reshape(len(members), mesh.dim, -1)
-            columns.append(own.reshape(dofs, -1))
-            parts.append(free)
-            labels += [(f"body {body_name(mesh, body, number)}", name) for name in MODE_NAMES[kinematics]]
+    motions = _of_bodies(mesh, kinematics, fixed)
+    columns, parts, labels = [motions.displacement], [motions.parts], list(motions.labels)
     if relations is not None:
-        for dof in np.unique(relations.indices[(body[relations.indices // mesh.dim] < 0)]):
-            if not fixed.ravel()[dof]:
-                columns.append(np.eye(dofs, 1, -int(dof)))
-                parts.append(np.ones((1, 1)))
-                labels.append((f"point {dof // mesh.dim}", f"translation along {'xyz'[dof % mesh.dim]}"))
-    if not columns:
-        return FreeMotions(np.empty((dofs, 0)), np.empty((0, 0)), [])
-    motions = FreeMotions(np.hstack(columns), block_diag(*parts), labels)
-    if relations is None or not relations.shape[0]:
+        lone = bodies(mesh)[1][relations.indices // mesh.dim] < 0
+        for dof in np.unique(relations.indices[lone & ~fixed.ravel()[relations.indices]]):
+            columns.append(np.eye(dofs, 1, -int(dof)))
+            parts.append(np.ones((1, 1)))
+            labels.append((f"point {dof // mesh.dim}", f"translation along {'xyz'[dof % mesh.dim]}"))
+    motions = FreeMotions(np.hstack(columns), np.asarray(block_diag(*parts), float), labels, motions.hinges)
+    if relations is None or not relations.shape[0] or not len(motions):
         return motions
     return motions.combined(_null_space(relations @ motions.displacement))
+
+
+def _of_bodies(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
+    """Return the motions that the supports `fixed` (n_points, dim) leave to bodies, and to parts of them at hinges."""
+    rigid = _parts_of(mesh, kinematics)
+    moving: list[tuple[NDArray[np.intp], Array]] = []  # nodes (m,) of a part, and its motions (m, dim, k) there
+    parts, labels = [np.empty((0, 0))], []
+    for number in range(rigid.count):
+        members = rigid.nodes_of(number)
+        modes = rigid_modes(mesh.points[members], kinematics)
+        modes = modes / np.abs(modes).max(axis=0)
+        free = _null_space(modes[fixed[members].ravel()])  # combinations of the part's modes that no support stops
+        moving.append((members, (modes @ free).reshape(len(members), mesh.dim, -1)))
+        if free.shape[1]:
+            parts.append(free)
+            labels += [(_part_name(mesh, rigid, number), name) for name in MODE_NAMES[kinematics]]
+    kept = _turning_about(mesh, rigid, moving)
+    spans = np.split(kept, np.cumsum([motion.shape[2] for _, motion in moving]))
+    displacement = np.zeros((mesh.n_points, mesh.dim, kept.shape[1]))
+    for number, ((members, motion), span) in enumerate(zip(moving, spans[:-1], strict=True)):
+        own = rigid.part[members] == number
+        displacement[members[own]] = motion[own] @ span
+    return FreeMotions(
+        displacement.reshape(mesh.points.size, kept.shape[1]), np.asarray(block_diag(*parts), float) @ kept, labels,
+        np.unique(rigid.hinge_node),
+    )  # fmt: skip
+
+
+def _parts_of(mesh: Mesh, kinematics: str) -> RigidParts:
+    """Return what moves as a whole: bodies, or parts of them between hinges."""
+    if kinematics != "axisymmetric":
+        return rigid_parts(mesh)
+    # Rings have no motion but along the axis, and one common node passes that on.
+    count, body = bodies(mesh)
+    return RigidParts(count, body.astype(np.intp), np.empty(0, np.intp), np.empty(0, np.intp))
+
+
+def _turning_about(mesh: Mesh, rigid: RigidParts, moving: list[tuple[NDArray[np.intp], Array]]) -> Array:
+    """Return the combinations (k, j) of the motions of all parts under which nodes at hinges stay together."""
+    width = sum(motion.shape[2] for _, motion in moving)
+    if not len(rigid.hinge_node):
+        return np.eye(width)
+    if width > MANY:
+        raise ModelError(
+            f"the mesh falls into {rigid.count} parts that hang together at single nodes or along lines only (first: "
+            f"{node_at(mesh, rigid.hinge_node[0])}): let cells share whole facets"
+        )
+    ends = np.cumsum([0] + [motion.shape[2] for _, motion in moving])
+    there = np.zeros((len(rigid.hinge_node), mesh.dim, width))
+    for row, (node, number) in enumerate(zip(rigid.hinge_node, rigid.hinge_part, strict=True)):
+        members, motion = moving[number]
+        there[row, :, ends[number] : ends[number + 1]] = motion[np.searchsorted(members, node)]
+    same = rigid.hinge_node[1:] == rigid.hinge_node[:-1]
+    return _null_space((there[1:] - there[:-1])[same].reshape(int(same.sum()) * mesh.dim, width))
+
+
+def node_at(mesh: Mesh, node: int) -> str:
+    """Return the number and the place of a node for messages."""
+    return f"point {node} at ({', '.join(f'{x:.6g}' for x in mesh.points[node])})"
+
+
+def _part_name(mesh: Mesh, rigid: RigidParts, number: int) -> str:
+    """Return the name of a body, or of a part of one and the first node at which it hangs on others."""
+    _, body = bodies(mesh)
+    members, hinges = rigid.nodes_of(number), rigid.hinges_of(number)
+    name = f"body {body_name(mesh, body, int(body[members[0]]))}"
+    if not len(hinges):
+        return name
+    part = _group_of(mesh, members) or f"around {mesh.points[members].mean(axis=0)}"
+    return f"{name}, the part {part} that hangs at {node_at(mesh, hinges[0])}"
 
 
 def _null_space(A: Array) -> Array:

@@ -87,6 +87,18 @@ def cracked():
     return model
 
 
+def hanging_together():
+    """A block on the corner of another one, whose common node was merged; only the lower one is held."""
+    mesh = generate.union(
+        generate.renamed(block((1.0, 1.0), (2, 2)), {"BLOCK": "A_BLOCK", "BOTTOM": "A_BOTTOM"}),
+        generate.renamed(block((1.0, 1.0), (2, 2), origin=(1.0, 1.0)), {"BLOCK": "B_BLOCK", "BOTTOM": "B_BOTTOM"}),
+    )
+    model = fc.Model(generate.merge_points(mesh, 1e-9), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("A_BOTTOM", "xy")
+    return model
+
+
 def with_materials(*given):
     model = blocks(materials=False)
     for E, nu, groups in given:
@@ -232,6 +244,12 @@ MESH = [
         lambda: solved(square_in_two()),
         fc.ModelError,
         r"3 rigid-body motions are not supported: body 'B': translation along x, .*rotation",
+    ),
+    Mistake(
+        "bodies that hang together at one node",
+        lambda: solved(hanging_together()),
+        fc.ModelError,
+        r"1 rigid-body motion is not supported: body number 1 \(around \[.*\]\), the part 'B_BLOCK' that hangs at point \d+ at \(1, 1\): .*rotation\. Fix or prescribe a displacement component that stops each, or let a load press the body against a contact\. Parts of bodies hang together at 1 nodes only \(first: point \d+ at \(1, 1\)\): merge whole facets there, or leave the parts separate and define the contact",
     ),
     Mistake(
         "a support on a node of no cell",
@@ -445,7 +463,28 @@ SUPPORTS = [
         fc.ModelError,
         r"prescribe\('LOWER_LEFT'\): unknown component 'z': known are x, y",
     ),
+    Mistake(
+        "a support that moves the axis of symmetry",
+        lambda: solved(on_axis(lambda model: model.prescribe("TOP", x=0.1))),
+        fc.ModelError,
+        r"x = 0\.1 is prescribed at point \d+ on the axis of symmetry, where the radial displacement is zero: leave the points at x = 0 out of the group",
+    ),
+    Mistake(
+        "a radial force on the axis of symmetry",
+        lambda: on_axis(lambda model: model.add_force("TOP_LEFT", x=1.0)),
+        fc.ModelError,
+        r"the nodal force on 'TOP_LEFT' has a radial component x at 1 points on the axis of symmetry \(first: point \d+\), where the circle that it acts along has no length: leave the points at x = 0 out",
+    ),
 ]
+
+
+def on_axis(add):
+    """A cylinder that stands on its bottom, with something wrong added."""
+    model = fc.Model(block((1.0, 1.0), (2, 2)), "axisymmetric")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("BOTTOM", "y")
+    add(model)
+    return model
 
 
 def sliding():
@@ -458,6 +497,26 @@ def sliding():
 def contradicting():
     model = blocks()
     model.prescribe("UPPER_TOP", y=0.5)
+    return model
+
+
+def pairs_overlap():
+    mesh = block_on_block()
+    model = blocks(mesh.with_groups(cells={"SOME": mesh.cell_groups["CONT_UPPER"][:1]}))
+    model.add_contact("some", secondary="SOME", primary="CONT_LOWER")
+
+
+def pushed_into_each_other():
+    model = blocks(supports=False)
+    model.fix("CONT_LOWER", "xy")
+    model.fix("CONT_UPPER", "x")
+    model.prescribe("CONT_UPPER", y=-0.02)
+    return model
+
+
+def corner_pushed():
+    model = with_obstacle(1.0)
+    model.prescribe("LEFT", y=0.0)
     return model
 
 
@@ -499,10 +558,36 @@ CONTACT = [
         r"contact 'again' joins 'CONT_LOWER' and 'CONT_UPPER', which contact 'pair' joins already: leave out one of the two",
     ),
     Mistake(
+        "two pairs over the same facets",
+        lambda: pairs_overlap(),
+        fc.ContactError,
+        r"contact 'some' joins facets of 'SOME' and 'CONT_LOWER' that contact 'pair' joins already: 'SOME' and 'CONT_UPPER' share facets with 2 nodes \(first: point \d+\), 'CONT_LOWER' and 'CONT_LOWER' share facets, too\. Leave out one of the two contacts, or make their groups apart",
+    ),
+    Mistake(
+        "the same obstacle twice",
+        lambda: with_obstacle(1.0).add_obstacle(
+            "again", secondary="TOP", obstacle=fc.obstacles.HalfSpace((2.0, 1.0), (0.0, -2.0)), motion={"y": -0.01}
+        ),
+        fc.ContactError,
+        r"contact 'again' presses facets of 'TOP' on the rigid obstacle on which contact 'plane' presses them already, with 3 nodes \(first: point \d+\): leave out one of the two",
+    ),
+    Mistake(
         "two pairs of one name",
         lambda: blocks().add_contact("pair", secondary="UPPER_LEFT", primary="LOWER_RIGHT"),
         fc.ContactError,
         r"there is already a contact pair 'pair': names must differ",
+    ),
+    Mistake(
+        "supports that push one side into the other",
+        lambda: solved(pushed_into_each_other()),
+        fc.ModelError,
+        r"supports push 7 of the 7 nodes of 'CONT_UPPER' into 'CONT_LOWER', contact 'pair', by up to 0\.02 \(point \d+ at \(0, 0\), instant 1\): contact forces cannot change what supports prescribe; prescribe other values, or the displacement of nodes that are not in contact",
+    ),
+    Mistake(
+        "a support that pushes a corner into an obstacle",
+        lambda: solved(corner_pushed()),
+        fc.FastcontactWarning,
+        r"supports push 1 of the 3 nodes of 'TOP' into the rigid obstacle, contact 'plane', by up to 0\.01 \(point \d+ at \(0, 1\), instant 1\): contact forces cannot change what supports prescribe; leave these nodes out of the support, or out of the contact \('excluded'\)",
     ),
     Mistake(
         "a penetration larger than an element",

@@ -24,6 +24,12 @@ OTHERWISE = {
         "two materials for one body in a case", "two materials for one group", "a material for all hides one of a group",
         "a key twice", "one pair twice in a case", "the same pair twice", "two pairs of one name",
     ),
+    "nothing is said: the pairs share the force at will, and each tells a part of the pressure": (
+        "two pairs over the same facets", "the same obstacle twice",
+    ),
+    "nothing is said: a hole opens along the axis, or its nodes pass through it": (
+        "a support that moves the axis of symmetry", "a radial force on the axis of symmetry",
+    ),
     "a division by zero: stresses that are infinite or not a number": ("nu is a half", "nu of 0.5 in a call"),
     "a stiffness that is not positive definite: a factorisation that fails, or a solution that makes no sense": (
         "nu above a half", "nu below -1", "E is negative", "a spring that pulls backwards",
@@ -59,7 +65,7 @@ OTHERWISE = {
         "component that a plane mesh lacks", "a support in z of a plane model",
     ),
     "the job ends with an exit code of success, and displacements of 1e10 or not a number": (
-        "one body is not held", "no body is held",
+        "one body is not held", "no body is held", "bodies that hang together at one node",
     ),
     "nothing is said: the last one wins, or both are added up": ("supports contradict", "supports that contradict each other"),
     "nothing is said: no node is ever in contact, and the bodies pass through each other": (
@@ -125,7 +131,8 @@ OTHERWISE = {
     ),
     "nothing is said: the bodies lie inside each other": (
         "a pair was forgotten", "bodies interpenetrate where no contact is defined",
-        "bodies overlap and no pair joins them",
+        "bodies overlap and no pair joins them", "supports that push one side into the other",
+        "a support that pushes a corner into an obstacle",
     ),
     "a singular matrix, or a body that flies away under springs that nobody asked for": ("bodies pulled apart by a force",),
     "nothing is said: springs that were added to make the matrix regular take part of the load": (

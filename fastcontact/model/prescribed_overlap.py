@@ -1,0 +1,182 @@
+"""Contact nodes that supports push into the other side, or off it where it is tied: no contact force can move them back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from fastcontact.contact.configuration import Configuration
+from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair, rows_along
+from fastcontact.errors import ModelError
+from fastcontact.model.contact_pair import ContactPair
+from fastcontact.model.ramp import Ramp, Table, combined, multiplier
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Pairs = Sequence[tuple[ContactPair, Formulation]]
+# A gap that changes with a displacement by less than this does not depend on it [-].
+STILL = 1e-6
+# Depths below this fraction of the largest prescribed displacement, or of the size of the model, are no mistake.
+SMALL, ROUNDING = 1e-3, 1e-9
+# So many instants of a history are looked at.
+SOME = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Supports:
+    """What supports prescribe: which components (n_points, dim), by history their values at multiplier 1 [length], a ramp."""
+
+    fixed: Mask
+    by_ramp: Mapping[Table | None, Array]
+    ramp: Ramp
+
+    def instants(self) -> list[float]:
+        """Return some instants of the ramp, the first and the last among them."""
+        found = list(self.ramp.instants)
+        return [found[k] for k in np.unique(np.linspace(0, len(found) - 1, SOME).round().astype(int))]
+
+    def at(self, instant: float) -> Array:
+        """Return the displacements (n_points, dim), zero where nothing is prescribed [length]."""
+        return combined(self.by_ramp, self.ramp, instant, self.fixed.shape)
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """`count` of the `total` nodes that face the other side of a pair are off it by up to `depth` [length], at `point`."""
+
+    count: int
+    total: int
+    depth: float
+    point: int
+    instant: float
+
+
+def check_prescribed(pairs: Pairs, supports: Supports) -> None:
+    """Raise ModelError if supports alone bring all nodes of a contact that face its other side into that side."""
+    for contact, formulation, found in _overlaps(pairs, supports):
+        if found.count == found.total:
+            raise ModelError(
+                f"{_described(contact, formulation, found)}: contact forces cannot change what supports prescribe; prescribe "
+                "other values, or the displacement of nodes that are not in contact"
+            )
+
+
+def prescribed_overlap_warnings(pairs: Pairs, supports: Supports) -> list[str]:
+    """Return a warning for each contact with nodes that supports alone bring into its other side."""
+    return [
+        f"{_described(contact, formulation, found)}: contact forces cannot change what supports prescribe; leave these nodes "
+        "out of the support, or out of the contact ('excluded')"
+        for contact, formulation, found in _overlaps(pairs, supports)
+    ]
+
+
+def _described(contact: ContactPair, formulation: Formulation, found: Overlap) -> str:
+    place = ", ".join(f"{x:.6g}" for x in formulation.points[found.point])
+    how = "off" if formulation.options.always_closed else "into"
+    other = f"'{contact.primary}'" if contact.primary else "the rigid obstacle"
+    return (
+        f"supports push {found.count} of the {found.total} nodes of '{contact.secondary}' {how} {other}, contact "
+        f"'{contact.name}', by up to {found.depth:.4g} (point {found.point} at ({place}), instant {found.instant:g})"
+    )
+
+
+def _overlaps(pairs: Pairs, supports: Supports) -> Iterator[tuple[ContactPair, Formulation, Overlap]]:
+    """Return for each pair what supports do to its nodes at the worst instant, if that is wrong."""
+    for contact, formulation in pairs:
+        side = formulation.secondary
+        usable = side.points[~formulation.options.excluded_nodes(side)]
+        nodes = usable[supports.fixed[usable].any(axis=1)]
+        if not len(nodes) or contact.force or formulation.options.penalty is not None:
+            continue
+        # The others face the other side as well, as far as this matters.
+        others = len(usable) - len(nodes)
+        worst = _worst(_at(contact, formulation, nodes, supports, instant) for instant in supports.instants())
+        if worst.count:
+            yield (
+                contact,
+                formulation,
+                Overlap(worst.count, worst.total + others, worst.depth, worst.point, worst.instant),
+            )
+
+
+def _worst(found: Iterable[Overlap]) -> Overlap:
+    return max(found, key=lambda overlap: overlap.depth)
+
+
+def _at(
+    contact: ContactPair, formulation: Formulation, nodes: NDArray[np.int32], supports: Supports, instant: float
+) -> Overlap:
+    """Return what supports do to some secondary nodes at an instant."""
+    displacement, ramp = supports.at(instant), supports.ramp
+    still = np.zeros(displacement.shape[1])
+    obstacle = still
+    if contact.obstacle is not None:
+        obstacle = multiplier(contact.ramp, ramp, instant) * np.array(contact.motion)
+    factor = 1.0 if contact.clearance_ramp is None else multiplier(contact.clearance_ramp, ramp, instant)
+    at = Configuration(displacement, np.zeros_like(displacement), obstacle, still, factor)
+    candidates = Candidates(nodes[:, None], np.ones((len(nodes), 1)))
+    if formulation.options.tied:
+        depth, paired = _torn(formulation, candidates, displacement, supports.fixed)
+    else:
+        depth, paired = _depth(formulation, candidates, at, supports.fixed)
+    small = max(SMALL * np.abs(displacement).max(), ROUNDING * np.ptp(formulation.points, axis=0).max())
+    row = int(np.argmax(depth))
+    return Overlap(int((depth > small).sum()), int(paired.sum()), float(depth[row]), int(nodes[row]), instant)
+
+
+def _depth(formulation: Formulation, candidates: Candidates, at: Configuration, fixed: Mask) -> tuple[Array, Mask]:
+    """Return how deep supports bring nodes (m,) into the other side [length], and which face it.
+
+    Zero where the gap depends on anything that no support prescribes. What overlaps before any load does not count.
+    """
+    before, rows, paired = _gaps(formulation, candidates, Configuration.undeformed(formulation.points), bare=True)
+    gap, rows, paired = _gaps(formulation, candidates, at)
+    if formulation.options.always_closed:
+        depth = np.abs(gap) - np.abs(before)
+    else:
+        depth = -gap - np.maximum(-before, 0.0)
+    return np.where(paired & _decided(rows, fixed), np.maximum(depth, 0.0), 0.0), paired
+
+
+def _gaps(
+    formulation: Formulation, candidates: Candidates, at: Configuration, bare: bool = False
+) -> tuple[Array, csr_array, Mask]:
+    """Return the gaps (m,) of nodes, without clearances if `bare`, their rows (m, n_dofs), and which face the other side."""
+    pairing = _paired(formulation, candidates, at)
+    rows, gap = gap_rows(candidates, pairing, formulation.primary, formulation.points)
+    gap = gap + rows @ at.displacement.ravel()
+    if not bare:
+        factor, reference = at.clearance_factor, formulation.points
+        gap = gap + formulation.options.added_gap(candidates, pairing, formulation.primary, reference, factor)
+    return np.where(pairing.paired, gap, 0.0), rows, pairing.paired
+
+
+def _paired(formulation: Formulation, candidates: Candidates, at: Configuration) -> Pairing:
+    coordinates = formulation.points + at.displacement
+    return pair(
+        candidates.positions(coordinates), formulation.primary, coordinates, formulation.projection_tolerance,
+        formulation.normals, at.obstacle,
+    )  # fmt: skip
+
+
+def _torn(formulation: Formulation, candidates: Candidates, displacement: Array, fixed: Mask) -> tuple[Array, Mask]:
+    """Return how far supports move tied nodes (m,) off their places on the other side [length], and which face it."""
+    pairing = _paired(formulation, candidates, Configuration.undeformed(formulation.points))
+    square = np.zeros(len(pairing.paired))
+    for axis in np.eye(fixed.shape[1]):
+        direction = np.broadcast_to(axis, pairing.normal.shape)
+        rows = rows_along(direction, candidates, pairing, formulation.primary, fixed.size)
+        square += np.where(_decided(rows, fixed), rows @ displacement.ravel(), 0.0) ** 2
+    return np.sqrt(square), pairing.paired
+
+
+def _decided(rows: csr_array, fixed: Mask) -> Mask:
+    """Return whether each of the rows (m, n_dofs) depends on supported components alone."""
+    free = np.abs(rows.data) > STILL
+    free &= ~fixed.ravel()[rows.indices]
+    return np.asarray(np.diff(np.concatenate([[0], np.cumsum(free)])[rows.indptr]) == 0)

@@ -1,0 +1,123 @@
+"""Bodies that hang together at one node or edge are mechanisms unless something holds both parts."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.model import rigid_motions
+
+
+def pair_of(first, second):
+    names = ("A_", "B_")
+    renamed = [
+        fc.generate.renamed(mesh, {group: name + group for group in mesh.group_names})
+        for name, mesh in zip(names, (first, second), strict=True)
+    ]
+    return fc.generate.merge_points(fc.generate.union(*renamed), 1e-9)
+
+
+def squares(element="quad4", n=2):
+    block = fc.generate.block
+    return pair_of(block((1.0, 1.0), (n, n), element), block((1.0, 1.0), (n, n), element, (1.0, 1.0)))
+
+
+def boxes(element="hex8", height=0.0):
+    box = fc.generate.box
+    return pair_of(
+        box((1.0, 1.0, 1.0), (1, 1, 1), element), box((1.0, 1.0, 1.0), (1, 1, 1), element, (1.0, 1.0, height))
+    )
+
+
+def model_of(mesh, kinematics="plane_strain"):
+    model = fc.Model(mesh, "3d" if mesh.dim == 3 else kinematics)
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    return model
+
+
+@pytest.mark.parametrize("element", ["tri3", "quad4", "tri6", "quad8", "quad9"])
+def test_a_square_on_the_corner_of_another_is_refused(element):
+    mesh = squares(element)
+    model = model_of(mesh)
+    model.fix("A_BOTTOM", "xy")
+    node = int(np.flatnonzero((mesh.points == 1.0).all(axis=1))[0])
+    pattern = (
+        rf"1 rigid-body motion is .*the part 'B_BLOCK' that hangs at point {node} at \(1, 1\).*at 1 nodes only .*merge"
+    )
+    with pytest.raises(fc.ModelError, match=pattern):
+        model.check()
+    model.fix("B_TOP", "y")
+    model.check()
+
+
+@pytest.mark.parametrize("element", ["tet4", "hex8", "wedge6", "tet10", "hex20"])
+@pytest.mark.parametrize(("height", "motions"), [(0.0, "1 rigid-body motion is"), (1.0, "3 rigid-body motions are")])
+def test_a_box_on_the_edge_or_corner_of_another_is_refused(element, height, motions):
+    model = model_of(boxes(element, height))
+    model.fix("A_YMIN", "xyz")
+    with pytest.raises(
+        fc.ModelError, match=rf"{motions} not supported: .*the part 'B_BOX' that hangs at point \d+ at \(1, 1, "
+    ):
+        model.check()
+    model.fix("B_YMAX", "xyz")
+    model.check()
+
+
+def test_both_parts_held_share_the_force_at_the_hinge():
+    """A hinge passes forces on: what pulls one part is held by both supports."""
+    model = model_of(squares(n=4))
+    model.fix("A_BOTTOM", "xy")
+    model.fix("B_TOP", "x")
+    model.add_body_force("B_BLOCK", y=-1.0)
+    (step,) = fc.solve(model, fc.linear_ramp(1))
+    assert step.reaction[model.mesh.points_of("A_BOTTOM"), 1].sum() == pytest.approx(1.0, rel=1e-9)
+
+
+def test_rings_in_axisymmetry_turn_about_no_node():
+    model = model_of(squares(), "axisymmetric")
+    model.fix("A_BOTTOM", "y")
+    model.add_body_force("B_BLOCK", y=-1e-3)
+    (step,) = fc.solve(model, fc.linear_ramp(1))
+    weight = 1e-3 * np.pi * (2.0**2 - 1.0**2)
+    assert step.reaction[model.mesh.points_of("A_BOTTOM"), 1].sum() == pytest.approx(weight, rel=1e-9)
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+def test_a_floor_holds_what_hangs_at_a_hinge(formulation):
+    model = model_of(squares(n=4))
+    model.fix("A_BOTTOM", "xy")
+    model.add_body_force("B_BLOCK", y=-1.0)
+    floor = fc.obstacles.HalfSpace((0.0, 0.99), (0.0, 1.0))
+    model.add_obstacle("floor", secondary="B_BOTTOM", obstacle=floor, formulation=formulation)
+    (step,) = fc.solve(model, fc.linear_ramp(1))
+    contact = step.contact["floor"]
+    lever = (model.mesh.points[contact.points, 0] - 1.0) @ contact.force_vectors[:, 1] / contact.force[1]
+    assert contact.force[1] * lever == pytest.approx(0.5, rel=1e-6)  # the moment of the weight about the hinge
+
+
+def test_a_load_away_from_the_floor_ends_with_the_name_of_the_part():
+    model = model_of(squares())
+    model.fix("A_BOTTOM", "xy")
+    model.add_body_force("B_BLOCK", y=1.0)
+    floor = fc.obstacles.HalfSpace((0.0, 0.99), (0.0, 1.0))
+    model.add_obstacle("floor", secondary="B_BOTTOM", obstacle=floor)
+    with pytest.raises(fc.ConvergenceError, match="'B_BLOCK' that hangs at point"):
+        fc.solve(model, fc.linear_ramp(1))
+
+
+def test_relations_and_springs_stop_a_hinge():
+    model = model_of(squares())
+    model.fix("A_BOTTOM", "xy")
+    model.add_spring("B_TOP_RIGHT", x=1.0)
+    model.check()
+    model = model_of(squares())
+    model.fix("A_BOTTOM", "xy")
+    model.relate([("B_TOP_RIGHT", "x", 1.0), ("A_TOP_LEFT", "x", -1.0)])
+    model.check()
+
+
+def test_a_mesh_that_falls_into_very_many_parts_is_refused_at_once(monkeypatch):
+    monkeypatch.setattr(rigid_motions, "MANY", 4)
+    with pytest.raises(
+        fc.ModelError, match=r"falls into 2 parts .*first: point \d+ at \(1, 1\)\): let cells share whole"
+    ):
+        model_of(squares()).check()

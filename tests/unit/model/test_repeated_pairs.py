@@ -1,0 +1,110 @@
+"""Two pairs may not press the same facets on each other, in whichever roles."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.mesh.generate import block, block_on_block
+
+
+def parts(mesh, group):
+    """The mesh with the facets of a group, from left to right, in halves and in an overlapping part of them."""
+    facets = mesh.cell_groups[group]
+    centres = np.concatenate([mesh.points[f][:, :2].mean(axis=1) for f in mesh.cells_of(group).values()])
+    facets = facets[np.argsort(centres[:, 0])]
+    half, third = len(facets) // 2, len(facets) // 3
+    return mesh.with_groups(
+        cells={f"{group}_LEFT": facets[:half], f"{group}_RIGHT": facets[half:], f"{group}_OVER": facets[third:]}
+    )
+
+
+@pytest.fixture
+def mesh():
+    return parts(parts(block_on_block(), "CONT_UPPER"), "CONT_LOWER")
+
+
+def model_of(mesh):
+    model = fc.Model(mesh, "3d" if mesh.dim == 3 else "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    return model
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        (("CONT_UPPER", "CONT_LOWER"), ("CONT_UPPER_LEFT", "CONT_LOWER")),
+        (("CONT_UPPER_LEFT", "CONT_LOWER"), ("CONT_UPPER", "CONT_LOWER")),
+        (("CONT_UPPER_LEFT", "CONT_LOWER"), ("CONT_UPPER_OVER", "CONT_LOWER")),
+        (("CONT_UPPER", "CONT_LOWER_LEFT"), ("CONT_UPPER", "CONT_LOWER_OVER")),
+        (("CONT_UPPER", "CONT_LOWER"), ("CONT_LOWER_LEFT", "CONT_UPPER")),
+        (("CONT_UPPER_LEFT", "CONT_LOWER"), ("CONT_LOWER", "CONT_UPPER_OVER")),
+        (("CONT_UPPER_OVER", "CONT_LOWER_LEFT"), ("CONT_LOWER_OVER", "CONT_UPPER_LEFT")),
+    ],
+)
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
+def test_facets_of_an_earlier_pair_are_refused(mesh, first, second, formulation):
+    model = model_of(mesh)
+    model.add_contact("first", secondary=first[0], primary=first[1], formulation=formulation)
+    with pytest.raises(
+        fc.ContactError, match=r"contact 'second' joins .* that contact 'first' joins already: .*point \d+"
+    ):
+        model.add_contact("second", secondary=second[0], primary=second[1], formulation=formulation)
+    assert len(model.contact) == 1
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_both_groups_are_the_same(mesh, swapped):
+    model = model_of(mesh)
+    sides = ("CONT_UPPER", "CONT_LOWER")
+    model.add_contact("first", secondary=sides[0], primary=sides[1])
+    with pytest.raises(fc.ContactError, match="which contact 'first' joins already"):
+        model.add_contact("second", secondary=sides[swapped], primary=sides[not swapped])
+
+
+def test_facets_that_stand_in_the_mesh_twice_are_the_same(mesh):
+    """Mesh generators write a facet once for each group that holds it."""
+    again = {name: np.concatenate([b, mesh.cells_of("CONT_UPPER").get(name, b[:0])]) for name, b in mesh.cells.items()}
+    before = sum(map(len, mesh.cells.values()))
+    assert list(mesh.cells)[-1] == "line2"
+    copied = mesh.replace(cells=again)
+    copied = copied.with_groups(cells={"COPY": range(before, before + len(mesh.cell_groups["CONT_UPPER"]))})
+    model = model_of(copied)
+    model.add_contact("first", secondary="CONT_UPPER", primary="CONT_LOWER")
+    with pytest.raises(fc.ContactError, match="contact 'second' joins"):
+        model.add_contact("second", secondary="COPY", primary="CONT_LOWER")
+
+
+def test_one_side_may_meet_two_others(mesh):
+    model = model_of(mesh)
+    model.add_contact("left", secondary="CONT_UPPER", primary="CONT_LOWER_LEFT")
+    model.add_contact("right", secondary="CONT_UPPER", primary="CONT_LOWER_RIGHT")
+    assert len(model.contact) == 2
+
+
+def pressed_in_a_corner():
+    model = model_of(block((1.0, 1.0), (2, 2)))
+    floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor)
+    return model
+
+
+def test_one_side_may_meet_two_obstacles():
+    model = pressed_in_a_corner()
+    model.add_obstacle("slope", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace((0.0, 0.0), (0.5, 1.0)))
+    model.add_obstacle("moving", secondary="BOTTOM", obstacle=model.contact[0].obstacle, motion={"y": 0.1})
+    assert len(model.contact) == 3
+
+
+def test_the_same_obstacle_twice_is_refused():
+    model = pressed_in_a_corner()
+    with pytest.raises(
+        fc.ContactError, match="contact 'again' presses facets of 'BOTTOM' on the rigid obstacle on which"
+    ):
+        model.add_obstacle("again", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace((5.0, 0.0), (0.0, 2.0)))
+
+
+def test_an_obstacle_and_a_pair_may_share_facets(mesh):
+    model = model_of(mesh)
+    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER")
+    model.add_obstacle("floor", secondary="CONT_UPPER", obstacle=fc.obstacles.HalfSpace((0.0, -5.0), (0.0, 1.0)))
+    assert len(model.contact) == 2
