@@ -179,7 +179,7 @@ def prepare(
     supported, prescribed = model.prescribed_by_ramp()
     pairs = {pair.name: model.bind(pair, supported) for pair in model.contact}
     moduli, material = model.material_numbers()
-    K = stiffened(stiffness(mesh, model.kinematics, moduli, material), model.springs)
+    K = stiffened(stiffness(mesh, model.kinematics, moduli, material, None, model.averaged_materials()), model.springs)
     system = System(
         driven.stiffness(K),
         driven.supported(supported).ravel(),

@@ -45,7 +45,8 @@ def recover(
         Number of the step, and its pseudo-time.
     """
     mesh, u = problem.model.mesh, problem.displacement(end.u)
-    stress = recovery.nodal_stress(mesh, problem.model.kinematics, problem.moduli, problem.material, u)
+    averaged = problem.model.averaged_materials()
+    stress = recovery.nodal_stress(mesh, problem.model.kinematics, problem.moduli, problem.material, u, averaged)
     von_mises = recovery.von_mises(stress)
     return StepResult(
         *place, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises), reaction.reshape(-1, mesh.dim),

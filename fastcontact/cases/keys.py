@@ -22,7 +22,7 @@ SOLVE: dict[str, Any] = {
 }
 # Tables that may occur several times, by kind: the types of their keys, and the keys that are required.
 LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
-    "material": ({"E": NUMBER, "nu": NUMBER, "groups": (list, str)}, ("E", "nu")),
+    "material": ({"E": NUMBER, "nu": NUMBER, "groups": (list, str), "volumetric": str}, ("E", "nu")),
     "support": ({"group": str, **AXES, "ramp": list}, ("group",)),
     "pressure": ({"group": str, "value": NUMBER, "ramp": list}, ("group", "value")),
     "traction": ({"group": str, **AXES, "ramp": list}, ("group",)),

@@ -17,8 +17,8 @@ from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
 
-def _add_material(model: Model, E: float, nu: float, groups: Any = None) -> None:
-    model.add_material(LinearElastic(E=float(E), nu=float(nu)), groups)
+def _add_material(model: Model, E: float, nu: float, groups: Any = None, volumetric: str = "auto") -> None:
+    model.add_material(LinearElastic(float(E), float(nu), volumetric), groups)
 
 
 # By kind of table, in the order in which they are added to the model.

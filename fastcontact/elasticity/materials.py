@@ -11,6 +11,10 @@ from numpy.typing import NDArray
 from fastcontact.errors import ModelError, unknown
 
 KINEMATICS = ("axisymmetric", "plane_strain", "plane_stress", "3d")
+# What elements make of the dilatation.
+VOLUMETRIC = ("auto", "plain", "mean_dilatation")
+# Poisson's ratio from which on a material has a mean dilatation by itself.
+NEARLY_INCOMPRESSIBLE = 0.49
 
 
 @dataclass(frozen=True)
@@ -25,10 +29,16 @@ class LinearElastic:
         Young's modulus [pressure], positive.
     nu : float
         Poisson's ratio, -1 < nu < 0.5.
+    volumetric : str
+        How elements take the dilatation, the change of volume: ``"plain"`` as it is; ``"mean_dilatation"`` its mean in
+        each quadrangle, hexahedron, wedge and pyramid (in quadratic ones a linear function), so that they do not lock
+        where the material is nearly incompressible. ``"auto"``: the latter from nu = 0.49 on. Nothing changes in
+        triangles and tetrahedra, and in plane stress.
     """
 
     E: float
     nu: float
+    volumetric: str = "auto"
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.E) and self.E > 0):
@@ -36,8 +46,16 @@ class LinearElastic:
         if not -1.0 < self.nu < 0.5:
             raise ModelError(
                 f"Poisson's ratio nu = {self.nu} must lie between -1 and 0.5, both excluded "
-                "(an incompressible material needs another formulation; nu = 0.499 is close to it)"
+                "(for an incompressible material take nu = 0.4999, in quadrangles or hexahedra: they have a mean dilatation "
+                "then and do not lock)"
             )
+        if self.volumetric not in VOLUMETRIC:
+            raise ModelError(unknown("volumetric", self.volumetric, VOLUMETRIC))
+
+    @property
+    def averaged(self) -> bool:
+        """Whether elements have a mean dilatation, where they can and kinematics are not plane stress."""
+        return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and self.nu >= NEARLY_INCOMPRESSIBLE)
 
     @property
     def shear_modulus(self) -> float:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact._jit import parallel
-from fastcontact.elasticity import element_2d_kernels, element_kernels
+from fastcontact.elasticity import dilatation, element_2d_kernels, element_kernels
+from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
@@ -17,7 +17,12 @@ BATCH = 16_000_000
 
 
 def stress_at_points(
-    mesh: Mesh, kinematics: str, moduli: Array, material: Materials, displacement: Array
+    mesh: Mesh,
+    kinematics: str,
+    moduli: Array,
+    material: Materials,
+    displacement: Array,
+    averaged: dilatation.Mask | None = None,
 ) -> dict[str, Array]:
     """Return by solid element the stress (n_cells, n_q, n_components) [pressure] at the default quadrature points.
 
@@ -34,55 +39,41 @@ def stress_at_points(
         By solid element: material number of each cell.
     displacement : ndarray (n_points, dim)
         Of all points [length].
+    averaged : ndarray of bool (n_materials,), optional
+        Which materials have a mean dilatation, see `dilatation`; none by default.
     """
-    loops, values = _CellStresses(mesh, kinematics, moduli, material, displacement), {}
-    for name, block in mesh.solids.items():
-        values[name] = loops.room(name, len(block))
-        loops.fill(name, 0, values[name])
-    return values
+    stress = CellStress(mesh, kinematics, moduli, displacement, averaged)
+    return {
+        name: stress.at(name, elements.get(name).quadrature[0], block, material[name])
+        for name, block in mesh.solids.items()
+    }
 
 
-def nodal_stress(mesh: Mesh, kinematics: str, moduli: Array, material: Materials, displacement: Array) -> Array:
+def nodal_stress(
+    mesh: Mesh,
+    kinematics: str,
+    moduli: Array,
+    material: Materials,
+    displacement: Array,
+    averaged: dilatation.Mask | None = None,
+) -> Array:
     """Return the stress (n_points, n_components) [pressure] at the nodes: `nodal_average` of `stress_at_points`.
 
     The stresses at points are formed for few cells at a time, which takes less memory. Arguments as for `stress_at_points`.
     """
-    loops = _CellStresses(mesh, kinematics, moduli, material, displacement)
+    stress = CellStress(mesh, kinematics, moduli, displacement, averaged)
     average = NodalAverage(mesh, moduli.shape[1])
     for name, block in mesh.solids.items():
-        room = loops.room(name, 1)
-        room = loops.room(name, min(len(block), BATCH // room.nbytes + 1))
+        element = elements.get(name)
+        xi, _ = element.quadrature
+        cell = np.empty((1, len(xi), moduli.shape[1]))
+        room = np.empty((min(len(block), BATCH // cell.nbytes + 1), *cell.shape[1:]))
         for first in range(0, len(block), len(room)):
+            rows = slice(first, first + len(room))
             values = room[: len(block) - first]
-            loops.fill(name, first, values)
-            average.add(block[first : first + len(values)], elements.get(name).extrapolation, values)
+            stress.fill(name, xi, block[rows], material[name][rows], values)
+            average.add(block[rows], element.extrapolation, values)
     return average.result()
-
-
-class _CellStresses:
-    """Stresses at the points of some of the cells; arguments as for `stress_at_points`."""
-
-    def __init__(self, mesh: Mesh, kinematics: str, moduli: Array, material: Materials, displacement: Array) -> None:
-        self._mesh, self._axisymmetric = mesh, kinematics == "axisymmetric"
-        self._moduli, self._material, self._displacement = moduli, material, displacement
-
-    def room(self, name: str, count: int) -> Array:
-        """Return an array for the stresses of `count` cells of an element."""
-        return np.empty((count, len(elements.get(name).tables[2]), self._moduli.shape[1]))
-
-    def fill(self, name: str, first: int, out: Array) -> None:
-        """Fill `out` (n_cells, n_q, n_components) with the stresses of the cells from `first` on, shared by threads."""
-        mesh, cells = self._mesh, self._mesh.cells[name]
-        N, dN, _ = elements.get(name).tables
-
-        def part(rows: tuple[int, int]) -> None:
-            own = slice(first + rows[0], first + rows[1])
-            element_kernels.loops(mesh.dim).stress(
-                mesh.points, cells[own], N, dN, self._moduli, self._material[name][own], self._axisymmetric,
-                self._displacement, out[slice(*rows)],
-            )  # fmt: skip
-
-        parallel.shared(part, parallel.portions(len(out), cells.shape[1]))
 
 
 class NodalAverage:

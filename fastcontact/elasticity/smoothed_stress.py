@@ -13,7 +13,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.elasticity import element_kernels, recovery
+from fastcontact.elasticity import dilatation, recovery
+from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
@@ -23,26 +24,26 @@ SIMPLEX = {3: 0.5, 4: 1.0 / math.sqrt(5.0)}
 
 
 def smoothed_stress(
-    mesh: Mesh, kinematics: str, moduli: Array, material: recovery.Materials, displacement: Array
+    mesh: Mesh,
+    kinematics: str,
+    moduli: Array,
+    material: recovery.Materials,
+    displacement: Array,
+    averaged: dilatation.Mask | None = None,
 ) -> dict[str, Array]:
     """Return by solid element the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each cell.
 
     It is the same at a node for all cells of one material. Arguments as for `recovery.stress_at_points`.
     """
+    stress = CellStress(mesh, kinematics, moduli, displacement, averaged)
     found = {name: np.empty((*block.shape, moduli.shape[1])) for name, block in mesh.solids.items()}
     for number in range(len(moduli)):
         average = recovery.NodalAverage(mesh, moduli.shape[1])
         rows = {name: np.flatnonzero(material[name] == number) for name in found}
         for name, chosen in rows.items():
             xi, outward = sampling(name)
-            element, cells = elements.get(name), mesh.cells[name][chosen]
-            N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
-            stress = np.empty((len(cells), len(xi), moduli.shape[1]))
-            element_kernels.loops(mesh.dim).stress(
-                mesh.points, cells, N, dN, moduli, material[name][chosen], kinematics == "axisymmetric", displacement,
-                stress,
-            )  # fmt: skip
-            average.add(cells, outward, stress)
+            cells = mesh.cells[name][chosen]
+            average.add(cells, outward, stress.at(name, xi, cells, material[name][chosen]))
         nodal = average.result()
         for name, chosen in rows.items():
             found[name][chosen] = nodal[mesh.cells[name][chosen]]

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 
 from fastcontact._jit import parallel
-from fastcontact.elasticity import element_kernels
+from fastcontact.elasticity import dilatation, dilatation_kernels, element_kernels
 from fastcontact.elasticity import stiffness_kernels as pattern_kernels
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
@@ -70,6 +71,7 @@ def stiffness(
     moduli: Array,
     material: dict[str, NDArray[np.int32]],
     pattern: Sparsity | None = None,
+    averaged: dilatation.Mask | None = None,
 ) -> bsr_array:
     """Assemble the stiffness matrix of the solid cells.
 
@@ -87,6 +89,8 @@ def stiffness(
         By solid element: material number of each cell.
     pattern : Sparsity, optional
         From `sparsity`, to reuse it.
+    averaged : ndarray of bool (n_materials,), optional
+        Which materials have a mean dilatation, see `dilatation`; none by default.
 
     Returns
     -------
@@ -95,23 +99,10 @@ def stiffness(
     """
     pattern = pattern or sparsity(mesh)
     data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))
-    loops = element_kernels.loops(mesh.dim)
     for name, block in mesh.solids.items():
-        tables = elements.get(name).tables
-        owner, parts = pattern.owners(mesh, name)
-
-        def add(
-            part: int, name: str = name, block: NDArray[np.int32] = block, tables: Any = tables, owner: Any = owner,
-            parts: Any = parts,
-        ) -> int:  # fmt: skip
-            rows = slice(*parts[part])
-            bad = loops.add_stiffness(
-                mesh.points, block[rows], *tables, moduli, material[name][rows], kinematics == "axisymmetric",
-                pattern.slots[name][rows], owner, part, data,
-            )  # fmt: skip
-            return int(bad) if bad < 0 else int(bad) + rows.start
-
-        found = parallel.shared(add, range(len(parts)))
+        split = dilatation.split(name, moduli, averaged)
+        add = _Addition(mesh, name, kinematics == "axisymmetric", material[name], pattern, data)
+        found = parallel.shared(partial(add.part, moduli=moduli, split=split), range(add.n_parts))
         bad = min((number for number in found if number >= 0), default=-1)
         if bad >= 0:
             where = mesh.points[block[bad]].mean(axis=0)
@@ -120,6 +111,40 @@ def stiffness(
             )
     size = mesh.n_points * mesh.dim
     return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
+
+
+class _Addition:
+    """The cells of one element, whose stiffness threads add to `data` (n_blocks, dim, dim)."""
+
+    def __init__(
+        self, mesh: Mesh, name: str, axisymmetric: bool, material: NDArray[np.int32], pattern: Sparsity, data: Array
+    ) -> None:
+        self._points, self._cells, self._material = mesh.points, mesh.cells[name], material
+        self._name, self._tables, self._axisymmetric = name, elements.get(name).tables, axisymmetric
+        self._owner, self._parts = pattern.owners(mesh, name)
+        self._slots, self._data = pattern.slots[name], data
+
+    @property
+    def n_parts(self) -> int:
+        """How many threads share the cells."""
+        return len(self._parts)
+
+    def part(self, number: int, moduli: Array, split: dilatation.Split | None) -> int:
+        """Add the rows of a part; return the number of the first cell with a Jacobian that is not positive, or -1."""
+        rows = slice(*self._parts[number])
+        cells, material, slots = self._cells[rows], self._material[rows], self._slots[rows]
+        target = self._axisymmetric, slots, self._owner, number, self._data
+        bad = element_kernels.loops(self._points.shape[1]).add_stiffness(
+            self._points, cells, *self._tables, moduli if split is None else split.moduli, material, *target
+        )
+        if bad >= 0:
+            return int(bad) + rows.start
+        if split is not None:
+            polynomials = dilatation.basis(self._name, elements.get(self._name).quadrature[0])
+            dilatation_kernels.add_stiffness(
+                self._points, cells, *self._tables, polynomials, split.bulk, material, *target
+            )
+        return -1
 
 
 def owners(cells: NDArray[np.int32], n_points: int) -> Owners:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.model import Model
@@ -95,6 +96,9 @@ def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: A
         fields = [field for field in fields if not callable(getattr(value, field.name))]
     elif not fields and callable(value):
         _take(_called(value, points), add, mesh, points)
+    if isinstance(value, LinearElastic):  # what the choice comes to, and nothing where it is plain, as in older files
+        fields = [field for field in fields if field.name != "volumetric"]
+        add(b"mean dilatation" if value.averaged else b"")
     for field in fields:
         add(field.name.encode())
         _take(getattr(value, field.name), add, mesh, points)

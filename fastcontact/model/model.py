@@ -514,6 +514,11 @@ class Model:
         self._check_all_have_material(numbers)
         return np.stack([material.moduli(self.kinematics) for material, _ in self.materials]), numbers
 
+    def averaged_materials(self) -> NDArray[np.bool_]:
+        """Return which materials (n_materials,) have a mean dilatation; none in plane stress, where none locks."""
+        free = self.kinematics == "plane_stress"
+        return np.array([material.averaged and not free for material, _ in self.materials], bool)
+
     def _check_material(self, index: int, group: str | None, given: NDArray[np.int32]) -> None:
         """Refuse a material for cells that have another one already, which was not given to all cells."""
         new = self.materials[index][0]

@@ -80,7 +80,9 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     True
     """
     moduli, material = model.material_numbers()
-    smooth = smoothed_stress(model.mesh, model.kinematics, moduli, material, step.displacement)
+    smooth = smoothed_stress(
+        model.mesh, model.kinematics, moduli, material, step.displacement, model.averaged_materials()
+    )
     squares, energy = [], 0.0
     for name in model.mesh.solids:
         own, whole = _differences(model, step.displacement, name, smooth[name])

@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.elasticity import element_kernels
+from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
@@ -157,10 +157,8 @@ def stress_in_cells(
     N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
     cells, (moduli, material) = mesh.cells[name][rows], model.material_numbers()
     numbers = material[name][rows]
-    stress = np.empty((len(cells), len(weights), moduli.shape[1]))
-    element_kernels.loops(mesh.dim).stress(
-        mesh.points, cells, N, dN, moduli, numbers, axisymmetric, displacement, stress
-    )
+    found = CellStress(mesh, model.kinematics, moduli, displacement, model.averaged_materials())
+    stress = found.at(name, xi, cells, numbers)
     elastic = np.array([(own.E, own.nu) for own, _ in model.materials])[numbers].T[:, :, None]
     return N, stress, cell_volumes(mesh.points[cells], N, dN, axisymmetric) * weights, elastic
 

@@ -53,6 +53,9 @@ class Element:
         Name of the element on the same corners without, or with, mid nodes.
     corner_shape : callable
         Shape functions (m, n_corners) [-] of the linear element on the same corners.
+    dilatation : int, optional
+        Degree, 0 or 1, up to which the dilatation of nearly incompressible materials has the whole bulk modulus; None
+        where gradients are constant, so that nothing can be left out.
     """
 
     name: str
@@ -68,6 +71,7 @@ class Element:
     linear: str
     quadratic: str
     corner_shape: Function
+    dilatation: int | None = None
 
     @property
     def dim(self) -> int:

@@ -38,5 +38,5 @@ ELEMENT = Element(
         (3, 7, 6, 2, 19, 14, 18, 10), (0, 3, 2, 1, 11, 10, 9, 8), (4, 5, 6, 7, 12, 13, 14, 15),
     ),
     shape=shape, gradient=gradient, quadrature=gauss_cube(3), meshio="hexahedron20", med="H20", vtk=25, linear="hex8",
-    quadratic="hex20", corner_shape=hex8.shape,
+    quadratic="hex20", corner_shape=hex8.shape, dilatation=1,
 )  # fmt: skip

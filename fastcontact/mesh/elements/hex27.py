@@ -28,5 +28,5 @@ ELEMENT = Element(
     name="hex27", nodes=NODES, edges=hex8.EDGES,
     facets=tuple((*facet, 20 + i) for i, facet in enumerate(hex20.ELEMENT.facets)), shape=shape, gradient=gradient,
     quadrature=gauss_cube(3), meshio="hexahedron27", med="H27", vtk=29, linear="hex8", quadratic="hex27",
-    corner_shape=hex8.shape,
+    corner_shape=hex8.shape, dilatation=1,
 )  # fmt: skip

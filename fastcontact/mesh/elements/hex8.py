@@ -25,5 +25,5 @@ ELEMENT = Element(
     name="hex8", nodes=NODES, edges=EDGES,
     facets=((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7)), shape=shape,
     gradient=gradient, quadrature=gauss_cube(2), meshio="hexahedron", med="HE8", vtk=12, linear="hex8",
-    quadratic="hex20", corner_shape=shape,
+    quadratic="hex20", corner_shape=shape, dilatation=0,
 )  # fmt: skip

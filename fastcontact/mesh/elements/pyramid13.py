@@ -54,5 +54,5 @@ ELEMENT = Element(
         (0, 3, 2, 1, 8, 7, 6, 5), (0, 1, 4, 5, 10, 9), (1, 2, 4, 6, 11, 10), (2, 3, 4, 7, 12, 11), (3, 0, 4, 8, 9, 12),
     ),
     shape=shape, gradient=gradient, quadrature=conical_pyramid(3), meshio="pyramid13", med="P13", vtk=27,
-    linear="pyramid5", quadratic="pyramid13", corner_shape=pyramid5.shape,
+    linear="pyramid5", quadratic="pyramid13", corner_shape=pyramid5.shape, dilatation=0,
 )  # fmt: skip

@@ -40,5 +40,5 @@ def gradient(xi: Array) -> Array:
 ELEMENT = Element(
     name="pyramid5", nodes=NODES, edges=EDGES, facets=((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
     shape=shape, gradient=gradient, quadrature=pyramid_5(), meshio="pyramid", med="PY5", vtk=14, linear="pyramid5",
-    quadratic="pyramid13", corner_shape=shape,
+    quadratic="pyramid13", corner_shape=shape, dilatation=0,
 )  # fmt: skip

@@ -23,5 +23,5 @@ def gradient(xi: Array) -> Array:
 
 ELEMENT = Element(
     name="quad4", nodes=NODES, edges=EDGES, facets=EDGES, shape=shape, gradient=gradient, quadrature=gauss_square(2),
-    meshio="quad", med="QU4", vtk=9, linear="quad4", quadratic="quad8", corner_shape=shape,
+    meshio="quad", med="QU4", vtk=9, linear="quad4", quadratic="quad8", corner_shape=shape, dilatation=0,
 )  # fmt: skip

@@ -15,5 +15,5 @@ shape, gradient = product_of_two(line3, line3, I, J)
 ELEMENT = Element(
     name="quad9", nodes=NODES, edges=quad4.EDGES, facets=quad8.ELEMENT.facets, shape=shape, gradient=gradient,
     quadrature=gauss_square(3), meshio="quad9", med="QU9", vtk=28, linear="quad4", quadratic="quad9",
-    corner_shape=quad4.shape,
+    corner_shape=quad4.shape, dilatation=1,
 )  # fmt: skip

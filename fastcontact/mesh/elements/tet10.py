@@ -26,5 +26,5 @@ ELEMENT = Element(
     name="tet10", nodes=NODES, edges=tet4.EDGES,
     facets=((0, 1, 3, 4, 8, 7), (1, 2, 3, 5, 9, 8), (2, 0, 3, 6, 7, 9), (0, 2, 1, 6, 5, 4)), shape=shape,
     gradient=gradient, quadrature=tetrahedron_5(), meshio="tetra10", med="T10", vtk=24, linear="tet4",
-    quadratic="tet10", corner_shape=tet4.shape,
+    quadratic="tet10", corner_shape=tet4.shape, dilatation=0,
 )  # fmt: skip

@@ -28,5 +28,5 @@ ELEMENT = Element(
     name="tri6", nodes=np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]]),
     edges=((0, 1), (1, 2), (2, 0)), facets=((0, 1, 3), (1, 2, 4), (2, 0, 5)), shape=shape, gradient=gradient,
     quadrature=triangle_6(), meshio="triangle6", med="TR6", vtk=22, linear="tri3", quadratic="tri6",
-    corner_shape=tri3.shape,
+    corner_shape=tri3.shape, dilatation=0,
 )  # fmt: skip

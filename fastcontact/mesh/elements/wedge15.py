@@ -39,5 +39,5 @@ def gradient(xi: Array) -> Array:
 ELEMENT = Element(
     name="wedge15", nodes=NODES, edges=wedge6.EDGES, facets=FACETS, shape=shape, gradient=gradient,
     quadrature=prism(triangle_7(), gauss_line(3)), meshio="wedge15", med="P15", vtk=26, linear="wedge6",
-    quadratic="wedge15", corner_shape=wedge6.shape,
+    quadratic="wedge15", corner_shape=wedge6.shape, dilatation=0,
 )  # fmt: skip

@@ -16,5 +16,5 @@ ELEMENT = Element(
     name="wedge18", nodes=NODES, edges=wedge6.EDGES,
     facets=(*wedge15.FACETS[:2], *((*facet, 15 + i) for i, facet in enumerate(wedge15.FACETS[2:]))), shape=shape,
     gradient=gradient, quadrature=prism(triangle_7(), gauss_line(3)), meshio="wedge18", med="P18", vtk=32,
-    linear="wedge6", quadratic="wedge18", corner_shape=wedge6.shape,
+    linear="wedge6", quadratic="wedge18", corner_shape=wedge6.shape, dilatation=0,
 )  # fmt: skip

@@ -19,5 +19,5 @@ shape, gradient = product_of_two(tri3, line2, I, J)
 ELEMENT = Element(
     name="wedge6", nodes=NODES, edges=EDGES, facets=((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
     shape=shape, gradient=gradient, quadrature=prism(triangle_3_sides(), gauss_line(2)), meshio="wedge", med="PE6",
-    vtk=13, linear="wedge6", quadratic="wedge15", corner_shape=shape,
+    vtk=13, linear="wedge6", quadratic="wedge15", corner_shape=shape, dilatation=0,
 )  # fmt: skip

@@ -1,0 +1,68 @@
+"""Stresses in cells from displacements, at any points of the reference cell."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact._jit import parallel
+from fastcontact.elasticity import dilatation, dilatation_kernels, element_kernels
+from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+
+class CellStress:
+    """Stresses from the displacements of a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    kinematics : str
+        ``"axisymmetric"``, ``"plane_strain"``, ``"plane_stress"`` or ``"3d"``.
+    moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
+        From `LinearElastic.moduli` [pressure].
+    displacement : ndarray (n_points, dim)
+        Of all points [length].
+    averaged : ndarray of bool (n_materials,), optional
+        Which materials have a mean dilatation, see `dilatation`; none by default.
+    """
+
+    def __init__(
+        self, mesh: Mesh, kinematics: str, moduli: Array, displacement: Array, averaged: dilatation.Mask | None = None
+    ) -> None:
+        self._mesh, self._axisymmetric, self._moduli = mesh, kinematics == "axisymmetric", moduli
+        self._displacement, self._averaged = np.ascontiguousarray(displacement), averaged
+
+    def at(self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32]) -> Array:
+        """Return the stresses (n_cells, n, n_components) [pressure] at points `xi` (n, dim) [-] of cells of an element.
+
+        `cells` (n_cells, n_nodes) of int; `material` (n_cells,) of int, the material number of each.
+        """
+        out = np.empty((len(cells), len(xi), self._moduli.shape[1]))
+        self.fill(name, xi, cells, material, out)
+        return out
+
+    def fill(self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32], out: Array) -> None:
+        """Fill `out` (n_cells, n, n_components) [pressure] in place, shared by threads; arguments as for `at`."""
+        element, split = elements.get(name), dilatation.split(name, self._moduli, self._averaged)
+        moduli = self._moduli if split is None else split.moduli
+        if xi is element.quadrature[0]:
+            N, dN, _ = element.tables
+        else:
+            N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
+        loops, points = element_kernels.loops(self._mesh.dim), self._mesh.points
+
+        def part(rows: tuple[int, int]) -> None:
+            own = slice(*rows)
+            shared = material[own], self._axisymmetric, self._displacement
+            loops.stress(points, cells[own], N, dN, moduli, *shared, out[own])
+            if split is not None:
+                polynomials = dilatation.basis(name, element.quadrature[0])
+                dilatation_kernels.add_pressure(
+                    points, cells[own], *element.tables, polynomials, split.bulk, *shared, dilatation.basis(name, xi),
+                    out[own],
+                )  # fmt: skip
+
+        parallel.shared(part, parallel.portions(len(out), cells.shape[1]))

@@ -1,0 +1,66 @@
+"""Mean dilatation: elements that do not lock where materials are nearly incompressible.
+
+The dilatation, the trace of the strain, is projected on polynomials of low degree in each cell: its mean in linear elements
+(the B-bar method: Hughes, Int. J. Numer. Meth. Engng 15, 1980), a linear function in quadratic ones. What remains of the
+strain is left as it is. In quadratic triangles, tetrahedra, wedges and pyramids, where a linear dilatation is still one
+condition too many, only its mean has the whole bulk modulus; the remainder has that of a material with nu = 0.3 and the same
+shear modulus, without which single cells could move freely (by conformal maps, whose deviatoric strain is zero).
+
+The element loops are given the moduli without the bulk modulus, and the loops of `dilatation_kernels` add the part of the
+projected dilatation.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.mesh import elements
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+# Bulk over shear modulus at nu = 0.3: 2 (1 + nu) / (3 (1 - 2 nu)).
+REMAINDER = 2.6 / 1.2
+
+
+class Split(NamedTuple):
+    """Moduli (n_materials, n, n) for the element loops, and bulk moduli (n_materials, 2) beside them [pressure].
+
+    Bulk moduli are those of the mean dilatation of a cell and of the remainder, zero where the element loops have them.
+    """
+
+    moduli: Array
+    bulk: Array
+
+
+def split(name: str, moduli: Array, averaged: Mask | None) -> Split | None:
+    """Return the moduli of an element without and with the part of the dilatation; None where nothing is projected.
+
+    Parameters
+    ----------
+    name : str
+        The element.
+    moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
+        From `LinearElastic.moduli` [pressure].
+    averaged : ndarray of bool (n_materials,), optional
+        Which materials have a mean dilatation; none by default.
+    """
+    if averaged is None or not averaged.any() or elements.get(name).dilatation is None:
+        return None
+    bulk = np.where(averaged, moduli[:, :3, :3].sum(axis=(1, 2)) / 9.0, 0.0)
+    deviatoric = moduli.copy()
+    deviatoric[:, :3, :3] -= bulk[:, None, None]
+    whole = elements.get(name).dilatation == elements.get(name).order - 1
+    rest = bulk if whole else np.minimum(bulk, REMAINDER * moduli[:, 3, 3])
+    return Split(deviatoric, np.column_stack([bulk, rest]))
+
+
+def basis(name: str, xi: Array) -> Array:
+    """Return the polynomials (n, m) [-] on which an element projects its dilatation, at the points `xi` (n, dim) [-]."""
+    element = elements.get(name)
+    one = np.ones((len(xi), 1))
+    if element.order == 1:
+        return one
+    return np.column_stack([one, xi - element.nodes[: element.n_corners].mean(axis=0)])
