@@ -248,6 +248,8 @@ def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> No
         row["dissipation"] = contact.dissipation
         moved = contact.obstacle_displacement
         row["obstacle_displacement"] = np.nan if moved is None else moved
+        if "middle" in (row.dtype.names or ()):  # not in a file of an earlier schema that is resumed
+            row["middle"] = contact.middle
         _extend(pair["rows"], table)
     _set_row(pair["steps"], number, row)
 

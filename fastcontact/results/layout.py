@@ -34,8 +34,11 @@ from fastcontact.results.step import ContactResult, StepResult
 Array = NDArray[np.float64]
 Flags = NDArray[np.int8]
 
-# 1: until the restart state came in. 2: restart state of the last step, any number of run records.
-SCHEMA = 2
+# 1: until the restart state came in. 2: restart state of the last step, any number of run records. 3: the middle of a
+# contact, and places measured from it.
+SCHEMA = 3
+# Files from this schema on can be resumed.
+RESUMABLE = 2
 
 # Point data by name, with the number of components that viewers expect; stress is a symmetric tensor.
 POINT_FIELDS = {
@@ -67,7 +70,7 @@ def restart_table(number: int) -> str:
 
 def contact_row(dim: int) -> np.dtype[Any]:
     """Return the type of one row of a contact table: one secondary node in one step."""
-    scalars = [(name, "<f8") for name in ("abscissa", "gap", "pressure", "multiplier")]
+    scalars = [(name, "<f8") for name in ("abscissa", "place", "gap", "pressure", "multiplier")]
     vectors = [(name, "<f8", (dim,)) for name in ("coordinates", "force_vectors", "normal", "shear")]
     return np.dtype([("points", "<i4"), ("active", "i1"), ("sticking", "i1"), *scalars, *vectors])
 
@@ -76,6 +79,7 @@ def contact_step(dim: int) -> np.dtype[Any]:
     """Return the type of the row that a contact pair has for each step: its rows, resultant, radius, work, obstacle."""
     sums = [("force", "<f8", (dim,)), ("radius", "<f8", (2,)), ("dissipation", "<f8")]
     sums.append(("obstacle_displacement", "<f8", (dim,)))  # NaN between bodies
+    sums.append(("middle", "<f8", (dim,)))
     return np.dtype([("first", "<i8"), ("count", "<i8"), *sums])
 
 

@@ -314,7 +314,7 @@ def _steps_to_resume(
         if not len(old):
             return [], False, ""
         begin_anew = "or start anew without resuming, which replaces the file"
-        if old.schema < layout.SCHEMA:
+        if old.schema < layout.RESUMABLE:
             raise FileError(
                 f"'{path}' was written by an earlier fastcontact, which kept nothing to go on from: name another file "
                 f"{begin_anew}"
