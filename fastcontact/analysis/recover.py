@@ -19,6 +19,7 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import normals
 from fastcontact.elasticity import recovery
+from fastcontact.results.material_stress import by_largest_von_mises
 from fastcontact.results.step import ContactResult, StepResult, half_width
 
 Array = NDArray[np.float64]
@@ -45,11 +46,14 @@ def recover(
         Number of the step, and its pseudo-time.
     """
     mesh, u = problem.model.mesh, problem.displacement(end.u)
-    stress = recovery.nodal_stress(mesh, problem.model.kinematics, problem.moduli, problem.material, u)
+    at_places = recovery.nodal_stress(
+        mesh, problem.model.kinematics, problem.moduli, problem.material, u, problem.sides
+    )
+    stress, by_material = by_largest_von_mises(problem.sides, problem.material_of_cells, at_places, mesh.n_points)
     von_mises = recovery.von_mises(stress)
     return StepResult(
         *place, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises), reaction.reshape(-1, mesh.dim),
-        contact, iterations,
+        contact, iterations, material_stress=by_material,
     )  # fmt: skip
 
 

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.results.material_stress import MaterialStress
+
 Array = NDArray[np.float64]
 
 
@@ -147,8 +149,9 @@ class StepResult:
     displacement : ndarray (n_points, dim)
         [length].
     stress : ndarray (n_points, 4) or (n_points, 6)
-        Nodal stress, averaged over the elements at each node; components xx, yy, zz, xy (then yz, xz in 3D), in
-        axisymmetry rr, yy, hoop, ry [pressure].
+        Nodal stress, averaged over the elements of one material at each node, where materials meet that of the side with
+        the largest von Mises stress; components xx, yy, zz, xy (then yz, xz in 3D), in axisymmetry rr, yy, hoop, ry
+        [pressure].
     von_mises, von_mises_signed : ndarray (n_points,)
         Equivalent stress of `stress`; the same with the sign of its trace [pressure].
     reaction : ndarray (n_points, dim)
@@ -163,6 +166,8 @@ class StepResult:
         Warnings of the step.
     cell_fields : dict of str to ndarray (n_solids,)
         Further numbers of every solid cell, in the order of ``mesh.solids``, e.g. an estimated error [unit of the field].
+    material_stress : MaterialStress, optional
+        The stress of each side at the nodes where materials meet; None where none do.
     restart : dict, optional
         Restart data for the next step: plain numbers, strings and arrays. Result files keep those of their last step.
     """
@@ -179,3 +184,16 @@ class StepResult:
     warnings: tuple[str, ...] = ()
     cell_fields: dict[str, Array] = field(default_factory=dict)
     restart: dict[str, Any] | None = field(default=None, repr=False)
+    material_stress: MaterialStress | None = None
+
+    def stress_of_material(self, number: int) -> Array:
+        """Return the nodal stress (n_points, 4) or (n_points, 6) with the side of one material where several meet [pressure].
+
+        Materials count from 0, in the order in which they were added to the model; at nodes that the material does not have
+        the stress is that of the others.
+        """
+        found = self.stress.copy()
+        if self.material_stress is not None:
+            own = self.material_stress.material == number
+            found[self.material_stress.points[own]] = self.material_stress.stress[own]
+        return found
