@@ -150,8 +150,8 @@ def contact_result(
     if pair.axisymmetric:
         total[0] = 0.0  # radial forces cancel over the full circle
     coordinates = pair.points[points]
-    along_normal = np.einsum("nd,nd->n", forces, np.where(np.isfinite(normal), normal, 0.0))
-    middle = contact_middle(pair, normal, along_normal, closed, gap)
+    faced = np.where(np.isfinite(normal), normal, 0.0)
+    middle = contact_middle(pair, faced, np.einsum("nd,nd->n", forces, faced), closed, gap)
     return ContactResult(
         name=name,
         formulation=pair.name,
