@@ -53,7 +53,7 @@ _NAMES = {
     "results.med": ("write_med_results",),
     "results.reader": ("open_results",),
     "results.step": ("ContactResult", "StepResult"),
-    "results.tables": ("contact_table", "line_table", "write_csv"),
+    "results.tables": ("contact_table", "line_table", "normal_stress", "write_csv"),
     "results.writer": ("ResultWriter",),
     "results.xmgrace": ("write_agr",),
     "studies.adaptive": ("adaptive_study",),

@@ -34,6 +34,7 @@ from fastcontact.results.step import ContactResult as ContactResult
 from fastcontact.results.step import StepResult as StepResult
 from fastcontact.results.tables import contact_table as contact_table
 from fastcontact.results.tables import line_table as line_table
+from fastcontact.results.tables import normal_stress as normal_stress
 from fastcontact.results.tables import write_csv as write_csv
 from fastcontact.results.writer import ResultWriter as ResultWriter
 from fastcontact.results.xmgrace import write_agr as write_agr

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.elasticity.constrained_system import System
+from fastcontact.elasticity.material_sides import MaterialSides, distinct, material_sides
 from fastcontact.elasticity.springs import stiffened
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.linear import choice
@@ -78,6 +80,8 @@ class Problem:
         The displacement components that a pairing solves for.
     contact_dofs : ndarray of int
         Components that constraints may involve.
+    sides : MaterialSides
+        Where materials meet, which have nodal stresses of their own.
     force_driven : ForceDrivenObstacles
         Rigid obstacles that forces move.
     prescribed, forces : dict of ramp table to ndarray (n_points + n_driven, dim)
@@ -91,6 +95,7 @@ class Problem:
     pairs: Mapping[str, Formulation]
     moduli: Array
     material: dict[str, NDArray[np.int32]]
+    sides: MaterialSides
     system: System
     bodies: UnsupportedBodies | None
     dofs: ActiveDofs
@@ -98,6 +103,11 @@ class Problem:
     force_driven: ForceDrivenObstacles
     prescribed: ByRamp
     forces: ByRamp
+
+    @cached_property
+    def material_of_cells(self) -> NDArray[np.int32]:
+        """Material of every solid cell (n_solids,), equal ones under one number."""
+        return np.concatenate(list(distinct(self.moduli, self.material).values()))
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -179,6 +189,7 @@ def prepare(
     supported, prescribed = model.prescribed_by_ramp()
     pairs = {pair.name: model.bind(pair, supported) for pair in model.contact}
     moduli, material = model.material_numbers()
+    sides = material_sides(mesh, distinct(moduli, material))
     K = stiffened(stiffness(mesh, model.kinematics, moduli, material, None, model.averaged_materials()), model.springs)
     system = System(
         driven.stiffness(K),
@@ -192,7 +203,7 @@ def prepare(
     bodies = UnsupportedBodies(motions, system, involved) if len(motions) else None
     involved = _prepare_solver(solver, system, bodies, driven.near_nullspace(near_nullspace(model)), involved)
     return Problem(
-        model, ramp, criteria, solver, pairs, moduli, material, system, bodies,
+        model, ramp, criteria, solver, pairs, moduli, material, sides, system, bodies,
         SurfaceDofs(system, contact_dofs, involved) if pairs and bodies is None and solver.condenses
         else ActiveDofs(system, contact_dofs),
         contact_dofs, driven, driven.prescribed(prescribed), driven.forces(model.forces_by_ramp()),

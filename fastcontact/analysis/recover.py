@@ -15,11 +15,13 @@ from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
 from fastcontact.analysis.state import State
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.contact_middle import contact_middle
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import normals
 from fastcontact.elasticity import recovery
-from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.material_stress import by_largest_von_mises
+from fastcontact.results.step import ContactResult, StepResult, half_width
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -45,12 +47,20 @@ def recover(
         Number of the step, and its pseudo-time.
     """
     mesh, u = problem.model.mesh, problem.displacement(end.u)
-    averaged = problem.model.averaged_materials()
-    stress = recovery.nodal_stress(mesh, problem.model.kinematics, problem.moduli, problem.material, u, averaged)
+    at_places = recovery.nodal_stress(
+        mesh,
+        problem.model.kinematics,
+        problem.moduli,
+        problem.material,
+        u,
+        problem.model.averaged_materials(),
+        problem.sides,
+    )
+    stress, by_material = by_largest_von_mises(problem.sides, problem.material_of_cells, at_places, mesh.n_points)
     von_mises = recovery.von_mises(stress)
     return StepResult(
         *place, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises), reaction.reshape(-1, mesh.dim),
-        contact, iterations,
+        contact, iterations, material_stress=by_material,
     )  # fmt: skip
 
 
@@ -158,6 +168,8 @@ def contact_result(
     if pair.axisymmetric:
         total[0] = 0.0  # radial forces cancel over the full circle
     coordinates = pair.points[points]
+    faced = np.where(np.isfinite(normal), normal, 0.0)
+    middle = contact_middle(pair, faced, np.einsum("nd,nd->n", forces, faced), closed, gap)
     return ContactResult(
         name=name,
         formulation=pair.name,
@@ -171,11 +183,13 @@ def contact_result(
         normal=normal,
         active=closed,
         force=total,
-        radius=_radius(_distance(part.positions, axis), active),
+        radius=half_width(middle.places(part.positions), active),
         shear=np.where(closed[:, None], along.shear, 0.0),
         sticking=closed & along.sticking,
         dissipation=along.dissipation,
         obstacle_displacement=at.obstacle.copy() if isinstance(pair.primary, RigidSide) else None,
+        middle=middle.position,
+        place=middle.places(coordinates),
     )
 
 
@@ -248,18 +262,8 @@ def _mostly_sticking(part: Constraints, sticking: Mask, multiplier: Array, press
     return part.nodal.pressure(np.where(sticking, multiplier, 0.0)) > 0.5 * pressure
 
 
-def _distance(positions: Array, axis: tuple[Array, Array] | None) -> Array:
-    """Return the distances (n,) of reference positions from the axis x = 0, or from another axis (place, direction)."""
-    if axis is None:
-        return np.abs(positions[:, 0])
+def _distance(positions: Array, axis: tuple[Array, Array]) -> Array:
+    """Return the distances (n,) of reference positions from an axis (place, direction) [length]."""
     foot, direction = axis
     arm = positions - foot
     return np.linalg.norm(arm - (arm @ direction)[:, None] * direction, axis=1)
-
-
-def _radius(distance: Array, active: Mask) -> tuple[float, float]:
-    """Return the distance of the outermost active constraint and of the next one beyond it."""
-    if not active.any():
-        return float("nan"), float("nan")
-    inside = distance[active].max()
-    return float(inside), float(distance[distance > inside].min(initial=np.inf))

@@ -34,7 +34,7 @@ LOOSE = 1e-4
 
 def result_warnings(problem: Problem, state: State, last: StepResult) -> list[str]:
     """Return the warnings about an analysis whose `last` step ended in a state."""
-    found = _interpenetration(problem, state) + _large_strain(problem, last.stress) + _large_rotation(problem, state)
+    found = _interpenetration(problem, state) + _large_strain(problem, last) + _large_rotation(problem, state)
     found += _carrying_springs(problem, state)
     found += [problem.solver.gave_up] if problem.solver.gave_up else []
     load = problem.load_at(last.load_factor)
@@ -131,9 +131,18 @@ def _carrying_springs(problem: Problem, state: State) -> list[str]:
     ]
 
 
-def _large_strain(problem: Problem, stress: Array) -> list[str]:
-    softest = min(material.shear_modulus for material, _ in problem.model.materials)
-    strain = float(recovery.von_mises(stress).max(initial=0.0) / (3 * softest))
+def _large_strain(problem: Problem, last: StepResult) -> list[str]:
+    shear = np.array([material.shear_modulus for material, _ in problem.model.materials])
+    strain, border = 0.0, last.material_stress
+    inside = np.ones(len(last.stress), bool)
+    if border is not None:
+        inside[border.points] = False
+        strain = float((recovery.von_mises(border.stress) / (3 * shear[border.material])).max())
+    for name, block in problem.model.mesh.solids.items():
+        for number in np.unique(problem.material[name]):
+            nodes = np.unique(block[problem.material[name] == number])
+            stress = last.von_mises[nodes[inside[nodes]]]
+            strain = max(strain, float(stress.max(initial=0.0) / (3 * shear[number])))
     if strain <= STRAIN:
         return []
     return [f"the largest equivalent strain is {strain:.3f}, beyond the {STRAIN} where linear kinematics hold well"]

@@ -53,6 +53,8 @@ class Case:
         Names of the units of length, force and pressure, for labels.
     approach : dict of str to float
         Approach of the theory by contact pair, where it was given [length].
+    folder : pathlib.Path
+        In which the files lie that the case names, absolute.
     """
 
     name: str
@@ -69,6 +71,7 @@ class Case:
     checks: list[Check] = field(default_factory=list)
     units: dict[str, str] = field(default_factory=dict)
     approach: dict[str, float] = field(default_factory=dict)
+    folder: Path = Path()
 
 
 def read_case(path: str | Path) -> Case:
@@ -176,6 +179,7 @@ def build_case(
         checks=_checks(data, probes, theories),
         units=_units(data),
         approach=approach,
+        folder=Path(folder).resolve(),
     )
 
 
@@ -263,9 +267,15 @@ def _theory(where: str, data: dict[str, Any]) -> Any:
 
 
 def described(data: dict[str, Any]) -> dict[str, Any]:
-    """Return title, units, theories and approach of a case, as `Case` holds them.
+    """Return title, units, theories, approach and the table of the ramp of a case, as `Case` holds them.
 
     `data` is the parsed text kept in a result file; it may be empty.
     """
     theories, approach = _theories(data)
-    return {"title": data.get("title", ""), "units": _units(data), "theories": theories, "approach": approach}
+    return {
+        "title": data.get("title", ""),
+        "units": _units(data),
+        "theories": theories,
+        "approach": approach,
+        "ramp": _ramp(data.get("ramp", {})).table,
+    }

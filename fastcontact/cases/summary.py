@@ -76,6 +76,7 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
         "force_vector": contact.force.tolist(),
         "radius": [_finite(value) for value in contact.radius],
         "pressure_max": contact.pressure_max,
+        "middle": contact.middle.tolist(),
         "closed_nodes": int(contact.active.sum()),
         "obstacle_displacement": None if moved is None else moved.tolist(),
         "penetration": contact.penetration,
@@ -94,7 +95,14 @@ def _probe(step: StepResult, point: int) -> dict[str, Any]:
         "displacement": step.displacement[point].tolist(),
         "von_mises": float(step.von_mises[point]),
         "pressure": float(contact.pressure[row]) if contact else None,
+        **({"stress_by_material": _by_material(step, point)} if _by_material(step, point) else {}),
     }
+
+
+def _by_material(step: StepResult, point: int) -> dict[str, list[float]]:
+    """Return the stress of each side at a point where materials meet, by number of the material; else empty."""
+    found = step.material_stress.at(point) if step.material_stress is not None else {}
+    return {str(number): stress.tolist() for number, stress in found.items()}
 
 
 def _against_theory(

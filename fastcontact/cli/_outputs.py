@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from fastcontact.cli._results import pressure_curves
+from fastcontact.cli._results import load_multiplier, pressure_curves
 from fastcontact.errors import FastcontactError, FileError
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -102,7 +102,8 @@ def profile_picture(case: Any, step: StepResult, path: str) -> None:
     if not step.contact:
         raise FastcontactError("there is no contact pair whose pressure could be plotted")
     name, contact = next(iter(step.contact.items()))
-    curves = pressure_curves(case.theories.get(name, {}), contact)
+    given = {"approach": case.approach.get(name), "load": load_multiplier(case.ramp.table, step)}
+    curves = pressure_curves(case.theories.get(name, {}), contact, **given)
     draw_profile(contact, step, curves, path, case.title, case.units)
 
 
@@ -111,15 +112,8 @@ def draw_profile(
 ) -> None:
     """Plot the pressure of a contact pair with theories by legend."""
     from fastcontact.results import plot
+    from fastcontact.results.tables import normal_stress
 
-    flat = contact.normal.shape[1] == 2
-    stress = step.stress[contact.points, 1] if flat else normal_stress(contact, step)
+    stress = normal_stress(contact, step)
     title = f"{title}\nload factor {step.load_factor:g}"
     save(plot.pressure_profile(contact, other_theories=theories, stress=stress, title=title, units=units), path)
-
-
-def normal_stress(contact: ContactResult, step: StepResult) -> Any:
-    """Return the stress (m,) at the contact nodes along the normals that they face [pressure]."""
-    xx, yy, zz, xy, yz, xz = step.stress[contact.points].T
-    x, y, z = contact.normal.T
-    return x * x * xx + y * y * yy + z * z * zz + 2.0 * (x * y * xy + y * z * yz + x * z * xz)

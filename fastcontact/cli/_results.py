@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
 from fastcontact.errors import CaseError, unknown
 
 
@@ -40,7 +41,7 @@ def chosen_contact(step: Any, name: str | None) -> str:
 
 
 def case_data(results: Any) -> dict[str, Any]:
-    """Return title, units, theories and approaches of the case text kept in the file; empty without one."""
+    """Return title, units, theories, approaches and ramp of the case text kept in the file; empty without one."""
     from fastcontact.cases.case import described
 
     try:
@@ -50,15 +51,47 @@ def case_data(results: Any) -> dict[str, Any]:
     return described(data)
 
 
-def pressure_curves(theories: Mapping[str, Any], contact: Any) -> dict[str, Any]:
+def load_multiplier(table: Sequence[tuple[float, float]], step: Any) -> float:
+    """Return the multiplier of the loads at a step, from the table of the ramp."""
+    return float(np.interp(step.load_factor, *np.transpose(table)))
+
+
+def pressure_curves(
+    theories: Mapping[str, Any], contact: Any, *, approach: float | None = None, load: float = 1.0
+) -> dict[str, Any]:
     """Return what to draw over the pressure of a contact, by legend: its theory at equal approach and at equal force.
 
-    There is nothing without a theory whose pressure can be drawn; that of a punch is infinite.
+    Parameters
+    ----------
+    theories : mapping
+        Of the pair, as `Case.theories` holds them.
+    contact : ContactResult
+    approach : float, optional
+        That the case gives the theory, reached at a multiplier of 1 [length]; without one the theory was given otherwise.
+    load : float
+        Multiplier of the loads at this step [-].
+
+    There is nothing without a theory whose pressure can be drawn; that of a flat punch is infinite.
     """
-    theory = theories.get("theory")
-    if not all(hasattr(theory, name) for name in ("pressure", "pressure_max", "radius")):
+    theory: Any = theories.get("theory")
+    own = pressure_curve(theory)
+    if own is None:
         return {}
-    return {"Hertz, equal approach": theory, **at_equal_force("Hertz, equal force", theory, contact, theories["share"])}
+    found: dict[str, Any] = {}
+    if approach is None and not hasattr(theory, "at_force"):
+        found[own.name] = theory
+    elif approach is not None and load == 1.0:
+        found[f"{own.name}, equal approach"] = theory
+    elif approach is not None and load > 0 and hasattr(theory, "at_approach"):
+        found[f"{own.name}, equal approach"] = theory.at_approach(approach * load)
+    return {**found, **at_equal_force(f"{own.name}, equal force", theory, contact, theories["share"])}
+
+
+def drawn(theory: Any) -> PressureCurve:
+    """Return the pressure of a theory that `pressure_curves` found."""
+    curve = pressure_curve(theory)
+    assert curve is not None
+    return curve
 
 
 def at_equal_force(legend: str, theory: Any, contact: Any, share: float) -> dict[str, Any]:

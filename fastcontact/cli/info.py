@@ -59,4 +59,10 @@ def _result_lines(results: Any) -> list[str]:
             ends = ", ".join(f"{end:.6g}" for end in counts["substeps"])
             found.append(f"    did not converge whole, went in parts up to {ends}")
         found += [f"    warning: {text}" for text in step.warnings]
+    meet = results[-1].material_stress if len(results) else None
+    if meet is not None:
+        found.append(
+            f"  materials meet at {len(set(meet.points.tolist()))} nodes: stress there is that of the side with the largest "
+            "von Mises stress, material_stress has each side's"
+        )
     return found

@@ -66,9 +66,14 @@ def _drawn(options: argparse.Namespace, results: Any, step: Any, case: dict[str,
         return plot.history(list(results), name, law=_results.law(theories), approach=approach, **labels)[0]
     theory = theories.get("theory")
     theory = getattr(theory, "hertz", theory)
-    curves = {}
+    curves: dict[str, Any] = {}
     if hasattr(theory, "stress_on_axis"):
         same = _results.at_equal_force("theory, equal force", theory, step.contact[name], theories["share"])
-        curves = {"theory, equal approach": theory, **same}
+        approach, load = case["approach"].get(name), _results.load_multiplier(case["ramp"], step)
+        if approach is not None and load > 0 and hasattr(theory, "at_approach"):
+            curves["theory, equal approach"] = theory.at_approach(approach * load) if load != 1.0 else theory
+        elif not same:
+            curves["theory"] = theory
+        curves |= same
     labels["title"] = f"{case['title']}\nstresses on the axis, {loaded}".strip()
     return plot.axis_stress(results.mesh, step, name, curves, **labels)

@@ -9,7 +9,7 @@ import numpy as np
 
 from fastcontact.cli import _results
 from fastcontact.cli._outputs import check_outputs, draw_profile
-from fastcontact.cli._results import pressure_curves
+from fastcontact.cli._results import drawn, load_multiplier, pressure_curves
 from fastcontact.cli._terminal import say
 
 HELP = "pressure along the contact line against theory: CSV, XMGRACE .agr, PNG"
@@ -35,10 +35,11 @@ def run(options: argparse.Namespace) -> int:
         case = _results.case_data(results)
     contact = step.contact[name]
     table = contact_table(contact, step)
-    theories = pressure_curves(case["theories"].get(name, {}), contact)
+    load = load_multiplier(case["ramp"], step)
+    theories = pressure_curves(case["theories"].get(name, {}), contact, approach=case["approach"].get(name), load=load)
     for label, theory in theories.items():
-        column = f"pressure_{label.replace(', ', '_').replace(' ', '_')}"
-        table = with_column(table, column, theory.pressure(table["radius"]))
+        column = f"pressure_{label.replace(', ', '_').replace(' ', '_').replace('é', 'e')}"
+        table = with_column(table, column, drawn(theory).pressure(table["radius"]))
     if options.csv:
         write_csv(options.csv, table)
     if options.agr:
@@ -64,16 +65,21 @@ def _print(table: Any) -> None:
 def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theories: dict[str, Any]) -> None:
     from fastcontact.results.xmgrace import Curve, write_agr
 
-    r = np.abs(contact.coordinates[:, 0])
-    curves = [Curve(r, contact.pressure, "computed", style="line+symbols")]
+    order = np.argsort(contact.place, kind="stable")
+    place = contact.place[order]
+    style = "line+symbols" if contact.coordinates.shape[1] == 2 else "symbols"
+    curves = [Curve(place, contact.pressure[order], "computed", style=style)]
     for label, theory in theories.items():
-        x = np.append(np.linspace(0.0, theory.radius, 200), r.max())
-        curves.append(Curve(x, theory.pressure(x), label))
+        curve = drawn(theory)
+        end = min(curve.radius, float(np.abs(place).max()))
+        x = np.unique(np.concatenate([place[[0, -1]], np.linspace(max(-end, min(place[0], 0.0)), end, 200)]))
+        curves.append(Curve(x, curve.pressure(np.abs(x)), label))
+    start = "axis" if contact.measured_from_axis else "middle of the contact"
     write_agr(
         path,
         curves,
         title=case["title"] or f"Contact '{contact.name}'",
         subtitle=f"load factor {step.load_factor:g}",
-        xlabel=f"distance from the axis [{case['units']['length']}]",
+        xlabel=f"distance from the {start} [{case['units']['length']}]",
         ylabel=f"contact pressure [{case['units']['pressure']}]",
     )

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from fastcontact.elasticity import dilatation, element_2d_kernels, element_kernels
 from fastcontact.elasticity.cell_stress import CellStress
+from fastcontact.elasticity.material_sides import MaterialSides
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
@@ -56,13 +57,16 @@ def nodal_stress(
     material: Materials,
     displacement: Array,
     averaged: dilatation.Mask | None = None,
+    sides: MaterialSides | None = None,
 ) -> Array:
     """Return the stress (n_points, n_components) [pressure] at the nodes: `nodal_average` of `stress_at_points`.
 
     The stresses at points are formed for few cells at a time, which takes less memory. Arguments as for `stress_at_points`.
+    With `sides` the average is over the cells of one material, (n_places, n_components) in their order.
     """
     stress = CellStress(mesh, kinematics, moduli, displacement, averaged)
-    average = NodalAverage(mesh, moduli.shape[1])
+    places = mesh.cells if sides is None else sides.cells
+    average = NodalAverage(mesh.n_points if sides is None else len(sides.node), moduli.shape[1])
     for name, block in mesh.solids.items():
         element = elements.get(name)
         xi, _ = element.quadrature
@@ -72,15 +76,15 @@ def nodal_stress(
             rows = slice(first, first + len(room))
             values = room[: len(block) - first]
             stress.fill(name, xi, block[rows], material[name][rows], values)
-            average.add(block[rows], element.extrapolation, values)
+            average.add(places[name][rows], element.extrapolation, values)
     return average.result()
 
 
 class NodalAverage:
     """The plain average, at each node, of the stresses of its cells there."""
 
-    def __init__(self, mesh: Mesh, components: int) -> None:
-        self._total, self._count = np.zeros((mesh.n_points, components)), np.zeros(mesh.n_points)
+    def __init__(self, count: int, components: int) -> None:
+        self._total, self._count = np.zeros((count, components)), np.zeros(count)
 
     def add(self, cells: NDArray[np.int32], extrapolation: Array, values: Array) -> None:
         """Add the stresses of `cells` (n_cells, n_nodes), `values` (n_cells, n_q, n_components) [pressure] at points.
@@ -111,7 +115,7 @@ def nodal_average(mesh: Mesh, at_points: dict[str, Array]) -> Array:
 
     From `at_points` (n_cells, n_q, n_components) [pressure], as SIEF_NOEU of code_aster; zero at points without solid cell.
     """
-    average = NodalAverage(mesh, next(iter(at_points.values())).shape[2])
+    average = NodalAverage(mesh.n_points, next(iter(at_points.values())).shape[2])
     for name, values in at_points.items():
         average.add(mesh.cells[name], elements.get(name).extrapolation, values)
     return average.result()

@@ -38,7 +38,7 @@ def smoothed_stress(
     stress = CellStress(mesh, kinematics, moduli, displacement, averaged)
     found = {name: np.empty((*block.shape, moduli.shape[1])) for name, block in mesh.solids.items()}
     for number in range(len(moduli)):
-        average = recovery.NodalAverage(mesh, moduli.shape[1])
+        average = recovery.NodalAverage(mesh.n_points, moduli.shape[1])
         rows = {name: np.flatnonzero(material[name] == number) for name in found}
         for name, chosen in rows.items():
             xi, outward = sampling(name)

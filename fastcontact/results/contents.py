@@ -18,14 +18,18 @@ from numpy.typing import NDArray
 
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import layout
+from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.step import ContactResult, StepResult
 
 # Rows of a growing table that are allocated together.
 ROWS, BYTES = 64, 4096
 
 
-def write_geometry(file: Any, mesh: Mesh, growing: Sequence[str] = ()) -> None:
-    """Write /VTKHDF with the solid cells, the static arrays, and room for the steps and their `growing` cell fields."""
+def write_geometry(file: Any, mesh: Mesh, growing: Sequence[str] = (), material: NDArray[Any] | None = None) -> None:
+    """Write /VTKHDF with the solid cells, the static arrays, and room for the steps and their `growing` cell fields.
+
+    Where materials meet, `material` (n_solids,) are those of the cells, and each step gets their stress.
+    """
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array([2, 0], np.int64)
     root.attrs["Type"] = np.bytes_("UnstructuredGrid")  # readers want a fixed-length ASCII string
@@ -45,9 +49,14 @@ def write_geometry(file: Any, mesh: Mesh, growing: Sequence[str] = ()) -> None:
         _packed(point_data, name, values)
     for name, values in cell_fields.items():
         _packed(cell_data, name, values)
-    for name in growing:
-        _growing_field(cell_data, name, len(cells.types), 1)
-    _write_steps_group(root, point_flags, cell_fields, growing)
+    widths = dict.fromkeys(growing, 1)
+    if material is not None:
+        _packed(cell_data, "material", material)
+        cell_fields = {**cell_fields, "material": material}
+        widths |= layout.MATERIAL_FIELDS
+    for name, width in widths.items():
+        _growing_field(cell_data, name, len(cells.types), width)
+    _write_steps_group(root, point_flags, cell_fields, widths)
 
 
 def _write_steps_group(
@@ -165,6 +174,11 @@ def append_fields(file: Any, mesh: Mesh, number: int, step: StepResult, cell_fie
         field, values = file["VTKHDF/CellData"][name], step.cell_fields[name]
         field.resize((number + 1) * len(values), axis=0)
         field[number * len(values) :] = values
+    if layout.CELL_STRESS in file["VTKHDF/CellData"]:
+        for name, values in layout.material_fields(mesh, step).items():
+            field = file["VTKHDF/CellData"][name]
+            field.resize((number + 1) * len(values), axis=0)
+            field[number * len(values) :] = values
 
 
 def append_tables(
@@ -177,6 +191,8 @@ def append_tables(
             pairs[name] = _new_pair(own["contact"], name, mesh.dim)
     for name, pair in pairs.items():
         _append_contact(pair, number, step.contact.get(name))
+    if step.material_stress is not None:
+        _append_sides(own, mesh, number, step.material_stress)
     contact = [[name, contact.formulation] for name, contact in step.contact.items()]
     text = as_json({**notes, "contact": contact, "iterations": step.iterations, "warnings": list(step.warnings)})
     row = (step.index, step.load_factor, len(own["notes"]), len(text))
@@ -190,7 +206,8 @@ def append_rows(file: Any, mesh: Mesh, number: int, step: StepResult, cell_field
     rows = {"Values": step.load_factor, "NumberOfParts": 1, "PartOffsets": 0, "CellOffsets": 0}
     for name, value in {**rows, "PointDataOffsets/displacement": number * mesh.n_points}.items():
         _set_row(steps[name], number, value)
-    for name in cell_fields:
+    further = layout.MATERIAL_FIELDS if layout.CELL_STRESS in file["VTKHDF/CellData"] else ()
+    for name in (*cell_fields, *further):
         _set_row(steps["CellDataOffsets"][name], number, number * len(file["VTKHDF/Types"]))
 
 
@@ -224,6 +241,10 @@ def step_size(mesh: Mesh, step: StepResult) -> int:
     fields = 8 * (sum(layout.POINT_FIELDS.values()) * mesh.n_points + sum(map(np.size, step.cell_fields.values())))
     row = layout.contact_row(mesh.dim).itemsize
     contact = sum((len(pair.points) + 2 * ROWS) * row + BYTES for pair in step.contact.values())
+    if step.material_stress is not None:
+        cells = len(step.material_stress.cells)
+        fields += 8 * 7 * cells
+        contact += (len(step.material_stress.points) + 2 * ROWS) * layout.material_row(mesh.dim).itemsize + 4 * cells
     return int(1.01 * fields) + contact + len(as_json([step.iterations, step.warnings]))
 
 
@@ -248,8 +269,26 @@ def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> No
         row["dissipation"] = contact.dissipation
         moved = contact.obstacle_displacement
         row["obstacle_displacement"] = np.nan if moved is None else moved
+        if "middle" in (row.dtype.names or ()):  # not in a file of an earlier schema that is resumed
+            row["middle"] = contact.middle
         _extend(pair["rows"], table)
     _set_row(pair["steps"], number, row)
+
+
+def _append_sides(own: Any, mesh: Mesh, number: int, found: MaterialStress) -> None:
+    """Append the stress of each side where materials meet; the tables are made with the first one."""
+    if "materials" not in own:
+        group = own.create_group(None)  # without a name until it is whole: the program may be interrupted
+        _packed(group, "cells", np.asarray(found.cells, np.int32))
+        growing_table(group, "rows", layout.material_row(mesh.dim))
+        growing_table(group, "steps", layout.SIDES_STEP)
+        own["materials"] = group
+    group = own["materials"]
+    table = np.zeros(len(found.points), group["rows"].dtype)
+    for name in ("points", "material", "stress"):
+        table[name] = getattr(found, name)
+    _set_row(group["steps"], number, np.array((len(group["rows"]), len(table)), layout.SIDES_STEP))
+    _extend(group["rows"], table)
 
 
 def _extend(table: Any, values: NDArray[Any]) -> None:

@@ -12,6 +12,7 @@ The second holds what VTK has no place for:
     fastcontact/kinematics, case, versions          texts as JSON
     fastcontact/steps                               a row for each step (STEP_ROW), with the place of its notes
     fastcontact/contact/0, 1, ...                   for each pair its name, a row for each node and step, a row for each step
+    fastcontact/materials                           where materials meet: of every cell; stress by material; a row a step
     fastcontact/notes                               JSON, one text after the other: iterations, warnings, how runs ended
     fastcontact/runs                                a row for each run (RUN_ROW), with the place of its notes
     fastcontact/restart0, restart1                  packed restart data of the last two steps
@@ -26,16 +27,21 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FileError
 from fastcontact.mesh import elements, topology
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.results.separated import mean_in_cells
 from fastcontact.results.step import ContactResult, StepResult
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.int8]
 
-# 1: until the restart state came in. 2: restart state of the last step, any number of run records.
-SCHEMA = 2
+# 1: until the restart state came in. 2: restart state of the last step, any number of run records. 3: the middle of a
+# contact, and places measured from it.
+SCHEMA = 3
+# Files from this schema on can be resumed.
+RESUMABLE = 2
 
 # Point data by name, with the number of components that viewers expect; stress is a symmetric tensor.
 POINT_FIELDS = {
@@ -47,6 +53,11 @@ POINT_FIELDS = {
     "contact_pressure": 1,
 }
 
+# Cell data of models in which materials meet: the nodal stress on each cell's own side, averaged over its nodes.
+CELL_STRESS = "stress_in_cell"
+CELL_VON_MISES = "von_mises_in_cell"
+MATERIAL_FIELDS = {CELL_STRESS: 6, CELL_VON_MISES: 1}
+
 # Element codes of the XDMF format by VTK cell type. Its readers take the nodes of all of them in VTK's order.
 XDMF_TYPES = {
     **{5: 0x4, 9: 0x5, 22: 0x24, 23: 0x25, 28: 0x23},  # triangles and quadrangles
@@ -55,6 +66,9 @@ XDMF_TYPES = {
 }
 
 STEP_ROW = np.dtype([("index", "<i8"), ("load_factor", "<f8"), ("notes_first", "<i8"), ("notes_count", "<i8")])
+
+# Where the rows of nodal stress by material of a step stand.
+SIDES_STEP = np.dtype([("first", "<i8"), ("count", "<i8")])
 
 # How a run ended: the steps that were complete then, and where its record stands among the notes.
 RUN_ROW = np.dtype([("n_steps", "<i8"), ("first", "<i8"), ("count", "<i8")])
@@ -67,7 +81,7 @@ def restart_table(number: int) -> str:
 
 def contact_row(dim: int) -> np.dtype[Any]:
     """Return the type of one row of a contact table: one secondary node in one step."""
-    scalars = [(name, "<f8") for name in ("abscissa", "gap", "pressure", "multiplier")]
+    scalars = [(name, "<f8") for name in ("abscissa", "place", "gap", "pressure", "multiplier")]
     vectors = [(name, "<f8", (dim,)) for name in ("coordinates", "force_vectors", "normal", "shear")]
     return np.dtype([("points", "<i4"), ("active", "i1"), ("sticking", "i1"), *scalars, *vectors])
 
@@ -76,7 +90,19 @@ def contact_step(dim: int) -> np.dtype[Any]:
     """Return the type of the row that a contact pair has for each step: its rows, resultant, radius, work, obstacle."""
     sums = [("force", "<f8", (dim,)), ("radius", "<f8", (2,)), ("dissipation", "<f8")]
     sums.append(("obstacle_displacement", "<f8", (dim,)))  # NaN between bodies
+    sums.append(("middle", "<f8", (dim,)))
     return np.dtype([("first", "<i8"), ("count", "<i8"), *sums])
+
+
+def material_row(dim: int) -> np.dtype[Any]:
+    """Return the type of a row of nodal stress on one side of a border of materials, for one step."""
+    return np.dtype([("points", "<i4"), ("material", "<i4"), ("stress", "<f8", (4 if dim == 2 else 6,))])
+
+
+def material_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
+    """Return the cell data of `MATERIAL_FIELDS`: stress (n_solids, 6), von Mises stress (n_solids,) [pressure]."""
+    stress = mean_in_cells(mesh, step)
+    return {CELL_STRESS: padded(stress, 6), CELL_VON_MISES: von_mises(stress)}
 
 
 class SolidCells(NamedTuple):

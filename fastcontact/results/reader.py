@@ -21,6 +21,7 @@ from fastcontact.mesh.files.paths import PathLike, existing_file
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import journal, layout
 from fastcontact.results.locking import is_being_written
+from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.texts import read_text
 
@@ -197,7 +198,10 @@ class Results(Sequence[StepResult]):
         grid = pyvista.UnstructuredGrid(flat, cells.types, layout.padded(self.mesh.points, 3))
         for name, values in (layout.point_fields(self.mesh, step) | layout.point_flags(self.mesh)).items():
             grid.point_data[name] = values
-        for name, values in (layout.cell_fields(self.mesh) | step.cell_fields).items():
+        by_cell: dict[str, Any] = layout.cell_fields(self.mesh) | step.cell_fields
+        if step.material_stress is not None:
+            by_cell |= {"material": step.material_stress.cells, **layout.material_fields(self.mesh, step)}
+        for name, values in by_cell.items():
             grid.cell_data[name] = values
         return grid
 
@@ -226,6 +230,7 @@ class Results(Sequence[StepResult]):
                 warnings=tuple(notes["warnings"]),
                 cell_fields=self._cell_fields(number),
                 restart=self._restart(number) if number == self._n_steps - 1 else None,
+                material_stress=self._material_stress(number),
             )
 
     def _restart(self, number: int) -> dict[str, Any] | None:
@@ -237,10 +242,27 @@ class Results(Sequence[StepResult]):
             return None
         return kept["restart"] if kept.get("step") == number else None
 
+    def _material_stress(self, number: int) -> MaterialStress | None:
+        """Return the stress of each side where materials meet; None for a step or file without."""
+        own = self._file["fastcontact"]
+        if "materials" not in own:
+            return None
+        steps = own["materials/steps"][number : number + 1]
+        if not len(steps) or not steps["count"][0]:
+            return None
+        first, count = int(steps["first"][0]), int(steps["count"][0])
+        rows, cells = own["materials/rows"][first : first + count], own["materials/cells"][()]
+        if len(rows) != count or first < 0 or len(cells) != len(self._file["VTKHDF/Types"]):
+            raise ValueError("the table of stresses by material is cut off")
+        if rows["points"].min() < 0 or rows["points"].max() >= self.mesh.n_points:
+            raise ValueError("the table of stresses by material names points that are not there")
+        columns = (np.ascontiguousarray(rows[name]) for name in ("points", "material", "stress"))
+        return MaterialStress(cells, *columns)
+
     @property
     def cell_field_names(self) -> list[str]:
         """Names of the cell fields that change from step to step."""
-        static = layout.cell_fields(self.mesh)
+        static = {*layout.cell_fields(self.mesh), *layout.MATERIAL_FIELDS, "material"}
         return [name for name in self._file["VTKHDF/CellData"] if name not in static]
 
     def _cell_fields(self, number: int) -> dict[str, NDArray[np.float64]]:
@@ -332,5 +354,6 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
         radius=(inner, outer),
         dissipation=float(step["dissipation"]) if "dissipation" in known else 0.0,
         obstacle_displacement=moved if np.isfinite(moved).all() else None,
+        middle=step["middle"].copy() if "middle" in known else None,  # type: ignore[arg-type]
         **columns,
     )

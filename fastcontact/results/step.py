@@ -8,7 +8,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.results.material_stress import MaterialStress
+
 Array = NDArray[np.float64]
+
+
+def half_width(place: Array, closed: NDArray[np.bool_]) -> tuple[float, float]:
+    """Return the bracket of the half-width of a contact [length]: (NaN, NaN) where nothing is closed.
+
+    From `place` (n,) from the middle, with a sign where they lie on both sides of it [length], and which are `closed`: half
+    the width up to the outermost closed places, and up to the next ones beyond. Where all places lie on one side, the
+    other half is the mirror image.
+    """
+    if not closed.any():
+        return float("nan"), float("nan")
+    low, high = float(place[closed].min()), float(place[closed].max())
+    if place.min() >= 0.0:
+        return high, float(place[place > high].min(initial=np.inf))
+    beyond, before = place[place > high].min(initial=np.inf), place[place < low].max(initial=-np.inf)
+    if not (np.isfinite(beyond) or np.isfinite(before)):
+        return 0.5 * (high - low), float("inf")
+    beyond, before = min(beyond, place.max()), max(before, place.min())  # on one side the surface ends
+    return 0.5 * (high - low), float(0.5 * (beyond - before))
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +64,8 @@ class ContactResult:
     force : ndarray (dim,)
         Resultant on the secondary side [force].
     radius : (float, float)
-        Bracket of the contact radius (half-width in plane problems): distance from the axis x = 0, in 3D from the axis of
-        first contact, of the outermost closed constraint and of the first open one beyond it [length]; NaN without
-        contact.
+        Bracket of the contact radius, in plane problems the half-width: from the `middle` to the outermost closed
+        constraint, and to the first open one beyond it [length]; NaN without contact.
     shear : ndarray (m, dim)
         Tangential traction on the secondary side, zero without friction or tie [pressure].
     sticking : ndarray of bool (m,)
@@ -54,6 +74,13 @@ class ContactResult:
         Work of friction in this step [energy].
     obstacle_displacement : ndarray (dim,), optional
         Displacement of a rigid obstacle [length]; None for contact between bodies.
+    middle : ndarray (dim,)
+        Middle of the contact on the reference surface: in axisymmetry on the axis; otherwise the centre of pressure, on the
+        planes of symmetry that the contact reaches, those on which supports hold an end of the surface [length].
+    place : ndarray (m,)
+        How far from the middle each node lies: in axisymmetry its radius; in plane problems, and where an axisymmetric
+        surface runs along the axis, the length along the surface, negative on one side of the middle; in 3D the distance from
+        the line through the middle along the mean normal [length].
     """
 
     name: str
@@ -73,22 +100,30 @@ class ContactResult:
     sticking: NDArray[np.bool_] = None  # type: ignore[assignment]
     dissipation: float = 0.0
     obstacle_displacement: Array | None = None
+    middle: Array = None  # type: ignore[assignment]
+    place: Array = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
+        if self.middle is None:
+            object.__setattr__(self, "middle", np.zeros(self.coordinates.shape[1]))
+        if self.place is None:  # of a file from before places were measured from the middle
+            flat = self.coordinates.shape[1] == 2
+            object.__setattr__(self, "place", np.abs(self.coordinates[:, 0]) if flat else np.array(self.abscissa))
         if self.shear is None:
             object.__setattr__(self, "shear", np.zeros_like(self.coordinates))
         if self.sticking is None:
             object.__setattr__(self, "sticking", self.active.copy())
 
     @property
+    def measured_from_axis(self) -> bool:
+        """Whether places are radii, in axisymmetry, rather than lengths along a surface or distances in space."""
+        flat = self.coordinates.shape[1] == 2
+        return flat and bool(self.middle[0] == 0.0) and bool(np.array_equal(self.place, np.abs(self.coordinates[:, 0])))
+
+    @property
     def stick_radius(self) -> tuple[float, float]:
         """Bracket of the stick zone, as `radius`: the outermost node that sticks, and the next one; NaN if none does."""
-        place = np.abs(self.coordinates[:, 0]) if self.coordinates.shape[1] == 2 else self.abscissa
-        sticking = self.active & self.sticking
-        if not sticking.any():
-            return float("nan"), float("nan")
-        inside = place[sticking].max()
-        return float(inside), float(place[place > inside].min(initial=np.inf))
+        return half_width(self.place, self.active & self.sticking)
 
     @property
     def pressure_max(self) -> float:
@@ -114,8 +149,9 @@ class StepResult:
     displacement : ndarray (n_points, dim)
         [length].
     stress : ndarray (n_points, 4) or (n_points, 6)
-        Nodal stress, averaged over the elements at each node; components xx, yy, zz, xy (then yz, xz in 3D), in
-        axisymmetry rr, yy, hoop, ry [pressure].
+        Nodal stress, averaged over the elements of one material at each node, where materials meet that of the side with
+        the largest von Mises stress; components xx, yy, zz, xy (then yz, xz in 3D), in axisymmetry rr, yy, hoop, ry
+        [pressure].
     von_mises, von_mises_signed : ndarray (n_points,)
         Equivalent stress of `stress`; the same with the sign of its trace [pressure].
     reaction : ndarray (n_points, dim)
@@ -131,6 +167,8 @@ class StepResult:
         Warnings of the step.
     cell_fields : dict of str to ndarray (n_solids,)
         Further numbers of every solid cell, in the order of ``mesh.solids``, e.g. an estimated error [unit of the field].
+    material_stress : MaterialStress, optional
+        The stress of each side at the nodes where materials meet; None where none do.
     restart : dict, optional
         Restart data for the next step: plain numbers, strings and arrays. Result files keep those of their last step.
     """
@@ -147,3 +185,16 @@ class StepResult:
     warnings: tuple[str, ...] = ()
     cell_fields: dict[str, Array] = field(default_factory=dict)
     restart: dict[str, Any] | None = field(default=None, repr=False)
+    material_stress: MaterialStress | None = None
+
+    def stress_of_material(self, number: int) -> Array:
+        """Return the nodal stress (n_points, 4) or (n_points, 6) with the side of one material where several meet [pressure].
+
+        Materials count from 0, in the order in which they were added to the model; at nodes that the material does not have
+        the stress is that of the others.
+        """
+        found = self.stress.copy()
+        if self.material_stress is not None:
+            own = self.material_stress.material == number
+            found[self.material_stress.points[own]] = self.material_stress.stress[own]
+        return found

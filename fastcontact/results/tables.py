@@ -34,13 +34,16 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Tab
     Returns
     -------
     structured ndarray (m,)
-        ``point``; ``x``, ``y`` (``z``), ``abscissa``, ``radius`` (distance from the axis), ``gap`` [length];
-        ``pressure`` [pressure]; ``multiplier`` [force or pressure]; ``force_x`` ... [force]; ``shear_x`` ...
-        [pressure]; ``active``, ``sticking`` (true or false). With `step` also ``displacement_x`` ... [length],
-        ``stress_xx`` ..., ``von_mises``, ``von_mises_signed`` [pressure].
+        ``point``; ``x``, ``y`` (``z``), ``abscissa``, ``radius`` (distance from the middle of the contact), ``place`` (the
+        same with a sign, see `ContactResult`), ``gap`` [length]; ``pressure`` [pressure]; ``multiplier`` [force or
+        pressure]; ``force_x`` ... [force]; ``shear_x`` ... [pressure]; ``active``, ``sticking`` (true or false). With
+        `step` also ``displacement_x`` ... [length], ``stress_xx`` ..., ``normal_stress``, ``von_mises``,
+        ``von_mises_signed`` [pressure].
     """
     columns = {
         **_places(contact.points, contact.coordinates, contact.abscissa),
+        "radius": np.abs(contact.place),
+        "place": contact.place,
         "gap": contact.gap,
         "pressure": contact.pressure,
         "multiplier": contact.multiplier,
@@ -49,7 +52,28 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Tab
         "active": contact.active,
         "sticking": contact.sticking,
     }
-    return _table(columns | (_fields(step, contact.points) if step is not None else {}))
+    if step is not None:
+        fields = _fields(step, contact.points)
+        before = {name: values for name, values in fields.items() if name not in ("von_mises", "von_mises_signed")}
+        columns |= before | {"normal_stress": normal_stress(contact, step)} | fields
+    table = _table(columns)
+    if contact.abscissa.any() or contact.coordinates.shape[1] == 3:
+        return table
+    return table[np.argsort(contact.place, kind="stable")]  # a closed line has no first node
+
+
+def normal_stress(contact: ContactResult, step: StepResult) -> NDArray[np.float64]:
+    """Return the stress ``n . sigma . n`` (m,) at the nodes of a contact along the normals n they face [pressure].
+
+    `step` is the one that the contact belongs to. Where contact presses it is minus the pressure, up to the mesh error. NaN
+    at nodes that face nothing.
+    """
+    stress, (x, y) = step.stress[contact.points].T, contact.normal.T[:2]
+    across = x * x * stress[0] + y * y * stress[1] + 2.0 * x * y * stress[3]
+    if len(stress) == 6:
+        z = contact.normal[:, 2]
+        across = across + z * z * stress[2] + 2.0 * (y * z * stress[4] + x * z * stress[5])
+    return np.where(np.linalg.norm(contact.normal, axis=1) > 0.5, across, np.nan)
 
 
 def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None = None) -> Table:
@@ -67,7 +91,8 @@ def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None
     Returns
     -------
     structured ndarray (m,)
-        ``point``; ``x``, ``y`` (``z``), ``abscissa``, ``radius``, ``displacement_x`` ... [length];
+        ``point``; ``x``, ``y`` (``z``), ``abscissa``, ``radius`` (distance from x = 0, in 3D from the y axis),
+        ``displacement_x`` ... [length];
         ``stress_xx`` ..., ``von_mises``, ``von_mises_signed`` [pressure].
 
     Raises
@@ -76,7 +101,10 @@ def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None
         If there is no such group, or it is no open line.
     """
     line = ordered_line(mesh, group, start)
-    return _table(_places(line.points, mesh.points[line.points], line.abscissa) | _fields(step, line.points))
+    places = mesh.points[line.points]
+    radius = np.abs(places[:, 0]) if mesh.dim == 2 else np.hypot(places[:, 0], places[:, 2])
+    columns = {**_places(line.points, places, line.abscissa), "radius": radius}
+    return _table(columns | _fields(step, line.points))
 
 
 def with_column(table: Table, name: str, values: NDArray[Any]) -> Table:
@@ -142,10 +170,7 @@ def _by_axis(prefix: str, vectors: NDArray[Any]) -> Columns:
 
 
 def _places(points: NDArray[Any], coordinates: NDArray[Any], abscissa: NDArray[Any]) -> Columns:
-    """Return where the nodes are; the radius is the distance from x = 0 in 2D, from the y axis in 3D."""
-    flat = coordinates.shape[1] == 2
-    radius = np.abs(coordinates[:, 0]) if flat else np.hypot.reduce(coordinates[:, ::2], axis=1)
-    return {"point": points, **_by_axis("", coordinates), "abscissa": abscissa, "radius": radius}
+    return {"point": points, **_by_axis("", coordinates), "abscissa": abscissa}
 
 
 def _fields(step: StepResult, points: NDArray[Any]) -> Columns:

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact.elasticity.material_sides import distinct, material_sides
 from fastcontact.errors import ConvergenceError, FileError, ModelError
 from fastcontact.mesh.files.hdf5_driver import new_hdf5
 from fastcontact.mesh.files.packing import packed
@@ -98,10 +99,11 @@ class ResultWriter:
         resume: bool = False,
         synchronise: bool | None = None,
     ) -> None:
+        self._material: Any = None
         if not isinstance(mesh, Mesh):
             if not isinstance(getattr(mesh, "mesh", None), Mesh) or not hasattr(mesh, "kinematics"):
                 raise ModelError(f"results need a mesh or a model to stand on, not {type(mesh).__name__}")
-            kinematics = mesh.kinematics
+            kinematics, self._material = mesh.kinematics, _materials_that_meet(mesh)
             case_text = case_text or getattr(mesh, "case_text", None) or ""
             mesh = mesh.mesh
         self.path = checked_target(path)
@@ -323,10 +325,20 @@ class ResultWriter:
                 size = contents.header_size(self._mesh) + len(case_text) + MARGIN
                 reserve(probe.fileno(), temporary.parent, 0, size)
             with new_hdf5(temporary) as file:
-                contents.write_geometry(file, self._mesh, self._cell_fields)
+                contents.write_geometry(file, self._mesh, self._cell_fields, self._material)
                 contents.write_own(file, self._mesh, kinematics, case_text)
         # Closed in between because Windows renames no open file; without locks viewers may follow.
         self._open()
+
+
+def _materials_that_meet(model: Any) -> Any:
+    """Return the materials of all solid cells (n_solids,) of a model where some meet; None where none do."""
+    if not getattr(model, "materials", None) or not hasattr(model, "material_numbers"):
+        return None
+    material = distinct(*model.material_numbers())
+    if not len(material_sides(model.mesh, material).points):
+        return None
+    return np.concatenate(list(material.values()))
 
 
 def _steps_to_resume(
@@ -342,7 +354,7 @@ def _steps_to_resume(
         if not len(old):
             return [], False, ""
         begin_anew = "or start anew without resuming, which replaces the file"
-        if old.schema < layout.SCHEMA:
+        if old.schema < layout.RESUMABLE:
             raise FileError(
                 f"'{path}' was written by an earlier fastcontact, which kept nothing to go on from: name another file "
                 f"{begin_anew}"
@@ -379,7 +391,8 @@ def _checked_names(cell_fields: Iterable[str], mesh: Mesh) -> tuple[str, ...]:
     """Return the names of cell fields, if all of them can be written."""
     names = tuple(cell_fields)
     for name in names:
-        if name in layout.cell_fields(mesh) or not name.isidentifier():
+        taken = {*layout.cell_fields(mesh), *layout.MATERIAL_FIELDS, "material"}
+        if name in taken or not name.isidentifier():
             raise FileError(
                 f"'{name}' cannot be the name of a cell field: it is taken or no plain word; choose another"
             )

@@ -116,7 +116,7 @@ def _case_on(linear: Mesh, curves: Sequence[Any], case: Case, chosen: Settings, 
     element = member.element
     quadratic = element is not None and elements.get(element).order == 2
     mesh = to_quadratic(linear, curves, centre_nodes=element == "quad9") if quadratic else linear
-    return build_case(case_data(chosen, member), name=case.name, text=case.text, mesh=mesh)
+    return build_case(case_data(chosen, member), name=case.name, folder=case.folder, text=case.text, mesh=mesh)
 
 
 def _solved(
@@ -191,9 +191,7 @@ def _place(case: Case, last: StepResult, quantity: str, pair: str | None) -> Arr
         return case.mesh.points[int(np.argmax(last.von_mises))]
     if pair is not None and quantity.startswith("pressure_"):
         contact = last.contact[pair]
-        at = (
-            np.argmin(np.abs(contact.coordinates[:, 0])) if quantity == "pressure_pole" else np.argmax(contact.pressure)
-        )
+        at = np.argmin(np.abs(contact.place)) if quantity == "pressure_pole" else np.argmax(contact.pressure)
         return contact.coordinates[int(at)]
     return None
 

@@ -14,7 +14,7 @@ from fastcontact.studies.convergence_report import Study
 from fastcontact.studies.execute import Progress, Result, raise_first, run_all
 from fastcontact.studies.fit import Limit, fit_limit
 from fastcontact.studies.job import Job, fields_of, job_of
-from fastcontact.studies.quantities import LABELS, of_theory
+from fastcontact.studies.quantities import EXACT_THEORIES, LABELS, of_theory
 from fastcontact.studies.series import Level, Series
 from fastcontact.studies.settings import Combination, Settings, combinations, settings
 
@@ -90,20 +90,29 @@ def gathered(case: Case, jobs: Sequence[Job], results: Sequence[Result], wanted:
         member = Combination(job.marks["element"], job.marks["formulation"])
         by_combination.setdefault(member, []).append((job.marks["level"], result))
     checked = [check.quantity for check in case.checks]
-    theory = case.theories.get(settings(case).pair or "", {}).get("theory")
+    own = case.theories.get(settings(case).pair or "", {})
+    theory, share = own.get("theory"), own.get("share", 1.0)
+    compared = "at equal approach" if settings(case).pair in case.approach else "under the given load"
     series, failed = [], {}
-    for member, own in by_combination.items():
-        if all("error" in result for _, result in own):
-            failed[str(member)] = str(own[0][1]["error"])
+    for member, runs in by_combination.items():
+        if all("error" in result for _, result in runs):
+            failed[str(member)] = str(runs[0][1]["error"])
         else:
-            series.append(_series(member, own, wanted, checked, theory))
+            series.append(_series(member, runs, [*wanted], checked, (theory, share, compared)))
     return Study(case.name, case.title, case.text, case.units, series, failed, theory)
 
 
 def _series(
-    member: Combination, results: list[tuple[int, Result]], wanted: Sequence[str], checked: Sequence[str], theory: Any
+    member: Combination,
+    results: list[tuple[int, Result]],
+    wanted: Sequence[str],
+    checked: Sequence[str],
+    theory: tuple[Any, float, str],
 ) -> Series:
-    """Return one element and formulation with its limits; `checked` are fitted where they are known."""
+    """Return one element and formulation with its limits; `checked` are fitted where they are known.
+
+    `theory` is that of the pair, the share of it that the model holds, and at what it is compared.
+    """
     solved = [(number, result) for number, result in results if "error" not in result]
     levels = [Level(number=number, **fields_of(Level, result)) for number, result in solved]
     known = levels[-1].values
@@ -114,15 +123,18 @@ def _series(
     limits = {name: limit for name in names if (limit := _limit(levels, name)) is not None}
     failed = {number: str(result["error"]) for number, result in results if "error" in result}
     last = solved[-1][1]
-    at_force, spread = _at_force(theory, limits.get("force"))
-    return Series(member, levels, failed, last["theory"], last["reference"], at_force, spread, names, limits)
+    at_force, spread = _at_force(*theory[:2], limits.get("force"))
+    exact = isinstance(theory[0], EXACT_THEORIES)
+    return Series(
+        member, levels, failed, last["theory"], last["reference"], at_force, spread, names, limits, exact, theory[2]
+    )
 
 
-def _at_force(theory: Any, force: Limit | None) -> tuple[dict[str, float], dict[str, float]]:
+def _at_force(theory: Any, share: float, force: Limit | None) -> tuple[dict[str, float], dict[str, float]]:
     """Return the theory's values at the limit of the force, and how much they change over its error bar."""
     if force is None or not force.value > force.uncertainty or not hasattr(theory, "at_force"):
         return {}, {}
-    middle, upper = (of_theory(theory.at_force(force.value + off)) for off in (0.0, force.uncertainty))
+    middle, upper = (of_theory(theory.at_force((force.value + off) / share), share) for off in (0.0, force.uncertainty))
     return middle, {name: abs(upper[name] - value) for name, value in middle.items()}
 
 

@@ -16,6 +16,8 @@ IN_TABLES = ("force", "pressure_max", "contact_radius", "von_mises_max")
 # Columns about limits, and the first columns of a table of all combinations.
 ON_TERMINAL = ("limit", "+-", "order", "theory", "model error", "mesh error", "at equal force")
 ON_PAGE = ("theory", "limit", "order", "mesh error", "model error", "at equal force")
+# Behind the error bar of a limit whose values do not settle.
+UNSETTLED = " (unsettled)"
 COMBINATION = ("combination", "levels", "finest DOF")
 
 
@@ -81,8 +83,10 @@ def _cells(series: Series, quantity: str, columns: Sequence[str], rounded: bool 
     same = series.split_equal_force(quantity) if quantity != "force" else None
     order = f"{limit.order:.2f}"
     texts = {
-        "limit": with_error_bar(limit.value, limit.uncertainty) if rounded else number(limit.value, 8),
-        "+-": number(limit.uncertainty, 2),
+        "limit": with_error_bar(limit.value, limit.uncertainty) + ("" if limit.converging else UNSETTLED)
+        if rounded
+        else number(limit.value, 8),
+        "+-": number(limit.uncertainty, 2) + ("" if limit.converging else UNSETTLED),
         "order": f"{order} +- {limit.order_uncertainty:.2f}" if math.isfinite(limit.order) else "-",
         "order alone": order,
         "theory": number(series.theory.get(quantity, math.nan), 8),
@@ -160,6 +164,7 @@ def _quantity_dict(series: Series, name: str) -> dict[str, Any]:
         "order": finite(limit.order) if limit else None,
         "order_uncertainty": finite(limit.order_uncertainty) if limit else None,
         "converging": limit.converging if limit else None,
+        "converges_to_theory": series.converges_to_theory(name),
         "theory": series.theory.get(name),
         "model_error": found.model if found else None,
         "model_error_uncertainty": found.uncertainty if found else None,

@@ -48,7 +48,8 @@ class Limit:
     n_levels : int
         Number of meshes that were fitted.
     converging : bool
-        Whether the last change is smaller than some change before; if not, there may be no limit.
+        Whether the values settle: the last change is smaller than nine tenths of the median of those before, or than a
+        twentieth of the largest; if not, there may be no limit.
     """
 
     value: float
@@ -109,7 +110,7 @@ def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
         order=order,
         order_uncertainty=float(np.sqrt(weight @ (orders - order) ** 2)),
         n_levels=len(value),
-        converging=bool(changes[-1] < changes[:-1].max()),
+        converging=bool(changes[-1] < max(0.9 * float(np.median(changes[:-1])), 0.05 * scale)),
     )
 
 

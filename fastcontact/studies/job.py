@@ -11,6 +11,7 @@ import traceback
 import warnings
 from collections import deque
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,14 +23,20 @@ from fastcontact.cases.case import Case, build_case
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import FastcontactError, FastcontactWarning
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.model.model import AGAINST_OBSTACLES
 from fastcontact.model.pair_options import SHARED_OPTIONS
 from fastcontact.results.step import StepResult
 from fastcontact.studies import quantities
 from fastcontact.studies.levels import Recipe, make_mesh, recipe
 from fastcontact.studies.settings import Combination, Settings
 
+# Keys of contact pairs and obstacles that belong to no formulation.
+KEYS = {
+    *("secondary", "primary", "formulation", "friction", "shape", "motion", "force", "ramp"),
+    *("file", "group", "flip", "crease"),
+}
 # Raised when the measured numbers or their form in a store change.
-SCHEMA = 1
+SCHEMA = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +51,14 @@ class Job:
     base: Mesh | None  # the case's mesh, where it was read from a file
     marks: dict[str, Any]  # distinguish this run from the others of its study, e.g. its level
     size: float = 0.0  # amount of work, in any unit that the runs of a study share
+    folder: Path = Path()  # in which files lie that the case names
 
     @property
     def key(self) -> str:
         """Hash of all that the numbers depend on: the case, its mesh, the version."""
         data = {key: value for key, value in self.data.items() if key not in ("title", "units", "check")}
         whole = {"version": __version__, "schema": SCHEMA, "data": data, "pair": self.pair, "recipe": self.recipe}
+        whole["folder"] = str(self.folder) if _names_files(self.data) else ""
         found = hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode())
         if self.base is not None:
             found.update(_fingerprint(self.base))
@@ -61,7 +70,13 @@ def job_of(
 ) -> Job:
     """Return the run of a case with an element and a formulation on the mesh of a level."""
     data, mesh = case_data(chosen, member), recipe(chosen, member.element, level)
-    return Job(label, case.name, data, chosen.pair, mesh, case.mesh if chosen.generator is None else None, marks, size)
+    base = case.mesh if chosen.generator is None else None
+    return Job(label, case.name, data, chosen.pair, mesh, base, marks, size, case.folder)
+
+
+def _names_files(data: dict[str, Any]) -> bool:
+    """Return whether a case has rigid obstacles from mesh files, which are read where it runs."""
+    return any("file" in entry or "file" in (entry.get("shape") or ()) for entry in data.get("obstacle", {}).values())
 
 
 def _fingerprint(mesh: Mesh) -> bytes:
@@ -78,20 +93,24 @@ def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
     Options that another formulation does not have are dropped.
     """
     data = copy.deepcopy({key: value for key, value in settings.data.items() if key != "study"})
-    for entry in data.get("contact", {}).values():
-        if combination.formulation is None:
-            break
-        own = entry.get("formulation")
-        entry["formulation"] = combination.formulation
-        if combination.formulation != own:
-            known = {f.name for f in dataclasses.fields(FORMULATIONS[combination.formulation])}
-            known |= {"secondary", "primary", "formulation", "friction", *SHARED_OPTIONS}
-            for key in [key for key in entry if key not in known]:
-                del entry[key]
-        entry.update(settings.options.get(combination.formulation, {}))
+    formulation = combination.formulation
+    for name, entry in data.get("contact", {}).items() if formulation else ():
+        _exchange(entry, str(formulation), settings, settings.formulations[name])
+    for name, entry in data.get("obstacle", {}).items() if formulation in AGAINST_OBSTACLES else ():
+        _exchange(entry, str(formulation), settings, settings.formulations[name])
     if settings.load_steps is not None:
         data["ramp"] = ramp_of(data.get("ramp", {}), settings.load_steps)
     return data
+
+
+def _exchange(entry: dict[str, Any], formulation: str, settings: Settings, own: str) -> None:
+    """Give the table of a contact pair or obstacle another formulation than its `own`."""
+    if formulation != own:
+        known = {f.name for f in dataclasses.fields(FORMULATIONS[formulation])} | KEYS | set(SHARED_OPTIONS)
+        for key in [key for key in entry if key not in known]:
+            del entry[key]
+    entry["formulation"] = formulation
+    entry.update(settings.options.get(formulation, {}))
 
 
 def ramp_of(ramp: dict[str, Any], steps: int) -> dict[str, Any]:
@@ -126,7 +145,7 @@ def measured(job: Job) -> dict[str, Any]:
     started = time.perf_counter()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FastcontactWarning)
-        case = build_case(job.data, name=job.name, mesh=make_mesh(job.recipe, job.base))
+        case = build_case(job.data, name=job.name, folder=job.folder, mesh=make_mesh(job.recipe, job.base))
         last = last_step(case)
     values = quantities.measure(case, last, job.pair)
     return {
@@ -163,4 +182,5 @@ def _profile(case: Case, last: StepResult, pair: str | None) -> dict[str, list[f
     if pair is None or case.mesh.dim != 2:
         return {}
     contact = last.contact[pair]
-    return {"r": np.abs(contact.coordinates[:, 0]).tolist(), "pressure": contact.pressure.tolist()}
+    order = np.argsort(contact.place, kind="stable")
+    return {"r": contact.place[order].tolist(), "pressure": contact.pressure[order].tolist()}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from fastcontact.errors import CaseError, FastcontactError, unknown
@@ -14,28 +15,61 @@ from fastcontact.studies.settings import Settings, makeable, shape_of
 
 Arguments = dict[str, Any]
 Recipe = dict[str, Any]
-# Of a generator: defaults that depend on other arguments, arguments to halve, arguments to double.
-Rule = tuple[Arguments, tuple[str, ...], tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class Rule:
+    """How the arguments of a generator change from one level to the next."""
+
+    defaults: Arguments = field(default_factory=dict)  # of arguments to change, where the case gives none
+    halve: tuple[str, ...] = ()
+    double: tuple[str, ...] = ()
+    root: tuple[str, ...] = ()  # ratios of neighbouring edges: their square roots are taken
 
 
 def _spheres(element: str, given: Mapping[str, Any]) -> Rule:
     R = float(given.get("R", 50.0))
     if shape_of(element) == "triangles":
-        return {"size": R / 25}, ("size", "contact_size"), ()
-    return {"arc_sizes": (R / 250, R / 25), "segments": 15}, ("arc_sizes", "radial_sizes"), ("segments",)
+        return Rule({"size": R / 25}, ("size", "contact_size"))
+    return Rule({"arc_sizes": (R / 250, R / 25), "segments": 15}, ("arc_sizes", "radial_sizes"), ("segments",))
 
 
 def _cylinder(element: str, given: Mapping[str, Any]) -> Rule:
     R = float(given.get("R", 50.0))
     far = float(given.get("size", R / 10))
-    return {"size": far, "contact_size": min(R / 100, far)}, ("size", "contact_size"), ()
+    return Rule({"size": far, "contact_size": min(R / 100, far)}, ("size", "contact_size"))
+
+
+def _ball(element: str, given: Mapping[str, Any]) -> Rule:
+    R = float(given.get("R", 50.0))
+    far = float(given.get("size", R / 4))
+    # Along a graded line the edges grow by `growth` times the distance, whatever their lengths.
+    return Rule({"size": far, "contact_size": min(R / 50, far)}, ("size", "contact_size", "growth"))
+
+
+def _half_space(element: str, given: Mapping[str, Any]) -> Rule:
+    width = float(given.get("width", 10.0))
+    radius, far = float(given.get("contact_radius", width / 10)), float(given.get("size", width / 4))
+    least = min(radius, float(given.get("contact_radius_y", radius)))
+    return Rule({"size": far, "contact_size": min(least / 10, far)}, ("size", "contact_size", "growth"))
+
+
+def _punched(element: str, given: Mapping[str, Any]) -> Rule:
+    return Rule({"edge_size": float(given.get("punch_radius", 1.0)) / 200}, ("edge_size",), root=("growth",))
 
 
 RULES: dict[str, Callable[[str, Mapping[str, Any]], Rule]] = {
     "half-spheres": _spheres,
+    "quarter-disc": _spheres,
     "cylinder-on-block": _cylinder,
-    "block-on-block": lambda element, given: ({}, (), ("divisions_lower", "divisions_upper")),
-    "box": lambda element, given: ({}, (), ("divisions",)),
+    "block-on-block": lambda element, given: Rule(double=("divisions_lower", "divisions_upper")),
+    "box": lambda element, given: Rule(double=("divisions",)),
+    "rings": lambda element, given: Rule(double=("divisions_inner", "divisions_outer")),
+    "graded-block": _half_space,
+    "punched-block": _punched,
+    "crowned-blocks": lambda element, given: Rule(halve=("contact_size",), root=("growth",)),
+    "sphere-on-block": _ball,
+    "sphere-octant": _ball,
 }
 
 
@@ -49,15 +83,21 @@ def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
     if settings.generator is None:
         curves = settings.curves and [[list(c.centre), c.radius, c.group] for c in settings.curves]
         return {"refinements": level, "element": element, "curves": curves}
-    element = element or "tri3"
+    element = element or str(_default_element(settings.generator))
     shape = shape_of(element)
     # Where level 0 is given by shape, it is that of quadratic cells; linear ones have the same nodes.
-    finer = level + int(shape in settings.arguments and elements.get(element).order == 1)
+    finer = level + int(settings.by_shape and elements.get(element).order == 1)
     given = settings.arguments.get(shape, settings.arguments.get("", {}))
     # Free triangles of another size lie in another pattern, which changes the largest pressure at random: refine them.
     halvings, refinements = (0, finer) if shape == "triangles" else (finer, 0)
     arguments = _finer(settings, element, given, halvings)
     return {"generator": settings.generator, "arguments": arguments, "refinements": refinements}
+
+
+def _default_element(generator: str) -> Any:
+    """Return the element that a generator makes where none is named; tri3 for one that is not known."""
+    maker = generate.GENERATORS.get(generator)
+    return inspect.signature(maker).parameters["element"].default if maker is not None else "tri3"
 
 
 def _not_makeable(settings: Settings, element: str) -> str:
@@ -80,19 +120,22 @@ def _finer(settings: Settings, element: str, given: Mapping[str, Any], level: in
     for key in given:
         if key not in signature:
             raise CaseError(unknown(f"argument of the generator {name} in [study]", key, signature))
-    defaults, halve, double = RULES[name](element, given) if name in RULES else ({}, (), ())
-    halve, double = settings.halve or halve, settings.double or double
+    rule = RULES[name](element, given) if name in RULES else Rule()
+    own = bool(settings.halve or settings.double)  # then the rule's ratios may not suit
+    halve, double = settings.halve or rule.halve, settings.double or rule.double
     if not (halve or double):
         raise CaseError(
             f"it is not known how the generator '{name}' makes finer meshes: name its arguments in [study] as "
             "halve = [...] or double = [...]"
         )
-    arguments = {**defaults, **given, **({"element": element} if "element" in signature else {})}
+    arguments = {**rule.defaults, **given, **({"element": element} if "element" in signature else {})}
     for names, factor in ((halve, 0.5**level), (double, 2**level)):
         for key in names:
             value = arguments.get(key, signature[key].default if key in signature else None)
             if value is not None:
                 arguments[key] = _scaled(value, factor)
+    for key in () if own else rule.root:
+        arguments[key] = arguments.get(key, signature[key].default) ** (0.5**level)
     return {key: list(value) if isinstance(value, tuple) else value for key, value in arguments.items()}
 
 

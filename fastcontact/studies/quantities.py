@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.analytic.lame import PressFit
+from fastcontact.analytic.manufactured import HertzBox
+from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.cases.case import Case
 from fastcontact.cases.checks import STRESS, at_point
 from fastcontact.contact.integration import facet_measure
@@ -19,6 +22,8 @@ from fastcontact.mesh.topology import bodies
 from fastcontact.results.step import ContactResult, StepResult
 
 Array = NDArray[np.float64]
+# Theories about the very bodies that are modelled, not about half spaces or beams in their place.
+EXACT_THEORIES = (PressFit, HertzBox)
 # Of the standard quantities, which every study shows where they are known: title, and kind of the unit, empty for ratios.
 LABELS = {
     "force": ("contact force", "force"),
@@ -49,17 +54,17 @@ def _of_contact(case: Case, contact: ContactResult, pair: str) -> dict[str, floa
         "pressure_max": contact.pressure_max,
         "contact_radius": contact_radius(contact),
     }
-    at_axis = np.abs(contact.coordinates[:, 0]) <= 1e-9 * np.ptp(contact.coordinates, axis=0).max()
-    if at_axis.any():
-        found["pressure_pole"] = float(contact.pressure[at_axis][0])
+    at_middle = np.abs(contact.place) <= 1e-9 * np.ptp(contact.coordinates, axis=0).max()
+    if at_middle.any():
+        found["pressure_pole"] = float(contact.pressure[at_middle][0])
     theory: Any = case.theories.get(pair, {}).get("theory")
-    if hasattr(theory, "pressure") and case.mesh.dim == 2:
+    if case.mesh.dim == 2 and pressure_curve(theory) is not None:
         side = secondary(case, pair)
         found["pressure_error"] = pressure_error(case, side, contact, theory)
         if hasattr(theory, "at_force") and found["force"] > 0:
-            same = theory.at_force(found["force"])
+            same = theory.at_force(found["force"] / case.theories[pair]["share"])
             found["pressure_error_equal_force"] = pressure_error(case, side, contact, same)
-    return found
+    return {name: value for name, value in found.items() if np.isfinite(value)}
 
 
 def secondary(case: Case, pair: str) -> Surface:
@@ -68,7 +73,7 @@ def secondary(case: Case, pair: str) -> Surface:
 
 
 def contact_radius(contact: ContactResult) -> float:
-    """Return the distance from the axis at which the pressure goes to zero [length]; NaN without contact.
+    """Return the distance from the middle at which the pressure goes to zero [length]; NaN without contact.
 
     Near the edge of a smooth contact the square of the pressure is linear in the square of the distance (Hertz: over
     the whole contact). A line is fitted through the closed nodes beyond 0.4 of the radius, without the last two, where the
@@ -79,7 +84,7 @@ def contact_radius(contact: ContactResult) -> float:
     if not np.isfinite(inside):
         return float("nan")
     outside = outside if np.isfinite(outside) else inside
-    r = np.abs(contact.coordinates[:, 0])
+    r = np.abs(contact.place)
     used = np.flatnonzero(contact.active & (contact.pressure > 0) & (r > 0.4 * inside) & (r < outside))
     used = used[np.argsort(r[used])]
     if len(used) < 3:
@@ -93,14 +98,18 @@ def contact_radius(contact: ContactResult) -> float:
 
 def pressure_error(case: Case, side: Surface, contact: ContactResult, theory: Any) -> float:
     """Return the L2 norm of pressure minus theory over the secondary reference surface, relative to the theory's."""
-    element = elements.get(side.element)
+    curve = pressure_curve(theory)
+    assert curve is not None
     xi, weights = quadrature.gauss_line(6)
-    shape = element.shape(xi)
-    points = case.mesh.points
-    area = facet_measure(side.facets, side.element, points, xi, case.model.kinematics == "axisymmetric") * weights
-    exact = theory.pressure(np.abs(points[side.facets][:, :, 0] @ shape.T))
-    off = contact.pressure[side.local] @ shape.T - exact
-    return float(np.sqrt((area * off**2).sum() / (area * exact**2).sum()))
+    squares = total = 0.0
+    for block in side.blocks:
+        shape = elements.get(block.element).shape(xi)
+        axisymmetric = case.model.kinematics == "axisymmetric"
+        area = facet_measure(block.facets, block.element, case.mesh.points, xi, axisymmetric) * weights
+        exact = curve.pressure(np.abs(contact.place[block.local] @ shape.T))
+        off = contact.pressure[block.local] @ shape.T - exact
+        squares, total = squares + float((area * off**2).sum()), total + float((area * exact**2).sum())
+    return float(np.sqrt(squares / total)) if total else float("nan")
 
 
 def peak(mesh: Mesh, values: Array, axisymmetric: bool) -> tuple[float, Array]:
@@ -175,7 +184,7 @@ def _vertex(x: Array, v: Array, on_axis: bool) -> tuple[float, Array] | None:
 
 def _depth(case: Case, pair: str, where: Array) -> float:
     """Return the distance of a place from the nearer side of a contact pair."""
-    sides = next((p.secondary, p.primary) for p in case.model.contact if p.name == pair)
+    sides = next((p.secondary, *filter(None, [p.primary])) for p in case.model.contact if p.name == pair)
     nodes = np.concatenate([case.mesh.points[case.mesh.points_of(side)] for side in sides])
     return float(np.linalg.norm(nodes - where, axis=1).min())
 
@@ -196,17 +205,24 @@ def mesh_size(case: Case, pair: str | None) -> float:
     """Return the length of the shortest facet of the secondary surface, or without contact of the shortest edge."""
     if pair is None:
         return quality(case.mesh).shortest_edge
-    side = secondary(case, pair)
-    ends = case.mesh.points[side.facets]
-    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min())
+    shortest = np.inf
+    for block in secondary(case, pair).blocks:
+        kind, corners = elements.get(block.element), case.mesh.points[block.facets]
+        ends = kind.edges if kind.dim == 2 else ((0, 1),)
+        for a, b in ends:
+            shortest = min(shortest, float(np.linalg.norm(corners[:, b] - corners[:, a], axis=1).min()))
+    return shortest
 
 
-def of_theory(theory: Any) -> dict[str, float]:
-    """Return the quantities of interest that a theory gives, in its units."""
+def of_theory(theory: Any, share: float = 1.0) -> dict[str, float]:
+    """Return the quantities of interest that a theory gives, in its units; the model holds a `share` of its force."""
     names = {"force": "force", "pressure_max": "pressure_max", "contact_radius": "radius"}
     found = {key: float(getattr(theory, name)) for key, name in names.items() if hasattr(theory, name)}
-    if hasattr(theory, "pressure"):
-        found["pressure_pole"] = float(theory.pressure(0.0))
+    if "force" in found:
+        found["force"] *= share
+    curve = pressure_curve(theory)
+    if curve is not None:
+        found |= {"pressure_max": curve.pressure_max, "pressure_pole": float(curve.pressure(0.0))}
     if hasattr(theory, "von_mises_maximum"):
         greatest = theory.von_mises_maximum()
         found |= {"von_mises_max": greatest.value, "von_mises_depth": greatest.depth}
@@ -220,11 +236,12 @@ def by_theory(case: Case, pair: str | None, force: float) -> dict[str, dict[str,
     """
     theories = case.theories.get(pair or "", {})
     theory: Any = theories.get("theory")
-    same = theory.at_force(force) if force > 0 and hasattr(theory, "at_force") else None
+    share = theories.get("share", 1.0)
+    same = theory.at_force(force / share) if force > 0 and hasattr(theory, "at_force") else None
     return {
-        "theory": of_theory(theory),
-        "reference": of_theory(theories.get("mesh_converged")),
-        "equal_force": of_theory(same),
+        "theory": of_theory(theory, share),
+        "reference": of_theory(theories.get("mesh_converged"), share),
+        "equal_force": of_theory(same, share),
     }
 
 

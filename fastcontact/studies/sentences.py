@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastcontact.studies.fit import CONFIDENCE
 from fastcontact.studies.quantities import title
-from fastcontact.studies.render.table import percent
+from fastcontact.studies.render.table import number, percent
 from fastcontact.studies.series import Series, Split
 
 # The quantities that sentences are about, in this order.
@@ -24,10 +24,16 @@ def _about_quantity(series: Series, quantity: str) -> list[str]:
     if found is None:
         off = percent(series.errors(quantity)[-1])
         return [f"{series.combination}: the mesh error of the {name} is {off} on the finest mesh."]
-    start = f"{series.combination}: at equal approach the {name}"
+    start = (
+        f"{series.combination}: the {name}"
+        if series.exact_theory
+        else f"{series.combination}: {series.compared} the {name}"
+    )
     finest = f"({series.finest.n_dofs} degrees of freedom)"
     bar = f"{100 * found.uncertainty:.2g} %"
-    if found.resolved:
+    if series.converges_to_theory(quantity) is False:
+        texts = [_not_to_theory(series, quantity, start, found)]
+    elif found.resolved and not series.exact_theory:
         texts = [
             f"{start} differs from theory by {percent(found.total)}. Of that, "
             f"{percent(found.model, found.uncertainty)} (+- {bar}) is model error, which no mesh removes, and "
@@ -39,15 +45,29 @@ def _about_quantity(series: Series, quantity: str) -> list[str]:
             f"{percent(found.mesh)} is mesh error on the finest mesh {finest}."
         ]
     if not series.limits[quantity].converging:
-        texts.append(f"The {name} does not settle: its last change is the largest, so finer meshes are needed.")
+        texts.append(
+            f"The {name} does not settle: it changes on the finest mesh as much as before, so that its error bar proves "
+            "nothing; finer meshes are needed."
+        )
     return texts + _about_cancelling(series, quantity, found) + _about_reference(series, quantity)
+
+
+def _not_to_theory(series: Series, quantity: str, start: str, found: Split) -> str:
+    """Return that a formulation misses a theory which is exact for the model."""
+    limit = series.limits[quantity]
+    tends = f"tends to {number(limit.value, 6)} +- {number(limit.uncertainty, 2)}"
+    return (
+        f"{start} {tends} where the theory has {number(found.theory, 6)}. That theory is about the very bodies of the model, "
+        f"so this is no model error: {series.combination} does not converge to it on these meshes. Compare formulations "
+        "(--formulations all), or let the meshes of the two sides match."
+    )
 
 
 def _about_cancelling(series: Series, quantity: str, found: Split) -> list[str]:
     """Name the mesh that lies nearer to theory than half the model error by its mesh error: it looks better than it is."""
     off = series.from_theory(quantity)
     best = min(range(len(off)), key=lambda k: abs(off[k]))
-    if not found.resolved or not abs(off[best]) < 0.5 * abs(found.model):
+    if series.exact_theory or not found.resolved or not abs(off[best]) < 0.5 * abs(found.model):
         return []
     level = series.levels[best]
     return [

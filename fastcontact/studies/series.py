@@ -9,6 +9,9 @@ from dataclasses import dataclass
 from fastcontact.studies.fit import Limit, step_orders
 from fastcontact.studies.settings import Combination
 
+# Relative differences below this are those of straight facets and tolerances, no matter of the formulation [-].
+EXACT = 1e-4
+
 
 @dataclass(frozen=True)
 class Split:
@@ -107,6 +110,10 @@ class Series:
         Those that were fitted, or would have been with more levels.
     limits : dict of str to Limit
         By quantity; empty with fewer than three levels.
+    exact_theory : bool
+        Whether the theory is about the very bodies of the model, so that there is no model error.
+    compared : str
+        At what the theory is held against the values: "at equal approach" or "under the given load".
     """
 
     combination: Combination
@@ -118,6 +125,8 @@ class Series:
     equal_force_spread: dict[str, float]
     quantities: tuple[str, ...]
     limits: dict[str, Limit]
+    exact_theory: bool = False
+    compared: str = "at equal approach"
 
     @property
     def finest(self) -> Level:
@@ -152,6 +161,13 @@ class Series:
         """Return model and mesh error at equal approach, where there are a limit and a theory."""
         limit, theory = self.limits.get(quantity), self.theory.get(quantity)
         return split(self.values(quantity)[-1], limit, theory) if limit and theory else None
+
+    def converges_to_theory(self, quantity: str) -> bool | None:
+        """Return whether the limit is that of an exact theory, within its error bar; None without such a theory."""
+        found, limit = self.split(quantity), self.limits.get(quantity)
+        if found is None or limit is None or not self.exact_theory:
+            return None
+        return bool(limit.converging and abs(found.model) <= max(found.uncertainty, EXACT))
 
     def split_equal_force(self, quantity: str) -> Split | None:
         """Return model and mesh error against the theory at the limit of the force."""

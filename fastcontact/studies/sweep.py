@@ -68,7 +68,7 @@ def parameter_sweep(
     choices = [dict(zip(parameters, values, strict=True)) for values in itertools.product(*parameters.values())]
     jobs = [_job(case, choice, element, formulation, level) for choice in choices]
     # An unknown key would make every run fail.
-    build_case(jobs[0].data, name=case.name, mesh=case.mesh)
+    build_case(jobs[0].data, name=case.name, folder=case.folder, mesh=case.mesh)
     results = run_all(jobs, executor=executor, workers=workers, store=store, on_progress=on_progress)
     raise_first("no point of the sweep could be solved", jobs, results)
     runs = list(zip(choices, results, strict=True))

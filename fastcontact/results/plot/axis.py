@@ -33,7 +33,9 @@ def axis_stress(
     units: Units = UNITS,
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot the stresses at the nodes on the axis x = 0 over the depth under the contact surface.
+    """Plot the stresses at the nodes on the axis of a contact over the depth under its surface.
+
+    The axis passes through the middle of the contact, along the normal there; in axisymmetry it is that of the bodies.
 
     Parameters
     ----------
@@ -41,7 +43,7 @@ def axis_stress(
         Two-dimensional.
     step : StepResult
     pair : str
-        Contact pair whose node on the axis is the origin.
+        Contact pair whose node nearest to the middle of the contact is the origin.
     theories : mapping of str to object, optional
         Curves by label: objects with ``stress_on_axis(depth)``, such as `analytic.hertz_point`.
     title, units, ax
@@ -53,10 +55,12 @@ def axis_stress(
         If the mesh is three-dimensional or has no nodes on the axis.
     """
     depth, side, stress = stresses_on_axis(mesh, step, pair)
+    upright = abs(_axis(step, pair)[1][1]) > 0.5
+    bodies = ("upper body", "lower body") if upright else ("right body", "left body")
     axes = new_axes(ax, (7.4, 5.4))
     reach = DEEP * np.nan_to_num(step.contact[pair].radius[0]) or float(depth.max())
     shown = depth <= reach
-    for number, (name, marker) in enumerate((("upper body", "^"), ("lower body", "v"))):
+    for number, (name, marker) in enumerate(zip(bodies, ("^", "v"), strict=True)):
         here = shown & (side == 1 - 2 * number)
         for colour, (what, component) in zip(("C0", "C1"), COMPONENTS.items(), strict=True):
             axes.plot(depth[here], stress[here, component], marker, color=colour, ms=4, label=f"{what}, {name}")
@@ -77,25 +81,55 @@ def axis_stress(
 
 
 def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, NDArray[np.int64], Array]:
-    """Return depth (n,) [length], side (n,), 1 above and -1 below the surface, and stress (n, 4) of the axis nodes."""
+    """Return depth (n,) [length], side (n,) and stress (n, 4) of the nodes on the axis.
+
+    The side is 1 above the surface and -1 below (right and left of it where the axis is level). Components are turned: xx
+    across the axis, yy along it, xy between the two.
+    """
     if mesh.dim != 2:
         raise FastcontactError("stresses along the axis are for meshes in two dimensions: probe points in three")
-    contact = step.contact[pair]
-    pole = contact.coordinates[int(np.argmin(np.abs(contact.coordinates[:, 0])))]
+    pole, direction = _axis(step, pair)
     tolerance = 1e-9 * np.ptp(mesh.points, axis=0).max()
     used = np.unique(np.concatenate([block.ravel() for block in mesh.solids.values()]))
-    nodes = used[np.abs(mesh.points[used, 0]) <= tolerance]
+    height = (mesh.points[used] - pole) @ direction
+    beside = (mesh.points[used] - pole) @ np.array([direction[1], -direction[0]])
+    # The normal of a deformed facet is that of the surface but for a few thousandths.
+    leaning = 0.0 if np.abs(direction).max() == 1.0 else 2e-3
+    on_axis = np.abs(beside) <= tolerance + leaning * np.abs(height)
+    nodes, height = used[on_axis], height[on_axis]
     if len(nodes) < 2:
-        raise FastcontactError("the mesh has no nodes on the axis x = 0, along which stresses could be plotted")
-    height = mesh.points[nodes, 1] - pole[1]
+        raise FastcontactError(
+            f"the mesh has no nodes on the axis of contact '{pair}', along which stresses could be plotted"
+        )
     # Two nodes stand at the pole, one of each body; where the cells of a node lie tells which is which.
-    side = np.where(np.abs(height) > tolerance, np.sign(height), _sides(mesh, nodes, pole[1])).astype(np.int64)
+    behind = _sides(mesh, nodes, pole, direction)
+    side = np.where(np.abs(height) > tolerance, np.sign(height), behind).astype(np.int64)
     order = np.lexsort((np.abs(height), side))
-    return np.abs(height)[order], side[order], step.stress[nodes][order]
+    return np.abs(height)[order], side[order], _turned(step.stress[nodes], direction)[order]
 
 
-def _sides(mesh: Mesh, nodes: NDArray[Any], level: float) -> Array:
+def _axis(step: StepResult, pair: str) -> tuple[Array, Array]:
+    """Return where the axis of a contact leaves the surface (2,) [length], and its direction upward (2,) [-]."""
+    contact = step.contact[pair]
+    nearest = int(np.argmin(np.abs(contact.place)))
+    normal = contact.normal[nearest]
+    if contact.measured_from_axis or not np.linalg.norm(normal) > 0.5:
+        return np.array([0.0, contact.coordinates[nearest, 1]]), np.array([0.0, 1.0])
+    along = int(np.argmax(np.abs(normal)))
+    direction = np.eye(2)[along] if abs(normal[along]) > 0.999 else normal * np.sign(normal[along])
+    return contact.coordinates[nearest], direction
+
+
+def _turned(stress: Array, direction: Array) -> Array:
+    """Return stress (n, 4) in axes across and along a direction (2,)."""
+    along, across = direction, np.array([direction[1], -direction[0]])
+    tensor = stress[:, [0, 3, 3, 1]].reshape(-1, 2, 2)
+    xx, yy, xy = (np.einsum("i,nij,j->n", a, tensor, b) for a, b in ((across, across), (along, along), (across, along)))
+    return np.column_stack([xx, yy, stress[:, 2], xy])
+
+
+def _sides(mesh: Mesh, nodes: NDArray[Any], pole: Array, direction: Array) -> Array:
     total = np.zeros(mesh.n_points)
     for block in mesh.solids.values():
-        np.add.at(total, block, (mesh.points[block, 1].mean(axis=1) - level)[:, None])
+        np.add.at(total, block, ((mesh.points[block].mean(axis=1) - pole) @ direction)[:, None])
     return np.asarray(np.sign(total[nodes]))

@@ -90,7 +90,7 @@ def contact_zones(
     axes = new_axes(ax, (7.4, 5.2))
     contacts = [step.contact[pair] for step in steps]
     x = np.concatenate([np.full(len(c.points), step.load_factor) for step, c in zip(steps, contacts, strict=True)])
-    y = np.concatenate([c.abscissa for c in contacts])
+    y = np.concatenate([c.place for c in contacts])
     closed = np.concatenate([c.active for c in contacts])
     sliding = closed & ~np.concatenate([c.sticking for c in contacts])
     for name, here in (("open", ~closed), ("closed", closed & ~sliding), ("sliding", sliding)):
@@ -99,9 +99,11 @@ def contact_zones(
     for step, contact in zip(steps, contacts, strict=True):
         place = {"xycoords": ("data", "axes fraction"), "ha": "center", "va": "bottom"}
         axes.annotate(str(int(contact.active.sum())), (step.load_factor, 1.0), fontsize=7, **place)
-    reach = y[closed].max(initial=0.0)
-    axes.set_ylim(0.0, 1.5 * reach if 0.0 < 1.5 * reach < y.max() else None)
-    distance = f"distance along the secondary surface [{units['length']}]"
+    reach, farthest = 1.5 * np.abs(y[closed]).max(initial=0.0), np.abs(y).max(initial=0.0)
+    top = reach if 0.0 < reach < farthest else None
+    axes.set_ylim((-top if top else None) if y.min(initial=0.0) < 0 else 0.0, top)
+    start = "axis" if contacts[-1].measured_from_axis else "middle of the contact"
+    distance = f"distance from the {start} [{units['length']}]"
     axes.set(xlabel="load factor (above: closed nodes)", ylabel=distance)
     axes.set_title(title or f"Contact '{pair}' over the load", pad=16)
     axes.legend(loc="upper left", fontsize=8)

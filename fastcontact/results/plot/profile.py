@@ -1,4 +1,4 @@
-"""The pressure of a contact pair over the distance from its axis, with theory beside it."""
+"""The pressure of a contact pair over the distance from its middle, with theory beside it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
 from fastcontact.results.plot._axes import UNITS, Units, new_axes
 from fastcontact.results.step import ContactResult
 
@@ -27,44 +28,81 @@ def pressure_profile(
     units: Units = UNITS,
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot the contact pressure over the distance from the axis (in 3D that of first contact), with theory beside it.
+    """Plot the contact pressure over the distance from the middle of the contact, with theory beside it.
+
+    In plane problems the distance is that along the surface, with a sign where nodes lie on both sides of the middle; see
+    `ContactResult.place`.
 
     Parameters
     ----------
     contact : ContactResult
-    theory : object with ``pressure(r)``, ``pressure_max`` and ``radius``, optional
+    theory : object of `analytic`, or one with ``pressure(r)``, ``pressure_max`` and ``radius``, optional
         E.g. `analytic.hertz_point`.
     other_theories : mapping of str to such an object, optional
         Further curves by legend.
     stress : ndarray (m,), optional
-        Normal stress at the contact nodes (compression negative), drawn with the opposite sign [pressure].
+        Normal stress at the contact nodes (compression negative), drawn with the opposite sign [pressure]; see
+        `normal_stress`.
     title : str
     units : mapping
         Names of the units of ``length`` and ``pressure`` for the labels.
     ax : matplotlib Axes, optional
     """
     ax = new_axes(ax, (7.0, 4.6))
-    flat = contact.coordinates.shape[1] == 2
-    r = np.abs(contact.coordinates[:, 0]) if flat else contact.abscissa
-    theories = {**({"Hertz, equal approach": theory} if theory is not None else {}), **(other_theories or {})}
-    reach = max([contact.radius[1] if np.isfinite(contact.radius[1]) else 0.0, *(t.radius for t in theories.values())])
-    reach = 1.35 * reach or float(r.max())
-    shown = r <= reach
-    for style, (legend, curve) in zip(("-", "--", ":", "-."), theories.items(), strict=False):
-        x = np.append(np.linspace(0.0, curve.radius, 400), reach)
-        label = f"{legend} ($p_0$ = {curve.pressure_max:.1f})"
-        ax.plot(x, curve.pressure(x), style, color="black", lw=1.1, label=label)
-    label = f"{contact.formulation.replace('_', '-')} ($p$ max = {contact.pressure_max:.1f})"
-    ax.plot(r[shown], contact.pressure[shown], "o-" if flat else "o", color="tab:blue", ms=4, lw=0.8, label=label)
+    order = np.argsort(contact.place, kind="stable")
+    place, flat = contact.place[order], contact.coordinates.shape[1] == 2
+    curves = _curves(theory, other_theories or {})
+    low, high = _shown_range(contact, curves)
+    shown = (place >= low) & (place <= high)
+    for style, (legend, curve) in zip(("-", "--", ":", "-."), curves.items(), strict=False):
+        end = min(curve.radius, high)
+        x = np.unique(np.concatenate([[low, high], np.linspace(max(-end, low), end, 400)]))
+        label = f"{legend} ($p_0$ = {curve.pressure_max:.4g})"
+        ax.plot(x, curve.pressure(np.abs(x)), style, color="black", lw=1.1, label=label)
+    label = f"{contact.formulation.replace('_', '-')} ($p$ max = {contact.pressure_max:.4g})"
+    pressure = contact.pressure[order][shown]
+    ax.plot(place[shown], pressure, "o-" if flat else "o", color="tab:blue", ms=4, lw=0.8, label=label)
     if stress is not None:
-        direction = "yy" if flat else "nn"
-        ax.plot(r[shown], -stress[shown], "x", color="tab:red", ms=5, label=rf"$-\sigma_{{{direction}}}$ at the nodes")
-    inside, outside = contact.radius
-    if np.isfinite(inside) and np.isfinite(outside):
-        ax.axvspan(inside, outside, color="tab:blue", alpha=0.15, lw=0, label=f"edge: {inside:.2f} to {outside:.2f}")
-    x_name, y_name = f"distance from the axis [{units['length']}]", f"contact pressure [{units['pressure']}]"
-    ax.set(xlabel=x_name, ylabel=y_name, title=title or f"Contact '{contact.name}'", xlim=(0.0, reach))
-    ax.set_ylim(bottom=0.0)
+        label = r"$-n \cdot \sigma \cdot n$ at the nodes"
+        ax.plot(place[shown], -stress[order][shown], "x", color="tab:red", ms=5, label=label)
+    _mark_edges(ax, contact, place)
+    start = "axis" if contact.measured_from_axis else "middle of the contact"
+    along = "distance along the surface" if flat and not contact.measured_from_axis else "distance"
+    x_name, y_name = f"{along} from the {start} [{units['length']}]", f"contact pressure [{units['pressure']}]"
+    ax.set(xlabel=x_name, ylabel=y_name, title=title or f"Contact '{contact.name}'", xlim=(low, high))
+    ax.set_ylim(min(0.0, 1.05 * float(pressure.min(initial=0.0))), 1.05 * ax.dataLim.y1 or None)
     ax.grid(alpha=0.3)
     ax.legend()
     return ax
+
+
+def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
+    """Return what can be drawn of theories, by legend."""
+    found = {legend: pressure_curve(other) for legend, other in others.items()}
+    own = pressure_curve(theory)
+    return {**({own.name: own} if own is not None else {}), **{k: c for k, c in found.items() if c is not None}}
+
+
+def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) -> tuple[float, float]:
+    """Return the ends of the abscissa: a third more than the contact and the theories take, on both sides where there are."""
+    closed = np.abs(contact.place[contact.active]).max(initial=0.0)
+    radii = [value for value in (*contact.radius, *(c.radius for c in curves.values())) if np.isfinite(value)]
+    farthest = float(np.abs(contact.place).max(initial=0.0))
+    reach = 1.35 * max([closed, *radii]) or 1.02 * farthest or 1.0
+    reach = min(reach, 1.02 * max(farthest, *radii, 1e-300)) if closed else reach
+    low = contact.place.min(initial=0.0)
+    return (max(-reach, 1.02 * float(low)) if low < 0 else 0.0), reach
+
+
+def _mark_edges(ax: Axes, contact: ContactResult, place: Array) -> None:
+    """Shade where the edge of the contact lies: between the outermost closed place and the first open one."""
+    inside, outside = contact.radius
+    if not (np.isfinite(inside) and np.isfinite(outside)):
+        return
+    centre = 0.0
+    if place.min(initial=0.0) < 0:
+        closed = contact.place[contact.active]
+        centre = 0.5 * float(closed.min() + closed.max()) if len(closed) else 0.0
+        ax.axvspan(centre - outside, centre - inside, color="tab:blue", alpha=0.15, lw=0)
+    label = f"edge: {inside:.4g} to {outside:.4g}"
+    ax.axvspan(centre + inside, centre + outside, color="tab:blue", alpha=0.15, lw=0, label=label)

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.contact.search.facet_tables import flat_triangles
+from fastcontact.elasticity.recovery import von_mises
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import UNITS, Units, new_axes
 from fastcontact.results.plot.solid import MOST_EDGES, draw_solid
+from fastcontact.results.separated import separated
 from fastcontact.results.step import StepResult
 
 if TYPE_CHECKING:
@@ -53,15 +55,16 @@ def deformed_shape(
     ax : matplotlib Axes, optional
         In 3D with ``projection="3d"``.
     """
-    solid = mesh.dim == 3
-    place = mesh.points + scale * step.displacement
+    solid, (whole, (mesh, node, stress)) = mesh.dim == 3, (mesh, separated(mesh, step))
+    values = step.von_mises if mesh is whole else von_mises(stress)  # each material's own, where they meet
+    place = mesh.points + scale * step.displacement[node]
     both = np.concatenate([place, place * [-1.0, 1.0]]) if mirrored and not solid else place
     axes = new_axes(ax, (7.0, 7.0) if solid else _size(both), "3d" if solid else None)
     field = (
-        draw_solid(axes, mesh, place, step.von_mises, edges, view) if solid else _draw(axes, mesh, place, step, edges)
+        draw_solid(axes, mesh, place, values, edges, view, node) if solid else _draw(axes, mesh, place, values, edges)
     )
     if both is not place:
-        _draw(axes, mesh, place * [-1.0, 1.0], step, edges)
+        _draw(axes, mesh, place * [-1.0, 1.0], values, edges)
     top = int(np.argmax(step.von_mises))
     where = ", ".join(f"{x:.2f}" for x in mesh.points[top])
     label = f"maximum {step.von_mises[top]:.1f} at ({where})"
@@ -85,15 +88,18 @@ def _below(place: Array) -> float:
     return -0.5 / (_size(place)[1] - 2.0)
 
 
-def _draw(ax: Axes, mesh: Mesh, place: Array, step: StepResult, edges: bool | None) -> Any:
-    """Draw the cells of a mesh in the plane at positions `place` (n_points, 2); return what carries the colours."""
+def _draw(ax: Axes, mesh: Mesh, place: Array, values: Array, edges: bool | None) -> Any:
+    """Draw the cells of a mesh in the plane at positions `place` (n_points, 2), coloured by `values` (n_points,).
+
+    Return what carries the colours.
+    """
     from matplotlib.collections import PolyCollection
     from matplotlib.tri import Triangulation
 
     loops = [cells[:, _outline(name)] for name, cells in mesh.solids.items()]
     flat = [cells[:, flat_triangles(cells.shape[1])].reshape(-1, 3) for cells in mesh.solids.values()]
     field = ax.tripcolor(
-        Triangulation(place[:, 0], place[:, 1], np.concatenate(flat)), step.von_mises, shading="gouraud", cmap="viridis"
+        Triangulation(place[:, 0], place[:, 1], np.concatenate(flat)), values, shading="gouraud", cmap="viridis"
     )
     if edges if edges is not None else sum(map(len, loops)) <= MOST_EDGES:
         for loop in loops:

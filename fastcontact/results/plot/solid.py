@@ -20,11 +20,15 @@ MOST_EDGES = 5000
 CUTS = 2
 
 
-def draw_solid(ax: Any, mesh: Mesh, place: Array, values: Array, edges: bool | None, view: tuple[float, float]) -> Any:
+def draw_solid(
+    ax: Any, mesh: Mesh, place: Array, values: Array, edges: bool | None, view: tuple[float, float],
+    node: NDArray[np.int32],
+) -> Any:  # fmt: skip
     """Draw the facets of the outer surface that face the eye; return what a colour bar is made of.
 
     The points stand at `place` (n_points, 3) [length] and are coloured by `values` (n_points,). Outlines of facets are drawn
-    if `edges` says so, by default up to MOST_EDGES. `view` is height and direction of the eye [degrees].
+    if `edges` says so, by default up to MOST_EDGES. `view` is height and direction of the eye [degrees]. Points of one `node`
+    (n_points,) are one: the mesh may be cut along borders inside.
     """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -34,7 +38,7 @@ def draw_solid(ax: Any, mesh: Mesh, place: Array, values: Array, edges: bool | N
     height, direction = np.radians(view)
     eye = np.array([np.cos(height) * np.cos(direction), np.cos(height) * np.sin(direction), np.sin(height)])
     pieces, colours, outlines = [], [], []
-    outer = outer_facets(mesh)
+    outer = outer_facets(mesh) if len(node) == node.max(initial=-1) + 1 else _without_cuts(mesh, node)
     for name, facets in outer.items():
         corners = place[facets]
         flat = flat_triangles(facets.shape[1])
@@ -62,6 +66,15 @@ def draw_solid(ax: Any, mesh: Mesh, place: Array, values: Array, edges: bool | N
     for setter, low, high in zip((ax.set_xlim, ax.set_ylim, ax.set_zlim), place.min(axis=0), place.max(axis=0)):
         setter(low, high)
     return ScalarMappable(norm, "viridis")
+
+
+def _without_cuts(mesh: Mesh, node: NDArray[np.int32]) -> dict[str, NDArray[np.int32]]:
+    """Return the outer facets but for those along cuts inside, where two facets have the same nodes."""
+    found = {}
+    for name, facets in outer_facets(mesh).items():
+        _, back, count = np.unique(np.sort(node[facets], axis=1), axis=0, return_inverse=True, return_counts=True)
+        found[name] = facets[count[back.ravel()] == 1]
+    return {name: facets for name, facets in found.items() if len(facets)}
 
 
 def _cut(n: int) -> Array:

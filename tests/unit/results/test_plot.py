@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.cli._outputs import normal_stress
+from fastcontact import normal_stress
 from fastcontact.mesh.generate import block, box, union
 from fastcontact.results.step import StepResult
 
@@ -90,7 +90,7 @@ def test_a_plane_mesh_is_still_drawn_in_the_plane():
     assert ax.get_legend().get_texts()[0].get_text().startswith("maximum 1.0 at (1.00, ")
 
 
-def test_a_pressure_profile_in_space_is_over_the_distance_from_first_contact():
+def test_a_pressure_profile_in_space_is_over_the_distance_from_the_middle():
     model = fc.Model(box((1.0, 1.0, 0.5), (5, 5, 2), "hex8", (-0.5, -0.5, -0.5)), "3d")
     model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
     model.fix("ZMIN", "xyz")
@@ -99,9 +99,9 @@ def test_a_pressure_profile_in_space_is_over_the_distance_from_first_contact():
     contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["ball"]
     ax = fc.plot.pressure_profile(contact, stress=-contact.pressure)
     distance = ax.lines[0].get_xdata()
-    assert np.isin(distance, contact.abscissa).all()
+    assert np.isin(distance, contact.place).all()
     assert distance.max() > 0.1
-    assert [text.get_text() for text in ax.get_legend().get_texts()][1] == r"$-\sigma_{nn}$ at the nodes"
+    assert [text.get_text() for text in ax.get_legend().get_texts()][1] == r"$-n \cdot \sigma \cdot n$ at the nodes"
 
 
 def test_the_stress_along_normals_in_space_is_that_of_the_tensor():

@@ -709,7 +709,7 @@ def test_a_file_from_the_future(path: Path) -> None:
     write(path)
     with h5py.File(path, "r+") as file:
         file["fastcontact"].attrs.modify("schema", 7)
-    with pytest.raises(FileError, match="has schema 7, this fastcontact reads up to 2: update it"):
+    with pytest.raises(FileError, match="has schema 7, this fastcontact reads up to 3: update it"):
         open_results(path)
 
 

@@ -73,7 +73,7 @@ def test_contact_table() -> None:
     contact = step.contact["c"]
     table = contact_table(contact)
     assert table.dtype.names == (
-        "point", "x", "y", "abscissa", "radius", "gap", "pressure", "multiplier", "force_x", "force_y",
+        "point", "x", "y", "abscissa", "radius", "place", "gap", "pressure", "multiplier", "force_x", "force_y",
         "shear_x", "shear_y", "active", "sticking",
     )  # fmt: skip
     assert table["point"].tolist() == [0, 4, 1]

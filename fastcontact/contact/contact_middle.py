@@ -1,0 +1,177 @@
+"""Where the middle of a contact is, and how far from it places on the secondary surface lie.
+
+In axisymmetry the middle is the axis. Otherwise it is the centre of pressure, of the contact as it is completed by reflection
+at the planes of symmetry that it reaches: a half or a quarter of a model has its middle on these planes. A plane of
+symmetry is one on which supports hold the nodes at an end of the surface across the plane.
+
+In the plane, places are lengths along the surface: a ring unrolls. The same holds in axisymmetry where the surface runs along
+the axis rather than across, as in a press fit of cylinders. In space places are distances from the line through the middle
+along the mean normal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.projection import nodal_normals
+from fastcontact.contact.surface import Surface
+from fastcontact.contact.unrolled_line import UnrolledLine, unrolled
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+# A plane of symmetry cuts the surface: its normal and that of the surface are nearly perpendicular [cosine].
+ACROSS = 0.5
+# Below this length of the mean of unit normals a surface closes on itself: it has no direction.
+DIRECTED = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class ContactMiddle:
+    """The middle of a contact in one step.
+
+    Attributes
+    ----------
+    position : ndarray (dim,)
+        On the surface [length].
+    line : UnrolledLine, optional
+        The surface as a line, where places are lengths along it; `start` is the length at the middle [length].
+    direction : ndarray (dim,), optional
+        Of the line from which distances are measured [-].
+    ignored : tuple of int
+        Coordinates along which the model stands for an endless one.
+    """
+
+    position: Array
+    line: UnrolledLine | None = None
+    start: float = 0.0
+    reversed: bool = False
+    direction: Array | None = None
+    ignored: tuple[int, ...] = ()
+
+    def places(self, positions: Array) -> Array:
+        """Return how far reference positions (n, dim) lie from the middle (n,), along a line with a sign [length]."""
+        if self.line is not None:
+            along = self.line.lengths(positions) - self.start
+            if self.line.closed:
+                along -= self.line.length * np.round(along / self.line.length)
+            return -along if self.reversed else along
+        arm = positions - self.position
+        arm[:, list(self.ignored)] = 0.0
+        if self.direction is not None:
+            arm -= (arm @ self.direction)[:, None] * self.direction
+        return np.asarray(np.linalg.norm(arm, axis=1))
+
+
+def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask, gap: Array) -> ContactMiddle:
+    """Return the middle of a contact.
+
+    Parameters
+    ----------
+    pair : Formulation
+    normal : ndarray (n_nodes, dim)
+        Unit normals that the secondary nodes face [-].
+    force : ndarray (n_nodes,)
+        Their normal contact forces [force].
+    closed : ndarray of bool (n_nodes,)
+    gap : ndarray (n_nodes,)
+        Open contact has its middle where the gap is smallest [length].
+    """
+    surface, points = pair.secondary, pair.points[pair.secondary.points]
+    weight = _weights(force, gap)
+    mean = weight @ normal
+    dim = points.shape[1]
+    if pair.axisymmetric and (_meets_axis(points) or abs(mean[0]) <= abs(mean[1])):
+        return ContactMiddle(np.array([0.0, float(weight @ points[:, 1])]), direction=np.array([0.0, 1.0]))
+    planes = symmetry_planes(surface, pair.points, pair.supported)
+    if closed.any():
+        planes = [plane for plane in planes if _reached(surface, plane[1], closed)]
+    if dim == 2:
+        return _along_line(surface, pair.points, weight, planes, mean)
+    return _in_space(points, weight, planes, mean)
+
+
+def _in_space(points: Array, weight: Array, planes: list[tuple[int, NDArray[np.intp]]], mean: Array) -> ContactMiddle:
+    """Return the middle on a surface in space; parallel planes of symmetry at both ends stand for an endless one."""
+    centre = weight @ points
+    ends: dict[int, list[float]] = {}
+    for axis, nodes in planes:
+        ends.setdefault(axis, []).append(float(points[nodes, axis].mean()))
+    ignored = tuple(axis for axis, values in ends.items() if len(values) > 1)
+    if len(ignored) >= 2:
+        ignored = ()
+    for axis, values in ends.items():
+        if len(values) == 1:
+            centre[axis], mean[axis] = values[0], 0.0
+    length = float(np.linalg.norm(mean))
+    return ContactMiddle(centre, direction=mean / length if length > DIRECTED else None, ignored=ignored)
+
+
+def _meets_axis(points: Array) -> bool:
+    """Return whether one of the `points` (n, 2) [length] lies on the axis x = 0."""
+    return bool(np.abs(points[:, 0]).min() <= 1e-9 * np.ptp(points, axis=0).max())
+
+
+def symmetry_planes(surface: Surface, coordinates: Array, supported: Mask | None) -> list[tuple[int, NDArray[np.intp]]]:
+    """Return the planes of symmetry at the ends of a surface: their axis, and which nodes of the surface lie on them.
+
+    `coordinates` and `supported` (n_points, dim) are those of all points; without supports there is no plane.
+    """
+    if supported is None:
+        return []
+    points, held = coordinates[surface.points], supported[surface.points]
+    tolerance, found = 1e-6 * float(np.ptp(points, axis=0).max()), []
+    across = np.abs(nodal_normals(surface, coordinates)) < ACROSS
+    for axis in range(points.shape[1]):
+        x = points[:, axis]
+        if np.ptp(x) <= 10 * tolerance:
+            continue
+        for end in (x.min(), x.max()):
+            on_end = np.abs(x - end) <= tolerance
+            nodes = np.flatnonzero(on_end & held[:, axis] & ~held.all(axis=1) & across[:, axis])
+            if len(nodes) and len(nodes) == np.count_nonzero(on_end & ~held.all(axis=1)):
+                found.append((axis, nodes))
+    return found
+
+
+def _weights(force: Array, gap: Array) -> Array:
+    """Return the weights (n_nodes,) of the nodes in the centre of pressure [-], which sum up to 1."""
+    weight, total = force, float(force.sum())
+    if total <= 1e-6 * float(np.abs(force).sum()):  # nothing presses, or contact that pulls as much
+        weight = np.abs(force)
+        total = float(weight.sum())
+    if total > 0:
+        return np.asarray(weight / total)
+    weight = np.zeros(len(force))
+    weight[int(np.argmin(gap))] = 1.0
+    return weight
+
+
+def _reached(surface: Surface, nodes: NDArray[np.intp], closed: Mask) -> bool:
+    """Return whether a facet with one of the `nodes` has a closed node."""
+    for block in surface.blocks:
+        touching = np.isin(block.local, nodes).any(axis=1)
+        if closed[block.local[touching]].any():
+            return True
+    return False
+
+
+def _along_line(
+    surface: Surface, coordinates: Array, weight: Array, planes: list[tuple[int, NDArray[np.intp]]], mean: Array
+) -> ContactMiddle:
+    """Return the middle on a surface in the plane; one in several pieces is seen along its mean normal."""
+    points = coordinates[surface.points]
+    centre = weight @ points
+    line = unrolled(surface, coordinates, centre if np.linalg.norm(mean) > DIRECTED else None)
+    if line is None:
+        across = np.array([-mean[1], mean[0]]) / (np.linalg.norm(mean) or 1.0)
+        line = UnrolledLine.straight(centre, across, float(np.ptp(points, axis=0).max()))
+    lengths = line.lengths(points)
+    if len(planes) == 1 and not line.closed:
+        start = float(lengths[planes[0][1]].mean())
+        return ContactMiddle(line.at(start), line, start, start > 0.5 * (lengths.min() + lengths.max()))
+    start = float(weight @ lengths)
+    return ContactMiddle(line.at(start), line, start)

@@ -1,0 +1,73 @@
+"""Nodes where cells of several materials meet: stress jumps there, so each material has a value of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class MaterialSides:
+    """Places for nodal values: one for each node, and further ones where materials meet.
+
+    Attributes
+    ----------
+    cells : mapping of str to ndarray (n_cells, n_nodes)
+        By solid element, the places of the nodes of each cell.
+    node : ndarray of int (n_places,)
+        Node of each place; the first n_points are the nodes themselves.
+    points, material, place : ndarray of int (k,)
+        Where materials meet, for each node and each of its materials: node, material, place; ordered by node.
+    """
+
+    cells: Mapping[str, Indices]
+    node: Indices
+    points: Indices
+    material: Indices
+    place: Indices
+
+
+def material_sides(mesh: Mesh, material: Mapping[str, Indices]) -> MaterialSides:
+    """Return where materials meet; `material` has by solid element the number (n_cells,) of each cell's material."""
+    n = mesh.n_points
+    least, most = np.full(n, np.iinfo(np.int32).max, np.int32), np.full(n, -1, np.int32)
+    for number in np.unique(np.concatenate([np.empty(0, np.int32), *material.values()]))[::-1]:
+        inside = np.concatenate([block[material[name] == number].ravel() for name, block in mesh.solids.items()])
+        least[inside] = number
+        most[inside] = np.maximum(most[inside], number)
+    shared = least < most
+    if not shared.any():
+        none = np.empty(0, np.int32)
+        return MaterialSides(dict(mesh.solids), np.arange(n, dtype=np.int32), none, none, none)
+    count = int(most.max()) + 1
+    keys = [
+        (block.astype(np.int64) * count + material[name][:, None])[shared[block]] for name, block in mesh.solids.items()
+    ]
+    rows = np.unique(np.concatenate(keys))
+    points, numbers = (rows // count).astype(np.int32), (rows % count).astype(np.int32)
+    further = numbers != least[points]
+    place = points.copy()
+    place[further] = n + np.arange(np.count_nonzero(further), dtype=np.int32)
+    cells = {}
+    for name, block in mesh.solids.items():
+        here = shared[block]
+        cells[name] = block.copy()
+        wanted = (block.astype(np.int64) * count + material[name][:, None])[here]
+        cells[name][here] = place[np.searchsorted(rows, wanted)]
+    node = np.concatenate([np.arange(n, dtype=np.int32), points[further]])
+    return MaterialSides(cells, node, points, numbers, place)
+
+
+def distinct(moduli: Array, material: Mapping[str, Indices]) -> dict[str, Indices]:
+    """Return the materials of all cells, those of equal moduli (n_materials, n_components, n_components) under one number."""
+    _, first, same = np.unique(moduli.reshape(len(moduli), -1), axis=0, return_index=True, return_inverse=True)
+    number = first[same.ravel()].astype(np.int32)
+    return {name: number[values] for name, values in material.items()}

@@ -1,0 +1,64 @@
+"""Nodal stress where materials meet: one value for each of them, since stress jumps from one to the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.elasticity import recovery
+from fastcontact.elasticity.material_sides import MaterialSides
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class MaterialStress:
+    """Stress at the nodes where materials meet, on the side of each.
+
+    Attributes
+    ----------
+    cells : ndarray of int (n_solids,)
+        Material of every solid cell, in the order of ``mesh.solids``: its number in the order in which materials were added
+        to the model, from 0; equal materials have the first one's.
+    points, material : ndarray of int (k,)
+        Where materials meet, a row for each node and each of its materials, ordered by node.
+    stress : ndarray (k, 4) or (k, 6)
+        Average over the cells of that material at the node, components as of `StepResult.stress` [pressure].
+    """
+
+    cells: Indices
+    points: Indices
+    material: Indices
+    stress: Array
+
+    def at(self, point: int) -> dict[int, Array]:
+        """Return the stress (4,) or (6,) at a node by material [pressure]; empty where it has only one."""
+        return {int(self.material[row]): self.stress[row] for row in np.flatnonzero(self.points == point)}
+
+
+def by_largest_von_mises(
+    sides: MaterialSides, cells: Indices, at_places: Array, n_points: int
+) -> tuple[Array, MaterialStress | None]:
+    """Return the nodal stress (n_points, n_components), and that of each side where materials meet [pressure].
+
+    Parameters
+    ----------
+    sides : MaterialSides
+    cells : ndarray of int (n_solids,)
+        Material of every solid cell.
+    at_places : ndarray (n_places, n_components)
+        Stress at the places of `sides` [pressure].
+    n_points : int
+
+    Where materials meet, the nodal stress is that of the side with the largest von Mises stress.
+    """
+    stress = at_places[:n_points].copy() if len(sides.points) else at_places
+    if not len(sides.points):
+        return stress, None
+    own = at_places[sides.place]
+    order = np.lexsort((recovery.von_mises(own), sides.points))  # the last row of each node has the largest
+    stress[sides.points[order]] = own[order]
+    return stress, MaterialStress(cells, sides.points, sides.material, own)

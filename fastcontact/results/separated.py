@@ -1,0 +1,40 @@
+"""The mesh of a step cut along the borders of materials, so that nodal stress has one value at every point."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.elasticity.material_sides import material_sides
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.results.step import StepResult
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+
+def separated(mesh: Mesh, step: StepResult) -> tuple[Mesh, Indices, Array]:
+    """Return the mesh cut along borders of materials, the node (m,) of each of its points, and the stress (m, ...) there.
+
+    The points of `mesh` come first. Stress [pressure] has the components of `StepResult.stress`. The mesh has solid cells
+    only and no groups; where no materials meet it is `mesh` itself.
+    """
+    found = step.material_stress
+    if found is None:
+        return mesh, np.arange(mesh.n_points, dtype=np.int32), step.stress
+    sides = material_sides(mesh, cells_by_element(mesh, found.cells))
+    stress = step.stress[sides.node]
+    stress[sides.place] = found.stress
+    return Mesh(mesh.points[sides.node], sides.cells), sides.node, stress
+
+
+def cells_by_element(mesh: Mesh, values: NDArray[np.int32]) -> dict[str, NDArray[np.int32]]:
+    """Return numbers of all solid cells (n_solids,) by element."""
+    ends = np.cumsum([len(block) for block in mesh.solids.values()])[:-1]
+    return dict(zip(mesh.solids, np.split(values, ends), strict=True))
+
+
+def mean_in_cells(mesh: Mesh, step: StepResult) -> Array:
+    """Return the mean (n_solids, n_components) of each solid cell's nodal stress on its own side [pressure]."""
+    apart, _, stress = separated(mesh, step)
+    return np.concatenate([stress[block].mean(axis=1) for block in apart.solids.values()])

@@ -1,0 +1,214 @@
+"""Places are measured from the middle of a contact, wherever it lies and whichever way it faces; what is drawn of it."""
+
+import csv
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.analytic.pressure_curve import pressure_curve
+from fastcontact.cli import main
+from fastcontact.cli._results import pressure_curves
+from fastcontact.contact.surface import surface
+from fastcontact.contact.unrolled_line import unrolled
+from fastcontact.results.step import half_width
+
+R, E, SIZE = 10.0, 1000.0, 0.2
+SIDES = {"up": ("y", 1.0, 0.0), "left": ("x", -1.0, 90.0), "down": ("y", -1.0, 180.0), "right": ("x", 1.0, 270.0)}
+
+
+def whole(half):
+    """Return a half model x >= 0 with its mirror image, as one body."""
+    other = fc.generate.renamed(fc.generate.mirrored(half, "x"), {name: f"M_{name}" for name in half.group_names})
+    mesh = fc.generate.merge_points(fc.generate.union(half, other), 1e-9)
+    for name in half.cell_groups:
+        mesh = mesh.merged_groups(f"ALL_{name}", [name, f"M_{name}"])
+    return mesh
+
+
+def pressed(x0, facing, half):
+    """Return contact and step of a block whose top, turned to one side and shifted, a cylinder is pressed upon."""
+    axis, sign, angle = SIDES[facing]
+    mesh = fc.generate.graded_block("quad8", width=8.0, contact_radius=1.2, contact_size=SIZE)
+    prefix = "" if half else "ALL_"
+    mesh = fc.generate.transformed(mesh if half else whole(mesh), rotate=angle, translate=(x0, -2 * x0))
+    centre = np.array([x0, -2 * x0])
+    centre["xy".index(axis)] += sign * R
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(E, 0.3))
+    if half:
+        model.fix("SYMMETRY_X", "x" if axis == "y" else "y")
+    model.fix(f"{prefix}BOTTOM", "xy" if not half else axis)
+    ball = fc.obstacles.Sphere(centre=tuple(centre), R=R)
+    model.add_obstacle("c", secondary=f"{prefix}CONTACT", obstacle=ball, motion={axis: -sign * 0.05})
+    step = fc.solve(model, fc.linear_ramp(1))[-1]
+    return step.contact["c"], step
+
+
+@pytest.mark.parametrize("half", [True, False], ids=["half", "whole"])
+@pytest.mark.parametrize(("x0", "facing"), [(0.0, "up"), (20.0, "up"), (-7.0, "left"), (3.0, "down"), (20.0, "right")])
+def test_the_half_width_is_that_of_hertz_wherever_the_contact_lies(x0, facing, half):
+    contact, step = pressed(x0, facing, half)
+    force = np.linalg.norm(contact.force) * (2 if half else 1)
+    hertz = fc.analytic.hertz_line(E1=E, nu1=0.3, R1=R, force=force)
+    np.testing.assert_allclose(contact.middle, [x0, -2 * x0], atol=1e-3 * SIZE)
+    assert contact.radius[0] - SIZE < hertz.radius < contact.radius[1] + SIZE
+    closed = contact.active
+    assert np.abs(contact.place[closed]).max() == pytest.approx(hertz.radius, abs=1.5 * SIZE)
+    assert (contact.place.min() < -1.0) != half
+    # the stress across the surface is the pressure, in any direction
+    normal = fc.normal_stress(contact, step)
+    inside = np.abs(contact.place) < 0.6 * hertz.radius
+    assert -normal[inside].mean() == pytest.approx(contact.pressure[inside].mean(), rel=0.03)
+    table = fc.contact_table(contact, step)
+    np.testing.assert_array_equal(table["radius"], np.abs(contact.place))
+    np.testing.assert_array_equal(table["normal_stress"], normal)
+    line = max(fc.plot.pressure_profile(contact, hertz).lines, key=lambda line: len(line.get_xdata()))
+    exact = hertz.pressure(np.abs(line.get_xdata()))
+    np.testing.assert_allclose(line.get_ydata(), exact)  # theory is drawn where the contact is
+
+
+@pytest.mark.parametrize("swapped", [False, True], ids=["cylinder", "block"])
+def test_the_middle_of_two_bodies_is_the_same_from_either_side(swapped):
+    mesh = fc.generate.transformed(
+        fc.generate.cylinder_on_block("quad4", size=8.0, contact_size=0.5), translate=(20.0, 0)
+    )
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(1e5, 0.3))
+    model.fix("AXIS", "x")
+    model.fix("BLOCK_BOTTOM", "y")
+    model.prescribe("CYLINDER_TOP", y=-0.5)
+    sides = ["CONT_CYLINDER", "CONT_BLOCK"]
+    secondary, primary = reversed(sides) if swapped else sides
+    model.add_contact("c", secondary=secondary, primary=primary)
+    contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["c"]
+    both = fc.analytic.hertz_line(E1=1e5, nu1=0.3, R1=50.0, E2=1e5, nu2=0.3, force=2 * np.linalg.norm(contact.force))
+    assert contact.middle[0] == pytest.approx(20.0, abs=1e-9)
+    assert contact.radius[0] - 0.5 < both.radius < contact.radius[1] + 0.5
+
+
+def rings():
+    """Return contact and step of a press fit: a quarter of two rings."""
+    mesh = fc.generate.rings("quad8", divisions_inner=(2, 6), divisions_outer=(2, 6))
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(210e3, 0.3))
+    model.fix("SYMMETRY_X", "x")
+    model.fix("SYMMETRY_Y", "y")
+    model.add_contact("c", secondary="CONT_INNER", primary="CONT_OUTER", clearance=-0.05)
+    step = fc.solve(model, fc.linear_ramp(1))[-1]
+    return step.contact["c"], step
+
+
+def test_a_ring_unrolls_and_its_stress_is_radial():
+    contact, step = rings()
+    quarter = 0.5 * np.pi * 50.0
+    assert np.ptp(contact.place) == pytest.approx(quarter, rel=1e-3)
+    assert (np.diff(contact.place) > 0).all() or (np.diff(contact.place) < 0).all()
+    np.testing.assert_allclose(-fc.normal_stress(contact, step), contact.pressure, rtol=0.03)
+
+
+def test_a_closed_line_is_cut_open_opposite_to_the_contact():
+    turns = np.linspace(0.0, 2 * np.pi, 24, endpoint=False)
+    ring = np.concatenate([r * np.column_stack([np.cos(turns), np.sin(turns)]) for r in (1.0, 2.0)])
+    quads = np.array([[i, (i + 1) % 24, 24 + (i + 1) % 24, 24 + i] for i in range(24)])[:, [0, 3, 2, 1]]
+    lines = np.array([[24 + i, 24 + (i + 1) % 24] for i in range(24)])
+    mesh = fc.Mesh(ring, {"quad4": quads, "line2": lines}, {"OUT": 24 + np.arange(24)}, {})
+    side = surface(mesh, "OUT")
+    line = unrolled(side, mesh.points, np.array([2.0, 0.0]))
+    assert line is not None
+    assert line.closed
+    np.testing.assert_allclose(line.nodes[0], [-2.0, 0.0], atol=1e-12)
+    lengths = line.lengths(mesh.points[side.points])
+    assert len(np.unique(np.round(lengths, 9))) == 24
+    np.testing.assert_allclose(line.at(0.5 * line.length), [2.0, 0.0], atol=1e-9)
+
+
+@pytest.mark.parametrize("quarter", [True, False], ids=["quarter", "whole"])
+def test_in_space_distances_are_from_the_centre_of_pressure_or_the_planes_of_symmetry(quarter):
+    low, size = (0.0, 1.0) if quarter else (-1.0, 2.0)
+    n = 8 if quarter else 16
+    at = np.array([20.0, -5.0, 3.0])
+    mesh = fc.generate.box((size, size, 1.0), (n, n, 4), "hex8", (at[0] + low, at[1] + low, at[2] - 1.0))
+    model = fc.Model(mesh, "3d")
+    model.add_material(fc.LinearElastic(E, 0.3))
+    if quarter:
+        model.fix("XMIN", "x")
+        model.fix("YMIN", "y")
+        model.fix("ZMIN", "z")
+    else:
+        model.fix("ZMIN", "xyz")
+    ball = fc.obstacles.Sphere(centre=(at[0], at[1], at[2] + 3.0), R=3.0)
+    model.add_obstacle("c", secondary="ZMAX", obstacle=ball, motion={"z": -0.05})
+    contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["c"]
+    np.testing.assert_allclose(contact.middle, at, atol=1e-6)
+    flat = np.hypot(*(contact.coordinates - at)[:, :2].T)
+    np.testing.assert_allclose(contact.place, flat, atol=1e-6)
+    assert contact.radius[0] == pytest.approx(flat[contact.active].max(), abs=0.13)
+
+
+def test_in_axisymmetry_places_are_radii_unless_the_surface_runs_along_the_axis():
+    shaft = fc.generate.block((1.0, 2.0), (4, 8), "quad4", (1.0, 5.0), name="SHAFT")
+    model = fc.Model(shaft, "axisymmetric")
+    model.add_material(fc.LinearElastic(E, 0.3))
+    model.fix("LEFT", "x")
+    model.fix("BOTTOM", "y")
+    hub = fc.obstacles.HalfSpace(point=(2.0, 0.0), normal=(-1.0, 0.0))
+    model.add_obstacle("c", secondary="RIGHT", obstacle=hub, motion={"x": -0.01})
+    contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["c"]
+    assert np.ptp(contact.place) == pytest.approx(2.0)
+    ends = fc.Model(shaft, "axisymmetric")
+    ends.add_material(fc.LinearElastic(E, 0.3))
+    ends.fix("BOTTOM", "y")
+    plate = fc.obstacles.HalfSpace(point=(0.0, 7.0), normal=(0.0, -1.0))
+    ends.add_obstacle("c", secondary="TOP", obstacle=plate, motion={"y": -0.01})
+    contact = fc.solve(ends, fc.linear_ramp(1))[-1].contact["c"]
+    np.testing.assert_array_equal(contact.place, contact.coordinates[:, 0])
+    assert contact.measured_from_axis
+
+
+@pytest.mark.parametrize(
+    ("place", "closed", "bracket"),
+    [
+        ([0, 1, 2, 3], [1, 1, 0, 0], (1, 2)),
+        ([-2, -1, 0, 1, 2], [0, 1, 1, 1, 0], (1, 2)),
+        ([-2, -1, 0, 1, 2], [1, 1, 1, 1, 1], (2, np.inf)),
+        ([-2, -1, 0, 1, 2], [1, 1, 1, 0, 0], (1, 1.5)),  # it ends with the surface on one side
+        ([0, 1, 2], [0, 0, 0], (np.nan, np.nan)),
+    ],
+)
+def test_the_half_width_lies_between_the_closed_and_the_open_places(place, closed, bracket):
+    assert half_width(np.array(place, float), np.array(closed, bool)) == pytest.approx(bracket, nan_ok=True)
+
+
+def test_a_theory_is_named_after_what_was_given():
+    contact, _ = pressed(0.0, "up", True)
+    line = fc.analytic.hertz_line(E1=E, nu1=0.3, R1=R, force=7.0)
+    (legend,) = pressure_curves({"theory": line, "share": 0.5}, contact)
+    assert legend == "Hertz, equal force"
+    point = fc.analytic.hertz_point(E1=E, nu1=0.3, R1=R, approach=0.2)
+    curves = pressure_curves({"theory": point, "share": 1.0}, contact, approach=0.2, load=0.5)
+    assert list(curves) == ["Hertz, equal approach", "Hertz, equal force"]
+    assert curves["Hertz, equal approach"].approach == pytest.approx(0.1)
+    fit = fc.analytic.press_fit_cylinders(
+        E_inner=E, nu_inner=0.3, E_outer=E, nu_outer=0.3, interface_radius=1.0, outer_radius=2.0, interference=0.01
+    )
+    assert list(pressure_curves({"theory": fit, "share": 1.0}, contact)) == ["Lamé"]
+    assert pressure_curve(fit).pressure(np.arange(3.0)).tolist() == [fit.pressure] * 3
+    assert pressure_curve(fc.analytic.flat_punch(E=E, nu=0.3, radius=1.0, force=1.0)) is None
+
+
+def test_the_command_writes_places_from_the_middle(tmp_path):
+    contact, step = rings()
+    mesh = fc.generate.rings("quad8", divisions_inner=(2, 6), divisions_outer=(2, 6))
+    path = tmp_path / "r.vtkhdf"
+    with fc.ResultWriter(path, mesh, kinematics="plane_strain") as out:
+        out.write(step)
+    read = fc.open_results(path)[-1].contact["c"]
+    np.testing.assert_array_equal(read.place, contact.place)
+    np.testing.assert_array_equal(read.middle, contact.middle)
+    files = {kind: tmp_path / f"p.{kind}" for kind in ("csv", "agr", "png")}
+    assert main(["profile", str(path), *(w for kind, f in files.items() for w in (f"--{kind}", str(f))), "-q"]) == 0
+    rows = list(csv.DictReader(files["csv"].open()))
+    np.testing.assert_allclose([float(row["place"]) for row in rows], contact.place)
+    assert "middle of the contact" in files["agr"].read_text()
+    assert files["png"].read_bytes()[:4] == b"\x89PNG"
