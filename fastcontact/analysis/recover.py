@@ -13,6 +13,7 @@ from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
 from fastcontact.analysis.state import State
+from fastcontact.contact.closed_nodes import carried
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.contact_middle import contact_middle
@@ -156,13 +157,12 @@ def contact_result(
     """
     points, dim = pair.secondary.points, pair.points.shape[1]
     multiplier, active = solution.multiplier[rows], solution.active[rows]
-    excluded = pair.options.excluded_nodes(pair.secondary)
-    pressure = np.where(excluded, 0.0, part.pressure(multiplier))
     gap, normal = pair.nodal_gap(at, displacement=displacement)
-    closed = _closed_nodes(pair, part, active, gap, pressure, at) & ~excluded
+    found = _closed(pair, part, multiplier, active, gap, at)
+    closed = found.nodes
     if part.tied is not None:  # as the bodies lay at rest
         normal = pair.nodal_gap(replace(at, displacement=np.zeros_like(at.displacement)))[1]
-    along = _along_the_surface(part, solution, rows, normal, pressure)
+    along = _along_the_surface(part, solution, rows, normal, found)
     forces = part.force(multiplier, along.force).reshape(-1, dim)[points]
     total = forces.sum(axis=0)
     if pair.axisymmetric:
@@ -177,14 +177,14 @@ def contact_result(
         coordinates=coordinates,
         abscissa=pair.secondary.abscissa if axis is None else _distance(coordinates, axis),
         gap=gap,
-        pressure=np.where(closed, pressure if part.equality is not None else np.maximum(pressure, 0.0), 0.0),
-        multiplier=pressure,
+        pressure=found.pressure,
+        multiplier=found.multiplier,
         force_vectors=forces,
         normal=normal,
         active=closed,
         force=total,
         radius=half_width(middle.places(part.positions), active),
-        shear=np.where(closed[:, None], along.shear, 0.0),
+        shear=along.shear,
         sticking=closed & along.sticking,
         dissipation=along.dissipation,
         obstacle_displacement=at.obstacle.copy() if isinstance(pair.primary, RigidSide) else None,
@@ -204,22 +204,59 @@ class _AlongTheSurface:
 
 
 def _along_the_surface(
-    part: Constraints, solution: Solution, rows: slice, normal: Array, pressure: Array
+    part: Constraints, solution: Solution, rows: slice, normal: Array, found: _Closed
 ) -> _AlongTheSurface:
     """Return what a pair does along its surface: nothing without friction or tie."""
-    multiplier, everywhere = solution.multiplier[rows], np.ones(len(pressure), bool)
+    multiplier, everywhere = solution.multiplier[rows], np.ones(len(normal), bool)
     if part.tied is not None:
         _, tangential = part.tied.forces(multiplier)
-        return _AlongTheSurface(_nodal_shear(part, part.tied.directions, tangential, normal), everywhere)
+        shear = _nodal_shear(part, part.tied.directions, tangential, normal)
+        return _AlongTheSurface(np.where(found.nodes[:, None], shear, 0.0), everywhere)
     if not (isinstance(solution, FrictionalEquilibrium) and part.tangents):
         return _AlongTheSurface(np.zeros_like(normal), everywhere)
     tangential, slip = solution.tangential[rows], solution.slip[rows]
+    shear = _nodal_shear(part, part.directions, tangential, normal, part.normal_forces(multiplier))
     return _AlongTheSurface(
-        _nodal_shear(part, part.directions, tangential, normal, part.normal_forces(multiplier)),
-        _mostly_sticking(part, solution.sticking[rows], multiplier, pressure),
+        shear * found.kept[:, None],
+        _mostly_sticking(part, solution.sticking[rows], multiplier, part.pressure(multiplier)),
         float(-(tangential * slip).sum()),
         tangential,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Closed:
+    """The closed nodes, their pressures (m,), and the pressures of all nodes as the formulation finds them [pressure]:
+    as a field (multiplier), and with which friction at the nodes goes (own).
+    """
+
+    nodes: Mask
+    pressure: Array
+    multiplier: Array
+    own: Array
+
+    @property
+    def kept(self) -> Array:
+        """What part of the pressures found (m,) closed nodes keep: friction keeps as much.
+
+        At most all where a field undershoots: next to nothing of it may then be left at a node, and its shear anything.
+        """
+        part = np.divide(self.pressure, self.own, out=np.ones_like(self.pressure), where=self.own > 0.0)
+        return np.where(self.nodes, np.minimum(part, 1.0) if self.own.min() < 0.0 else part, 0.0)
+
+
+def _closed(
+    pair: Formulation, part: Constraints, multiplier: Array, active: Mask, gap: Array, at: Configuration
+) -> _Closed:
+    """Return the closed nodes of a pair, and their pressures: those whose integral is the force."""
+    assert part.nodal is not None
+    forces, excluded = part.normal_forces(multiplier), pair.options.excluded_nodes(pair.secondary)
+    over_side, shares = part.nodal.over_whole_side(forces), part.nodal.shares(forces)
+    closed = _closed_nodes(pair, part, active, gap, over_side, at) & ~excluded
+    may_pull = part.equality is not None
+    closed, pressure = carried(closed, over_side, shares, part.nodal.nodal_areas, pair.secondary, may_pull)
+    own = part.nodal.pressure(forces) * part.nodal.covered
+    return _Closed(closed, pressure, np.where(excluded, 0.0, over_side), own)
 
 
 def _closed_nodes(
@@ -246,11 +283,12 @@ def _nodal_shear(
     Frames turn from point to point: the traction is that of the Cartesian components of the forces, and its part along
     the nodal normals is no shear.
     """
-    assert part.nodal is not None
+    nodal = part.nodal
+    assert nodal is not None
     forces = np.einsum("nk,ndk->nd", tangential, np.stack(directions, axis=2))
     if along_normal is not None:
         forces += along_normal[:, None] * normals(directions)
-    traction = np.column_stack([part.nodal.pressure(component) for component in forces.T])
+    traction = np.column_stack([nodal.pressure(component) * nodal.covered for component in forces.T])
     return traction - np.einsum("nd,nd->n", traction, normal)[:, None] * normal
 
 

@@ -27,11 +27,40 @@ class Compliance(Protocol):
 
 
 class NodalField(Protocol):
-    """What the forces of constraints mean at the secondary nodes."""
+    """What the forces of constraints mean at the secondary nodes.
+
+    Attributes
+    ----------
+    nodal_areas : ndarray (n_nodes,)
+        Integrals of the nodes' shape functions over the whole secondary side [area].
+    covered : ndarray (n_nodes,) or float
+        What part of a node's area faces the primary side, or takes part in contact at all [-].
+    """
+
+    nodal_areas: Array
+
+    @property
+    def covered(self) -> Array | float:
+        """See the class: all of it, unless a formulation knows parts of facets."""
+        return 1.0
 
     def pressure(self, force: Array) -> Array:
         """Return nodal pressures (n_nodes,) per reference area [pressure] from normal forces (m,) [force]."""
         ...
+
+    def over_whole_side(self, force: Array) -> Array:
+        """Return nodal pressures (n_nodes,) per area of the whole secondary side, whatever part of it faces the other.
+
+        The integral of this field over the side is the sum of the forces.
+        """
+        return self.pressure(force) * self.covered
+
+    def shares(self, force: Array) -> Array:
+        """Return the shares (n_nodes,) of the nodes in the sum of the forces [force].
+
+        The pressures over the whole side times the areas, but for nodes whose areas vanish.
+        """
+        return self.over_whole_side(force) * self.nodal_areas
 
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
         """Return the nodes in contact (n_nodes,) for active constraints (m,), nodal gaps [length], pressures [pressure].

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
 
 from fastcontact.errors import ContactError, MeshError
 from fastcontact.mesh import elements
@@ -96,6 +97,17 @@ class Surface:
         """Which ends (n_facets, 2) of lines meet another line."""
         ends = np.concatenate([block.local[:, :2] for block in self.blocks])
         return np.asarray(np.bincount(ends.ravel())[ends] > 1)
+
+    @cached_property
+    def near(self) -> csr_array:
+        """One (m, m) where two nodes lie in one facet or in two facets that share a node."""
+        rows = [np.repeat(block.local, block.local.shape[1], axis=1).ravel() for block in self.blocks]
+        columns = [np.tile(block.local, block.local.shape[1]).ravel() for block in self.blocks]
+        row, column, m = np.concatenate(rows), np.concatenate(columns), len(self.points)
+        beside = csr_array(coo_array((np.ones(len(row)), (row, column)), shape=(m, m)))
+        found = csr_array(beside @ beside)
+        found.data[:] = 1.0
+        return found
 
     def corners(self, coordinates: Array) -> list[Array]:
         """Return the nodes (n_facets, n_nodes, dim) of each block at nodal `coordinates` (n_points, dim)."""

@@ -51,10 +51,12 @@ class ContactResult:
     gap : ndarray (m,)
         Open positive, closed zero, clearance included; negative by what a penalty lets penetrate [length].
     pressure : ndarray (m,)
-        Contact pressure, >= 0 in compression, per reference area; negative only where tied or bilateral contact pulls
+        Contact pressure, >= 0 in compression, per reference area; negative only where tied or bilateral contact pulls. With
+        the shape functions of the facets its integral over the whole reference surface is the sum of the normal forces
         [pressure].
     multiplier : ndarray (m,)
-        The pressure that the formulation finds at the nodes, before open nodes and tension count as zero [pressure].
+        The pressure that the formulation finds at the nodes, before closed nodes take over what open ones have of it, and
+        tension [pressure].
     force_vectors : ndarray (m, dim)
         Contact force on each secondary node; axisymmetric: over the full circle [force].
     normal : ndarray (m, dim)

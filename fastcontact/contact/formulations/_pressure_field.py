@@ -37,6 +37,12 @@ from fastcontact.errors import ContactError
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+# The area of a node on the axis vanishes but for rounding errors; what is below this part of the largest is none.
+NO_AREA = 1e-9
+# Corners of quadratic faces have next to none, or less.
+NO_SHARE = 1e-3
+# Of shape functions at a point, where two nodes are equally near.
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,26 +59,41 @@ class PressureField(NodalField):
         Nodes of the independent values.
     around : ndarray of int (m, n)
         Nodes of the facet of each integration point, counted on the secondary side.
+    shape : ndarray (m, n)
+        Their shape functions there [-].
     renewed : bool
         Whether every pairing has integration points of its own.
+    nodal_areas : ndarray (n_nodes,)
+        Integrals of the nodes' shape functions over the whole secondary side, by the rule of the points [area].
+    covered_areas : ndarray (n_nodes,)
+        The same over the points that take part [area].
     """
 
     projection: Projection
     nodes: csr_array
     independent: NDArray[np.intp]
     around: NDArray[np.intp]
+    shape: Array
     renewed: bool
+    nodal_areas: Array
+    covered_areas: Array
 
     @classmethod
     def of_points(
-        cls, P: csr_array, areas: Array, rho: float, field: tuple[csr_array, NDArray[np.intp]],
-        around: NDArray[np.intp], renewed: bool,
+        cls, points: tuple[NDArray[np.intp], Array], areas: tuple[Array, Array], rho: float,
+        field: tuple[csr_array, NDArray[np.intp]], renewed: bool,
     ) -> PressureField:  # fmt: skip
-        """Return the field of points with shape functions P (m, n_nodes); `field` are `nodes` and `independent`."""
-        nodes, independent = field
+        """Return the field of points in facets with nodes and shape functions (m, n); `field` are `nodes` and `independent`.
+
+        `areas` are those of the points that take part, zero elsewhere, and of all points, both (m,) [area].
+        """
+        (around, shape), (nodes, independent), (taking_part, whole) = points, field, areas
+        P = shapes_at(shape, around, nodes.shape[0])
+        covered, total = P.T @ taking_part, P.T @ whole
         P = csr_array(P @ nodes)
-        mass = splu((P.T @ diags_array(areas) @ P).tocsc()) if len(independent) else None
-        return cls(Projection(P, areas, rho, mass), nodes, independent, around, renewed)
+        mass = splu((P.T @ diags_array(taking_part) @ P).tocsc()) if len(independent) else None
+        projection = Projection(P, taking_part, rho, mass)
+        return cls(projection, nodes, independent, around, shape, renewed, total, covered)
 
     @property
     def areas(self) -> Array:
@@ -83,11 +104,35 @@ class PressureField(NodalField):
         """Return the field at the nodes; it may be slightly negative beyond the edge of the contact."""
         return self.nodes @ self.projection.field(force)
 
+    @property
+    def covered(self) -> Array:
+        """What part of the areas takes part; all of it for nodes without area."""
+        whole = self.nodal_areas
+        with_area = np.abs(whole) > NO_AREA * np.abs(whole).max(initial=0.0)
+        return np.divide(self.covered_areas, whole, out=np.ones_like(whole), where=with_area)
+
+    def shares(self, force: Array) -> Array:
+        """Return the field times the areas that take part."""
+        return self.pressure(force) * self.covered_areas
+
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
-        """Return the nodes where ``pressure - rho gap`` is positive, on facets with an active point."""
-        touched = np.zeros(len(gap), bool)
-        touched[self.around[active]] = True
-        return touched & (pressure - self.projection.rho * np.where(np.isfinite(gap), gap, np.inf) > 0)
+        """Return the nodes with a pressure that an active point is nearest to.
+
+        The nodal gap plays no part: between facets that curve differently, nodes of facets in contact stand off. A node
+        without area, at the corner of some quadratic faces, can carry nothing for such a point: there the nearest one with
+        an area is closed, too. A point without area, at an axis, is never active: there the facet tells.
+        """
+        usual = self.nodal_areas > NO_SHARE * self.nodal_areas.max(initial=0.0)
+        near = _nearest(self.around[active], self.shape[active], len(gap))
+        near |= _nearest(
+            self.around[active], np.where(usual[self.around[active]], self.shape[active], -np.inf), len(gap)
+        )
+        if not usual.all():
+            seen = self.projection.areas > 0
+            touched = np.zeros(len(gap), bool)
+            touched[self.around[active]] = True
+            near |= touched & ~usual & ~_nearest(self.around[seen], self.shape[seen], len(gap))
+        return near & (pressure > 0)
 
     def initially_active(self, gap: Array, pressure: Array) -> Mask | None:
         """Return the points where the field exceeds rho times the gap, if they were not there in the last pairing."""
@@ -95,6 +140,13 @@ class PressureField(NodalField):
             return None
         field = self.projection.P @ pressure[self.independent]
         return (self.projection.areas > 0) & (field - self.projection.rho * gap > 0)
+
+
+def _nearest(around: NDArray[np.intp], shape: Array, n_nodes: int) -> Mask:
+    """Return the nodes (n_nodes,) with the largest shape functions (m, n) at any of the points; several where equal."""
+    found = np.zeros(n_nodes, bool)
+    found[around[shape >= shape.max(axis=1, keepdims=True, initial=-np.inf) - ROUNDING]] = True
+    return found
 
 
 def shapes_at(shape: Array, local: NDArray[np.intp], n_nodes: int) -> csr_array:

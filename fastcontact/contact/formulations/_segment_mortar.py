@@ -20,7 +20,7 @@ from scipy.sparse import csr_array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._cut_lines import line_points
-from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation, shapes_at
+from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.pair_options import spread
 from fastcontact.contact.pairing import Candidates, Pairing, pair
@@ -75,16 +75,18 @@ class SegmentMortar(PressureFieldFormulation):
         covered = np.bincount(facet, weights=np.where(found.paired, area, 0.0))
         kept = found.paired & (covered > COVERED * total)[facet] & (area > 0) & ~self.options.out(candidates)
         pairing = Pairing(found.facet, found.xi, found.normal, kept)
-        field = self._pressure_field(facet, shape, np.where(kept, area, 0.0))
+        field = self._pressure_field(facet, shape, np.where(kept, area, 0.0), area)
         return self.of_points(candidates, pairing, field, at)
 
-    def _pressure_field(self, facet: NDArray[np.intp], shape: Array, area: Array) -> PressureField:
-        """Set up the pressure field on the nodes of facets that take part, from points (m,), shapes (m, n), areas (m,)."""
+    def _pressure_field(self, facet: NDArray[np.intp], shape: Array, area: Array, whole: Array) -> PressureField:
+        """Set up the pressure field on the nodes of facets that take part, from points (m,), shapes (m, n), areas (m,).
+
+        `area` is zero where a point takes no part, `whole` nowhere.
+        """
         column, m = self.secondary.local[facet], len(self.secondary.points)
         seen = np.zeros(m, bool)
         seen[column[area > 0]] = True
         excluded = self.options.excluded_nodes(self.secondary)
         independent = np.flatnonzero(seen & ~excluded)
         nodes = csr_array(spread(self.secondary, excluded, independent)[:, independent])
-        P = shapes_at(shape, column, m)
-        return PressureField.of_points(P, area, self._rho, (nodes, independent), column, renewed=True)
+        return PressureField.of_points((column, shape), (area, whole), self._rho, (nodes, independent), renewed=True)

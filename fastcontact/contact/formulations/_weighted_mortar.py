@@ -13,6 +13,7 @@ linear between the corners, also on quadratic facets; only corners have gaps.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -27,7 +28,7 @@ from fastcontact.contact.formulations._dual_basis import COVERED, dual_functions
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap
 from fastcontact.contact.formulations._rows import Entries, rows_of, scaled
-from fastcontact.contact.integration import facet_measure, fine_rule
+from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
 from fastcontact.contact.pairing import Candidates, tangents_by_axes
 from fastcontact.contact.projection import facet_normals, nodal_normals
 from fastcontact.contact.surface import Surface
@@ -120,8 +121,25 @@ class WeightedMortar(Formulation):
 
     def _nodal(self, weight: Array) -> WeightedPressures:
         """Return what forces mean at the nodes; `weight` (m,) are the areas of the gaps [area]."""
-        blocks = self.secondary.blocks if self.multipliers == "standard" else ()
-        return WeightedPressures(weight, [(elements.get(block.element), block.local) for block in blocks])
+        quadratic = [
+            (elements.get(block.element).n_corners, T, block.local)
+            for block, T in zip(self.secondary.blocks, self._test, strict=True)
+            if elements.get(block.element).order == 2
+        ]
+        m = len(self.secondary.points)
+        held = np.zeros(m, bool)
+        if self.supported is not None:
+            held[:] = self.supported[self.secondary.points].all(axis=1)
+        return WeightedPressures(weight, *self._areas, quadratic, held)
+
+    @cached_property
+    def _areas(self) -> tuple[Array, Array]:
+        """The integrals (m,) of the test functions and of the shape functions over the whole secondary side [area]."""
+        whole = nodal_areas(self.secondary, self.points, self.axisymmetric)
+        tested = np.zeros_like(whole)
+        for block, full in zip(self.secondary.blocks, self._whole, strict=True):
+            np.add.at(tested, block.local, full)
+        return tested, whole
 
     def _closing_slip_of_nodes(
         self, sliding: list[csr_array], normal: Array, directions: tuple[Array, ...], at: Configuration
@@ -254,20 +272,59 @@ class WeightedPressures(NodalField):
     ----------
     weight : ndarray (m,)
         Area that each gap stands for, infinite where it does nothing [area].
-    interpolated : list of (Element, ndarray of int (n_facets, n_nodes))
-        Kinds of facets, and their nodes, on which only corners have multipliers.
+    tested : ndarray (m,)
+        Integrals of the positive functions over the whole secondary side [area].
+    nodal_areas : ndarray (m,)
+        The same of the shape functions [area].
+    quadratic : list of (int, ndarray (n_nodes, n_nodes), ndarray of int (n_facets, n_nodes))
+        Kinds of quadratic facets: number of corners, positive functions by shape functions, nodes.
+    held : ndarray of bool (m,)
+        Nodes that supports prescribe altogether: their forces are between supports, and say nothing of their neighbours.
     """
 
     weight: Array
-    interpolated: list[tuple[elements.Element, NDArray[np.integer]]]
+    tested: Array
+    nodal_areas: Array
+    quadratic: list[tuple[int, Array, NDArray[np.signedinteger]]]
+    held: Mask
 
     def pressure(self, force: Array) -> Array:
-        """Return forces over areas; at mid nodes without a multiplier, the mean of their corners."""
-        pressure = force / self.weight
-        for element, local in self.interpolated:
-            linear = elements.get(element.linear).shape(element.nodes)[element.n_corners :]
-            pressure[local[:, element.n_corners :]] = pressure[local[:, : element.n_corners]] @ linear.T
-        return pressure
+        """Return forces over the areas that their gaps stand for; at mid nodes without a gap, the mean of their corners."""
+        return self._at_nodes(force / self.weight, only_without_gap=True)
+
+    @property
+    def covered(self) -> Array:
+        """What part of the whole areas the gaps stand for; none where there is no gap."""
+        usable = np.isfinite(self.weight)
+        return np.divide(self.weight, self.tested, out=np.zeros_like(self.weight), where=usable & (self.tested > 0.0))
+
+    def over_whole_side(self, force: Array) -> Array:
+        """Return forces over the whole areas of the positive functions; see `_at_nodes`.
+
+        A node may face the other side with as little as it likes, and its force goes to nothing with that: over what it
+        faces its pressure is as good as undetermined, over all that belongs to it it is not.
+        """
+        return self._at_nodes(np.divide(force, self.tested, out=np.zeros_like(force), where=self.tested > 0.0))
+
+    def _at_nodes(self, coefficients: Array, only_without_gap: bool = False) -> Array:
+        """Return the nodal values (m,) of a field with `coefficients` (m,) of the positive functions.
+
+        They are the coefficients themselves but for mid nodes of quadratic facets, where functions of corners are not
+        zero, or the only ones.
+        """
+        values = coefficients.copy()
+        for corners, T, local in self.quadratic:
+            with_gaps = T[corners:].any()
+            if only_without_gap and with_gaps:
+                continue
+            own = coefficients[local[:, corners:]]
+            values[local[:, corners:]] = coefficients[local] @ T[:, corners:]
+            if with_gaps and self.held.any():
+                held = self.held[local]
+                values[local[:, corners:]] += (held @ T[:, corners:]) * own - (held * coefficients[local]) @ T[
+                    :, corners:
+                ]
+        return values
 
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
         """Return the active nodes, and mid nodes without a multiplier that have a pressure."""

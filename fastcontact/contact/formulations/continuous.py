@@ -65,11 +65,13 @@ class Continuous(PressureFieldFormulation):
             shortest = min(shortest, size.min() ** (1 / xi.shape[1]))
         self._candidates = Candidates(filled_up(nodes), filled_up(shapes))
         rho = self.augmentation * self.modulus / shortest
-        areas_of_points = np.where(self.options.out(self._candidates), 0.0, np.concatenate(areas))
+        whole = np.concatenate(areas)
+        areas_of_points = np.where(self.options.out(self._candidates), 0.0, whole)
         around = filled_up(local)
         P = shapes_at(self._candidates.shape, around, len(self.secondary.points))
         field = self._determined(P, areas_of_points)
-        self._field = PressureField.of_points(P, areas_of_points, float(rho), field, around, renewed=False)
+        points = around, self._candidates.shape
+        self._field = PressureField.of_points(points, (areas_of_points, whole), float(rho), field, renewed=False)
 
     def _rule(self, element: str) -> quadrature.Rule:
         if self.integration not in RULES:

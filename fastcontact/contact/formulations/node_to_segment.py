@@ -59,7 +59,7 @@ class NodeToSegment(Formulation):
         positions = self._candidates.positions(deformed)
         pairing = pair(positions, self.primary, deformed, self.projection_tolerance, self.normals, at.obstacle)
         pairing.paired[self.options.out(self._candidates)] = False
-        areas = self._nodal.areas
+        areas = self._nodal.nodal_areas
         usable = np.where(areas > 1e-12 * areas.max(), areas, np.inf)
         return replace(self.assembled(self._candidates, pairing, None, at), areas=usable, nodal=self._nodal)
 
@@ -77,19 +77,19 @@ class NodalForces(NodalField):
 
     Attributes
     ----------
-    areas : ndarray (n_nodes,)
+    nodal_areas : ndarray (n_nodes,)
         Integrals of the nodes' shape functions [area].
     mass : SuperLU, optional
         Factors of the mass matrix of quadratic facets: their nodal areas are not positive (zero at the axis), so that
         division by them means nothing.
     """
 
-    areas: Array
+    nodal_areas: Array
     mass: SuperLU | None = None
 
     def pressure(self, force: Array) -> Array:
         """Return nodal forces over nodal areas; on quadratic facets, solve with the mass matrix of the surface instead."""
-        return force / self.areas if self.mass is None else self.mass.solve(force)
+        return force / self.nodal_areas if self.mass is None else self.mass.solve(force)
 
 
 FORMULATION = NodeToSegment

@@ -1,0 +1,79 @@
+r"""Nodal pressures that tell the story of the contact force: none at open nodes, no tension, and the force as their integral.
+
+A pressure field that is found by projection undershoots beyond the edge of the contact, and what an open node has of it is
+part of the force all the same: :math:`\int p_h\,dA = \sum_j A_j p_j` holds for all nodes together. So the share
+:math:`A_j p_j` of an open node is not dropped but handed to the closed nodes next to it, those of its facets and of the
+facets around these, all of which change by the same pressure. That is the least change over so few nodes; fewer take a kink,
+and more are farther from where the error is. A tension at a closed node makes it an open one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.contact.surface import Surface
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+# A node with less than this part of the mean area takes no share: its pressure would be anything.
+NO_AREA = 1e-3
+# Shares below this part of the largest are rounding errors.
+ROUNDING = 1e-16
+
+
+def carried(
+    closed: Mask, nodal: Array, shares: Array, areas: Array, side: Surface, may_pull: bool = False
+) -> tuple[Mask, Array]:
+    """Return which nodes are closed without tension, and the pressures (m,) with which they carry all shares.
+
+    Parameters
+    ----------
+    closed : ndarray of bool (m,)
+        Nodes in contact.
+    nodal : ndarray (m,)
+        Pressures of all nodes [pressure].
+    shares : ndarray (m,)
+        Shares of all nodes in the resultant: their pressures times their areas, but for nodes without area [force].
+    areas : ndarray (m,)
+        Integrals of the nodes' shape functions over the whole side [area].
+    side : Surface
+    may_pull : bool
+        Leave tension where it is.
+    """
+    while True:
+        if not may_pull:
+            closed = closed & (nodal >= 0.0)
+        pressure = nodal + _received(closed, nodal, shares, areas, side)
+        tension = closed & (pressure < 0.0)
+        if may_pull or not tension.any():
+            return closed, np.where(closed, pressure, 0.0)
+        closed = closed & ~tension
+
+
+def _received(closed: Mask, nodal: Array, shares: Array, areas: Array, side: Surface) -> Array:
+    """Return the pressures (m,) that closed nodes take from others; arguments as of `carried`."""
+    takers = closed & (areas > NO_AREA * np.abs(areas).mean())
+    moving = np.where(closed, shares - nodal * areas, shares)
+    moving[takers | (np.abs(moving) <= ROUNDING * np.abs(shares).max(initial=0.0))] = 0.0
+    if not moving.any():
+        return np.zeros_like(moving)
+    # From ring to ring towards the takers, the farthest first.
+    rings = _rings(takers, moving, side)
+    for inner, outer in zip(rings[-2::-1], rings[:0:-1], strict=True):
+        room = np.where(inner, areas if inner is takers else 1.0, 0.0)
+        given = np.divide(moving, side.near @ room, out=np.zeros_like(moving), where=outer)
+        moving = np.where(outer, 0.0, moving) + room * (side.near @ given)
+    return np.divide(moving, areas, out=np.zeros_like(moving), where=takers)
+
+
+def _rings(takers: Mask, moving: Array, side: Surface) -> list[Mask]:
+    """Return the takers, the nodes near them, those near these, and so on until all that moves is reached."""
+    rings, reached = [takers], takers.copy()
+    while (moving[~reached] != 0.0).any():
+        ring = (side.near @ rings[-1].astype(np.float64) > 0.0) & ~reached
+        if not ring.any():
+            break
+        rings.append(ring)
+        reached |= ring
+    return rings
