@@ -54,6 +54,10 @@ class ContactResult:
         Work of friction in this step [energy].
     obstacle_displacement : ndarray (dim,), optional
         Displacement of a rigid obstacle [length]; None for contact between bodies.
+    primary_points : ndarray of int (k,)
+        Point numbers of the primary side; none for a rigid obstacle.
+    primary_force_vectors : ndarray (k, dim)
+        Contact force on each of them; axisymmetric: over the full circle [force]. A node of both sides counts here alone.
     """
 
     name: str
@@ -73,8 +77,13 @@ class ContactResult:
     sticking: NDArray[np.bool_] = None  # type: ignore[assignment]
     dissipation: float = 0.0
     obstacle_displacement: Array | None = None
+    primary_points: NDArray[np.int32] = None  # type: ignore[assignment]
+    primary_force_vectors: Array = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
+        if self.primary_points is None:
+            object.__setattr__(self, "primary_points", np.empty(0, np.int32))
+            object.__setattr__(self, "primary_force_vectors", np.empty((0, self.coordinates.shape[1])))
         if self.shear is None:
             object.__setattr__(self, "shear", np.zeros_like(self.coordinates))
         if self.sticking is None:
