@@ -23,7 +23,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Let other folders of code_aster's cases be tried."""
     parser.addoption("--linear-solver", help="what the choice 'auto' stands for in this run: direct, cholmod, amg, ...")
     parser.addoption(
-        "--cases", type=Path, default=SHARED / "cases", help="folder of validation specs (JSON) with their meshes (MED)"
+        "--cases", type=Path, action="append", help="another folder of validation specs (JSON) with meshes (MED)"
     )
 
 

@@ -20,7 +20,7 @@ from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import Step
 from fastcontact.analysis.iterate import gaps_and_forces
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.recover import contact_results, counted, first_contacts, never_opening, recover
+from fastcontact.analysis.recover import contact_results, counted, first_contacts, never_opening, recover, tractions
 from fastcontact.analysis.state import State
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.rigid_motions import generalised
@@ -158,7 +158,7 @@ def after_contact(
         end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
         unsettled=settled.unsettled, first_contact=first_contacts(problem, start, load, end.u),
         extrapolation=start.extrapolation.converged(end.u, gaps_and_forces(settled.constraints, settled.solution)),
-        never_opening=never_opening(problem, start, settled),
+        never_opening=never_opening(problem, start, settled), traction=tractions(problem, settled),
     )  # fmt: skip
     results = contact_results(problem, start, load, settled, end)
     touched = end.touched | {name for name, found in results.items() if found.active.any()}

@@ -160,6 +160,7 @@ class Problem:
             state.obstacles.get(name, still),
             load.clearance_factors.get(name, 1.0),
             state.never_opening.get(name),
+            state.traction.get(name),
         )
 
     def initial_state(self) -> State:

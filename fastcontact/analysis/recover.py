@@ -20,6 +20,7 @@ from fastcontact.contact.contact_middle import contact_middle
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import normals
+from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import recovery
 from fastcontact.results.material_stress import by_largest_von_mises
 from fastcontact.results.step import ContactResult, StepResult, half_width
@@ -120,6 +121,18 @@ def never_opening(
     return found
 
 
+def tractions(problem: Problem, settled: SettledContact) -> dict[str, tuple[Array, Array]]:
+    """Return by contact pair with a tangential penalty the places of its constraints, and the tangential tractions there."""
+    found = {}
+    for name, rows in settled.constraints.rows().items():
+        part, solution = settled.constraints.parts[name], settled.solution
+        if problem.pairs[name].options.tangential_penalty is not None and isinstance(solution, FrictionalEquilibrium):
+            assert part.areas is not None
+            forces = np.einsum("nk,ndk->nd", solution.tangential[rows], np.stack(part.directions, axis=2))
+            found[name] = part.positions, forces / part.areas[:, None]
+    return found
+
+
 def counted(settled: SettledContact | None, linear_iterations: int) -> dict[str, Any]:
     """Return the work of a load step, see `StepResult.iterations`."""
     history = settled.iterate.history if settled is not None else []
@@ -163,7 +176,9 @@ def contact_result(
     if part.tied is not None:  # as the bodies lay at rest
         normal = pair.nodal_gap(replace(at, displacement=np.zeros_like(at.displacement)))[1]
     along = _along_the_surface(part, solution, rows, normal, found)
-    forces = part.force(multiplier, along.force).reshape(-1, dim)[points]
+    everywhere = part.force(multiplier, along.force).reshape(-1, dim)
+    opposite = pair.primary.points if isinstance(pair.primary, Surface) else np.empty(0, np.int32)
+    forces = np.where(np.isin(points, opposite)[:, None], 0.0, everywhere[points])
     total = forces.sum(axis=0)
     if pair.axisymmetric:
         total[0] = 0.0  # radial forces cancel over the full circle
@@ -190,6 +205,8 @@ def contact_result(
         obstacle_displacement=at.obstacle.copy() if isinstance(pair.primary, RigidSide) else None,
         middle=middle.position,
         place=middle.places(coordinates),
+        primary_points=opposite,
+        primary_force_vectors=everywhere[opposite],
     )
 
 

@@ -41,6 +41,8 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
     loaded = bool(load.force.any() or load.lift.any())
     for name, pair in problem.pairs.items():
         contact = last.contact[name]
+        if pair.options.gap_only:
+            continue
         found += _deep(pair, contact, state.u) + _lost(name, contact, name in state.touched, loaded)
         found += _unresolved(name, pair, contact)
     return found + _unsettled(state) + _loose(problem, last)

@@ -35,6 +35,9 @@ class State:
         By contact pair, the displacement of its rigid obstacle [length].
     never_opening : dict of str to (ndarray (m, dim), ndarray of bool (m,))
         By contact pair that is bilateral once closed, places of constraints [length] and which of them are closed for good.
+    traction : dict of str to (ndarray (m, dim), ndarray (m, dim))
+        By contact pair that slips a little before it slides, places of constraints [length] and the tangential tractions
+        there [pressure].
     first_contact : dict of str to (ndarray (dim,), ndarray (dim,))
         By contact pair in space, where the bodies met first [length] and the normal there [-].
     extrapolation : Extrapolation
@@ -60,6 +63,7 @@ class State:
     obstacles: Mapping[str, Array] = field(default_factory=dict)
     never_opening: Mapping[str, tuple[Array, Mask]] = field(default_factory=dict)
     first_contact: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
+    traction: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
     extrapolation: Extrapolation = field(default_factory=Extrapolation)
     largest_force: float = 0.0
     largest_work: float = 0.0
@@ -85,6 +89,7 @@ class State:
                     "closed": _listed(self.never_opening.get(name)),
                     "now": self.obstacles[name].copy() if name in self.obstacles else None,
                     "first_contact": _listed(self.first_contact.get(name)),
+                    "traction": _listed(self.traction.get(name)),
                 }
                 for name in self.active
             },
@@ -106,8 +111,8 @@ class State:
         u = np.concatenate([displacement.ravel(), kept["obstacles"]])
         pairs, numbers = kept["pairs"], kept["numbers"]
         found = {
-            key: {name: own[key] for name, own in pairs.items() if own[key] is not None}
-            for key in ("closed", "now", "first_contact")
+            key: {name: own[key] for name, own in pairs.items() if own.get(key) is not None}
+            for key in ("closed", "now", "first_contact", "traction")
         }
         return cls(
             u,
@@ -117,6 +122,7 @@ class State:
             obstacles={name: now.copy() for name, now in found["now"].items()},
             never_opening={name: (both[0], both[1]) for name, both in found["closed"].items()},
             first_contact={name: (both[0], both[1]) for name, both in found["first_contact"].items()},
+            traction={name: (both[0], both[1]) for name, both in found["traction"].items()},
             extrapolation=Extrapolation.from_dict(kept["extrapolation"], u)
             if "extrapolation" in kept
             else Extrapolation(),

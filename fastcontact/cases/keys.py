@@ -30,7 +30,10 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     "force": ({"group": str, **AXES, "distribute": bool, "ramp": list}, ("group",)),
     "couple": ({"group": str, "component": str}, ("group", "component")),
     "relation": ({"terms": list, "value": NUMBER, "ramp": list}, ("terms",)),
-    "spring": ({"group": (str, int), "to": (str, int), **AXES, "axial": NUMBER}, ("group",)),
+    "spring": (
+        {"group": (str, int), "to": (str, int), **AXES, "axial": NUMBER, "transverse": NUMBER, "direction": list},
+        ("group",),
+    ),
 }
 # A rigid surface: the facets of a group of a file, or of the mesh of the model.
 SURFACE = {"file": str, "group": str, "flip": bool, "crease": NUMBER}

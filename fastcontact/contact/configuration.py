@@ -28,6 +28,9 @@ class Configuration:
     never_opening : (ndarray (k, dim), ndarray of bool (k,)), optional
         Reference places of constraints at the end of the load step before [length], and which of them never open again;
         None where all may open.
+    traction : (ndarray (k, dim), ndarray (k, dim)), optional
+        Reference places of constraints at the end of the load step before [length], and the tangential tractions there
+        [pressure]; None where nothing depends on them.
     """
 
     displacement: Array
@@ -36,6 +39,7 @@ class Configuration:
     obstacle_start: Array
     clearance_factor: float = 1.0
     never_opening: tuple[Array, Mask] | None = None
+    traction: tuple[Array, Array] | None = None
 
     @classmethod
     def displaced(cls, displacement: Array) -> Configuration:

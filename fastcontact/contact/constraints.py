@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, vstack
+from scipy.sparse import csr_array, diags_array, vstack
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -116,6 +116,10 @@ class Constraints:
         Constraints that hold as equations, with multipliers of either sign; None stands for none.
     softness : ndarray (m,), optional
         Compliance of each constraint along its normal alone, beside C [length / force]; None stands for zero.
+    tangential_softness : ndarray (m,), optional
+        Compliance of each constraint along its tangents [length / force]; None stands for zero.
+    elastic_slip : ndarray (len(tangents), m), optional
+        What the forces along the tangents at the beginning of the step take from its slip by that compliance [length].
     low_rank_compliance : ndarray (1 + len(tangents), m, h), optional
         Z of a compliance ``Z Z.T`` beside C, of normal forces and then of tangential ones; None stands for zero.
     areas : ndarray (m,), optional
@@ -137,6 +141,8 @@ class Constraints:
     equality: Mask | None = None
     softness: Array | None = None
     low_rank_compliance: Array | None = None
+    tangential_softness: Array | None = None
+    elastic_slip: Array | None = None
     areas: Array | None = None
     nodal: NodalField | None = None
     tied: Tied | None = None
@@ -159,10 +165,24 @@ class Constraints:
         """Coefficients of friction (m,), zero where there are none [-]."""
         return np.zeros(len(self)) if self.friction is None else self.friction
 
+    def gaps(self, displacement: Array) -> Array:
+        """Return the gaps (m,) [length] for displacements (n_points, dim) [length], compliance left out."""
+        return np.asarray(self.gap0 + self.B @ displacement.ravel())
+
+    def without(self, open_for_now: Mask) -> Constraints:
+        """Return these constraints of which some (m,) cannot close."""
+        if not open_for_now.any():
+            return self
+        keep = diags_array((~open_for_now).astype(float))
+        rows = [csr_array(keep @ matrix) for matrix in (self.B, *self.tangents)]
+        for matrix in rows:
+            matrix.eliminate_zeros()
+        return replace(self, B=rows[0], tangents=tuple(rows[1:]))
+
     def gaps_at_rest(self) -> Array:
         """Return gaps and slips (1 + k, m) at u = 0 [length]."""
         drift = np.zeros((len(self.tangents), len(self))) if self.drift is None else self.drift
-        return np.vstack([self.gap0, drift])
+        return np.vstack([self.gap0, drift if self.elastic_slip is None else drift + self.elastic_slip])
 
     def force(self, multiplier: Array, tangential: Array | None = None) -> Array:
         """Return the nodal contact forces (n_dofs,) of normal forces (m,) and tangential ones (m, k) [force]."""
@@ -218,10 +238,12 @@ def stacked(parts: Mapping[str, Constraints]) -> StackedConstraints:
         _stacked_tangents(one),
         _stacked_directions(one),
         np.concatenate([np.zeros(len(part)) if part.friction is None else part.friction for part in one]),
-        _stacked_drift(one),
+        _stacked_slips([part.drift for part in one], one),
         _stacked_vectors([part.equality for part in one], one, bool),
         _stacked_vectors([part.softness for part in one], one, float),
         _stacked_low_rank(one),
+        _stacked_vectors([part.tangential_softness for part in one], one, float),
+        _stacked_slips([part.elastic_slip for part in one], one),
         parts=parts,
     )
 
@@ -234,12 +256,13 @@ def _stacked_vectors(found: Sequence[NDArray[Any] | None], parts: list[Constrain
     return np.concatenate([own if vector is None else vector for own, vector in zip(zero, found, strict=True)])
 
 
-def _stacked_drift(parts: list[Constraints]) -> Array | None:
-    """Return the drift of all parts, zero where a part has none."""
+def _stacked_slips(found: Sequence[Array | None], parts: list[Constraints]) -> Array | None:
+    """Return slips (k, m) of all parts as one, zero where a part has none; None where no part has any."""
     count = max(len(part.tangents) for part in parts)
-    if all(part.drift is None for part in parts):
+    if all(slip is None for slip in found):
         return None
-    return np.hstack([np.zeros((count, len(part))) if part.drift is None else part.drift for part in parts])
+    zero = [np.zeros((count, len(part))) for part in parts]
+    return np.hstack([own if slip is None else slip for own, slip in zip(zero, found, strict=True)])
 
 
 def _stacked_tangents(parts: list[Constraints]) -> tuple[csr_array, ...]:

@@ -16,7 +16,7 @@ from fastcontact.mesh import elements
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-KINDS = ("unilateral", "bilateral", "bilateral_once_closed", "tied")
+KINDS = ("unilateral", "bilateral", "bilateral_once_closed", "tied", "gap_only")
 Field = Callable[[Array], Array]
 
 
@@ -35,6 +35,12 @@ class PairOptions:
         A key of `KINDS`.
     penalty : float, optional
         Pressure by penetration [pressure / length]; None: no penetration.
+    tangential_penalty : callable, optional
+        Shear by slip of what sticks, a function from reference positions (n, dim) on the secondary side to positive numbers
+        (n,) [pressure / length]; None: none slips.
+    search_distance : float, optional
+        What is farther off, or deeper inside, now and as the load step begins, is not faced [length]; None: at any
+        distance.
     """
 
     clearance: Field | None = None
@@ -43,6 +49,13 @@ class PairOptions:
     frictionless: Mask | None = None
     kind: str = "unilateral"
     penalty: float | None = None
+    tangential_penalty: Field | None = None
+    search_distance: float | None = None
+
+    @property
+    def gap_only(self) -> bool:
+        """Whether the pair is only watched: it has gaps, and no forces."""
+        return self.kind == "gap_only"
 
     @property
     def tied(self) -> bool:

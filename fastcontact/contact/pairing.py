@@ -77,15 +77,15 @@ def pair(
     primary: Surface | RigidSide,
     coordinates: Array,
     projection_tolerance: float,
-    normals: str | None = "facet",
+    normals: str | Sequence[float] = "facet",
     obstacle: Array | None = None,
 ) -> Pairing:
     """Project candidate positions (n, dim) on the closest facet of `primary` at nodal `coordinates` [length].
 
     A candidate farther out than `projection_tolerance` facet lengths beyond the end of its facet is not paired
-    (TOLE_PROJ_EXT of code_aster). With `normals` ``"averaged"``, the normal is interpolated between nodal means of
-    the facets' normals, so that it does not jump where facets meet, and the candidates are projected along it. A rigid
-    obstacle is displaced by `obstacle` (dim,) [length].
+    (TOLE_PROJ_EXT of code_aster). Unless `normals` is ``"facet"``, the normal is interpolated between nodal means of
+    the facets' normals, so that it does not jump where facets meet, and the candidates are projected along it; a unit
+    vector (dim,) is the normal everywhere. A rigid obstacle is displaced by `obstacle` (dim,) [length].
 
     Raises
     ------
@@ -101,7 +101,10 @@ def pair(
     if normals == "facet":
         allowed = _allowed(primary, found, projection_tolerance)
         return Pairing(found.facet, found.xi, found.normal, found.overhang <= allowed)
-    at_nodes = nodal_normals(primary, coordinates)
+    if isinstance(normals, str):
+        at_nodes = nodal_normals(primary, coordinates)
+    else:
+        at_nodes = np.tile(np.array(normals), (len(primary.points), 1))
     project = along_normals if coordinates.shape[1] == 3 else along_line_normals
     facet, xi, overhang = project(candidates, primary, coordinates, at_nodes, found)
     normal = interpolated(at_nodes, places(primary, facet, xi))

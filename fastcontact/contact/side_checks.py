@@ -16,17 +16,25 @@ Array = NDArray[np.float64]
 SAMPLE = 200
 
 
-def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface) -> None:
-    """Raise ContactError for sides of contact `name` that share nodes or cannot face each other."""
+def check_sides(
+    mesh: Mesh, name: str, secondary: Surface, primary: Surface, excluded: NDArray[np.bool_] | None = None
+) -> None:
+    """Raise ContactError for sides of contact `name` that share nodes or cannot face each other.
+
+    They may share nodes that carry no contact, `excluded` (n_points,).
+    """
     if secondary.group == primary.group:
         raise ContactError(
             f"contact '{name}' has '{primary.group}' on both sides: name the group of the other body as one of them"
         )
     shared = np.intersect1d(secondary.points, primary.points)
+    if excluded is not None:
+        shared = shared[~excluded[shared]]
     if len(shared):
         raise ContactError(
             f"the two sides of contact '{name}' share {len(shared)} nodes (first: point {shared[0]}): "
-            "duplicate the nodes of the interface, one set for each side"
+            "duplicate the nodes of the interface, one set for each side, or name the nodes where two surfaces of one body "
+            "meet in `excluded`"
         )
     ours, theirs = _facet_frames(mesh, secondary), _facet_frames(mesh, primary)
     apart = theirs[0][None] - ours[0][:, None]

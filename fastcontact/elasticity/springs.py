@@ -41,45 +41,81 @@ class Springs:
         return self.stiffness * (self.rows @ displacement.ravel())
 
 
-def grounded(name: str, nodes: NDArray[np.integer], stiffness: Mapping[int, float], n_dofs: int, dim: int) -> Springs:
-    """Return a spring from each of the `nodes` (n,) to the ground along every axis of `stiffness` [force / length]."""
-    dofs = np.concatenate([nodes.astype(np.intp) * dim + axis for axis in stiffness])
-    values = np.repeat(np.array(list(stiffness.values()), float), len(nodes))
-    rows = csr_array((np.ones(len(dofs)), dofs, np.arange(len(dofs) + 1)), shape=(len(dofs), n_dofs))
-    return Springs(name, rows, values, True)
+def grounded(
+    name: str,
+    nodes: NDArray[np.integer],
+    stiffness: Mapping[int, float],
+    n_dofs: int,
+    dim: int,
+    along: Mapping[str, float] | None = None,
+    direction: Array | None = None,
+) -> Springs:
+    """Return springs from each of the `nodes` (n,) to the ground, as `between` describes them."""
+    directions, values = _frame(stiffness, along or {}, direction, dim)
+    dofs = np.tile(nodes.astype(np.intp)[:, None] * dim + np.arange(dim), (len(values), 1))
+    rows = _rows(np.repeat(directions, len(nodes), axis=0), dofs, n_dofs)
+    return Springs(name, rows, np.repeat(values, len(nodes)), True)
 
 
 def between(
-    name: str, points: Array, first: int, second: int, stiffness: Mapping[int, float], axial: float | None
+    name: str,
+    points: Array,
+    first: int,
+    second: int,
+    stiffness: Mapping[int, float],
+    along: Mapping[str, float],
+    direction: Array | None = None,
 ) -> Springs:
     """Return springs between two of the `points` (n_points, dim) [length].
 
-    Along every axis of `stiffness` [force / length], and along their line with the stiffness `axial` [force / length].
-    ModelError if the two are one, or are at one place and have no line between them.
+    Along every axis of `stiffness` [force / length]; ``along["axial"]`` and ``along["transverse"]`` [force / length] act
+    along and across their line, or the unit vector `direction` (dim,). ModelError if the two are one, or are at one place
+    and have no line between them.
     """
     if first == second:
         raise ModelError(f"{name}: both ends are point {first}; without a second node a spring hangs on the ground")
     dim = points.shape[1]
+    if along and direction is None:
+        direction = _line(name, points, first, second)
+    directions, values = _frame(stiffness, along, direction, dim)
+    dofs = np.array([first, second])[:, None] * dim + np.arange(dim)
+    entries = np.concatenate([-directions, directions], axis=1)
+    return Springs(name, _rows(entries, np.tile(dofs.ravel(), (len(values), 1)), points.size), values, False)
+
+
+def _line(name: str, points: Array, first: int, second: int) -> Array:
+    """Return the unit vector (dim,) from one point to another."""
+    line = points[second] - points[first]
+    length = float(np.linalg.norm(line))
+    if length <= 1e-12 * np.abs(points).max():
+        raise ModelError(
+            f"{name}: points {first} and {second} are at the same place and have no line between them: give x, y or "
+            "z instead of axial, or a direction"
+        )
+    return np.asarray(line / length)
+
+
+def _frame(
+    stiffness: Mapping[int, float], along: Mapping[str, float], direction: Array | None, dim: int
+) -> tuple[Array, Array]:
+    """Return the directions (m, dim) in which springs act, and their stiffness (m,) [force / length]."""
     directions = [np.eye(dim)[axis] for axis in stiffness]
     values = list(stiffness.values())
-    if axial is not None:
-        line = points[second] - points[first]
-        length = float(np.linalg.norm(line))
-        if length <= 1e-12 * np.abs(points).max():
-            raise ModelError(
-                f"{name}: points {first} and {second} are at the same place and have no line between them: give x, y or "
-                "z instead of axial"
-            )
-        directions.append(line / length)
-        values.append(axial)
-    along = np.array(directions)
-    dofs = np.array([first, second])[:, None] * dim + np.arange(dim)
-    entries = np.concatenate([-along, along], axis=1)
-    m = len(along)
-    rows = csr_array((entries.ravel(), np.tile(dofs.ravel(), m), 2 * dim * np.arange(m + 1)), shape=(m, points.size))
+    if direction is not None:
+        frame = np.vstack([direction, np.linalg.svd(direction[None])[2][1:]])
+        kinds = ["axial", *["transverse"] * (dim - 1)]
+        directions += [vector for vector, kind in zip(frame, kinds, strict=True) if kind in along]
+        values += [along[kind] for kind in kinds if kind in along]
+    return np.array(directions), np.array(values, float)
+
+
+def _rows(entries: Array, dofs: NDArray[np.integer], n_dofs: int) -> csr_array:
+    """Return a matrix (m, n_dofs) from the `entries` (m, k) of its rows at `dofs` (m, k)."""
+    m, k = entries.shape
+    rows = csr_array((entries.ravel(), dofs.ravel(), k * np.arange(m + 1)), shape=(m, n_dofs))
     rows.eliminate_zeros()
     rows.sort_indices()
-    return Springs(name, rows, np.array(values, float), False)
+    return rows
 
 
 def stacked(springs: Sequence[Springs], n_dofs: int) -> csr_array:

@@ -98,7 +98,7 @@ def check_penetration(name: str, pair: Formulation) -> None:
 
     An intended interference is smaller, or given as a clearance.
     """
-    if pair.options.tied:
+    if pair.options.tied or pair.options.gap_only:
         return
     at_rest = Configuration.undeformed(pair.points)
     total, geometric = pair.nodal_gap(at_rest)[0], pair.nodal_gap(at_rest, with_clearance=False)[0]

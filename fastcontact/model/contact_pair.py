@@ -34,7 +34,8 @@ class ContactPair:
     @property
     def eliminable(self) -> bool:
         """Whether closed constraints can be eliminated: not where they give way by themselves."""
-        return self.formulation != "continuous" and not self.options.get("penalty")
+        soft = any(self.options.get(option) for option in ("penalty", "tangential_penalty"))
+        return self.formulation != "continuous" and not soft
 
     @property
     def clearance_ramp(self) -> Table | None:

@@ -39,6 +39,7 @@ from fastcontact.elasticity.loads import (
 from fastcontact.elasticity.materials import KINEMATICS, LinearElastic
 from fastcontact.elasticity.relations import Relation, stacked_rows
 from fastcontact.elasticity.springs import Springs, between, grounded, stacked
+from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.mesh.mesh import Mesh
@@ -295,6 +296,8 @@ class Model:
         y: float | None = None,
         z: float | None = None,
         axial: float | None = None,
+        transverse: float | None = None,
+        direction: Sequence[float] | None = None,
     ) -> None:
         """Hang every node of a group on the ground by springs, or join two nodes by them.
 
@@ -306,16 +309,19 @@ class Model:
             Group of one node or point number: the springs then lie between the single node of `group` and this one.
         x, y, z : float
             Stiffness along the axes [force / length]; in axisymmetry over the full circle.
-        axial : float
-            Stiffness along the line between the two nodes [force / length], which keeps its reference direction.
+        axial, transverse : float
+            Stiffness along the line between the two nodes, and along every direction across it [force / length]. The line
+            keeps its reference direction.
+        direction : sequence of float, optional
+            Takes the place of the line between the two nodes: a vector of any length.
         """
         name = f"the spring on '{group}'" if to is None else f"the spring between '{group}' and '{to}'"
         given = {"x": x, "y": y, "z": z}
-        if axial is not None and to is None:
-            raise ModelError(f"{name} has an axial stiffness but no second node: name it by `to`, or give x, y or z")
-        axes = {} if axial is not None and set(given.values()) == {None} else axes_of(name, given, self.mesh.dim)
-        values = [*axes.values(), *([] if axial is None else [axial])]
-        for value in values:
+        own = {"axial": axial, "transverse": transverse}
+        along = {key: value for key, value in own.items() if value is not None}
+        vector = self._direction(name, along, to is not None, direction)
+        axes = {} if along and set(given.values()) == {None} else axes_of(name, given, self.mesh.dim)
+        for value in [*axes.values(), *along.values()]:
             check_number(f"the stiffness of {name}", value)
             if not value > 0:
                 raise ModelError(f"{name}: the stiffness {value:g} must be positive")
@@ -323,12 +329,33 @@ class Model:
         if not len(nodes):
             raise ModelError(f"group '{group}' is empty: no spring can be there")
         if to is None:
-            self.springs.append(grounded(name, nodes, axes, self.n_dofs, self.mesh.dim))
+            self.springs.append(grounded(name, nodes, axes, self.n_dofs, self.mesh.dim, along, vector))
             return
         ends = [*nodes, *self._nodes(to)]
         if len(ends) != 2:
             raise ModelError(f"{name} needs one node at each end, but finds {len(nodes)} and {len(ends) - len(nodes)}")
-        self.springs.append(between(name, self.mesh.points, int(ends[0]), int(ends[1]), axes, axial))
+        self.springs.append(between(name, self.mesh.points, int(ends[0]), int(ends[1]), axes, along, vector))
+
+    def _direction(
+        self, name: str, along: Mapping[str, float], joined: bool, direction: Sequence[float] | None
+    ) -> Array | None:
+        """Return the unit vector (dim,) along which a spring is axial; None for the line between its nodes, or for none."""
+        if direction is None:
+            if along and not joined:
+                raise ModelError(
+                    f"{name} has an axial or transverse stiffness but no second node: name it by `to`, give a direction, "
+                    "or x, y or z"
+                )
+            return None
+        if not along:
+            raise ModelError(f"{name} has a direction, but no axial or transverse stiffness that would use it")
+        vector = np.asarray(direction, float)
+        length = np.linalg.norm(vector)
+        if vector.shape != (self.mesh.dim,) or not (np.isfinite(length) and length > 0):
+            raise ModelError(
+                f"the direction {direction} of {name} must be a vector of {self.mesh.dim} numbers, not all zero"
+            )
+        return np.asarray(vector / length)
 
     def holding_rows(self) -> csr_array:
         """Return the rows (m, n_dofs) [unit of the caller] of relations and springs; their product with free motions is 0."""
@@ -367,18 +394,25 @@ class Model:
               ``"bilateral_once_closed"`` what is closed at the end of a load step never opens again. ``"tied"`` neither
               opens nor slides: the two sides are paired once, as they lie, and their relative displacement stays zero,
               also across initial gaps, which are kept (a rotation then strains by its angle times the gap).
+              ``"gap_only"`` watches the gaps, negative where the sides penetrate, and has no forces.
             - ``clearance``: added to the gap, a number or a function from reference positions (n, dim) on the secondary
               side to lengths (n,); positive opens the gap, negative is an interference, as of a press fit [length].
               ``clearance_primary``: the same on the primary side, at the positions faced. ``clearance_ramp``: their
               history, as pairs (instant, multiplier); without one they are there from the beginning.
             - ``excluded``: groups whose nodes carry no contact. Where the formulation has integration points, those
-              nearer to such a node than to any other take no part. ``frictionless``: groups whose nodes carry no
-              friction, likewise.
+              nearer to such a node than to any other take no part. The two sides may share such nodes. ``frictionless``:
+              groups whose nodes carry no friction, likewise.
             - ``penalty``: pressure by penetration [pressure / length], instead of none at all; results tell the
-              penetration. It does not soften friction.
+              penetration. It does not soften friction; ``tangential_penalty`` does: shear by slip of what sticks, a number
+              or a function of the secondary position [pressure / length].
+            - ``slip``: ``"symmetric"`` (default): closing a gap along the mean of both sides' normals is no slip;
+              ``"primary"``: all relative motion along the tangents to the primary side is, as in code_aster.
+            - ``search_distance``: what is farther off than this, or deeper inside, now and as the load step begins, is not
+              faced [length].
             - ``normals``: ``"facet"`` or ``"averaged"`` between the facets at a node, which curved sides that fit closely
-              need; ``projection_tolerance``: how far points may stand out beyond the end of the primary side, in facet
-              lengths.
+              need; ``"secondary"``: those of the secondary side; a vector out of the primary side's body: one normal for
+              all of it. ``projection_tolerance``: how far points may stand out beyond the end of the primary side, in
+              facet lengths.
         """
         if formulation is None:
             sides = surface(self.mesh, secondary), surface(self.mesh, primary)
@@ -477,6 +511,9 @@ class Model:
             if option not in known:
                 raise ContactError(unknown(f"option of {pair.formulation}", option, known))
         secondary = surface(self.mesh, pair.secondary)
+        options = pair_options(
+            pair.name, pair.options, self.mesh, secondary, against_obstacle=pair.obstacle is not None
+        )
         primary: Surface | RigidSide
         if pair.obstacle is not None:
             if pair.formulation not in AGAINST_OBSTACLES:
@@ -486,11 +523,8 @@ class Model:
             primary = RigidSide(pair.obstacle, np.array(pair.motion))
         else:
             primary = surface(self.mesh, pair.primary)
-            check_sides(self.mesh, pair.name, secondary, primary)
+            check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
         modulus = min((m.E / (1 - m.nu**2) for m, _ in self.materials), default=1.0)
-        options = pair_options(
-            pair.name, pair.options, self.mesh, secondary, against_obstacle=pair.obstacle is not None
-        )
         own = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
         axisymmetric = self.kinematics == "axisymmetric"
         return kind(
@@ -541,6 +575,20 @@ class Model:
         groups = [g for g, members in self.mesh.cell_groups.items() if np.isin(members, cells).any()]
         named = f", in {', '.join(repr(g) for g in groups)}" if groups else ""
         raise ModelError(f"{total} solid cells have no material{named}: add_material for their groups")
+
+    def internal_forces(self, displacement: Array) -> Array:
+        """Return the nodal forces (n_points, dim) [force] that hold the solid cells deformed by `displacement`.
+
+        They are in balance with loads, contact, supports, relations and springs; axisymmetric: over the full circle.
+
+        Parameters
+        ----------
+        displacement : ndarray (n_points, dim)
+            Of a step result [length].
+        """
+        moduli, material = self.material_numbers()
+        K = stiffness(self.mesh, self.kinematics, moduli, material, None, self.averaged_materials())
+        return np.asarray(K @ np.ravel(displacement)).reshape(-1, self.mesh.dim)
 
     def prescribed(self) -> tuple[NDArray[np.bool_], Array]:
         """Return (fixed, values), both (n_points, dim): supported components, and their displacement at ramp value 1."""

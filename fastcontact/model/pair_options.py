@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact.contact.pair_options import KINDS, Field, Mask, PairOptions
+from fastcontact.contact.pair_options import KINDS, Array, Field, Mask, PairOptions
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.loads import check_number, check_value, evaluated
 from fastcontact.errors import ContactError, unknown
@@ -16,7 +16,10 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.ramp import Table, table_of
 
 # Options that every contact pair takes, beside those of its formulation.
-SHARED_OPTIONS = ("clearance", "clearance_primary", "clearance_ramp", "excluded", "frictionless", "kind", "penalty")
+SHARED_OPTIONS = (
+    "clearance", "clearance_primary", "clearance_ramp", "excluded", "frictionless", "kind", "penalty", "search_distance",
+    "tangential_penalty",
+)  # fmt: skip
 
 
 def pair_options(
@@ -34,12 +37,14 @@ def pair_options(
         raise ContactError(f"contact '{name}' has a clearance_ramp, but no clearance that it could multiply")
     clearance_ramp(name, options)
     return PairOptions(
-        _length(f"the clearance of contact '{name}'", options.get("clearance")),
-        _length(f"the clearance_primary of contact '{name}'", options.get("clearance_primary")),
+        _function(f"the clearance of contact '{name}'", options.get("clearance")),
+        _function(f"the clearance_primary of contact '{name}'", options.get("clearance_primary")),
         excluded=_nodes(name, "excluded", options, mesh, side),
         frictionless=_nodes(name, "frictionless", options, mesh, side),
         kind=_kind(name, options, against_obstacle),
-        penalty=_penalty(name, options),
+        penalty=_positive(name, "penalty", options, "no penetration"),
+        tangential_penalty=_tangential_penalty(name, options.get("tangential_penalty")),
+        search_distance=_positive(name, "search_distance", options, "any distance"),
     )
 
 
@@ -50,11 +55,15 @@ def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
         raise ContactError(unknown(f"kind of contact '{name}'", str(kind), KINDS))
     if kind != "unilateral" and options.get("friction"):
         raise ContactError(f"contact '{name}' is {kind}, which knows no friction: leave out 'friction' or 'kind'")
+    if options.get("tangential_penalty") is not None and not options.get("friction"):
+        raise ContactError(f"contact '{name}' has a tangential_penalty, but no friction that it could soften")
+    if kind == "gap_only" and "penalty" in options:
+        raise ContactError(f"contact '{name}' is gap_only, which has no forces: leave out 'penalty' or 'kind'")
     if kind == "tied" and against_obstacle:
         raise ContactError(
             f"contact '{name}' cannot be tied to a rigid obstacle: prescribe the displacements of the group, or couple them"
         )
-    for option in ("clearance", "clearance_primary", "penalty"):
+    for option in ("clearance", "clearance_primary", "penalty", "search_distance"):
         if kind == "tied" and option in options:
             raise ContactError(
                 f"contact '{name}' is tied, which keeps the sides as they lie, exactly: leave out '{option}'"
@@ -62,15 +71,31 @@ def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
     return str(kind)
 
 
-def _penalty(name: str, options: Mapping[str, Any]) -> float | None:
-    if options.get("penalty") is None:
+def _positive(name: str, option: str, options: Mapping[str, Any], without: str) -> float | None:
+    """Return the number of an option that must be positive, None where it is not given; `without` says what that means."""
+    value = options.get(option)
+    if value is None:
         return None
-    check_number(f"the penalty of contact '{name}'", options["penalty"])
-    if not options["penalty"] > 0:
+    check_number(f"the {option} of contact '{name}'", value)
+    if not value > 0:
+        raise ContactError(f"{option} = {value} of contact '{name}' must be positive; leave it out for {without}")
+    return float(value)
+
+
+def _tangential_penalty(name: str, value: Any) -> Field | None:
+    """Return a number or a function of position as a function; None for none."""
+    penalty = _function(f"the tangential_penalty of contact '{name}'", value)
+    return None if penalty is None else partial(_all_positive, penalty, name)
+
+
+def _all_positive(penalty: Field, name: str, positions: Array) -> Array:
+    values = penalty(positions)
+    if not (values > 0).all():
         raise ContactError(
-            f"penalty = {options['penalty']} of contact '{name}' must be positive; leave it out for no penetration"
+            f"the tangential_penalty {values.min():g} of contact '{name}' must be positive; leave it out for stick without "
+            "slip"
         )
-    return float(options["penalty"])
+    return values
 
 
 def clearance_ramp(name: str, options: Mapping[str, Any]) -> Table | None:
@@ -99,8 +124,8 @@ def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side:
     return mask
 
 
-def _length(what: str, value: Any) -> Field | None:
-    """Return a number or a function of position as a function that checks what it returns; None for zero."""
+def _function(what: str, value: Any) -> Field | None:
+    """Return a number or a function of position as a function that checks what it returns; None for None."""
     if value is None:
         return None
     check_value(what, value)

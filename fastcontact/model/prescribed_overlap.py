@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair, rows_along
+from fastcontact.contact.pairing import Candidates, gap_rows, rows_along
 from fastcontact.errors import ModelError
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.ramp import Ramp, Table, combined, multiplier
@@ -147,7 +147,7 @@ def _gaps(
     formulation: Formulation, candidates: Candidates, at: Configuration, bare: bool = False
 ) -> tuple[Array, csr_array, Mask]:
     """Return the gaps (m,) of nodes, without clearances if `bare`, their rows (m, n_dofs), and which face the other side."""
-    pairing = _paired(formulation, candidates, at)
+    pairing = formulation.facing(candidates, at)
     rows, gap = gap_rows(candidates, pairing, formulation.primary, formulation.points)
     gap = gap + rows @ at.displacement.ravel()
     if not bare:
@@ -156,17 +156,9 @@ def _gaps(
     return np.where(pairing.paired, gap, 0.0), rows, pairing.paired
 
 
-def _paired(formulation: Formulation, candidates: Candidates, at: Configuration) -> Pairing:
-    coordinates = formulation.points + at.displacement
-    return pair(
-        candidates.positions(coordinates), formulation.primary, coordinates, formulation.projection_tolerance,
-        formulation.normals, at.obstacle,
-    )  # fmt: skip
-
-
 def _torn(formulation: Formulation, candidates: Candidates, displacement: Array, fixed: Mask) -> tuple[Array, Mask]:
     """Return how far supports move tied nodes (m,) off their places on the other side [length], and which face it."""
-    pairing = _paired(formulation, candidates, Configuration.undeformed(formulation.points))
+    pairing = formulation.facing(candidates, Configuration.undeformed(formulation.points))
     square = np.zeros(len(pairing.paired))
     for axis in np.eye(fixed.shape[1]):
         direction = np.broadcast_to(axis, pairing.normal.shape)

@@ -240,7 +240,11 @@ def step_size(mesh: Mesh, step: StepResult) -> int:
     """Return an upper bound for what a step takes in the file, but for its restart state [bytes]."""
     fields = 8 * (sum(layout.POINT_FIELDS.values()) * mesh.n_points + sum(map(np.size, step.cell_fields.values())))
     row = layout.contact_row(mesh.dim).itemsize
-    contact = sum((len(pair.points) + 2 * ROWS) * row + BYTES for pair in step.contact.values())
+    faced = layout.primary_row(mesh.dim).itemsize
+    contact = sum(
+        (len(pair.points) + 2 * ROWS) * row + (len(pair.primary_points) + 2 * ROWS) * faced + BYTES
+        for pair in step.contact.values()
+    )
     if step.material_stress is not None:
         cells = len(step.material_stress.cells)
         fields += 8 * 7 * cells
@@ -252,6 +256,7 @@ def _new_pair(parent: Any, name: str, dim: int) -> Any:
     pair = parent.create_group(None)  # without a name until it is whole: the program may be interrupted
     pair["name"] = as_json(name)
     growing_table(pair, "rows", layout.contact_row(dim))
+    growing_table(pair, "primary", layout.primary_row(dim))
     growing_table(pair, "steps", layout.contact_step(dim))
     parent[str(len(parent))] = pair
     return pair
@@ -272,6 +277,11 @@ def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> No
         if "middle" in (row.dtype.names or ()):  # not in a file of an earlier schema that is resumed
             row["middle"] = contact.middle
         _extend(pair["rows"], table)
+        if "primary" in pair:  # not in files begun before there was such a table
+            faced = np.zeros(len(contact.primary_points), pair["primary"].dtype)
+            faced["points"], faced["force_vectors"] = contact.primary_points, contact.primary_force_vectors
+            row["primary_first"], row["primary_count"] = len(pair["primary"]), len(faced)
+            _extend(pair["primary"], faced)
     _set_row(pair["steps"], number, row)
 
 

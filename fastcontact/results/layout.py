@@ -11,7 +11,8 @@ The second holds what VTK has no place for:
     fastcontact/mesh                                points, cells of all dimensions, groups
     fastcontact/kinematics, case, versions          texts as JSON
     fastcontact/steps                               a row for each step (STEP_ROW), with the place of its notes
-    fastcontact/contact/0, 1, ...                   for each pair its name, a row for each node and step, a row for each step
+    fastcontact/contact/0, 1, ...                   for each pair its name, a row for each node and step, a row for each step;
+                                                    forces on the primary side, a row for each of its nodes and step
     fastcontact/materials                           where materials meet: of every cell; stress by material; a row a step
     fastcontact/notes                               JSON, one text after the other: iterations, warnings, how runs ended
     fastcontact/runs                                a row for each run (RUN_ROW), with the place of its notes
@@ -86,12 +87,21 @@ def contact_row(dim: int) -> np.dtype[Any]:
     return np.dtype([("points", "<i4"), ("active", "i1"), ("sticking", "i1"), *scalars, *vectors])
 
 
+def primary_row(dim: int) -> np.dtype[Any]:
+    """Return the type of one row of the table of forces on the primary side: one node in one step."""
+    return np.dtype([("points", "<i4"), ("force_vectors", "<f8", (dim,))])
+
+
 def contact_step(dim: int) -> np.dtype[Any]:
-    """Return the type of the row that a contact pair has for each step: its rows, resultant, radius, work, obstacle."""
+    """Return the type of the row that a contact pair has for each step: its rows, resultant, radius, work, obstacle.
+
+    Files of schema 2 from before `primary_row` have neither that table nor its place.
+    """
     sums = [("force", "<f8", (dim,)), ("radius", "<f8", (2,)), ("dissipation", "<f8")]
     sums.append(("obstacle_displacement", "<f8", (dim,)))  # NaN between bodies
     sums.append(("middle", "<f8", (dim,)))
-    return np.dtype([("first", "<i8"), ("count", "<i8"), *sums])
+    places = [(name, "<i8") for name in ("first", "count", "primary_first", "primary_count")]
+    return np.dtype([*places, *sums])
 
 
 def material_row(dim: int) -> np.dtype[Any]:
@@ -232,6 +242,12 @@ def check_contact(where: str, contact: ContactResult, mesh: Mesh) -> None:
         found, shape = np.shape(getattr(contact, name)), (len(contact.points), *row[name].shape)
         if found != shape:
             raise FileError(f"{where}: {name} has shape {found}, but {shape} is needed")
-    outside = np.asarray(contact.points)[(contact.points < 0) | (contact.points >= mesh.n_points)]
+    if np.shape(contact.primary_force_vectors) != (len(contact.primary_points), mesh.dim):
+        raise FileError(
+            f"{where}: primary_force_vectors has shape {np.shape(contact.primary_force_vectors)}, but "
+            f"{(len(contact.primary_points), mesh.dim)} is needed"
+        )
+    named = np.concatenate([contact.points, contact.primary_points])
+    outside = named[(named < 0) | (named >= mesh.n_points)]
     if len(outside):
         raise FileError(f"{where}: point {outside[0]} is not in the mesh of {mesh.n_points} points")

@@ -347,6 +347,13 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
     # Early files of schema 1 have no shear, sticking, dissipation or obstacles: their analyses had none.
     known = step.dtype.names
     moved = step["obstacle_displacement"].copy() if "obstacle_displacement" in known else np.array([np.nan])
+    faced = {}
+    if "primary_first" in known:  # earlier files of schema 2 have no forces on the primary side
+        first, count = int(step["primary_first"]), int(step["primary_count"])
+        table = pair["primary"][first : first + count]
+        if len(table) != count or first < 0:
+            raise ValueError(f"the table of primary forces of '{name}' is cut off")
+        faced = {f"primary_{column}": np.ascontiguousarray(table[column]) for column in ("points", "force_vectors")}
     return ContactResult(
         name=name,
         formulation=formulation,
@@ -355,5 +362,6 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
         dissipation=float(step["dissipation"]) if "dissipation" in known else 0.0,
         obstacle_displacement=moved if np.isfinite(moved).all() else None,
         middle=step["middle"].copy() if "middle" in known else None,  # type: ignore[arg-type]
+        **faced,
         **columns,
     )

@@ -83,6 +83,10 @@ class ContactResult:
         How far from the middle each node lies: in axisymmetry its radius; in plane problems, and where an axisymmetric
         surface runs along the axis, the length along the surface, negative on one side of the middle; in 3D the distance from
         the line through the middle along the mean normal [length].
+    primary_points : ndarray of int (k,)
+        Point numbers of the primary side; none for a rigid obstacle.
+    primary_force_vectors : ndarray (k, dim)
+        Contact force on each of them; axisymmetric: over the full circle [force]. A node of both sides counts here alone.
     """
 
     name: str
@@ -104,6 +108,8 @@ class ContactResult:
     obstacle_displacement: Array | None = None
     middle: Array = None  # type: ignore[assignment]
     place: Array = None  # type: ignore[assignment]
+    primary_points: NDArray[np.int32] = None  # type: ignore[assignment]
+    primary_force_vectors: Array = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         if self.middle is None:
@@ -111,6 +117,9 @@ class ContactResult:
         if self.place is None:  # of a file from before places were measured from the middle
             flat = self.coordinates.shape[1] == 2
             object.__setattr__(self, "place", np.abs(self.coordinates[:, 0]) if flat else np.array(self.abscissa))
+        if self.primary_points is None:
+            object.__setattr__(self, "primary_points", np.empty(0, np.int32))
+            object.__setattr__(self, "primary_force_vectors", np.empty((0, self.coordinates.shape[1])))
         if self.shear is None:
             object.__setattr__(self, "shear", np.zeros_like(self.coordinates))
         if self.sticking is None:

@@ -203,7 +203,7 @@ CASES = [
         "unknown normals",
         'secondary = "CONT1"',
         'secondary = "CONT1"\nnormals = "smooth"',
-        r"unknown kind of normals 'smooth': known are averaged, facet",
+        r"unknown kind of normals 'smooth': known are a vector, averaged, facet, secondary",
     ),
     ("no load step", "steps = 20", "steps = 0", r"the number of load steps must be a positive whole number, not 0"),
     (

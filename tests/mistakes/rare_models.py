@@ -272,6 +272,6 @@ MISTAKES = [
         "a spring without second node",
         lambda: with_load("add_spring", group="UPPER_TOP_LEFT", axial=1.0),
         fc.ModelError,
-        r"the spring on 'UPPER_TOP_LEFT' has an axial stiffness but no second node: name it by `to`, or give x, y or z",
+        r"the spring on 'UPPER_TOP_LEFT' has an axial or transverse stiffness but no second node: name it by `to`, give a",
     ),
 ]

@@ -2,30 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from aster_loads import Support, constant
 from aster_mesh import Entry, MissingError, listed, nodes_of
+from scipy.spatial import cKDTree
 
 import fastcontact as fc
+from fastcontact.contact.integration import nodal_areas
 from fastcontact.contact.obstacles import HalfSpace
+from fastcontact.contact.surface import surface
 
-# How code_aster iterates, how it describes the same thing to itself, and what an exact method does not need.
-IGNORED_CONTACT = {
-    "command", "name", "zones", "FORMULATION", "FROTTEMENT", "REAC_GEOM", "NB_ITER_GEOM", "LISSAGE", "VERI_NORM",
-    "ALGO_RESO_CONT", "ALGO_RESO_GEOM", "ALGO_RESO_FROT", "ITER_GEOM_MAXI", "ITER_CONT_MAXI", "ITER_CONT_MULT",
-    "ITER_FROT_MAXI", "ITER_CONT_TYPE", "RESI_GEOM", "RESI_FROT", "RESI_CONT", "RESI_ABSO", "STOP_SINGULIER",
-    "NB_RESOL", "LISS", "MODELE", "INFO", "STOP_INTERP", "ITER_GCP_MAXI", "PRE_COND", "COEF_RESI", "RECH_LINEAIRE",
+# How code_aster iterates, and how it describes the same thing to itself.
+ITERATIONS = {
+    "command", "name", "zones", "VERI_NORM", "ALGO_RESO_CONT", "ALGO_RESO_GEOM", "ALGO_RESO_FROT", "ITER_GEOM_MAXI",
+    "ITER_CONT_MAXI", "ITER_CONT_MULT", "ITER_FROT_MAXI", "ITER_CONT_TYPE", "RESI_GEOM", "RESI_FROT", "RESI_CONT",
+    "RESI_ABSO", "STOP_SINGULIER", "NB_RESOL", "MODELE", "INFO", "STOP_INTERP", "ITER_GCP_MAXI", "PRE_COND",
+    "COEF_RESI", "RECH_LINEAIRE",
 }  # fmt: skip
-IGNORED_ZONE = {
-    "master", "slave", "interface", "ALGO_CONT", "ALGO_FROT", "APPARIEMENT", "NORMALE", "INTEGRATION", "ORDRE_INT",
-    "CONTACT_INIT", "COEF_CONT", "COEF_FROT", "COEF_PENA_CONT", "COEF_PENA_FROT", "E_N", "E_T", "COEF_MATR_FROT",
-    "COULOMB", "TOLE_PROJ_EXT", "TOLE_PROJ_INT", "TOLE_APPA", "ADAPTATION", "SEUIL_INIT", "SEUIL_AUTO", "TYPE_APPA",
-    "TYPE_PROJECTION", "GRAND_GLIS", "TYPE_JACOBIEN", "VECT_MAIT", "VECT_ESCL", "MAIT_VECT_Y", "ESCL_VECT_Y",
-    "PENE_MAXI", "GLIS_MAXI", "RESOLUTION", "SANS_GROUP_NO_FR", "SANS_NOEUD_FR", "GLISSIERE", "TOLE_INTERP",
+CONTACT = {"FORMULATION", "FROTTEMENT", "REAC_GEOM", "NB_ITER_GEOM", "LISSAGE"}
+# Numbers of an augmented Lagrangian, of a projection or a search, on which its converged result does not depend.
+ZONE_ITERATIONS = {
+    "interface", "COEF_CONT", "COEF_FROT", "COEF_MATR_FROT", "ADAPTATION", "SEUIL_INIT", "SEUIL_AUTO", "TYPE_APPA",
+    "TYPE_PROJECTION", "TYPE_JACOBIEN", "TOLE_INTERP", "ORDRE_INT",
 }  # fmt: skip
+ZONE = {
+    "master", "slave", "ALGO_CONT", "ALGO_FROT", "APPARIEMENT", "NORMALE", "INTEGRATION", "CONTACT_INIT", "E_N", "E_T",
+    "COULOMB", "TOLE_PROJ_EXT", "VECT_MAIT", "MAIT_FIXE", "MAIT_VECT_Y", "RESOLUTION", "SANS_GROUP_NO_FR",
+    "SANS_NOEUD_FR", "GLISSIERE", "DIST_APPA",
+}  # fmt: skip
+# What a keyword may say: that which is translated, or makes no difference to a result.
+CHOICES = {
+    "ALGO_CONT": ("CONTRAINTE", "STANDARD", "PENALISATION", "LAGRANGIEN", "LAC"),
+    "ALGO_FROT": ("STANDARD", "PENALISATION", "LAGRANGIEN"),
+    "APPARIEMENT": ("MAIT_ESCL", "NODAL", "MORTAR"),
+    "NORMALE": ("MAIT", "MAIT_ESCL", "ESCL"),
+    "CONTACT_INIT": ("OUI", "NON", "INTERPENETRE"),
+    # VECT_Y turns the frame of the tangents, and friction is the same in every direction.
+    "VECT_MAIT": ("AUTO", "FIXE", "VECT_Y"),
+    "RESOLUTION": ("OUI", "NON"),
+    "GLISSIERE": ("OUI", "NON"),
+}
 INTEGRATION = {"AUTO": "node", "GAUSS": "gauss", "SIMPSON": "simpson"}
 # Material added on a side, where we count what is added to the gap.
 OFFSETS = {"DIST_ESCL": "clearance", "DIST_MAIT": "clearance_primary"}
@@ -36,27 +55,26 @@ EXCLUSIONS = ("SANS_GROUP_NO", "SANS_NOEUD", "SANS_GROUP_MA", "SANS_MAILLE")
 def add_zone(model: fc.Model, name: str, contact: Entry, zone: Entry, supports: Sequence[Support]) -> None:
     """Add a zone of DEFI_CONTACT as a contact pair, or as an obstacle where no solid lies behind the master side.
 
-    The discrete method is node-to-segment. The continuous one is mortar where code_aster integrates over cut facets,
-    where facets are quadratic, and where meshes do not match; elsewhere, and where the slave nodes are the integration
-    points (a value on a coarse mesh depends on that), it is the continuous one. A penalty, which only approximates the
-    exact method, is replaced by it.
+    The discrete method is node-to-segment. The continuous one is the continuous one where its integration points are Gauss
+    points or the slave nodes (a value on a coarse mesh depends on that); where those carry quadratic fields, closing each
+    is node-to-segment. It is mortar where code_aster integrates over cut facets, and for other rules on meshes that are
+    quadratic or do not match. A penalty along the normal, which only approximates the exact method, is replaced by it.
     """
     mesh = model.mesh
-    options: dict[str, Any] = {}
-    if contact.get("LISSAGE") == "OUI":
-        options["normals"] = "averaged"
-    if contact.get("FROTTEMENT", "SANS") == "COULOMB":
-        options["friction"] = constant(zone.get("COULOMB", 0.0), "COULOMB of a contact zone")
-        options |= _frictionless_nodes(zone, mesh, supports)
-    if zone.get("GLISSIERE") == "OUI":
-        # Contact that starts closed, as by default, stays so.
-        options["kind"] = "bilateral_once_closed" if zone.get("CONTACT_INIT") == "NON" else "bilateral"
-    options |= {ours: -constant(zone[key], f"{key} of a contact zone") for key, ours in OFFSETS.items() if key in zone}
     solid = np.unique(np.concatenate([block.ravel() for block in mesh.solids.values()]))
     behind, backed = (np.isin(nodes_of(mesh, {"GROUP_MA": zone[side]}), solid).all() for side in ("slave", "master"))
     if not behind:
         raise MissingError(f"needs a rigid meshed surface without solid as the secondary side ({zone['slave']})")
-    options |= _formulation(contact, zone, mesh, against_obstacle=not backed)
+    options = _formulation(contact, zone, mesh, against_obstacle=not backed)
+    options |= _normals(contact, zone, mesh.dim, options["formulation"]) if backed else {}
+    options |= _kind(zone)
+    options |= {ours: -constant(zone[key], f"{key} of a contact zone") for key, ours in OFFSETS.items() if key in zone}
+    if contact.get("FROTTEMENT", "SANS") == "COULOMB":
+        options["friction"] = constant(zone.get("COULOMB", 0.0), "COULOMB of a contact zone")
+        options["slip"] = "primary"
+        options |= _frictionless_nodes(zone, mesh, supports)
+        if zone.get("ALGO_FROT") == "PENALISATION":
+            options["tangential_penalty"] = _tangential_penalty(model, zone)
     options |= _excluded_nodes(zone, mesh, supports, options, against_obstacle=not backed)
     if backed:
         model.add_contact(name, secondary=zone["slave"], primary=zone["master"], **options)
@@ -64,19 +82,62 @@ def add_zone(model: fc.Model, name: str, contact: Entry, zone: Entry, supports: 
         model.add_obstacle(name, secondary=zone["slave"], obstacle=_obstacle(mesh, zone, supports), **options)
 
 
+def _kind(zone: Entry) -> dict[str, Any]:
+    """Return what a zone says about closing, opening and searching."""
+    options: dict[str, Any] = {}
+    if "DIST_APPA" in zone:
+        options["search_distance"] = float(zone["DIST_APPA"])
+    if zone.get("GLISSIERE") == "OUI":
+        # Only with OUI all nodes start closed.
+        options["kind"] = "bilateral" if zone.get("CONTACT_INIT") == "OUI" else "bilateral_once_closed"
+    if zone.get("RESOLUTION") == "NON":
+        options["kind"] = "gap_only"
+    return options
+
+
+def _tangential_penalty(model: fc.Model, zone: Entry) -> Callable[[np.ndarray], np.ndarray]:
+    """Return E_T, a force by slip at each slave node, as a shear by slip at reference positions."""
+    side = surface(model.mesh, zone["slave"])
+    areas = nodal_areas(side, model.mesh.points, model.kinematics == "axisymmetric")
+    tree, stiffness = cKDTree(model.mesh.points[side.points]), float(zone["E_T"])
+    circle = 2 * np.pi if model.kinematics == "axisymmetric" else 1.0
+    return lambda positions: circle * stiffness / areas[tree.query(positions)[1]]
+
+
+def _normals(contact: Entry, zone: Entry, dim: int, formulation: str) -> dict[str, Any]:
+    """Return the option `normals` of a zone: those of the master facets, unless they are smoothed."""
+    if zone.get("VECT_MAIT") == "FIXE":
+        return {"normals": [float(component) for component in zone["MAIT_FIXE"][:dim]]}
+    if zone.get("NORMALE") == "ESCL":
+        return {"normals": "secondary"}
+    # MAIT_ESCL is the mean of both sides' normals; the sides that have it are flat.
+    if contact.get("LISSAGE") == "OUI":
+        return {"normals": "averaged"}
+    # Normals that jump between facets show where friction acts; without it they only keep the pairing from settling.
+    faceted = dim == 2 and formulation != "mortar" and contact.get("FROTTEMENT", "SANS") == "COULOMB"
+    return {"normals": "facet"} if faceted else {}
+
+
 def _formulation(contact: Entry, zone: Entry, mesh: fc.Mesh, *, against_obstacle: bool) -> dict[str, Any]:
     facets = mesh.cells_of(zone["slave"], dim=mesh.dim - 1) | mesh.cells_of(zone["master"], dim=mesh.dim - 1)
     quadratic = not set(facets) <= {"line2", "tri3", "quad4"}
-    rule = INTEGRATION.get(zone.get("INTEGRATION", "AUTO"), "gauss")
     matching = zone.get("interface", {}).get("matching", False)
+    mortar = zone.get("APPARIEMENT") == "MORTAR" or zone.get("ALGO_CONT") == "LAC"
+    rule = INTEGRATION.get(zone.get("INTEGRATION", "AUTO"), "gauss")
+    if rule == "node" and set(facets) & {"tri6", "quad8"}:
+        rule = "gauss"  # as AUTO does where nodes have no positive areas
     if contact.get("FORMULATION", "DISCRETE") == "DISCRETE":
         options: dict[str, Any] = {"formulation": "node_to_segment"}
-    elif against_obstacle:
-        options = {"formulation": "continuous", "integration": "gauss" if quadratic else rule}
-    elif not quadratic and zone.get("APPARIEMENT") != "MORTAR" and (rule == "node" or matching):
-        options = {"formulation": "continuous", "integration": rule}
-    else:
+        if zone.get("APPARIEMENT") == "NODAL" and not against_obstacle:
+            options["opposite"] = "node"
+    elif mortar or (rule == "simpson" and not against_obstacle and (quadratic or not matching)):
         return {"formulation": "mortar"}
+    elif rule == "node" and quadratic and not against_obstacle:
+        options = {"formulation": "node_to_segment"}
+    else:
+        options = {"formulation": "continuous", "integration": rule}
+        if rule == "gauss":
+            options["n_gauss"] = 3
     if "TOLE_PROJ_EXT" in zone and not against_obstacle:
         options["projection_tolerance"] = float(zone["TOLE_PROJ_EXT"])
     return options
@@ -89,13 +150,12 @@ def missing_in_contact(contact: Entry) -> Iterator[str]:
         yield f"the contact FORMULATION {contact['FORMULATION']}"
     if contact.get("FROTTEMENT", "SANS") not in ("SANS", "COULOMB"):
         yield f"the friction law {contact['FROTTEMENT']}"
-    yield from (f"{key} of DEFI_CONTACT" for key in contact if key not in IGNORED_CONTACT)
+    yield from (f"{key} of {contact.get('command')}" for key in contact if key not in ITERATIONS | CONTACT)
     for zone in contact.get("zones", ()):
         yield from (f"gap offsets {key}" for key in NO_OFFSETS if zone.get(key, "NON") != "NON")
-        known = {*IGNORED_ZONE, *OFFSETS, *NO_OFFSETS, *EXCLUSIONS}
+        known = {*ZONE_ITERATIONS, *ZONE, *OFFSETS, *NO_OFFSETS, *EXCLUSIONS}
         yield from (f"{key} of a contact zone" for key in zone if key not in known)
-        if zone.get("RESOLUTION", "OUI") != "OUI":
-            yield "contact that is only checked, RESOLUTION = NON"
+        yield from (f"{key} = {zone[key]}" for key, said in CHOICES.items() if zone.get(key, said[0]) not in said)
 
 
 def _frictionless_nodes(zone: Entry, mesh: fc.Mesh, supports: Sequence[Support]) -> dict[str, Any]:

@@ -147,10 +147,10 @@ def _terms(spec: Entry, load: Entry) -> Iterator[_Term]:
 
 
 def _history(load: Entry, times: Sequence[float]) -> History:
-    """Return pairs (instant, multiplier) at the instants of the run."""
+    """Return pairs (instant, multiplier) at the instants of the run; code_aster does not evaluate the first one."""
     function = load.get("time_multiplier", 1.0)
     if isinstance(function, dict) and function.get("function") == "piecewise_linear":
-        return tuple((t, _piecewise_linear(function, t)) for t in times)
+        return ((times[0], 0.0), *((t, _piecewise_linear(function, t)) for t in times[1:]))
     multiplier = constant(function, "time multiplier")
     return tuple((t, multiplier) for t in times)
 

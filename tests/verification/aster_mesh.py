@@ -46,6 +46,13 @@ def _with_derived(mesh: fc.Mesh, entry: Entry) -> fc.Mesh:
     if "new_node_group" in entry and how.startswith("nodes of cell group"):
         nodes = nodes_of(mesh, {"GROUP_MA": sources})
         return mesh.with_groups(points=dict.fromkeys(listed(entry["new_node_group"]), nodes))
+    if "new_node_group" in entry and how.startswith(("DIFFE", "INTERSEC")):
+        first, *others = (nodes_of(mesh, {"GROUP_NO": name}) for name in sources)
+        combine = np.setdiff1d if how.startswith("DIFFE") else np.intersect1d
+        found = functools.reduce(combine, others, first)
+        if len(found) != entry.get("n", len(found)):
+            raise MissingError(f"finds {len(found)} nodes in the derived group {entry}")
+        return mesh.with_groups(points=dict.fromkeys(listed(entry["new_node_group"]), found))
     if "new_cell_group" in entry and how.startswith(("UNION", "same cells")):
         members = np.concatenate([mesh.cell_groups[name] for name in sources])
         return mesh.with_groups(cells=dict.fromkeys(listed(entry["new_cell_group"]), members))

@@ -10,24 +10,36 @@ import fastcontact as fc
 
 # Between two nodes, and from a node to the ground.
 LINES, POINTS = "K_T_D_L", "K_T_D_N"
+KEYWORDS = {"DISCRET", "DISCRET_2D"}
+KNOWN = {"CARA", "VALE", "REPERE", "GROUP_MA", "GROUP_NO", "NOEUD", "SYME"}
+
+
+def _entries(run: Entry) -> list[Entry]:
+    found = run.get("elementary_characteristics") or {}
+    return [entry for keyword in sorted(KEYWORDS) for entry in listed(found.get(keyword, []))]
 
 
 def missing_in_springs(run: Entry) -> Iterator[str]:
     """Yield the reasons why the discrete elements of a run cannot be translated."""
-    for entry in (run.get("elementary_characteristics") or {}).get("DISCRET", ()):
+    for keyword in run.get("elementary_characteristics") or {}:
+        if keyword not in {*KEYWORDS, "MODELE"}:
+            yield f"{keyword} of AFFE_CARA_ELEM"
+    for entry in _entries(run):
+        yield from (f"{key} of discrete elements" for key in entry if key not in KNOWN)
         if entry["CARA"] not in (LINES, POINTS):
             yield f"springs {entry['CARA']}"
-        elif _local(entry) and (entry["CARA"] == POINTS or any(entry["VALE"][1:])):
-            yield f"springs {entry['CARA']} in a frame of their own"
+        elif _local(entry) and entry["CARA"] == POINTS:
+            yield "springs of a node in a frame of their own"
+        elif _local(entry) and len(set(entry["VALE"][1:])) > 1:
+            yield "springs with two stiffnesses across their line"
 
 
 def add_springs(model: fc.Model, run: Entry) -> None:
     """Add the discrete elements of AFFE_CARA_ELEM; components without stiffness do nothing."""
-    for entry in (run.get("elementary_characteristics") or {}).get("DISCRET", ()):
+    for entry in _entries(run):
         values = [float(value) for value in entry["VALE"]]
-        stiffness = {axis: value for axis, value in zip("xyz", values, strict=False) if value}
-        if _local(entry):
-            stiffness = {"axial": values[0]} if values[0] else {}
+        names = ("axial", "transverse") if _local(entry) else "xyz"
+        stiffness = {name: value for name, value in zip(names, values, strict=False) if value}
         if not stiffness:
             continue
         if entry["CARA"] == POINTS:

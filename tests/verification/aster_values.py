@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from aster_mesh import Entry, MissingError, nodes_of
 from aster_spec import Problem
+from scipy.spatial import cKDTree
 
 import fastcontact as fc
 from fastcontact.mesh import elements
@@ -90,10 +91,9 @@ def values(test: Entry, problem: Problem, steps: Sequence[fc.StepResult]) -> lis
     """Return the tested value; several where a value must hold at several places."""
     step = _step(test, problem, steps)
     name, component = _field_of(test)
-    field = FIELDS.get(name)
-    if field is None:
+    if name not in FIELDS:
         raise MissingError(f"needs the field {name}")
-    found = field(problem, step, component, test)
+    found = _in_frame(test, problem, lambda c: FIELDS[name](problem, step, c, test), component)
     nodes = _location(test, problem, found)
     outside = [node for node in nodes if node not in found]
     if outside:
@@ -108,13 +108,44 @@ def values(test: Entry, problem: Problem, steps: Sequence[fc.StepResult]) -> lis
     return [float(REDUCTIONS[kind](there))]
 
 
+def _table(test: Entry) -> Entry:
+    """Return what POST_RELEVE_T was asked for, of a value that went through a table."""
+    actions = [test.get("extraction") or {}]
+    actions += [made["kw"].get("ACTION") for made in test.get("provenance") or () if made["cmd"] == "POST_RELEVE_T"]
+    return next((a for a in actions if isinstance(a, dict) and a.get("OPERATION") == "EXTRACTION"), {})
+
+
+def _in_frame(test: Entry, problem: Problem, field: Callable[[str], Field], component: str) -> Field:
+    """Return a component in the frame that a table was written in; see REPERE in the README of the cases."""
+    frame = _table(test).get("REPERE", "GLOBAL")
+    if frame == "GLOBAL":
+        return field(component)
+    if problem.mesh.dim != 2:
+        raise MissingError(f"needs the frame {frame} in 3D")
+    points = problem.mesh.points
+    if frame == "POLAIRE" and component == "SIXX":
+        xx, yy, xy = (field(name) for name in ("SIXX", "SIYY", "SIXY"))
+        radial = {node: points[node] / np.linalg.norm(points[node]) for node in xx if points[node].any()}
+        return {n: float(r[0] ** 2 * xx[n] + r[1] ** 2 * yy[n] + 2 * r[0] * r[1] * xy[n]) for n, r in radial.items()}
+    if frame == "LOCAL" and component in ("DX", "DY"):
+        nodes = [number - 1 for number in test["location"]["nodes_1based"]]
+        line = points[nodes[-1]] - points[nodes[0]]
+        along = line / np.linalg.norm(line)
+        if np.abs(np.cross(points[nodes] - points[nodes[0]], along)).max() > 1e-6 * np.linalg.norm(line):
+            raise MissingError("needs the frame LOCAL along a line that is not straight")
+        axis = along if component == "DX" else np.array([-along[1], along[0]])
+        x, y = field("DX"), field("DY")
+        return {node: float(axis[0] * x[node] + axis[1] * y[node]) for node in nodes}
+    raise MissingError(f"needs {component} in the frame {frame}")
+
+
 def _field_of(test: Entry) -> tuple[str, str]:
     """Return the field and the component, also of values that went through a table."""
     if "field" in test:
         return test["field"], test["component"]
-    extraction = test.get("extraction") or {}
-    if "NOM_CHAM" in extraction and extraction.get("OPERATION") == "EXTRACTION" and not test.get("filter"):
-        return extraction["NOM_CHAM"], test["table_column"]
+    table = _table(test)
+    if "NOM_CHAM" in table and (test.get("location") or not test.get("filter")):
+        return table["NOM_CHAM"], test["table_column"]
     named = {entry["NOM_PARA"]: entry for entry in test.get("filter") or ()}
     if test.get("table_column") == "VALE" and {"NOM_CHAM", "NOM_CMP"} <= set(named):
         return named["NOM_CHAM"]["VALE_K"], named["NOM_CMP"]["VALE_K"]
@@ -163,6 +194,23 @@ def _stress(problem: Problem, step: fc.StepResult, component: str, test: Entry) 
         raise MissingError(f"needs SIEF_NOEU {component}")
     solid = np.unique(np.concatenate([block.ravel() for block in problem.mesh.solids.values()]))
     return dict(zip(solid.tolist(), step.stress[solid, STRESS[component]], strict=True))
+
+
+def _element_stress(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
+    """Return stresses of the elements at their own nodes: of one cell, or the mean over the elements at each node."""
+    if component not in STRESS or STRESS[component] >= step.stress.shape[1]:
+        raise MissingError(f"needs SIGM_ELNO {component}")
+    mesh = problem.mesh
+    moduli, material = problem.model.material_numbers()
+    at_points = fc.recovery.stress_at_points(mesh, problem.model.kinematics, moduli, material, step.displacement)
+    group = (test.get("location") or {}).get("GROUP_MA")
+    chosen = None if group is None else mesh.split(mesh.cell_groups[group])
+    total, count = np.zeros(mesh.n_points), np.zeros(mesh.n_points)
+    for name, stress in fc.recovery.stress_at_element_nodes(at_points).items():
+        rows = np.arange(len(stress)) if chosen is None else chosen.get(name, np.empty(0, int))
+        np.add.at(total, mesh.cells[name][rows], stress[rows, :, STRESS[component]])
+        np.add.at(count, mesh.cells[name][rows], 1.0)
+    return {int(node): float(total[node] / count[node]) for node in np.flatnonzero(count)}
 
 
 def _equivalent(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
@@ -241,11 +289,11 @@ def _contact_element(problem: Problem, step: fc.StepResult, component: str, test
 
 
 def _contact_node(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
-    per_radian = 1 / (2 * np.pi) if problem.model.kinematics == "axisymmetric" else 1.0
+    per_radian = _per_radian(problem)
     if component == "JEU":
         return _contact_values(step, lambda contact: contact.gap)
     if component == "CONT":
-        return _contact_values(step, lambda contact: np.where(contact.active, 2 - contact.sticking, 0))
+        return _status(problem, step)
     if component in ("RX", "RY", "RZ"):
         axis = "XYZ".index(component[1])
         return _contact_values(step, lambda contact: per_radian * contact.force_vectors[:, axis])
@@ -255,36 +303,69 @@ def _contact_node(problem: Problem, step: fc.StepResult, component: str, test: E
         )
     if component in ("PROJ_X", "PROJ_Y", "PROJ_Z"):
         axis = "XYZ".index(component[-1])
-        return _contact_values(step, lambda contact: _projection(contact, step)[:, axis])
+        return _contact_values(step, lambda contact: _projection(problem, contact, step)[:, axis])
     raise MissingError(f"needs CONT_NOEU {component}")
 
 
-def _projection(contact: fc.ContactResult, step: fc.StepResult) -> np.ndarray:
-    """Return where the secondary nodes project to, (m, dim)."""
+def _status(problem: Problem, step: fc.StepResult) -> Field:
+    """Return 0 open, 1 closed and sticking, 2 closed and sliding, also without friction; watched: 3 penetrating, -1 lost."""
+    found: Field = {}
+    for pair in problem.model.contact:
+        contact = step.contact[pair.name]
+        if pair.options.get("kind") == "gap_only":
+            status = np.where(np.isfinite(contact.gap), np.where(contact.gap < 0, 3, 0), -1)
+        else:
+            sticking = contact.sticking & bool(pair.options.get("friction"))
+            status = np.where(contact.active, 2 - sticking, 0)
+        found.update(zip(contact.points.tolist(), status.astype(float).tolist(), strict=True))
+    return found
+
+
+def _projection(problem: Problem, contact: fc.ContactResult, step: fc.StepResult) -> np.ndarray:
+    """Return where the secondary nodes project to, (m, dim); with NODAL that is the nearest node."""
     position = contact.coordinates + step.displacement[contact.points]
-    return position - contact.gap[:, None] * contact.normal
+    zone = problem.run["contact"]["zones"][list(step.contact).index(contact.name)]
+    if zone.get("APPARIEMENT") != "NODAL":
+        return position - contact.gap[:, None] * contact.normal
+    nodes = nodes_of(problem.mesh, {"GROUP_MA": zone["master"]})
+    opposite = (problem.mesh.points + step.displacement)[nodes]
+    return opposite[cKDTree(opposite).query(position)[1]]
 
 
 def _reaction(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
-    """Return support reactions plus contact forces; those on the primary side are not in the results."""
+    """Return forces of supports, relations and contact, on both sides of it; code_aster counts springs as elements."""
     axis = ("DX", "DY", "DZ").index(component)
-    per_radian = 1 / (2 * np.pi) if problem.model.kinematics == "axisymmetric" else 1.0
-    found = dict(enumerate(step.reaction[:, axis] * per_radian))
-    for node, force in _contact_values(step, lambda contact: per_radian * contact.force_vectors[:, axis]).items():
-        found[node] += force
-    for pair in problem.model.contact:
-        for node in nodes_of(problem.mesh, {"GROUP_MA": pair.primary or []}):
-            found.pop(int(node), None)
-    return found
+    total = step.reaction[:, axis].copy()
+    for contact in step.contact.values():
+        np.add.at(total, contact.points, contact.force_vectors[:, axis])
+        np.add.at(total, contact.primary_points, contact.primary_force_vectors[:, axis])
+    if any(springs.grounded for springs in problem.model.springs):
+        raise MissingError("needs REAC_NODA with springs to the ground")
+    return dict(enumerate(total * _per_radian(problem)))
+
+
+def _internal(problem: Problem, step: fc.StepResult, component: str, test: Entry) -> Field:
+    """Return forces that hold the elements as they are, springs among them."""
+    axis = ("DX", "DY", "DZ").index(component)
+    total = problem.model.internal_forces(step.displacement)
+    for springs in problem.model.springs:
+        total += (springs.rows.T @ springs.tension(step.displacement)).reshape(total.shape)
+    return dict(enumerate(total[:, axis] * _per_radian(problem)))
+
+
+def _per_radian(problem: Problem) -> float:
+    return 1 / (2 * np.pi) if problem.model.kinematics == "axisymmetric" else 1.0
 
 
 FIELDS: dict[str, Callable[[Problem, fc.StepResult, str, Entry], Field]] = {
     "DEPL": _displacement,
     "SIEF_NOEU": _stress,
     "SIGM_NOEU": _stress,
+    "SIGM_ELNO": _element_stress,
     "SIEQ_NOEU": _equivalent,
     "PRES_NOEU": _surface_pressure,
     "CONT_ELEM": _contact_element,
     "CONT_NOEU": _contact_node,
     "REAC_NODA": _reaction,
+    "FORC_NODA": _internal,
 }

@@ -1,14 +1,16 @@
-"""code_aster's validation cases, read from a folder of specs (``pytest --cases DIR``) and run through our interface.
+"""code_aster's validation cases, read from folders of specs (``pytest --cases DIR``) and run through our interface.
 
-Every tested value must lie within the tolerance of its spec, but for the `AMENDMENTS`: there the spec itself says that
-the stated value is wrong, or what its tolerance stands for, or that an exact method must do better. A case that needs
-what fastcontact does not have is skipped, with the name of what is missing.
+Every tested value must lie within the tolerance of its spec, but for the `AMENDMENTS`: there the stated value is wrong, or
+belongs to something else than the case, or its tolerance stands for something, or an exact method must do better; and
+for `STOPPED`, where code_aster ends early. A case that needs what fastcontact does not have is skipped, with the name of
+what is missing; so is one that states no value.
 """
 
 import math
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import aster_spec
@@ -18,6 +20,8 @@ from aster_mesh import MissingError
 
 import fastcontact as fc
 
+SHARED = Path(__file__).resolve().parents[3] / "shared"
+FOLDERS = SHARED / "cases", SHARED / "more-cases"
 # Load on the slider of SSNV503, its coefficient of friction and the slope it lies on.
 SLIDER_FORCE, SLIDER_FRICTION, SLOPE = 300.0 * 40.0 * 20.0, 0.3, math.radians(30.0)
 
@@ -34,22 +38,54 @@ class Amendment:
     more: dict[str, Any] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Stopped:
+    """A run whose geometry updates code_aster ends by its own rule, and how many those are."""
+
+    name: str
+    run: int
+    updates: int
+    why: str
+
+
 def exactly(test, problem):
     """Mortar represents a uniform pressure without error."""
     return all(pair.formulation == "mortar" for pair in problem.model.contact)
 
 
-def sliding_force(component):
-    """The resultant of the slider's contact is tested while it slides."""
-    return lambda test, problem: test["run"] == 2 and test.get("table_column") == component
+def sliding_force(component, frame="GLOBAL"):
+    """The resultant of the slider's contact is tested while it slides, along the axes or along its own line."""
+
+    def of(test, problem):
+        found = (test.get("extraction") or {}).get("REPERE", "GLOBAL")
+        return (test["run"], test.get("table_column"), found) == (2, component, frame)
+
+    return of
 
 
+DISTANCE = (
+    "DIST_APPA = 1 is measured to the nearest node of the master side in code_aster, 50 away on its one facet, so that it "
+    "finds no contact: -20. We measure to the surface, which is 0 away: -9.1e-7, and -8.9e-7 with cells an eighth as long"
+)
+# SSNA122B, axis node M, without and with friction.
+FINITE_STRAIN = (
+    "the values belong to finite strain and a mesh that is coarse for its quadratic facets: DY is -0.13294 and -0.13079 in "
+    "code_aster, -0.13268 and -0.13055 here, SIYY -94.12 and -95.47 against -94.03 and -95.41; by mortar on cells a "
+    "quarter as long DY is -0.13385 and -0.13172, SIYY -87.1 and -88.6"
+)
 AMENDMENTS = [
     Amendment("ssnp170", "a uniform stress is exact on any mesh", exactly, tolerance=1e-10),
     Amendment("ssnp121", "a uniform pressure is exact for nu = 0", exactly, tolerance=1e-8),
     Amendment(
-        "ssna122", "the value belongs to finite strain, from which small strain differs by 0.2 %",
+        "ssna122", FINITE_STRAIN,
         lambda test, problem: test["tolerance_is_default"], tolerance=2e-3,
+    ),
+    Amendment(
+        "zzzz237", DISTANCE, lambda test, problem: test["run"] in (2, 3) and test["component"] == "DY", reference=0.0,
+    ),
+    Amendment(
+        "ssnv503", "the limit of friction is 3600 a unit of width, not 3624", sliding_force("DX", "LOCAL"),
+        reference=-12000.0 * SLIDER_FRICTION, tolerance=1e-3,
     ),
     Amendment(
         "ssnp154", "the mesh was moved back before this value was taken",
@@ -67,14 +103,28 @@ AMENDMENTS = [
 ]  # fmt: skip
 
 
+STOPPED = [
+    Stopped(
+        "ssnv104d", 0, 3,
+        "code_aster stops where an update changes the displacement by less than 1 %: after three updates a step SIYY at N291 "
+        "is -4647.96 at the end, where it computes -4648.04; settled it is -4703.27, 6.3 % from Hertz in place of 5.0 %. A "
+        "finer mesh has no such value: N291 is held by itself (-8330, then -20551); at N55, held too, it is -4632 with "
+        "cells a quarter as long",
+    ),
+]  # fmt: skip
+# These cases go beyond small strain, and mix materials, on purpose; any other warning is an error.
+ON_PURPOSE = ("the largest equivalent strain", "the largest rotation", "Young's moduli differ by a factor of 1e\\+07")
+
+
 def pytest_generate_tests(metafunc):
     if "spec_and_run" not in metafunc.fixturenames:
         return
-    folder = metafunc.config.getoption("--cases")
-    found = list(aster_spec.specs(folder))
-    absent = pytest.param(None, id="none", marks=pytest.mark.skip(reason=f"there are no specs in {folder}"))
-    cases = [pytest.param((path, run), id=f"{path.stem}-{run}") for path, run in found]
-    metafunc.parametrize("spec_and_run", cases or [absent])
+    cases = []
+    for folder in metafunc.config.getoption("--cases") or FOLDERS:
+        found = [pytest.param((path, run), id=f"{path.stem}-{run}") for path, run in aster_spec.specs(folder)]
+        absent = pytest.mark.skip(reason=f"there are no specs in {folder}")
+        cases += found or [pytest.param(None, id=f"none-{folder.name}", marks=absent)]
+    metafunc.parametrize("spec_and_run", cases)
 
 
 def test_values_lie_within_the_tolerances_of_code_aster(spec_and_run):
@@ -92,9 +142,9 @@ def verdicts_of(path, run):
     try:
         problem = aster_spec.problem(path, run)
         with warnings.catch_warnings():
-            # These cases go beyond small strain on purpose; any other warning is an error.
-            warnings.filterwarnings("ignore", "the largest equivalent strain", fc.FastcontactWarning)
-            steps = aster_spec.solve(problem)
+            for beginning in ON_PURPOSE:
+                warnings.filterwarnings("ignore", beginning, fc.FastcontactWarning)
+            steps = aster_spec.solve(stopped_as_in_code_aster(problem))
     except MissingError as reason:
         pytest.skip(str(reason))
     verdicts, missing = [], []
@@ -116,3 +166,11 @@ def amended(test, problem):
             tolerance = tolerance if amendment.tolerance is None else amendment.tolerance
             test = {**test, **amendment.more}
     return test, reference, tolerance
+
+
+def stopped_as_in_code_aster(problem):
+    """Return the problem, with the number of geometry updates after which code_aster stops where that shows."""
+    for stop in STOPPED:
+        if (problem.spec["name"], problem.run["run"]) == (stop.name, stop.run):
+            return replace(problem, criteria=fc.Criteria(geometry_updates=stop.updates))
+    return problem

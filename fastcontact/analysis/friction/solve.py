@@ -52,7 +52,9 @@ def solve(
         A solution with nearly the same forces; one of other constraints is passed over.
     """
     forces = None if guess is None else guess.forces_along(constraints.directions, len(constraints))
-    of_their_own = (constraints.compliance, constraints.softness, constraints.low_rank_compliance)
+    of_their_own = (
+        constraints.compliance, constraints.softness, constraints.low_rank_compliance, constraints.tangential_softness
+    )  # fmt: skip
     if isinstance(loaded, LoadedNonsymmetric) and all(part is None for part in of_their_own):
         found = _eliminated(loaded, constraints, closed, accuracy, u, forces)
         if found is not None:
@@ -103,6 +105,9 @@ def _among(
     R = csr_array(vstack([matrix[rows] for matrix in (constraints.B, *constraints.tangents)], format="csr"))
     at_rest = constraints.gaps_at_rest()
     free, F = loaded.flexibility(R)
+    if constraints.tangential_softness is not None:  # before idle slips are looked for: what gives way is not idle
+        slips = np.arange(len(rows), len(F))
+        F[slips, slips] += np.tile(constraints.tangential_softness[rows], k)
     Q = aligning(own_compliance(F, 3)) if k == 2 else None
     still = np.flatnonzero(idle(own_compliance(F if Q is None else np.asarray(Q @ (Q @ F).T), 1 + k))) + len(rows)
     _add_compliance(F, constraints, rows)

@@ -16,6 +16,7 @@ from fastcontact.contact.constraints import Compliance, Constraints
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair, rows_along, tangents
+from fastcontact.contact.prescribed_normals import Normals, checked_normals, opposed
 from fastcontact.contact.projection import interpolated, nodal_normals, places
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.tied import TiedPair, tied
@@ -24,7 +25,7 @@ from fastcontact.errors import ContactError, unknown
 Array = NDArray[np.float64]
 # Vectors shorter than this have no direction; unit normals that differ by less are the same.
 TINY, ALIKE = 1e-300, 1e-9
-NORMALS = ("facet", "averaged")
+SLIPS = ("symmetric", "primary")
 # Nodes on an axis or plane of symmetry stand out a little beyond facets that lean, in facet lengths.
 ON_SYMMETRY = 0.05
 
@@ -49,9 +50,15 @@ class Formulation(ABC):
         Coefficient of Coulomb friction, zero for none [-].
     projection_tolerance : float
         How far a point may stand out beyond the end of its facet and still be paired, in facet lengths.
-    normals : str, optional
-        ``"facet"``: of the primary facet at the projection; ``"averaged"``: interpolated between nodal means. By default
-        the former in 2D and the latter in 3D, where a point opposite an edge between facets often flips for ever.
+    normals : str or sequence of float, optional
+        Along which the gap is measured. ``"facet"``: that of the primary facet at the projection; ``"averaged"``:
+        interpolated between nodal means. By default the former in 2D and the latter in 3D, where a point opposite an edge
+        between facets often flips for ever. ``"secondary"``: opposite to the mean normal of the secondary side at the
+        point. A vector (dim,) of any length: that one for the whole primary side, out of its body; points are projected
+        along it.
+    slip : str
+        ``"symmetric"``: closing a gap along the mean of both sides' normals is no slip. ``"primary"``: all relative motion
+        along the tangents to the primary side is, also of a gap that closes while its normal leans, as in code_aster.
     options : PairOptions
         Options of the pair that do not depend on its formulation, e.g. its clearance.
     supported : ndarray of bool (n_points, dim), optional
@@ -66,7 +73,8 @@ class Formulation(ABC):
 
     friction: float = 0.0
     projection_tolerance: float = 0.5
-    normals: str | None = None
+    normals: Normals | None = None
+    slip: str = "symmetric"
     options: PairOptions = field(default_factory=PairOptions, repr=False)
     supported: NDArray[np.bool_] | None = field(default=None, repr=False)
 
@@ -77,8 +85,9 @@ class Formulation(ABC):
     def __post_init__(self) -> None:
         if self.normals is None:
             self.normals = "facet" if self.points.shape[1] == 2 else "averaged"
-        if self.normals not in NORMALS:
-            raise ContactError(unknown("kind of normals", self.normals, NORMALS))
+        self.normals = checked_normals(self.normals, self.points, self.primary)
+        if self.slip not in SLIPS:
+            raise ContactError(unknown("kind of slip", self.slip, SLIPS))
         if not (np.isfinite(self.friction) and self.friction >= 0):
             raise ContactError(f"the coefficient of friction {self.friction} must be a number >= 0")
         if not self.projection_tolerance >= 0:
@@ -103,13 +112,31 @@ class Formulation(ABC):
         """
         if self.tied is not None:
             return self.tied.constraints()
-        part = self.unilateral(at)
-        softness = None
-        if self.options.penalty is not None:
-            if part.areas is None:
-                raise ContactError(f"formulation '{self.name}' knows no penalty: leave out the option")
-            softness = 1.0 / (self.options.penalty * part.areas)
-        return replace(part, equality=self.never_opening(part.positions, at), softness=softness)
+        part = self._softened(self.unilateral(at), at)
+        if self.options.gap_only:
+            return part.without(np.ones(len(part), bool))
+        if self.options.search_distance is not None:
+            # Also as the step begins: what this iterate lets through by itself is not out of reach.
+            away = np.minimum(np.abs(part.gaps(at.displacement)), np.abs(part.gaps(at.start)))
+            part = part.without(away > self.options.search_distance)
+        return replace(part, equality=self.never_opening(part.positions, at))
+
+    def _softened(self, part: Constraints, at: Configuration) -> Constraints:
+        """Return constraints that give way by penalties along the normal and along the tangents, where there are any."""
+        normal, tangential, areas = self.options.penalty, self.options.tangential_penalty, part.areas
+        if normal is None and tangential is None:
+            return part
+        if areas is None:
+            raise ContactError(f"formulation '{self.name}' knows no penalty: leave out the option")
+        if normal is not None:
+            part = replace(part, softness=np.asarray(1.0 / (normal * areas)))
+        if tangential is None or not part.tangents:
+            return part
+        give, elastic = 1.0 / tangential(part.positions), np.zeros((len(part.tangents), len(part)))
+        if at.traction is not None:
+            before = _at_places(at.traction, part.positions)
+            elastic = np.stack([-give * np.einsum("md,md->m", t, before) for t in part.directions])
+        return replace(part, tangential_softness=give / areas, elastic_slip=elastic)
 
     @cached_property
     def tied(self) -> TiedPair | None:
@@ -122,10 +149,29 @@ class Formulation(ABC):
             return np.ones(len(positions), bool)
         if at.never_opening is None:
             return None
-        from scipy.spatial import cKDTree
+        return np.asarray(_at_places(at.never_opening, positions))
 
-        places_before, closed = at.never_opening
-        return np.asarray(closed[cKDTree(places_before).query(positions)[1]])
+    def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
+        """Return what candidates face on the displaced configuration, by the options of the pair.
+
+        `tolerance` takes the place of `projection_tolerance` where it is given.
+        """
+        deformed = self.points + at.displacement
+        beyond = self.projection_tolerance if tolerance is None else tolerance
+        assert self.normals is not None
+        pairing = pair(candidates.positions(deformed), self.primary, deformed, beyond, self.normals, at.obstacle)
+        if self.normals != "secondary":
+            return pairing
+        return opposed(pairing, self._secondary_normals(candidates, deformed))
+
+    def _secondary_normals(self, candidates: Candidates, deformed: Array) -> Array:
+        """Return unit means (n, dim) of the secondary facets' normals at candidates."""
+        local = np.zeros(len(deformed), np.intp)
+        local[self.secondary.points] = np.arange(len(self.secondary.points))
+        ours = np.einsum(
+            "nk,nkd->nd", candidates.shape, nodal_normals(self.secondary, deformed)[local[candidates.nodes]]
+        )
+        return np.asarray(ours / np.maximum(np.linalg.norm(ours, axis=1, keepdims=True), TINY))
 
     def assembled(
         self, candidates: Candidates, pairing: Pairing, compliance: Compliance | None, at: Configuration
@@ -138,9 +184,10 @@ class Formulation(ABC):
             return Constraints(B, gap0, positions, compliance)
         directions = tuple(tangents(pairing.normal))
         along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
+        drift: Array | None = None
         if isinstance(self.primary, RigidSide):
             drift = -np.stack([t @ (at.obstacle - at.obstacle_start) for t in directions])
-        else:
+        elif self.slip == "symmetric":
             drift = self._closing_slip(candidates, pairing, directions, at)
         friction = self.options.coefficients(self.friction, candidates)
         return Constraints(B, gap0, positions, compliance, along, directions, friction, drift)
@@ -180,12 +227,9 @@ class Formulation(ABC):
         drift = np.zeros((len(directions), len(pairing.paired)))
         rows = np.flatnonzero(pairing.paired)
         facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
-        local = np.zeros(len(deformed), np.intp)
-        local[self.secondary.points] = np.arange(len(self.secondary.points))
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
-        ours = np.einsum("nk,nkd->nd", shape, nodal_normals(self.secondary, deformed)[local[nodes]])
         theirs = interpolated(nodal_normals(self.primary, deformed), facing)
-        mean = theirs - ours / np.maximum(np.linalg.norm(ours, axis=1, keepdims=True), TINY)
+        mean = theirs - self._secondary_normals(Candidates(nodes, shape), deformed)
         length = np.linalg.norm(mean, axis=1, keepdims=True)
         mean = np.divide(mean, length, out=np.zeros_like(mean), where=length > ALIKE)
         apart = np.einsum("nk,nkd->nd", shape, start[nodes])
@@ -216,11 +260,17 @@ class Formulation(ABC):
         (n_points, dim) is given, the gaps are those that it leaves in the pairing of `at` [length].
         """
         nodes = Candidates(self.secondary.points[:, None], np.ones((len(self.secondary.points), 1)))
-        deformed = self.points + at.displacement
-        tolerance = max(self.projection_tolerance, ON_SYMMETRY)
-        pairing = pair(nodes.positions(deformed), self.primary, deformed, tolerance, self.normals, at.obstacle)
+        pairing = self.facing(nodes, at, max(self.projection_tolerance, ON_SYMMETRY))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
         if with_clearance:
             gap0 += self.options.added_gap(nodes, pairing, self.primary, self.points, at.clearance_factor)
         u = at.displacement if displacement is None else displacement
         return np.where(pairing.paired, gap0 + G @ u.ravel(), np.inf), pairing.normal
+
+
+def _at_places(known: tuple[Array, NDArray[Any]], positions: Array) -> NDArray[Any]:
+    """Return what is `known` at places (k, dim) [length], values (k, ...), at the one nearest to each of `positions`."""
+    from scipy.spatial import cKDTree
+
+    places_before, values = known
+    return np.asarray(values[cKDTree(places_before).query(positions)[1]])

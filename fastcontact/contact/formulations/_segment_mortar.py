@@ -23,7 +23,8 @@ from fastcontact.contact.formulations._cut_lines import line_points
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.pair_options import spread
-from fastcontact.contact.pairing import Candidates, Pairing, pair
+from fastcontact.contact.pairing import Candidates, Pairing
+from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import quadrature
@@ -46,7 +47,7 @@ class SegmentMortar(PressureFieldFormulation):
     """
 
     projection_tolerance: float = 1e-6
-    normals: str = "averaged"
+    normals: Normals | None = "averaged"
     n_gauss: int | None = None
     multipliers: str = "standard"
 
@@ -70,7 +71,7 @@ class SegmentMortar(PressureFieldFormulation):
         points = line_points(block, self.primary, self.points, deformed, self.axisymmetric, n_gauss, borders)
         facet, shape, area = points.facet, points.shape, points.area
         candidates = Candidates(self.secondary.facets[facet], shape)
-        found = pair(candidates.positions(deformed), self.primary, deformed, self.projection_tolerance, self.normals)
+        found = self.facing(candidates, at)
         total = np.bincount(facet, weights=area)
         covered = np.bincount(facet, weights=np.where(found.paired, area, 0.0))
         kept = found.paired & (covered > COVERED * total)[facet] & (area > 0) & ~self.options.out(candidates)

@@ -30,6 +30,7 @@ from fastcontact.contact.formulations._overlap import Overlap
 from fastcontact.contact.formulations._rows import Entries, rows_of, scaled
 from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
 from fastcontact.contact.pairing import Candidates, tangents_by_axes
+from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.projection import facet_normals, nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
@@ -50,15 +51,15 @@ class WeightedMortar(Formulation):
 
     Parameters
     ----------
-    normals : str
+    normals : str or sequence of float
         What the normal of a node is the mean of: ``"facet"``, those of the primary facets that it faces;
-        ``"averaged"``, nodal means of them.
+        ``"averaged"``, nodal means of them. ``"secondary"`` and vectors as in `Formulation`.
     multipliers : str
         ``"dual"`` or, between faces, ``"standard"``.
     """
 
     projection_tolerance: float = 1e-6
-    normals: str = "averaged"
+    normals: Normals | None = "averaged"
     multipliers: str = "standard"
 
     name: ClassVar[str] = "mortar"
@@ -116,7 +117,7 @@ class WeightedMortar(Formulation):
             tangents=tuple(self._along(direction, sliding) for direction in directions),
             directions=directions,
             friction=self.options.coefficients(self.friction, nodes),
-            drift=self._closing_slip_of_nodes(sliding, normal, directions, at),
+            drift=self._closing_slip_of_nodes(sliding, normal, directions, at) if self.slip == "symmetric" else None,
         )
 
     def _nodal(self, weight: Array) -> WeightedPressures:
@@ -237,6 +238,10 @@ class WeightedMortar(Formulation):
     def _mean_normals(self, overlap: Overlap, deformed: Array) -> Array:
         """Return unit means (m, dim) of the primary normals that the nodes face; the last axis for nodes without."""
         assert isinstance(self.primary, Surface)
+        if self.normals == "secondary":
+            return -nodal_normals(self.secondary, deformed)
+        if not isinstance(self.normals, str):
+            return np.tile(np.array(self.normals), (len(self.secondary.points), 1))
         mean = np.zeros((len(self.secondary.points), deformed.shape[1]))
         averaged = nodal_normals(self.primary, deformed)
         tests = dict(zip((block.element for block in self.secondary.blocks), self._test, strict=True))

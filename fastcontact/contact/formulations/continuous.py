@@ -17,7 +17,8 @@ from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation, shapes_at
 from fastcontact.contact.integration import facet_measure, fine_rule, gauss_rule
 from fastcontact.contact.pair_options import spread
-from fastcontact.contact.pairing import Candidates, filled_up, pair
+from fastcontact.contact.pairing import Candidates, filled_up
+from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.surface import FacetBlock
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh import elements, quadrature
@@ -39,11 +40,11 @@ class Continuous(PressureFieldFormulation):
     n_gauss : int, optional
         Gauss points in each direction of a facet, on triangles 3, 6, 12 or 16 points in all for 2 to 5; by default 3 on
         linear and 4 on quadratic facets. They must determine the field.
-    normals : str
+    normals : str or sequence of float
         ``"averaged"`` by default: with normals that jump between facets, a point opposite a node can flip for ever.
     """
 
-    normals: str = "averaged"
+    normals: Normals | None = "averaged"
 
     integration: str = "gauss"
     n_gauss: int | None = None
@@ -134,9 +135,7 @@ class Continuous(PressureFieldFormulation):
 
     def unilateral(self, at: Configuration) -> Constraints:
         """Pair the integration points on the displaced configuration and return their gaps."""
-        deformed = self.points + at.displacement
-        positions = self._candidates.positions(deformed)
-        pairing = pair(positions, self.primary, deformed, self.projection_tolerance, self.normals, at.obstacle)
+        pairing = self.facing(self._candidates, at)
         areas = self._field.projection.areas
         pairing.paired[~(areas > 1e-12 * areas.max())] = False
         return self.of_points(self._candidates, pairing, self._field, at)

@@ -21,16 +21,28 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.integration import fine_rule, mass_matrix, nodal_areas
-from fastcontact.contact.pairing import Candidates, pair
-from fastcontact.errors import ContactError
+from fastcontact.contact.node_pairing import at_nodes
+from fastcontact.contact.pairing import Candidates, Pairing
+from fastcontact.contact.surface import Surface
+from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh import elements
 
 Array = NDArray[np.float64]
+OPPOSITE = ("facet", "node")
 
 
 @dataclass(eq=False)
 class NodeToSegment(Formulation):
-    """Node-to-segment contact; parameters as in `Formulation`."""
+    """Node-to-segment contact; further parameters as in `Formulation`.
+
+    Parameters
+    ----------
+    opposite : str
+        ``"facet"``: the gap is that to the primary facet a node faces. ``"node"``: to the nearest primary node, as suits
+        meshes that match and hardly slide (APPARIEMENT='NODAL' of code_aster).
+    """
+
+    opposite: str = "facet"
 
     name: ClassVar[str] = "node_to_segment"
     geometry_in_loop: ClassVar[bool] = False
@@ -38,6 +50,10 @@ class NodeToSegment(Formulation):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.opposite not in OPPOSITE:
+            raise ContactError(unknown("what a node of node_to_segment lies opposite to", self.opposite, OPPOSITE))
+        if self.opposite == "node" and not isinstance(self.primary, Surface):
+            raise ContactError("a rigid obstacle has no nodes: leave out opposite = 'node'")
         for block in self.secondary.blocks:
             self._check_areas(block.element)
         nodes = self.secondary.points[:, None]
@@ -53,11 +69,18 @@ class NodeToSegment(Formulation):
                 "whose corner nodes carry no pressure: use formulation 'continuous' or 'mortar', or swap the sides"
             )
 
+    def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
+        """Return what candidates face: facets, or the primary nodes nearest to them."""
+        found = super().facing(candidates, at, tolerance)
+        if self.opposite == "facet":
+            return found
+        assert isinstance(self.primary, Surface)
+        assert self.normals is not None
+        return at_nodes(found, candidates, self.primary, self.points + at.displacement, self.normals)
+
     def unilateral(self, at: Configuration) -> Constraints:
         """Pair on the displaced configuration and return one gap per secondary node."""
-        deformed = self.points + at.displacement
-        positions = self._candidates.positions(deformed)
-        pairing = pair(positions, self.primary, deformed, self.projection_tolerance, self.normals, at.obstacle)
+        pairing = self.facing(self._candidates, at)
         pairing.paired[self.options.out(self._candidates)] = False
         areas = self._nodal.nodal_areas
         usable = np.where(areas > 1e-12 * areas.max(), areas, np.inf)

@@ -1,5 +1,7 @@
 """Springs at nodes and between them: exact solutions, held motions, reactions, messages."""
 
+import tomllib
+
 import numpy as np
 import pytest
 
@@ -118,6 +120,69 @@ def test_an_oblique_spring_resists_along_its_line_only():
     np.testing.assert_allclose(spring.tension(along), 3.0 * 0.6 / np.sqrt(3.0), rtol=1e-14)
     along[corner] = (1.0, -1.0, 0.0)
     np.testing.assert_allclose(spring.tension(along), 0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("to_ground", [False, True])
+def test_a_spring_has_one_stiffness_along_its_line_and_another_across(dim, to_ground):
+    """For any displacement, the force is axial along the direction, transverse across it, whatever the axes."""
+    mesh = fc.generate.box((1.0, 1.0, 1.0), (1, 1, 1)) if dim == 3 else fc.generate.block((WIDTH, HEIGHT), (1, 1))
+    first, second = 0, mesh.n_points - 1
+    model = fc.Model(mesh, "3d" if dim == 3 else "plane_strain")
+    direction = np.array([1.0, -2.0, 0.5])[:dim]
+    ends = {} if to_ground else {"to": second}
+    model.add_spring(first, **ends, axial=7.0, transverse=3.0, direction=direction.tolist())
+    (spring,) = model.springs
+    unit = direction / np.linalg.norm(direction)
+    for move in np.random.default_rng(1).normal(size=(5, dim)):
+        u = np.zeros(mesh.points.shape)
+        u[first] = move
+        force = (spring.rows.T @ spring.tension(u)).reshape(u.shape)
+        along = (move @ unit) * unit
+        np.testing.assert_allclose(force[first], 7.0 * along + 3.0 * (move - along), rtol=1e-13, atol=1e-14)
+        np.testing.assert_allclose(force[second], 0.0 if to_ground else -force[first], atol=1e-14)
+
+
+def test_springs_of_equal_stiffness_in_all_directions_need_no_direction():
+    mesh = fc.generate.block((WIDTH, HEIGHT), (1, 1))
+    model = fc.Model(mesh, "plane_strain")
+    model.add_spring(0, mesh.n_points - 1, axial=4.0, transverse=4.0)
+    model.add_spring(0, mesh.n_points - 1, x=4.0, y=4.0)
+    own, axes = ((s.rows.T @ np.diag(s.stiffness) @ s.rows.toarray()) for s in model.springs)
+    np.testing.assert_allclose(own, axes, atol=1e-13)
+
+
+def test_a_case_file_takes_directions():
+    text = """
+kinematics = "plane_strain"
+[mesh]
+generator = "block-on-block"
+[[material]]
+E = 1000.0
+nu = 0.0
+[[spring]]
+group = "UPPER_TOP_RIGHT"
+axial = 20.0
+transverse = 2.0
+direction = [1.0, 1.0]
+"""
+    (spring,) = build_case(tomllib.loads(text), name="case").model.springs
+    np.testing.assert_allclose(sorted(spring.stiffness), [2.0, 20.0])
+    np.testing.assert_allclose(np.abs(spring.rows.data), np.sqrt(0.5))
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    ({"axial": 1.0}, "axial or transverse stiffness but no second node"),
+    ({"transverse": 1.0}, "axial or transverse stiffness but no second node"),
+    ({"x": 1.0, "direction": [1.0, 0.0]}, "has a direction, but no axial or transverse stiffness"),
+    ({"axial": 1.0, "direction": [0.0, 0.0]}, "must be a vector of 2 numbers, not all zero"),
+    ({"axial": 1.0, "direction": [1.0, 0.0, 0.0]}, "must be a vector of 2 numbers, not all zero"),
+    ({"axial": -1.0, "direction": [1.0, 0.0]}, "must be positive"),
+])  # fmt: skip
+def test_wrong_directions_are_refused(arguments, words):
+    model = fc.Model(fc.generate.block((WIDTH, HEIGHT), (1, 1)), "plane_strain")
+    with pytest.raises(fc.ModelError, match=words):
+        model.add_spring(0, **arguments)
 
 
 def test_a_far_end_without_a_body_may_be_fixed_or_is_told():
