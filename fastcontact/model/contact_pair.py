@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -32,6 +33,11 @@ class ContactPair:
     force: Driving = ()
 
     @property
+    def method(self) -> str:
+        """The formulation and the kind of its multipliers, where the pair names one, for messages."""
+        return method(self.formulation, self.options)
+
+    @property
     def eliminable(self) -> bool:
         """Whether closed constraints can be eliminated: not where they give way by themselves."""
         soft = any(self.options.get(option) for option in ("penalty", "tangential_penalty"))
@@ -46,3 +52,8 @@ class ContactPair:
     def opposite(self) -> str:
         """What the secondary side may touch, for messages."""
         return self.primary if self.obstacle is None else "a rigid obstacle"
+
+
+def method(formulation: str, options: Mapping[str, Any]) -> str:
+    """Return a formulation and the kind of its multipliers, where options name one."""
+    return f"{formulation} with {options['multipliers']} multipliers" if "multipliers" in options else formulation

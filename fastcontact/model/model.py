@@ -52,7 +52,7 @@ from fastcontact.model.checks import (
     check_ramps,
     check_supports,
 )
-from fastcontact.model.contact_pair import ContactPair, Driving
+from fastcontact.model.contact_pair import ContactPair, Driving, method
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
 from fastcontact.model.prescribed_overlap import Supports, check_prescribed
@@ -140,7 +140,7 @@ class Model:
         self.contact: list[ContactPair] = []
 
     def __repr__(self) -> str:
-        pairs = ", ".join(f"{p.name}: {p.secondary} on {p.opposite}, {p.formulation}" for p in self.contact)
+        pairs = ", ".join(f"{p.name}: {p.secondary} on {p.opposite}, {p.method}" for p in self.contact)
         return f"Model({self.kinematics}, {self.mesh!r}, {self.n_dofs} degrees of freedom; contact: {pairs or 'none'})"
 
     @property
@@ -382,9 +382,8 @@ class Model:
             The side whose nodes or integration points are projected and carry the constraints, and the side
             projected upon. Facets are oriented from the solid behind them.
         formulation : str, optional
-            ``"node_to_segment"``, ``"continuous"`` or ``"mortar"``. By default mortar where facets are quadratic or the
-            nodes of the two sides do not lie opposite to each other, else node-to-segment; ``repr(model)`` and the log
-            tell which.
+            ``"node_to_segment"``, ``"continuous"`` or ``"mortar"``. By default mortar with dual multipliers, which is right
+            on any two surfaces; ``repr(model)`` and the log tell it.
         **options
             What every formulation takes, in addition to the fields of the formulation itself:
 
@@ -415,9 +414,8 @@ class Model:
               facet lengths.
         """
         if formulation is None:
-            sides = surface(self.mesh, secondary), surface(self.mesh, primary)
-            formulation, reason = default_formulation(*sides, self.mesh.points)
-            log.info("contact '%s': formulation %s, since %s", name, formulation, reason)
+            formulation, options, reason = default_formulation(self.mesh.dim, options)
+            log.info("contact '%s': %s, since %s", name, method(formulation, options), reason)
         self._add_pair(ContactPair(name, secondary, primary, formulation, options))
 
     def add_obstacle(

@@ -21,7 +21,8 @@ def spheres(friction=0.3, **options):
     model.fix("A1A2", "x")
     model.prescribe("A2B2", y=-2.0)
     model.prescribe("A1B1", y=+2.0)
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2", friction=friction, **options)
+    options = {"formulation": "node_to_segment", "friction": friction, **options}
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2", **options)
     return model
 
 

@@ -65,7 +65,7 @@ def test_case_files_take_what_python_takes(text, options):
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
     one, other = solved(case), fc.solve(model, case.ramp)[-1]
     assert np.array_equal(one.displacement, other.displacement)
-    assert one.contact["pair"].formulation == options.get("formulation", "node_to_segment")
+    assert one.contact["pair"].formulation == options.get("formulation", "mortar")
 
 
 def test_an_obstacle_takes_them_from_a_case_file():

@@ -1,4 +1,4 @@
-"""The formulation that a pair gets without asking for one."""
+"""The formulation that a pair gets without asking for one: right on any two surfaces, also where others are not."""
 
 import logging
 
@@ -6,68 +6,140 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.contact.default_formulation import default_formulation
-from fastcontact.contact.surface import surface
-from fastcontact.mesh.generate import box, half_spheres, renamed, union
+from fastcontact.mesh.generate import box, renamed, union
+
+E, NU = 210e3, 0.3
 
 
-def chosen(mesh, secondary, primary):
-    both = {
-        default_formulation(surface(mesh, a), surface(mesh, b), mesh.points)[0]
-        for a, b in ((secondary, primary), (primary, secondary))
-    }
-    assert len(both) == 1, "which side is secondary must not matter"
-    return both.pop()
+def solved(model: fc.Model) -> fc.ContactResult:
+    return fc.solve(model, fc.linear_ramp(1))[-1].contact["pair"]
 
 
-@pytest.mark.parametrize(("element", "upper", "expected"), [
-    ("quad4", (8, 4), "node_to_segment"), ("tri3", (8, 2), "node_to_segment"), ("quad4", (7, 4), "mortar"),
-    ("tri3", (16, 4), "mortar"), ("quad8", (8, 4), "mortar"), ("tri6", (5, 4), "mortar"), ("quad9", (8, 4), "mortar"),
+def bent(element, radii, cells, ends):
+    """A block bent to a part of a ring between two angles: BOTTOM at the first radius, TOP at the second."""
+    mesh = fc.generate.block((1.0, 1.0), cells, element)
+    angle, radius = (
+        ends[0] + (ends[1] - ends[0]) * mesh.points[:, 0],
+        radii[0] + (radii[1] - radii[0]) * mesh.points[:, 1],
+    )
+    return mesh.replace(points=radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
+
+
+def named(mesh, prefix):
+    return renamed(mesh, {group: f"{prefix}_{group}" for group in mesh.group_names})
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("element", ["quad4", "tri6", "quad8", "quad9"])
+def test_rings_that_match_turn_by_nothing(element, swapped):
+    """Node-to-segment takes the normal of either facet at a node opposite a node: it is wrong, or flips for ever."""
+    whole = (0.0, -2.0 * np.pi)
+    parts = [
+        named(fc.generate.merge_points(bent(element, radii, (40, 6), whole), 1e-6), name)
+        for name, radii in (("IN", (20.0, 50.0)), ("OUT", (50.0, 100.0)))
+    ]
+    model = fc.Model(union(*parts), "plane_strain")
+    model.add_material(fc.LinearElastic(E, NU))
+    model.fix("OUT_TOP", "xy")
+    model.prescribe(
+        "IN_BOTTOM", x=lambda X: 0.02 * X[:, 0] / np.hypot(*X.T), y=lambda X: 0.02 * X[:, 1] / np.hypot(*X.T)
+    )
+    sides = ("OUT_BOTTOM", "IN_TOP") if swapped else ("IN_TOP", "OUT_BOTTOM")
+    model.add_contact("pair", secondary=sides[0], primary=sides[1])
+    step = fc.solve(model, fc.linear_ramp(1))[-1]
+    c1, c2 = np.linalg.solve([[20.0, 1 / 20.0], [100.0, 1 / 100.0]], [0.02, 0.0])  # u_r = c1 r + c2 / r
+    exact = E / (1 + NU) * (c2 / 50.0**2 - c1 / (1 - 2 * NU))
+    assert step.contact["pair"].active.all()
+    np.testing.assert_allclose(step.contact["pair"].pressure, exact, rtol=0.01)
+    X, u = model.mesh.points, step.displacement
+    assert np.abs(X[:, 0] * u[:, 1] - X[:, 1] * u[:, 0]).max() < 1e-6 * 100.0
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("part", [0.0, 0.1, 0.5])
+def test_what_matches_at_first_is_right_after_sliding(part, swapped):
+    """A shoe slid in its hollow by a part of a facet: a coarse mesh has the force of a fine one."""
+    angle = part * 0.2 * np.pi / 16
+
+    def force(level: int, element: str) -> float:
+        cells = 16 * level
+        shoe = bent(element, (48.0, 50.0), (cells, 2 * level), (-0.4 * np.pi, -0.6 * np.pi))
+        hollow = bent(element, (50.0, 54.0), (2 * cells, 4 * level), (-0.3 * np.pi, -0.7 * np.pi))
+        model = fc.Model(union(named(shoe, "SHOE"), named(hollow, "HOLLOW")), "plane_strain")
+        model.add_material(fc.LinearElastic(E, NU))
+        model.fix("HOLLOW_TOP", "xy")
+
+        def moved(X, axis):
+            turned = X @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+            return (turned * (1.0 + 0.05 / np.hypot(*X.T))[:, None] - X)[:, axis]
+
+        model.prescribe("SHOE_BOTTOM", x=lambda X: moved(X, 0), y=lambda X: moved(X, 1))
+        sides = ("HOLLOW_BOTTOM", "SHOE_TOP") if swapped else ("SHOE_TOP", "HOLLOW_BOTTOM")
+        model.add_contact("pair", secondary=sides[0], primary=sides[1])
+        return float(np.linalg.norm(solved(model).force))
+
+    assert force(1, "quad4") == pytest.approx(force(2, "quad8"), rel=0.03)
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("element", ["tri3", "quad4", "tri6", "quad8", "quad9"])
+@pytest.mark.parametrize("upper", [8, 11])
+def test_a_uniform_pressure_in_the_plane(element, upper, swapped):
+    mesh = fc.generate.block_on_block(element, divisions_upper=(upper, 4))
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(E, 0.0))
+    model.fix("LOWER_BOTTOM", "xy")
+    model.prescribe("UPPER_TOP", x=0.0, y=-0.1)
+    sides = ("CONT_LOWER", "CONT_UPPER") if swapped else ("CONT_UPPER", "CONT_LOWER")
+    model.add_contact("pair", secondary=sides[0], primary=sides[1])
+    np.testing.assert_allclose(solved(model).pressure, 0.01 * E, rtol=1e-8)
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("element", ["tet4", "hex8", "tet10", "hex20", "hex27"])
+@pytest.mark.parametrize("upper", [3, 4])
+def test_a_uniform_pressure_in_space(element, upper, swapped):
+    parts = [
+        named(box((1.0, 1.0, 0.5), (n, n, 1), element, (0.0, 0.0, z)), name)
+        for name, n, z in (("LOW", 3, -0.5), ("UP", upper, 0.0))
+    ]
+    model = fc.Model(union(*parts), "3d")
+    model.add_material(fc.LinearElastic(E, 0.0))
+    model.fix("LOW_ZMIN", "xyz")
+    model.prescribe("UP_ZMAX", x=0.0, y=0.0, z=-0.01)
+    sides = ("LOW_ZMAX", "UP_ZMIN") if swapped else ("UP_ZMIN", "LOW_ZMAX")
+    model.add_contact("pair", secondary=sides[0], primary=sides[1])
+    np.testing.assert_allclose(solved(model).pressure, 0.01 * E, rtol=1e-6)
+
+
+def test_sides_that_mix_linear_and_quadratic_facets():
+    parts = [
+        named(fc.generate.block((1.0, 1.0), (4, 4), element, (x, y)), "LOW" if y < 0 else "UP")
+        for element, x, y in (("quad4", 0.0, -1.0), ("quad8", 1.1, -1.0), ("quad8", 0.0, 0.0), ("tri3", 1.1, 0.0))
+    ]
+    model = fc.Model(union(*parts), "plane_strain")
+    model.add_material(fc.LinearElastic(E, 0.0))
+    model.fix("LOW_BOTTOM", "xy")
+    model.prescribe("UP_TOP", x=0.0, y=-0.02)
+    model.add_contact("pair", secondary="UP_BOTTOM", primary="LOW_TOP")
+    np.testing.assert_allclose(solved(model).pressure, 0.01 * E, rtol=1e-8)
+
+
+@pytest.mark.parametrize(("options", "expected"), [
+    ({}, "mortar with dual multipliers"), ({"multipliers": "standard"}, "mortar with standard multipliers"),
+    ({"n_gauss": 4}, "mortar"), ({"formulation": "node_to_segment"}, "node_to_segment"),
 ])  # fmt: skip
-def test_blocks(element, upper, expected):
-    mesh = fc.generate.block_on_block(element, divisions_upper=upper)
-    assert chosen(mesh, "CONT_UPPER", "CONT_LOWER") == expected
+def test_the_choice_is_seen_in_the_model(options, expected):
+    model = fc.Model(fc.generate.block_on_block("quad4"), "plane_strain")
+    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
+    assert f"pair: CONT_UPPER on CONT_LOWER, {expected}" in repr(model)
 
 
-@pytest.mark.parametrize(("element", "expected"), [
-    ("tri3", "node_to_segment"), ("quad4", "node_to_segment"), ("tri6", "mortar"), ("quad8", "mortar"),
-])  # fmt: skip
-def test_half_spheres_are_mirror_images(element, expected):
-    """Their gap grows away from the axis: only where they nearly touch can nodes lie opposite to each other."""
-    assert chosen(half_spheres(element), "CONT1", "CONT2") == expected
-
-
-def test_a_cylinder_on_a_block_does_not_match():
-    assert chosen(fc.generate.cylinder_on_block("quad4"), "CONT_CYLINDER", "CONT_BLOCK") == "mortar"
-
-
-@pytest.mark.parametrize(("element", "divisions", "expected"), [
-    ("hex8", (2, 3, 1), "node_to_segment"), ("tet4", (2, 3, 2), "node_to_segment"), ("hex8", (3, 2, 1), "mortar"),
-    ("hex20", (2, 3, 1), "mortar"), ("tet10", (2, 3, 1), "mortar"),
-])  # fmt: skip
-def test_boxes(element, divisions, expected):
-    parts = [box((1.0, 1.0, 1.0), d, element, (0.0, 0.0, z)) for d, z in (((2, 3, 1), -1.0), (divisions, 0.0))]
-    mesh = union(*(renamed(p, {n: f"{side}_{n}" for n in p.group_names}) for p, side in zip(parts, "LU", strict=True)))
-    assert chosen(mesh, "U_ZMIN", "L_ZMAX") == expected
-
-
-def test_it_does_not_depend_on_units_or_place():
-    for scale, turn in ((1e-9, 0.0), (1.0, 1.1), (1e3, 2.5)):
-        rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-        for upper, expected in (((8, 4), "node_to_segment"), ((7, 4), "mortar")):
-            mesh = fc.generate.block_on_block("quad4", divisions_upper=upper)
-            mesh = mesh.replace(points=scale * mesh.points @ rotation.T)
-            assert chosen(mesh, "CONT_UPPER", "CONT_LOWER") == expected
-
-
-def test_the_choice_is_seen_in_the_model_and_in_the_log(caplog):
+def test_the_choice_is_seen_in_the_log(caplog):
     model = fc.Model(fc.generate.block_on_block("quad4"), "plane_strain")
     with caplog.at_level(logging.INFO, "fastcontact"):
         model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER")
-        asked = fc.Model(model.mesh, "plane_strain")
-        asked.add_contact("other", secondary="CONT_UPPER", primary="CONT_LOWER", formulation="node_to_segment")
-    assert "pair: CONT_UPPER on CONT_LOWER, mortar" in repr(model)
-    assert "other: CONT_UPPER on CONT_LOWER, node_to_segment" in repr(asked)
     assert caplog.messages == [
-        "contact 'pair': formulation mortar, since the nodes of the two sides do not lie opposite to each other"
+        "contact 'pair': mortar with dual multipliers, since these are right on any two surfaces and cost little with "
+        "every linear solver"
     ]

@@ -34,7 +34,8 @@ def spheres(E: float = 20_000.0, friction: float = 0.0, arc: float = 3.0) -> fc.
     model.fix("A1A2", "x")
     model.prescribe("A2B2", y=-2.0)
     model.prescribe("A1B1", y=+2.0)
-    model.add_contact("hertz", secondary="CONT1", primary="CONT2", friction=friction)
+    options = {"formulation": "node_to_segment", "friction": friction}
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2", **options)
     return model
 
 
