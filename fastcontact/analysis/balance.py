@@ -19,6 +19,8 @@ from fastcontact.errors import ConvergenceError
 Array = NDArray[np.float64]
 # Round-off of a sum of internal forces, in units of the sum of their sizes.
 ROUND_OFF = 16 * float(np.finfo(float).eps)
+# Forces are there beyond so much round-off from elsewhere.
+THERE = 100.0
 # What is allowed where there are no forces but round-off, in the same units.
 ALLOWED = 1e-12
 
@@ -112,11 +114,13 @@ def balance(problem: Problem, u: Array, contact_force: Array, external: Array, l
 def _round_off(problem: Problem, u: Array, forces: tuple[Array, ...], largest_force: float) -> float:
     """Return how far internal forces may be off where there are no other `forces` (n_dofs,) than their round-off [force].
 
-    That is so where no degree of freedom knows its force to the criterion. Where forces are there, they are what counts:
-    stiff parts that move far may not hide what is missing from soft ones.
+    That is so where no degree of freedom knows its force to the criterion, or the force itself may be round-off from
+    elsewhere. Where forces are there, they are what counts: stiff parts that move far may not hide what is missing from
+    soft ones.
     """
-    row_sums = problem.system.K.row_sums(u)
-    known = max(float(np.max(np.abs(part) * problem.criteria.relative - ROUND_OFF * row_sums)) for part in forces)
-    if known > SLACK * largest_force * problem.criteria.relative:
-        return SLACK * largest_force
-    return max(max(ALLOWED, 10 * problem.solver.tolerance) * largest(row_sums), SLACK * largest_force)
+    row_sums, slack = problem.system.K.row_sums(u), SLACK * largest_force
+    noise = max(slack, THERE * ROUND_OFF * largest(row_sums))
+    for part in map(np.abs, forces):
+        if ((part > noise) & (part * problem.criteria.relative > ROUND_OFF * row_sums)).any():
+            return slack
+    return max(max(ALLOWED, 10 * problem.solver.tolerance) * largest(row_sums), slack)
