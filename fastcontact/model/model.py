@@ -371,9 +371,9 @@ class Model:
               friction, likewise.
             - ``penalty``: pressure by penetration [pressure / length], instead of none at all; results tell the
               penetration. It does not soften friction.
-            - ``normals``: ``"facet"`` or ``"averaged"`` between the facets at a node, which curved sides that fit closely
-              need; ``projection_tolerance``: how far points may stand out beyond the end of the primary side, in facet
-              lengths.
+            - ``normals``: ``"facet"`` or ``"averaged"`` between the facets that meet at a node at less than 45 degrees, which
+              curved sides that fit closely need; ``projection_tolerance``: how far points may stand out beyond the end of the
+              primary side and still carry force, in facet lengths.
         """
         if formulation is None:
             formulation, options, reason = default_formulation(self.mesh.dim, options)

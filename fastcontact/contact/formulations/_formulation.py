@@ -16,14 +16,15 @@ from fastcontact.contact.constraints import Compliance, Constraints
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair, rows_along, tangents
-from fastcontact.contact.projection import interpolated, nodal_normals, places
+from fastcontact.contact.projection import at_nodes_of_facets, interpolated, nodal_normals, places, smooth_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.tied import TiedPair, tied
 from fastcontact.errors import ContactError, unknown
 
 Array = NDArray[np.float64]
 NORMALS = ("facet", "averaged")
-# Nodes on an axis or plane of symmetry stand out a little beyond facets that lean, in facet lengths.
+# Nodes on an axis or plane of symmetry stand out a little beyond facets that lean, nodes at the end of one side beyond
+# that of the other where the two strain differently, in facet lengths.
 ON_SYMMETRY = 0.05
 
 
@@ -46,7 +47,8 @@ class Formulation(ABC):
     friction : float
         Coefficient of Coulomb friction, zero for none [-].
     projection_tolerance : float
-        How far a point may stand out beyond the end of its facet and still be paired, in facet lengths.
+        How far a point may stand out beyond the end of the primary side and still be paired, in facet lengths. A little by
+        default, lest points at the very end come and go as the bodies strain.
     normals : str, optional
         ``"facet"``: of the primary facet at the projection; ``"averaged"``: interpolated between nodal means. By default
         the former in 2D and the latter in 3D, where a point opposite an edge between facets often flips for ever.
@@ -63,7 +65,7 @@ class Formulation(ABC):
     modulus: float
 
     friction: float = 0.0
-    projection_tolerance: float = 0.5
+    projection_tolerance: float = ON_SYMMETRY
     normals: str | None = None
     options: PairOptions = field(default_factory=PairOptions, repr=False)
     supported: NDArray[np.bool_] | None = field(default=None, repr=False)
@@ -182,7 +184,8 @@ class Formulation(ABC):
         local[self.secondary.points] = np.arange(len(self.secondary.points))
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
         ours = np.einsum("nk,nkd->nd", shape, nodal_normals(self.secondary, deformed)[local[nodes]])
-        theirs = interpolated(nodal_normals(self.primary, deformed), facing)
+        theirs = at_nodes_of_facets(smooth_normals(self.primary, deformed))[pairing.facet[rows]]
+        theirs = interpolated(theirs, facing)
         mean = theirs - ours / np.linalg.norm(ours, axis=1, keepdims=True)
         mean /= np.linalg.norm(mean, axis=1, keepdims=True)
         apart = np.einsum("nk,nkd->nd", shape, start[nodes])
