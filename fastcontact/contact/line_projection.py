@@ -19,20 +19,32 @@ def along_line_normals(
     """Project points (n, 2) on a line along its interpolated normals; see `projection.along_normals`."""
     n_facets = side.n_facets
     corners, at_nodes = np.zeros((n_facets, 3, 2)), np.zeros((n_facets, 3, 2))
+    at_nodes[:, : normals.shape[1]] = normals
     counts, ends = np.empty(n_facets, np.intp), np.empty((n_facets, 2), np.intp)
     first = 0
     for block in side.blocks:
         rows, k = slice(first, first + len(block.facets)), block.facets.shape[1]
-        corners[rows, :k], at_nodes[rows, :k] = coordinates[block.facets], normals[block.local]
-        counts[rows], ends[rows] = k, block.local[:, :2]
+        corners[rows, :k], counts[rows], ends[rows] = coordinates[block.facets], k, block.local[:, :2]
         first = rows.stop
     facet, xi, overhang = start.facet.astype(np.intp), start.xi[:, 0].copy(), start.overhang.copy()
     work = np.empty(3), np.empty(3)
-    neighbour = _neighbours(ends, len(side.points))
+    neighbour = np.where(smooth_ends(side, normals), _neighbours(ends, len(side.points)), -1)
     line_projection_kernels.along_normals(
         np.ascontiguousarray(points), corners, at_nodes, counts, neighbour, facet, xi, overhang, *work
     )
     return facet, xi[:, None], overhang
+
+
+def smooth_ends(side: Surface, normals: Array) -> NDArray[np.bool_]:
+    """Return which ends (n_facets, 2) of lines another line goes on from without a corner.
+
+    `normals` (n_facets, k, 2) are those of the facets at their nodes, see `projection.smooth_normals`: the same for both
+    facets at such an end.
+    """
+    ends = np.concatenate([block.local[:, :2] for block in side.blocks])
+    total = np.zeros((len(side.points), 2))
+    np.add.at(total, ends, normals[:, :2])
+    return np.asarray(side.inner_ends & (np.linalg.norm(total, axis=1)[ends] > 2.0 - 1e-6))
 
 
 def _neighbours(ends: Indices, n_points: int) -> Indices:

@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fastcontact.contact.line_projection import along_line_normals
+from fastcontact.contact.line_projection import along_line_normals, smooth_ends
 from fastcontact.contact.obstacles.rigid_side import RigidSide
-from fastcontact.contact.projection import along_normals, interpolated, nodal_normals, places
+from fastcontact.contact.projection import (
+    Places,
+    along_normals,
+    at_nodes_of_facets,
+    interpolated,
+    places,
+    smooth_normals,
+)
 from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.contact.surface import Surface
 
 Array = NDArray[np.float64]
-# In facet lengths: how far beyond both facets at a node a point may lie and still face it.
+# In facet lengths: how far beyond both facets at a node a point may lie and still face it; what is rounding.
 FOLDED = 0.5
+ROUNDING = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +71,9 @@ class Pairing:
         False where a candidate stands out beyond the end of the primary surface.
     offset : ndarray (n,), optional
         What the gap is besides ``normal . x`` where the primary side is a rigid obstacle [length]; None for facets.
+    beyond : ndarray (n, dim - 1), optional
+        How far beyond the end of the primary surface candidates stand, in reference coordinates of the facet, which goes
+        on straight there; None where none does.
     """
 
     facet: NDArray[np.intp]
@@ -70,6 +81,14 @@ class Pairing:
     normal: Array
     paired: NDArray[np.bool_]
     offset: Array | None = None
+    beyond: Array | None = None
+
+    def places(self, primary: Surface, rows: NDArray[np.intp]) -> Places:
+        """Return the points of `primary` that candidates `rows` (n,) face, facets going on straight beyond their ends."""
+        found = places(primary, self.facet[rows], self.xi[rows])
+        if self.beyond is None:
+            return found
+        return replace(found, shape=found.shape + np.einsum("nkj,nj->nk", found.gradient, self.beyond[rows]))
 
 
 def pair(
@@ -83,9 +102,11 @@ def pair(
     """Project candidate positions (n, dim) on the closest facet of `primary` at nodal `coordinates` [length].
 
     A candidate farther out than `projection_tolerance` facet lengths beyond the end of its facet is not paired
-    (TOLE_PROJ_EXT of code_aster). Unless `normals` is ``"facet"``, the normal is interpolated between nodal means of
-    the facets' normals, so that it does not jump where facets meet, and the candidates are projected along it; a unit
-    vector (dim,) is the normal everywhere. A rigid obstacle is displaced by `obstacle` (dim,) [length].
+    (TOLE_PROJ_EXT of code_aster). One that is paired there faces the facet gone on straight, so that the forces on both
+    sides have one line of action; they balance in moment. Unless `normals` is ``"facet"``, the normal is interpolated
+    between nodal means of the facets' normals, so that it does not jump where facets meet but for corners, and the
+    candidates are projected along it; a unit vector (dim,) is the normal everywhere. A rigid obstacle is displaced by
+    `obstacle` (dim,) [length].
 
     Raises
     ------
@@ -99,28 +120,51 @@ def pair(
         return Pairing(nowhere, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)
     found = closest_of_kinds(candidates, primary.corners(coordinates))
     if normals == "facet":
-        allowed = _allowed(primary, found, projection_tolerance)
-        return Pairing(found.facet, found.xi, found.normal, found.overhang <= allowed)
-    if isinstance(normals, str):
-        at_nodes = nodal_normals(primary, coordinates)
-    else:
-        at_nodes = np.tile(np.array(normals), (len(primary.points), 1))
+        inner = _at_smooth_ends(primary, coordinates, found)
+        paired = found.overhang <= np.where(inner, max(projection_tolerance, FOLDED), projection_tolerance)
+        outside = paired & ~inner & (found.overhang > ROUNDING)
+        return _straight_on(
+            Pairing(found.facet, found.xi, found.normal, paired), candidates, primary, coordinates, outside
+        )
+    at_nodes = at_nodes_of_facets(smooth_normals(primary, coordinates))
+    if not isinstance(normals, str):
+        at_nodes = np.broadcast_to(np.array(normals), at_nodes.shape).copy()
     project = along_normals if coordinates.shape[1] == 3 else along_line_normals
     facet, xi, overhang = project(candidates, primary, coordinates, at_nodes, found)
-    normal = interpolated(at_nodes, places(primary, facet, xi))
-    return Pairing(facet, xi, normal, overhang <= projection_tolerance)
+    normal = interpolated(at_nodes[facet], places(primary, facet, xi))
+    paired = overhang <= projection_tolerance
+    return _straight_on(
+        Pairing(facet, xi, normal, paired), candidates, primary, coordinates, paired & (overhang > ROUNDING)
+    )
 
 
-def _allowed(primary: Surface, found: Closest, projection_tolerance: float) -> Array | float:
-    """Return how far (n,) candidates may stand out beyond the facets they are closest to.
+def _straight_on(
+    pairing: Pairing, candidates: Array, primary: Surface, coordinates: Array, outside: NDArray[np.bool_]
+) -> Pairing:
+    """Return the pairing with how far those `outside` (n,) stand beyond the ends of their facets."""
+    rows = np.flatnonzero(outside)
+    if not len(rows):
+        return pairing
+    at = places(primary, pairing.facet[rows], pairing.xi[rows])
+    corners = coordinates[at.nodes]
+    apart = candidates[rows] - np.einsum("nk,nkd->nd", at.shape, corners)
+    axes = np.concatenate([np.einsum("nkj,nkd->ndj", at.gradient, corners), pairing.normal[rows][:, :, None]], axis=2)
+    beyond = np.zeros_like(pairing.xi)
+    beyond[rows] = np.linalg.solve(axes, apart[:, :, None])[:, :-1, 0]
+    return replace(pairing, beyond=beyond)
+
+
+def _at_smooth_ends(primary: Surface, coordinates: Array, found: Closest) -> NDArray[np.bool_]:
+    """Return which candidates (n,) stand out at an end of a line where another line goes on from without a corner.
 
     On lines that fold inward, points at a distance lie beyond the ends of both facets at a node, but not beyond the end
-    of the surface.
+    of the surface. At a corner they lie beside it.
     """
-    if found.position.shape[1] == 3:
-        return projection_tolerance
-    inside = primary.inner_ends[found.facet, (found.xi[:, 0] > 0.0).astype(np.intp)]
-    return np.where(inside, max(projection_tolerance, FOLDED), projection_tolerance)
+    out = found.overhang > 0.0
+    if found.position.shape[1] == 3 or not out.any():
+        return np.zeros(len(out), bool)
+    smooth = smooth_ends(primary, at_nodes_of_facets(smooth_normals(primary, coordinates)))
+    return np.asarray(out & smooth[found.facet, (found.xi[:, 0] > 0.0).astype(np.intp)])
 
 
 def filled_up(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
@@ -201,7 +245,7 @@ def rows_along(
     rows = np.flatnonzero(pairing.paired)
     nodes, weights = candidates.nodes[rows], candidates.shape[rows]
     if not isinstance(primary, RigidSide):
-        facing = places(primary, pairing.facet[rows], pairing.xi[rows])
+        facing = pairing.places(primary, rows)
         nodes, weights = np.hstack([nodes, facing.nodes]), np.hstack([weights, -facing.shape])
     values = weights[:, :, None] * direction[rows][:, None, :]
     columns = nodes[:, :, None] * dim + np.arange(dim)

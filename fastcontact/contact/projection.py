@@ -7,6 +7,7 @@ moves on smoothly (Puso and Laursen, 2004, section 3; Popp, Gitterle, Gee and Wa
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,8 @@ STEP = 1e-13
 INSIDE = 1e-10
 # A projection that ends farther beyond its facet than this, in facet lengths, is not trusted.
 BEYOND = 1.0
+# Facets that meet at a smaller angle than this approximate a smooth surface; others form a corner [degrees].
+CORNER = 45.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +90,43 @@ def nodal_normals(side: Surface, coordinates: Array) -> Array:
     return total / np.linalg.norm(total, axis=1, keepdims=True)
 
 
+def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
+    """Return by block the unit normals (n_facets, n_nodes, dim) that facets have at their nodes as parts of a smooth surface.
+
+    The nodal means of `nodal_normals`; at corners the mean of those facets alone that meet the facet smoothly, so that a
+    punch is flat up to its corner, also where its flanks belong to the surface.
+    """
+    means = nodal_normals(side, coordinates)
+    own = [facet_normals(block, coordinates) for block in side.blocks]
+    smooth = [means[block.local] for block in side.blocks]
+    # A node is at a corner where a facet leans from the mean by more than half the angle between two that form one.
+    flat, corner = np.cos(np.radians(0.5 * CORNER)), np.zeros(len(side.points), bool)
+    for block, normals, mean in zip(side.blocks, own, smooth, strict=True):
+        corner[block.local[np.einsum("fad,fad->fa", normals, mean) < flat]] = True
+    if not corner.any():
+        return smooth
+    node = np.concatenate([block.local.ravel() for block in side.blocks])
+    weight = np.concatenate([_angles(block, coordinates).ravel() for block in side.blocks])
+    normal = np.concatenate([normals.reshape(-1, coordinates.shape[1]) for normals in own])
+    joined = np.concatenate([normals.reshape(-1, coordinates.shape[1]) for normals in smooth])
+    for at in np.flatnonzero(corner):
+        here = np.flatnonzero(node == at)
+        beside = normal[here] @ normal[here].T > np.cos(np.radians(CORNER))
+        total = (beside * weight[here]) @ normal[here]
+        joined[here] = total / np.linalg.norm(total, axis=1, keepdims=True)
+    ends = np.cumsum([normals.shape[0] * normals.shape[1] for normals in own])[:-1]
+    return [part.reshape(like.shape) for part, like in zip(np.split(joined, ends), own, strict=True)]
+
+
+def at_nodes_of_facets(parts: Sequence[Array]) -> Array:
+    """Return what blocks have at the nodes of their facets (n_facets, k, ...) as one array, as wide as the widest block.
+
+    The last entry of facets with fewer nodes is repeated, as in `places`.
+    """
+    width = max(part.shape[1] for part in parts)
+    return np.concatenate([part[:, np.minimum(np.arange(width), part.shape[1] - 1)] for part in parts])
+
+
 def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
     """Return the unit normals (n_facets, n_nodes, dim) of facets at their own nodes."""
     element = elements.get(block.element)
@@ -110,8 +150,8 @@ def _angles(block: FacetBlock, coordinates: Array) -> Array:
 
 
 def interpolated(normals: Array, at: Places) -> Array:
-    """Return unit normals (n, dim) at places, interpolated from nodal ones (m, dim)."""
-    normal = np.einsum("nk,nkd->nd", at.shape, normals[at.local])
+    """Return unit normals (n, dim) at places, interpolated from those at the nodes of their facets (n, k, dim)."""
+    normal = np.einsum("nk,nkd->nd", at.shape, normals)
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
@@ -127,8 +167,8 @@ def along_normals(
     side : Surface
     coordinates : ndarray (n_points, 3)
         Of all nodes [length].
-    normals : ndarray (m, 3)
-        Unit normals at the nodes of the surface.
+    normals : ndarray (n_facets, k, 3)
+        Unit normals of the facets at their nodes, see `smooth_normals`.
     start : Closest
         Closest points; kept where the projection fails.
 
@@ -171,7 +211,7 @@ def _newton(
     busy = np.arange(len(points))
     for _ in range(MAX_ITERATIONS):
         at = places(side, facet[busy], xi[busy])
-        corners, directions = coordinates[at.nodes], normals[at.local]
+        corners, directions = coordinates[at.nodes], normals[facet[busy]]
         carried = corners + height[busy, None, None] * directions
         residual = points[busy] - np.einsum("nk,nkd->nd", at.shape, carried)
         normal = np.einsum("nk,nkd->nd", at.shape, directions)

@@ -408,10 +408,10 @@ class Model:
               ``"primary"``: all relative motion along the tangents to the primary side is, as in code_aster.
             - ``search_distance``: what is farther off than this, or deeper inside, now and as the load step begins, is not
               faced [length].
-            - ``normals``: ``"facet"`` or ``"averaged"`` between the facets at a node, which curved sides that fit closely
-              need; ``"secondary"``: those of the secondary side; a vector out of the primary side's body: one normal for
-              all of it. ``projection_tolerance``: how far points may stand out beyond the end of the primary side, in
-              facet lengths.
+            - ``normals``: ``"facet"`` or ``"averaged"`` between the facets that meet at a node at less than 45 degrees, which
+              curved sides that fit closely need; ``"secondary"``: those of the secondary side; a vector out of the primary
+              side's body: one normal for all of it. ``projection_tolerance``: how far points may stand out beyond the end of
+              the primary side and still carry force, in facet lengths.
         """
         if formulation is None:
             formulation, options, reason = default_formulation(self.mesh.dim, options)

@@ -138,8 +138,8 @@ def _formulation(contact: Entry, zone: Entry, mesh: fc.Mesh, *, against_obstacle
         options = {"formulation": "continuous", "integration": rule}
         if rule == "gauss":
             options["n_gauss"] = 3
-    if "TOLE_PROJ_EXT" in zone and not against_obstacle:
-        options["projection_tolerance"] = float(zone["TOLE_PROJ_EXT"])
+    if not against_obstacle:
+        options["projection_tolerance"] = float(zone.get("TOLE_PROJ_EXT", 0.5))
     return options
 
 

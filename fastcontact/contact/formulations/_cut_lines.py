@@ -20,6 +20,8 @@ from fastcontact.mesh import elements, quadrature
 Array = NDArray[np.float64]
 # Parts of a facet shorter than this, in its own length, are rounding errors of the cut.
 SLIVER = 1e-10
+# Lines face each other if their normals enclose more than 120 degrees: beside a corner the flank is closest, but not faced.
+OPPOSITE = -0.5
 NO_BORDERS = np.empty(0, np.intp), np.empty(0)
 
 
@@ -77,6 +79,13 @@ def _cuts(
     return facet[:-1][piece], xi[:-1][piece], xi[1:][piece]
 
 
+def normals_at(block: FacetBlock, coordinates: Array, points: LinePoints) -> Array:
+    """Return the unit normals (n, 2) of a block at integration points, for nodal `coordinates` (n_points, 2)."""
+    gradient = elements.get(block.element).gradient(points.xi[:, None])[:, :, 0]
+    tangent = np.einsum("nk,nkd->nd", gradient, coordinates[block.facets[points.facet]])
+    return np.column_stack([tangent[:, 1], -tangent[:, 0]]) / np.linalg.norm(tangent, axis=1, keepdims=True)
+
+
 def line_overlap(
     secondary: Surface, primary: Surface, reference: Array, deformed: Array, axisymmetric: bool, tolerance: float
 ) -> Overlap:
@@ -99,8 +108,9 @@ def line_overlap(
         points = line_points(block, primary, reference, deformed, axisymmetric, k + 2)
         at = Candidates(block.facets[points.facet], points.shape).positions(deformed)
         facing = pair(at, primary, deformed, tolerance)
+        opposite = np.einsum("nd,nd->n", normals_at(block, deformed, points), facing.normal) < OPPOSITE
         # A piece faces the other side with all its points or none: with too few it would not carry a field of its own.
-        mostly = facing.paired.reshape(-1, k + 2).mean(axis=1) > 0.5
+        mostly = (facing.paired & opposite).reshape(-1, k + 2).mean(axis=1) > 0.5
         area = np.where(np.repeat(mostly, k + 2), points.area, 0.0)
         mass = np.zeros((n, k, k))
         np.add.at(mass, points.facet, area[:, None, None] * points.shape[:, :, None] * points.shape[:, None, :])

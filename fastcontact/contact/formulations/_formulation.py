@@ -17,7 +17,7 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair, rows_along, tangents
 from fastcontact.contact.prescribed_normals import Normals, checked_normals, opposed
-from fastcontact.contact.projection import interpolated, nodal_normals, places
+from fastcontact.contact.projection import at_nodes_of_facets, interpolated, nodal_normals, places, smooth_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.tied import TiedPair, tied
 from fastcontact.errors import ContactError, unknown
@@ -26,7 +26,8 @@ Array = NDArray[np.float64]
 # Vectors shorter than this have no direction; unit normals that differ by less are the same.
 TINY, ALIKE = 1e-300, 1e-9
 SLIPS = ("symmetric", "primary")
-# Nodes on an axis or plane of symmetry stand out a little beyond facets that lean, in facet lengths.
+# Nodes on an axis or plane of symmetry stand out a little beyond facets that lean, nodes at the end of one side beyond
+# that of the other where the two strain differently, in facet lengths.
 ON_SYMMETRY = 0.05
 
 
@@ -49,7 +50,8 @@ class Formulation(ABC):
     friction : float
         Coefficient of Coulomb friction, zero for none [-].
     projection_tolerance : float
-        How far a point may stand out beyond the end of its facet and still be paired, in facet lengths.
+        How far a point may stand out beyond the end of the primary side and still be paired, in facet lengths. A little by
+        default, lest points at the very end come and go as the bodies strain.
     normals : str or sequence of float, optional
         Along which the gap is measured. ``"facet"``: that of the primary facet at the projection; ``"averaged"``:
         interpolated between nodal means. By default the former in 2D and the latter in 3D, where a point opposite an edge
@@ -72,7 +74,7 @@ class Formulation(ABC):
     modulus: float
 
     friction: float = 0.0
-    projection_tolerance: float = 0.5
+    projection_tolerance: float = ON_SYMMETRY
     normals: Normals | None = None
     slip: str = "symmetric"
     options: PairOptions = field(default_factory=PairOptions, repr=False)
@@ -228,7 +230,8 @@ class Formulation(ABC):
         rows = np.flatnonzero(pairing.paired)
         facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
-        theirs = interpolated(nodal_normals(self.primary, deformed), facing)
+        theirs = at_nodes_of_facets(smooth_normals(self.primary, deformed))[pairing.facet[rows]]
+        theirs = interpolated(theirs, facing)
         mean = theirs - self._secondary_normals(Candidates(nodes, shape), deformed)
         length = np.linalg.norm(mean, axis=1, keepdims=True)
         mean = np.divide(mean, length, out=np.zeros_like(mean), where=length > ALIKE)

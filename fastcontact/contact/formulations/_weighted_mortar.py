@@ -31,7 +31,7 @@ from fastcontact.contact.formulations._rows import Entries, rows_of, scaled
 from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
 from fastcontact.contact.pairing import Candidates, tangents_by_axes
 from fastcontact.contact.prescribed_normals import Normals
-from fastcontact.contact.projection import facet_normals, nodal_normals
+from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh import elements
@@ -243,15 +243,14 @@ class WeightedMortar(Formulation):
         if not isinstance(self.normals, str):
             return np.tile(np.array(self.normals), (len(self.secondary.points), 1))
         mean = np.zeros((len(self.secondary.points), deformed.shape[1]))
-        averaged = nodal_normals(self.primary, deformed)
+        normals_of = {
+            block.element: facet_normals(block, deformed) if self.normals == "facet" else smooth
+            for block, smooth in zip(self.primary.blocks, smooth_normals(self.primary, deformed), strict=True)
+        }
         tests = dict(zip((block.element for block in self.secondary.blocks), self._test, strict=True))
         for coupling in overlap.couplings:
             ours, theirs = coupling.pairs.T
-            if self.normals == "averaged":
-                normals = averaged[coupling.primary.local[theirs]]
-            else:
-                normals = facet_normals(coupling.primary, deformed)[theirs]
-            faced = coupling.integrals @ normals
+            faced = coupling.integrals @ normals_of[coupling.primary.element][theirs]
             np.add.at(mean, coupling.secondary.local[ours], tests[coupling.secondary.element] @ faced)
         length = np.linalg.norm(mean, axis=1, keepdims=True)
         return np.where(length > 0, mean / np.where(length > 0, length, 1.0), np.eye(mean.shape[1])[-1])

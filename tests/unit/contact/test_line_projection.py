@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 import fastcontact as fc
 from fastcontact.contact.line_projection import along_line_normals
 from fastcontact.contact.pairing import pair
-from fastcontact.contact.projection import interpolated, nodal_normals, places
+from fastcontact.contact.projection import at_nodes_of_facets, interpolated, places, smooth_normals
 from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import surface
 from fastcontact.mesh import elements
@@ -32,20 +32,20 @@ def test_points_lie_along_the_normal_of_their_projection(element):
     rng = np.random.default_rng(3)
     x = rng.uniform(0.1, 3.9, 400)
     candidates = np.column_stack([x, 1.0 + 0.3 * np.sin(2.5 * x) + rng.uniform(-0.1, 0.25, 400)])
-    normals = nodal_normals(side, mesh.points)
+    normals = at_nodes_of_facets(smooth_normals(side, mesh.points))
     start = closest_of_kinds(candidates, side.corners(mesh.points))
     facet, xi, overhang = along_line_normals(candidates, side, mesh.points, normals, start)
     at = places(side, facet, xi)
     foot = np.einsum("nk,nkd->nd", at.shape, mesh.points[at.nodes])
     assert (overhang == 0.0).all()
-    assert np.abs(cross(candidates - foot, interpolated(normals, at))).max() < 1e-13
+    assert np.abs(cross(candidates - foot, interpolated(normals[facet], at))).max() < 1e-13
 
 
 @pytest.mark.parametrize("element", ["quad4", "quad8"])
 def test_against_a_plain_root_on_every_facet(element):
     """Height over the surface is small, so that each point has one projection: that of a bracketed root."""
     mesh, side = wavy(element)
-    normals = nodal_normals(side, mesh.points)
+    normals = at_nodes_of_facets(smooth_normals(side, mesh.points))
     reference = elements.get(side.element)
     rng = np.random.default_rng(5)
     x = rng.uniform(0.1, 3.9, 60)
@@ -56,7 +56,7 @@ def test_against_a_plain_root_on_every_facet(element):
 
         def aside(s, f, point=point):
             N = reference.shape(np.array([[s]]))[0]
-            return float(cross(point - N @ mesh.points[side.facets[f]], N @ normals[side.local[f]]))
+            return float(cross(point - N @ mesh.points[side.facets[f]], N @ normals[f]))
 
         roots = [
             (f, brentq(aside, -1.0, 1.0, args=(f,), xtol=1e-14))

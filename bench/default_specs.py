@@ -1,0 +1,72 @@
+"""Open validation specs by each choice: ``python bench/default_specs.py DIR [DIR ...]``.
+
+The specs (JSON, with MED meshes) are read by the runner of tests/verification; of each run, told are the values out of the
+tolerance of the spec, of all, and by how many times the worst exceeds it.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "verification"))
+
+import aster_contact
+import aster_spec
+import aster_values
+import test_code_aster_cases
+from aster_mesh import MissingError
+from defaults import AGAINST_OBSTACLES, CHOICES
+
+import fastcontact as fc
+
+OWN = aster_contact._formulation
+OTHERS = {"continuous": "continuous gauss"}
+
+
+def told(path: Path, run: int, choice: str) -> str:
+    """Return how a run ends by a choice; "runner": by that which the runner itself makes."""
+
+    def formulation(contact: Any, zone: Any, mesh: fc.Mesh, *, against_obstacle: bool) -> dict[str, Any]:
+        if choice == "runner":
+            return OWN(contact, zone, mesh, against_obstacle=against_obstacle)
+        if against_obstacle:
+            return {"formulation": "continuous", **AGAINST_OBSTACLES.get(OTHERS.get(choice, choice), {})}
+        return {"formulation": None, **CHOICES[choice]}
+
+    aster_contact._formulation = formulation
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            problem = aster_spec.problem(path, run)
+            steps = aster_spec.solve(problem)
+        except MissingError:
+            return "-"
+        except Exception as error:
+            return type(error).__name__
+        ratios = []
+        for test in problem.spec["tests"]:
+            if test["run"] == run and test["value_reference"] is not None:
+                try:
+                    given = test_code_aster_cases.amended(test, problem)
+                    ratios.append(aster_values.verdict(*given, problem, steps).ratio)
+                except MissingError:
+                    continue
+    wrong = sum(not ratio <= 1.0 for ratio in ratios)
+    return f"{wrong} of {len(ratios)}" + (f" ({max(ratios):.1f})" if wrong else "")
+
+
+def main() -> None:
+    choices = ["runner", *CHOICES]
+    print("| spec | " + " | ".join(choices) + " |\n" + "| --- " * (1 + len(choices)) + "|")
+    for folder in sys.argv[1:]:
+        for path, run in aster_spec.specs(Path(folder)):
+            print(
+                f"| {path.stem}-{run} | " + " | ".join(told(path, run, choice) for choice in choices) + " |", flush=True
+            )
+
+
+if __name__ == "__main__":
+    main()

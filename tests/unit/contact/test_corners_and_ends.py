@@ -1,0 +1,120 @@
+"""Where the primary side has a corner or ends nothing beside it carries force, and both sides balance in moment."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.contact.pairing import pair
+from fastcontact.contact.projection import smooth_normals
+from fastcontact.contact.surface import surface
+from fastcontact.elasticity.stiffness import stiffness
+from fastcontact.mesh.generate import block, box, renamed, union
+
+WAYS = [
+    {"formulation": "node_to_segment", "normals": "facet"}, {"formulation": "node_to_segment", "normals": "averaged"},
+    {"formulation": "continuous"}, {"formulation": "mortar"}, {"formulation": "mortar", "multipliers": "dual"},
+]  # fmt: skip
+NAMES = ["facet", "averaged", "continuous", "standard", "dual"]
+
+
+def named(mesh, prefix):
+    return renamed(mesh, {group: f"{prefix}_{group}" for group in mesh.group_names})
+
+
+def punch(dim=2, shift=0.55, nu=0.0, element=None, cells=(10, 7)):
+    """A punch on a block twice as wide, which its corners press into."""
+    n, m = cells
+    if dim == 2:
+        low = block((2.0, 1.0), (n, n // 2), element or "quad4", (0.0, -1.0))
+        up = block((1.0, 1.0), (m, m), element or "quad4", (shift, 0.0))
+    else:
+        low = box((2.0, 2.0, 1.0), (n, n, 2), element or "hex8", (0.0, 0.0, -1.0))
+        up = box((1.0, 1.0, 1.0), (m, m, 2), element or "hex8", (shift, shift, 0.0))
+        low, up = (renamed(mesh, {"ZMIN": "BOTTOM", "ZMAX": "TOP"}) for mesh in (low, up))
+    mesh = union(named(low, "L"), named(up, "U"))
+    if dim == 2:
+        whole = np.concatenate([mesh.cell_groups[name] for name in ("U_BOTTOM", "U_LEFT", "U_RIGHT")])
+        mesh = mesh.with_groups(cells={"U_WHOLE": whole})
+    model = fc.Model(mesh, "plane_strain" if dim == 2 else "3d")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=nu))
+    model.fix("L_BOTTOM", "xyz"[:dim])
+    model.prescribe("U_TOP", **dict.fromkeys("xyz"[: dim - 1], 0.0), **{"xyz"[dim - 1]: -0.01})
+    return model
+
+
+def pressed(model, secondary, primary, **options):
+    model.add_contact("pair", secondary=secondary, primary=primary, **options)
+    return fc.solve(model, fc.linear_ramp(1))[-1]
+
+
+@pytest.mark.parametrize("way", [WAYS[0], WAYS[1], WAYS[4]], ids=[NAMES[0], NAMES[1], NAMES[4]])
+@pytest.mark.parametrize("cells", [(8, 4), (8, 7)])
+def test_flanks_beside_the_corner_of_a_punch_change_nothing(way, cells):
+    """They stand at right angles to what the punch presses: the block rises beside it, and touches none of them."""
+    found = [
+        pressed(punch(nu=0.3, shift=0.5, cells=cells), "L_TOP", primary, **way).contact["pair"].force[1]
+        for primary in ("U_BOTTOM", "U_WHOLE")
+    ]
+    assert found[1] == pytest.approx(found[0], rel=2e-3)
+
+
+@pytest.mark.parametrize("way", WAYS, ids=NAMES)
+@pytest.mark.parametrize("shift", [0.55, 0.53, 0.51])
+def test_forces_of_both_sides_balance_in_moment(way, shift):
+    """The punch is primary; nodes of the block stand 0.35, 0.21 and 0.07 of its facets beyond its edge."""
+    model = punch(shift=shift)
+    step = pressed(model, "L_TOP", "U_BOTTOM", **way)
+    contact, mesh = step.contact["pair"], model.mesh
+    force = abs(contact.force[1])
+    K = stiffness(mesh, model.kinematics, *model.material_numbers())
+    nodal = (K @ step.displacement.ravel()).reshape(-1, 2)
+    at, sides = mesh.points + step.displacement, np.concatenate([mesh.points_of("L_TOP"), mesh.points_of("U_BOTTOM")])
+    moment = at[sides, 0] @ nodal[sides, 1] - at[sides, 1] @ nodal[sides, 0]
+    # A mean gap need not point along the mean normal, so that dual multipliers balance but for what is of second order.
+    assert abs(moment) < (1e-6 if way.get("multipliers") == "dual" else 1e-8) * force
+    if way["formulation"] == "node_to_segment":
+        beyond = (contact.coordinates[:, 0] < shift - 1e-9) | (contact.coordinates[:, 0] > 1.0 + shift + 1e-9)
+        assert beyond.any()
+        assert np.abs(contact.force_vectors[beyond]).max() == 0.0
+
+
+@pytest.mark.parametrize("normals", ["facet", "averaged"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_who_wants_them_has_forces_beyond_the_edge_in_balance(dim, normals):
+    model = punch(dim, shift=0.55, cells=(10, 7) if dim == 2 else (10, 3))
+    options = {"formulation": "node_to_segment", "normals": normals, "projection_tolerance": 0.5}
+    step = pressed(model, "L_TOP", "U_BOTTOM", **options)
+    contact, mesh = step.contact["pair"], model.mesh
+    force = np.abs(contact.force[-1])
+    beyond = (contact.coordinates[:, 0] < 0.55 - 1e-9) | (contact.coordinates[:, 0] > 1.55 + 1e-9)
+    assert np.abs(contact.force_vectors[beyond]).max() > 1e-3 * force
+    K = stiffness(mesh, model.kinematics, *model.material_numbers())
+    nodal = (K @ step.displacement.ravel()).reshape(-1, dim)
+    at, sides = mesh.points + step.displacement, np.concatenate([mesh.points_of("L_TOP"), mesh.points_of("U_BOTTOM")])
+    x, f = at[sides], nodal[sides]
+    moments = [x[:, a] @ f[:, b] - x[:, b] @ f[:, a] for a in range(dim) for b in range(a)]
+    assert np.abs(moments).max() < 1e-8 * force
+
+
+def test_normals_are_averaged_on_what_is_smooth_and_kept_at_corners():
+    model = punch(shift=0.5)
+    side = surface(model.mesh, "U_WHOLE")
+    (normals,) = smooth_normals(side, model.mesh.points)
+    middle = model.mesh.points[side.facets].mean(axis=1)
+    expected = np.where(middle[:, 1:] < 1e-9, [0.0, -1.0], np.sign(middle[:, :1] - 1.0) * [1.0, 0.0])
+    np.testing.assert_allclose(normals, np.repeat(expected[:, None], 2, axis=1), atol=1e-14)
+    ring = surface(fc.generate.rings("quad4", divisions_inner=(2, 8), divisions_outer=(2, 8)), "CONT_INNER")
+    points = fc.generate.rings("quad4", divisions_inner=(2, 8), divisions_outer=(2, 8)).points
+    (normals,) = smooth_normals(ring, points)
+    inner = ring.inner_ends
+    outward = points[ring.facets] / np.linalg.norm(points[ring.facets], axis=2, keepdims=True)
+    np.testing.assert_allclose(normals[inner], outward[inner], atol=1e-14)
+
+
+def test_points_beside_a_corner_face_nothing():
+    """On a line that folds gently inward a point beyond both facets at a node still faces it; beside a corner it does not."""
+    mesh = punch(shift=0.5).mesh
+    beside = np.array([[0.5 - 0.03, -0.01], [0.5 + 0.03, -0.01]])
+    for normals in ("facet", "averaged"):
+        found = pair(beside, surface(mesh, "U_WHOLE"), mesh.points, 0.05, normals)
+        assert found.paired.tolist() == [False, True]
