@@ -44,6 +44,8 @@ def carried(
     while True:
         if not may_pull:
             closed = closed & (nodal >= 0.0)
+            if shares.sum() > 0.0 and not _takers(closed, areas).any():
+                return _alone(shares, areas)
         pressure = nodal + _received(closed, nodal, shares, areas, side)
         tension = closed & (pressure < 0.0)
         if may_pull or not tension.any():
@@ -53,7 +55,7 @@ def carried(
 
 def _received(closed: Mask, nodal: Array, shares: Array, areas: Array, side: Surface) -> Array:
     """Return the pressures (m,) that closed nodes take from others; arguments as of `carried`."""
-    takers = closed & (areas > NO_AREA * np.abs(areas).mean())
+    takers = _takers(closed, areas)
     moving = np.where(closed, shares - nodal * areas, shares)
     moving[takers | (np.abs(moving) <= ROUNDING * np.abs(shares).max(initial=0.0))] = 0.0
     if not moving.any():
@@ -65,6 +67,17 @@ def _received(closed: Mask, nodal: Array, shares: Array, areas: Array, side: Sur
         given = np.divide(moving, side.near @ room, out=np.zeros_like(moving), where=outer)
         moving = np.where(outer, 0.0, moving) + room * (side.near @ given)
     return np.divide(moving, areas, out=np.zeros_like(moving), where=takers)
+
+
+def _takers(closed: Mask, areas: Array) -> Mask:
+    return closed & (areas > NO_AREA * np.abs(areas).mean())
+
+
+def _alone(shares: Array, areas: Array) -> tuple[Mask, Array]:
+    """Return the node with the largest share as the only closed one, and pressures (m,) with which it carries them all."""
+    most = np.argmax(np.where(_takers(np.ones(len(areas), bool), areas), shares, -np.inf))
+    closed = np.arange(len(areas)) == most
+    return closed, np.where(closed, shares.sum() / areas[most], 0.0)
 
 
 def _rings(takers: Mask, moving: Array, side: Surface) -> list[Mask]:

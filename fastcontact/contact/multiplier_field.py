@@ -24,7 +24,7 @@ class Projection:
     P : csr_array (m, k)
         Functions of the multiplier field at the integration points.
     areas : ndarray (m,)
-        W; a point without area (at the axis) never carries a force.
+        W; a point without area, at the axis, does not give way: C vanishes there. It may carry a force of its own.
     rho : float
         Augmentation [pressure / length].
     mass : SuperLU, optional
@@ -40,13 +40,16 @@ class Projection:
         """Return rows and columns `rows` of C."""
         if self.mass is None:
             return np.zeros((len(rows), len(rows)))
-        P = self.P[rows].toarray()
-        return (np.diag(1.0 / self.areas[rows]) - P @ self.mass.solve(np.ascontiguousarray(P.T))) / self.rho
+        areas = self.areas[rows]
+        P = self.P[rows].toarray() * (areas > 0)[:, None]
+        own = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)
+        return (np.diag(own) - P @ self.mass.solve(np.ascontiguousarray(P.T))) / self.rho
 
     def apply(self, multiplier: Array) -> Array:
         """Return ``C multiplier``."""
-        own = np.divide(multiplier, self.areas, out=np.zeros_like(multiplier), where=self.areas > 0)
-        return (own - self.P @ self.field(multiplier)) / self.rho
+        inside = self.areas > 0
+        own = np.divide(multiplier, self.areas, out=np.zeros_like(multiplier), where=inside)
+        return np.where(inside, own - self.P @ self.field(np.where(inside, multiplier, 0.0)), 0.0) / self.rho
 
     def field(self, multiplier: Array) -> Array:
         """Return the independent values (k,) of the multiplier field [pressure] for point forces (m,) [force]."""

@@ -76,7 +76,9 @@ def _moments(part: Constraints) -> csr_array:
     P, areas = part.compliance.P, part.compliance.areas
     weighted = csr_array(P.T @ diags_array(areas))
     scale = np.asarray(abs(weighted).sum(axis=1)).ravel()
-    return csr_array(diags_array(1.0 / np.maximum(scale, 1e-300)) @ weighted)
+    alone = np.flatnonzero((areas == 0.0) & part.usable)  # at the axis
+    single = csr_array((np.ones(len(alone)), (np.arange(len(alone)), alone)), shape=(len(alone), len(areas)))
+    return csr_array(vstack([diags_array(1.0 / np.maximum(scale, 1e-300)) @ weighted, single]))
 
 
 def _cleaned(rows: csr_array) -> csr_array:

@@ -1,7 +1,8 @@
 """Lines cut opposite the nodes of the other side, and integrated piece by piece.
 
 The gap between facets that do not match has a kink wherever a node of the primary side stands opposite; between two of
-those it is smooth (Popp, Gee and Wall, 2009).
+those it is smooth (Popp, Gee and Wall, 2009). Where the primary side ends, what is opposite lies along the normal there:
+what is beyond faces nothing, and the projections that tell so must agree with the cut.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from fastcontact.contact.formulations._overlap import Coupling, Overlap
 from fastcontact.contact.pairing import Candidates, pair
+from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.search.closest import closest
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements, quadrature
@@ -22,6 +24,8 @@ Array = NDArray[np.float64]
 SLIVER = 1e-10
 # Lines face each other if their normals enclose more than 120 degrees: beside a corner the flank is closest, but not faced.
 OPPOSITE = -0.5
+# A tolerance of the projection below this, in facet lengths, is one for rounding errors.
+ROUNDING = 1e-3
 NO_BORDERS = np.empty(0, np.intp), np.empty(0)
 
 
@@ -42,13 +46,14 @@ def line_points(
     deformed: Array,
     axisymmetric: bool,
     n_gauss: int,
+    tolerance: float,
     borders: tuple[NDArray[np.intp], Array] = NO_BORDERS,
 ) -> LinePoints:
     """Cut the facets of a block on the deformed configuration and put Gauss points on every piece.
 
-    `borders` are further cuts: facets (n,) and xi (n,).
+    The primary side ends `tolerance` facet lengths beyond its ends. `borders` are further cuts: facets (n,) and xi (n,).
     """
-    facet, begin, end = _cuts(block, primary, deformed, borders)
+    facet, begin, end = _cuts(block, primary, deformed, tolerance, borders)
     s, w = quadrature.gauss_line(n_gauss)
     xi = (0.5 * (begin + end)[:, None] + 0.5 * (end - begin)[:, None] * s[:, 0]).ravel()
     weight = (0.5 * (end - begin)[:, None] * w).ravel()
@@ -63,7 +68,7 @@ def line_points(
 
 
 def _cuts(
-    block: FacetBlock, primary: Surface, deformed: Array, borders: tuple[NDArray[np.intp], Array]
+    block: FacetBlock, primary: Surface, deformed: Array, tolerance: float, borders: tuple[NDArray[np.intp], Array]
 ) -> tuple[NDArray[np.intp], Array, Array]:
     """Return (facet, begin, end) of the pieces of the facets of a block, in their reference coordinate."""
     ends = np.unique(np.concatenate([other.facets[:, :2].ravel() for other in primary.blocks]))
@@ -71,8 +76,9 @@ def _cuts(
     along = opposite.xi[:, 0]
     inside = (opposite.overhang == 0.0) & (np.abs(along) < 1.0 - SLIVER)
     n = len(block.facets)
-    facet = np.concatenate([np.arange(n), np.arange(n), opposite.facet[inside], borders[0]])
-    xi = np.concatenate([np.full(n, -1.0), np.full(n, 1.0), along[inside], borders[1]])
+    ending, place = _opposite_ends(block, primary, deformed, tolerance)
+    facet = np.concatenate([np.arange(n), np.arange(n), opposite.facet[inside], borders[0], ending])
+    xi = np.concatenate([np.full(n, -1.0), np.full(n, 1.0), along[inside], borders[1], place])
     order = np.lexsort((xi, facet))
     facet, xi = facet[order], xi[order]
     piece = (facet[1:] == facet[:-1]) & (np.diff(xi) > SLIVER)
@@ -84,6 +90,43 @@ def normals_at(block: FacetBlock, coordinates: Array, points: LinePoints) -> Arr
     gradient = elements.get(block.element).gradient(points.xi[:, None])[:, :, 0]
     tangent = np.einsum("nk,nkd->nd", gradient, coordinates[block.facets[points.facet]])
     return np.column_stack([tangent[:, 1], -tangent[:, 0]]) / np.linalg.norm(tangent, axis=1, keepdims=True)
+
+
+def _opposite_ends(
+    block: FacetBlock, primary: Surface, deformed: Array, tolerance: float
+) -> tuple[NDArray[np.intp], Array]:
+    """Return (facet, xi) of the points of a block that lie on the normals at the ends of the primary side."""
+    # A tolerance for rounding errors alone is no part of the side: a cut there would leave a strip that faces it.
+    ends = (1.0, 1.0 + 2.0 * tolerance) if tolerance > ROUNDING else (1.0,)
+    normals, first, facets, places = nodal_normals(primary, deformed), 0, [], []
+    for other in primary.blocks:
+        shape = elements.get(other.element).shape
+        for end, s in [(end, sign * beyond) for end, sign in ((0, -1.0), (1, 1.0)) for beyond in ends]:
+            free = np.flatnonzero(~primary.inner_ends[first : first + len(other.facets), end])
+            weights = shape(np.array([[s]]))[0]
+            foot = np.einsum("k,fkd->fd", weights, deformed[other.facets[free]])
+            normal = np.einsum("k,fkd->fd", weights, normals[other.local[free]])
+            away = deformed[block.facets][None] - foot[:, None, None]
+            crossed = away[..., 0] * normal[:, None, None, 1] - away[..., 1] * normal[:, None, None, 0]
+            facet, xi = _zeros(crossed.reshape(-1, block.facets.shape[1]))
+            facets.append(facet % len(block.facets))
+            places.append(xi)
+        first += len(other.facets)
+    return np.concatenate(facets), np.concatenate(places)
+
+
+def _zeros(values: Array) -> tuple[NDArray[np.intp], Array]:
+    """Return (row, xi) of the zeros inside lines of two or three nodes with nodal `values` (n, k)."""
+    a, b = values[:, 0], values[:, 1]
+    slope, middle = 0.5 * (b - a), 0.5 * (a + b) if values.shape[1] == 2 else values[:, 2]
+    bend = 0.5 * (a + b) - middle
+    root = np.sqrt(np.maximum(slope**2 - 4.0 * bend * middle, 0.0))
+    half = -0.5 * (slope + np.where(slope < 0.0, -root, root))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        both = np.stack([half / bend, middle / half], axis=1)
+    both[slope**2 < 4.0 * bend * middle] = np.nan
+    row, which = np.nonzero(np.abs(both) < 1.0 - SLIVER)
+    return row, both[row, which]
 
 
 def line_overlap(
@@ -105,7 +148,7 @@ def line_overlap(
     masses, couplings = [], []
     for block in secondary.blocks:
         n, k = block.facets.shape
-        points = line_points(block, primary, reference, deformed, axisymmetric, k + 2)
+        points = line_points(block, primary, reference, deformed, axisymmetric, k + 2, tolerance)
         at = Candidates(block.facets[points.facet], points.shape).positions(deformed)
         facing = pair(at, primary, deformed, tolerance)
         opposite = np.einsum("nd,nd->n", normals_at(block, deformed, points), facing.normal) < OPPOSITE

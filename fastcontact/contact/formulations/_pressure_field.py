@@ -116,23 +116,26 @@ class PressureField(NodalField):
         return self.pressure(force) * self.covered_areas
 
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
-        """Return the nodes with a pressure that an active point is nearest to.
+        """Return the nodes with a pressure that an active point is nearest to; at least one of its facet, if any has one.
 
         The nodal gap plays no part: between facets that curve differently, nodes of facets in contact stand off. A node
         without area, at the corner of some quadratic faces, can carry nothing for such a point: there the nearest one with
-        an area is closed, too. A point without area, at an axis, is never active: there the facet tells.
+        an area is closed, too. Of nodes that no point with an area is nearest to, at an axis or beyond the end of the other
+        side, the facet tells.
         """
         usual = self.nodal_areas > NO_SHARE * self.nodal_areas.max(initial=0.0)
         near = _nearest(self.around[active], self.shape[active], len(gap))
         near |= _nearest(
             self.around[active], np.where(usual[self.around[active]], self.shape[active], -np.inf), len(gap)
         )
-        if not usual.all():
-            seen = self.projection.areas > 0
-            touched = np.zeros(len(gap), bool)
-            touched[self.around[active]] = True
-            near |= touched & ~usual & ~_nearest(self.around[seen], self.shape[seen], len(gap))
-        return near & (pressure > 0)
+        seen, touched = self.projection.areas > 0, np.zeros(len(gap), bool)
+        touched[self.around[active]] = True
+        near |= touched & ~_nearest(self.around[seen], self.shape[seen], len(gap))
+        near &= pressure > 0
+        # Forces at one end of a facet, opposite an edge, may leave the nearest node a tension: then its others.
+        alone = self.around[active][~near[self.around[active]].any(axis=1)]
+        near[alone[pressure[alone] > 0]] = True
+        return near
 
     def initially_active(self, gap: Array, pressure: Array) -> Mask | None:
         """Return the points where the field exceeds rho times the gap, if they were not there in the last pairing."""

@@ -10,20 +10,19 @@ The pressure at a point and the complementarity are those of `_pressure_field`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._cut_lines import line_points
+from fastcontact.contact.formulations._determined_field import WholeFacets, determined
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
 from fastcontact.contact.integration import facet_measure
-from fastcontact.contact.pair_options import spread
-from fastcontact.contact.pairing import Candidates, Pairing
+from fastcontact.contact.pairing import Candidates
 from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
@@ -60,6 +59,7 @@ class SegmentMortar(PressureFieldFormulation):
         facets, element = self.secondary.facets, self.secondary.element
         xi, weights = quadrature.gauss_line(3)
         lengths = facet_measure(facets, element, self.points, xi, False) @ weights
+        self._whole = [WholeFacets.of(self.secondary.blocks[0], self.points, self.axisymmetric)]
         self._rho = self.augmentation * self.modulus / float(lengths.min())
 
     def unilateral(self, at: Configuration) -> Constraints:
@@ -68,14 +68,17 @@ class SegmentMortar(PressureFieldFormulation):
         assert isinstance(self.primary, Surface)
         block, borders = self.secondary.blocks[0], self.options.borders(self.secondary)
         n_gauss = block.facets.shape[1] + 1 if self.n_gauss is None else self.n_gauss
-        points = line_points(block, self.primary, self.points, deformed, self.axisymmetric, n_gauss, borders)
+        points = line_points(
+            block, self.primary, self.points, deformed, self.axisymmetric, n_gauss, self.projection_tolerance, borders
+        )
         facet, shape, area = points.facet, points.shape, points.area
         candidates = Candidates(self.secondary.facets[facet], shape)
         found = self.facing(candidates, at)
+        paired = np.repeat(found.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
         total = np.bincount(facet, weights=area)
-        covered = np.bincount(facet, weights=np.where(found.paired, area, 0.0))
-        kept = found.paired & (covered > COVERED * total)[facet] & (area > 0) & ~self.options.out(candidates)
-        pairing = Pairing(found.facet, found.xi, found.normal, kept)
+        covered = np.bincount(facet, weights=np.where(paired, area, 0.0))
+        kept = paired & (covered > COVERED * total)[facet] & (area > 0) & ~self.options.out(candidates)
+        pairing = replace(found, paired=kept)
         field = self._pressure_field(facet, shape, np.where(kept, area, 0.0), area)
         return self.of_points(candidates, pairing, field, at)
 
@@ -84,10 +87,9 @@ class SegmentMortar(PressureFieldFormulation):
 
         `area` is zero where a point takes no part, `whole` nowhere.
         """
-        column, m = self.secondary.local[facet], len(self.secondary.points)
-        seen = np.zeros(m, bool)
-        seen[column[area > 0]] = True
-        excluded = self.options.excluded_nodes(self.secondary)
-        independent = np.flatnonzero(seen & ~excluded)
-        nodes = csr_array(spread(self.secondary, excluded, independent)[:, independent])
-        return PressureField.of_points((column, shape), (area, whole), self._rho, (nodes, independent), renewed=True)
+        n, k = self.secondary.facets.shape
+        mass = np.zeros((n, k, k))
+        np.add.at(mass, facet, area[:, None, None] * shape[:, :, None] * shape[:, None, :])
+        field = determined(self.secondary, self._whole, [mass], self.options.excluded_nodes(self.secondary))
+        points = self.secondary.local[facet], shape
+        return PressureField.of_points(points, (area, whole), self._rho, field, renewed=True)

@@ -5,7 +5,8 @@ The integration points stay where they are on the secondary facets; see `_pressu
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -34,7 +35,8 @@ class Continuous(PressureFieldFormulation):
     Parameters
     ----------
     integration : str
-        ``"gauss"``, ``"simpson"`` (on each half or quarter of a quadratic facet) or ``"node"``. On triangles Simpson's
+        ``"gauss"``, ``"simpson"`` (on each half or quarter of a quadratic facet) or ``"node"``, where every node keeps off
+        the other side, on the axis, too, where it has no area. On triangles Simpson's
         place is taken by the closed rule of seven points. The nodes of six-node triangles and eight-node quadrangles
         have no positive areas, so ``"node"`` is refused there.
     n_gauss : int, optional
@@ -137,8 +139,23 @@ class Continuous(PressureFieldFormulation):
         """Pair the integration points on the displaced configuration and return their gaps."""
         pairing = self.facing(self._candidates, at)
         areas = self._field.projection.areas
-        pairing.paired[~(areas > 1e-12 * areas.max())] = False
-        return self.of_points(self._candidates, pairing, self._field, at)
+        at_axis = self._at_axis
+        pairing.paired[~(areas > 1e-12 * areas.max()) & ~at_axis] = False
+        part = self.of_points(self._candidates, pairing, self._field, at)
+        if part.friction is not None and at_axis.any():  # nothing slides at the axis
+            part = replace(part, friction=np.where(at_axis, 0.0, part.friction))
+        return part
+
+    @cached_property
+    def _at_axis(self) -> NDArray[np.bool_]:
+        """The points (m,) that are nodes on the axis: without area, but nothing else keeps those nodes apart.
+
+        Not with a penalty, which acts on areas.
+        """
+        areas = self._field.projection.areas
+        if self.integration != "node" or not self.axisymmetric or self.options.penalty is not None:
+            return np.zeros(len(areas), bool)
+        return (areas == 0.0) & ~self.options.out(self._candidates)
 
 
 def _simpson(element: str) -> quadrature.Rule:

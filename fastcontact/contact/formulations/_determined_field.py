@@ -1,0 +1,149 @@
+r"""Pressure fields that their integration points determine, however little of a facet takes part.
+
+The points of a facet that faces the other side with a strip of itself determine next to nothing of a field over all of
+it: on a strip of a fraction :math:`\theta` at the end of a line, what a polynomial of degree k is at the other end weighs
+:math:`\theta^{2k+1}`. How well a facet determines its field says the smallest eigenvalue of its mass matrix over what takes
+part, relative to that over the whole facet. Where it is too small the field is a simpler one there: linear between the
+corners of a quadratic facet, or the value that it has at the nodes which other facets determine. Fields that are constant
+over a strip remain among them, so a uniform pressure passes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array, diags_array, lil_array
+
+from fastcontact.contact.integration import facet_measure, fine_rule
+from fastcontact.contact.pair_options import spread
+from fastcontact.contact.surface import FacetBlock, Surface
+from fastcontact.mesh import elements
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Indices = NDArray[np.intp]
+# A line is determined by a seventh of it, a parabola by two fifths; values at the other end count no more than thirtyfold.
+DETERMINED = 1e-3
+# Facets whose mass matrix differs by less than this part are whole.
+WHOLE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class WholeFacets:
+    """What the fields of the facets of a block weigh over all of them.
+
+    Attributes
+    ----------
+    block : FacetBlock
+    to_corners : ndarray (n_corners, k)
+        Corner functions by shape functions [-].
+    mass : ndarray (n_facets, k, k)
+        Integrals of products of two shape functions over the facets [area].
+    """
+
+    block: FacetBlock
+    to_corners: Array
+    mass: Array
+
+    @classmethod
+    def of(cls, block: FacetBlock, points: Array, axisymmetric: bool) -> WholeFacets:
+        """Integrate over the facets of a block at reference `points` (n_points, dim) [length]."""
+        element = elements.get(block.element)
+        xi, weights = fine_rule(block.element)
+        N = element.shape(xi)
+        dA = facet_measure(block.facets, block.element, points, xi, axisymmetric) * weights
+        to_corners = elements.get(element.linear).shape(element.nodes).T
+        return cls(block, to_corners, np.einsum("fq,qa,qb->fab", dA, N, N))
+
+    def degrees(self, mass: Array) -> Indices:
+        """Return what field (n_facets,) `mass` (n_facets, k, k) over what takes part determines.
+
+        2 all of it, 1 one that is linear between the corners, 0 none, -1 where nothing takes part.
+        """
+        found = np.full(len(mass), 2)
+        found[~mass.any(axis=(1, 2))] = -1
+        size = np.einsum("fkk->f", self.mass)
+        partly = np.flatnonzero((found == 2) & (np.abs(mass - self.mass).max(axis=(1, 2)) > WHOLE * size))
+        whole, part, T = self.mass[partly], mass[partly], self.to_corners
+        linear = _smallest(T @ whole @ T.T, T @ part @ T.T) > DETERMINED
+        found[partly] = np.where(_smallest(whole, part) > DETERMINED, 2, np.where(linear, 1, 0))
+        return found
+
+
+def _smallest(whole: Array, part: Array) -> Array:
+    """Return the smallest eigenvalues (n_facets,) of mass matrices relative to those of whole facets."""
+    inverse = np.linalg.inv(np.linalg.cholesky(whole))
+    return np.asarray(np.linalg.eigvalsh(inverse @ part @ inverse.transpose(0, 2, 1))[:, 0])
+
+
+def determined(
+    side: Surface, whole: list[WholeFacets], masses: list[Array], excluded: Mask
+) -> tuple[csr_array, Indices]:
+    """Return the field at all nodes (m, k) by its independent values, and the nodes (k,) of these.
+
+    Parameters
+    ----------
+    side : Surface
+    whole : list of WholeFacets
+        Of each block of the side.
+    masses : list of ndarray (n_facets, n_nodes, n_nodes)
+        Integrals of products of two shape functions over what takes part [area].
+    excluded : ndarray of bool (m,)
+        Nodes that have no value of their own.
+    """
+    degrees = [one.degrees(mass) for one, mass in zip(whole, masses, strict=True)]
+    own = np.zeros(len(side.points), bool)
+    for one, degree in zip(whole, degrees, strict=True):
+        own[one.block.local[degree == 2]] = True
+        own[one.block.local[degree == 1][:, : len(one.to_corners)]] = True
+    own &= ~excluded
+    for one, degree, mass in zip(whole, degrees, masses, strict=True):
+        _give_each_a_value(own, one.block.local[degree >= 0], mass[degree >= 0], excluded)
+    independent = np.flatnonzero(own)
+    values = spread(side, excluded, independent) if excluded.any() else csr_array(diags_array(own.astype(float)))
+    if any((degree[degree >= 0] < 2).any() for degree in degrees):
+        values = _interpolated(csr_array(values), whole, degrees, own, excluded)
+    return csr_array(csr_array(values)[:, independent]), independent
+
+
+def _give_each_a_value(own: Mask, local: Indices, mass: Array, excluded: Mask) -> None:
+    """Make one node independent, in place, in facets that have none: where most of the facet takes part."""
+    for row in np.flatnonzero(~own[local].any(axis=1)):
+        nodes = local[row]
+        if not (own[nodes].any() or excluded[nodes].all()):
+            own[nodes[np.argmax(np.where(excluded[nodes], -np.inf, mass[row].sum(axis=1)))]] = True
+
+
+def _interpolated(
+    values: csr_array, whole: list[WholeFacets], degrees: list[Indices], own: Mask, excluded: Mask
+) -> csr_array:
+    """Return the values (m, m) with those of nodes that are neither independent nor excluded.
+
+    Corners take the mean of the independent nodes of their facets, and other nodes what is linear between the corners.
+    """
+    m = len(own)
+    pairs = []
+    for one, degree in zip(whole, degrees, strict=True):
+        local = one.block.local[degree >= 0]
+        corners = local[:, : len(one.to_corners)]
+        row, column = np.repeat(corners, local.shape[1], axis=1).ravel(), np.tile(local, corners.shape[1]).ravel()
+        kept = ~own[row] & ~excluded[row] & own[column]
+        pairs.append(np.column_stack([row[kept], column[kept]]))
+    row, column = np.unique(np.concatenate(pairs), axis=0).T
+    count = np.bincount(row, minlength=m)
+    values = csr_array(diags_array((own | excluded).astype(float)) @ values)
+    values = csr_array(values + coo_array((1.0 / count[row], (row, column)), shape=(m, m)))
+    return csr_array(values + _between_corners(whole, degrees, own | excluded) @ values)
+
+
+def _between_corners(whole: list[WholeFacets], degrees: list[Indices], done: Mask) -> csr_array:
+    """Return the rows (m, m) of nodes between corners that are not `done` (m,): linear between those."""
+    between = lil_array((len(done), len(done)))
+    for one, degree in zip(whole, degrees, strict=True):
+        corners = len(one.to_corners)
+        facet, k = np.nonzero(~done[one.block.local[:, corners:]] & (degree >= 0)[:, None])
+        for nodes, node in zip(one.block.local[facet], k + corners, strict=True):
+            between[nodes[node], nodes[:corners]] = one.to_corners[:, node]  # the same from either side
+    return csr_array(between)
