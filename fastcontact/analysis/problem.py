@@ -171,12 +171,12 @@ def prepare(
 ) -> Problem:
     """Assemble a model that was checked before, and prepare the linear solver; see `run.solve` for the parameters."""
     mesh, driven = model.mesh, model.force_driven
-    solver = choice.make(
-        linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, tolerance=linear_tolerance, precision=linear_precision,
-        columns=not all(pair.eliminable for pair in model.contact),
-    )  # fmt: skip
     supported, prescribed = model.prescribed_by_ramp()
     pairs = {pair.name: model.bind(pair, supported) for pair in model.contact}
+    solver = choice.make(
+        linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, tolerance=linear_tolerance, precision=linear_precision,
+        columns=not all(pair.eliminable for pair in pairs.values()),
+    )  # fmt: skip
     moduli, material = model.material_numbers()
     K = stiffened(stiffness(mesh, model.kinematics, moduli, material), model.springs)
     system = System(

@@ -32,11 +32,6 @@ class ContactPair:
     force: Driving = ()
 
     @property
-    def eliminable(self) -> bool:
-        """Whether closed constraints can be eliminated: not where they give way by themselves."""
-        return self.formulation != "continuous" and not self.options.get("penalty")
-
-    @property
     def clearance_ramp(self) -> Table | None:
         """History of the clearance; None where it does not change."""
         return clearance_ramp(self.name, self.options)
