@@ -62,7 +62,10 @@ def solve(
         watch = _Watch(signs, active) if may_leave else None
         rows, compliance = np.flatnonzero(active), constraints.normal_compliance
         C = None if compliance is None else compliance.block(rows)
-        u, forces = loaded.solve(constraints.B[rows], -constraints.gap0[rows], C, guess, watch, accuracy.residual)
+        nodes = None if constraints.nodes is None else constraints.nodes[rows]
+        u, forces = loaded.solve(
+            constraints.B[rows], -constraints.gap0[rows], C, guess, watch, accuracy.residual, nodes
+        )
         guess = u
         if watch is not None and watch.wanted is not None:
             left.add(active.tobytes())

@@ -182,13 +182,13 @@ def prepare(
 ) -> Problem:
     """Assemble a model that was checked before, and prepare the linear solver; see `run.solve` for the parameters."""
     mesh, driven = model.mesh, model.force_driven
+    supported, prescribed = model.prescribed_by_ramp()
+    pairs = {pair.name: model.bind(pair, supported) for pair in model.contact}
     solver = choice.make(
         linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, precision=linear_precision,
         tolerance=choice.tight_enough(linear_tolerance, criteria.relative),
-        columns=not all(pair.eliminable for pair in model.contact),
+        columns=not all(pair.eliminable for pair in pairs.values()),
     )  # fmt: skip
-    supported, prescribed = model.prescribed_by_ramp()
-    pairs = {pair.name: model.bind(pair, supported) for pair in model.contact}
     moduli, material = model.material_numbers()
     sides = material_sides(mesh, distinct(moduli, material))
     K = stiffened(stiffness(mesh, model.kinematics, moduli, material, None, model.averaged_materials()), model.springs)

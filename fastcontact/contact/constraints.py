@@ -124,6 +124,8 @@ class Constraints:
         Z of a compliance ``Z Z.T`` beside C, of normal forces and then of tangential ones; None stands for zero.
     areas : ndarray (m,), optional
         Area that each constraint stands for [area]; infinite where it does nothing.
+    nodes : ndarray of int (m,), optional
+        The secondary node whose displacement each constraint involves most, where there is one for each.
     nodal : NodalField, optional
         What normal forces mean at the secondary nodes.
     tied : Tied, optional
@@ -144,6 +146,7 @@ class Constraints:
     tangential_softness: Array | None = None
     elastic_slip: Array | None = None
     areas: Array | None = None
+    nodes: NDArray[np.intp] | None = None
     nodal: NodalField | None = None
     tied: Tied | None = None
 
@@ -244,6 +247,7 @@ def stacked(parts: Mapping[str, Constraints]) -> StackedConstraints:
         _stacked_low_rank(one),
         _stacked_vectors([part.tangential_softness for part in one], one, float),
         _stacked_slips([part.elastic_slip for part in one], one),
+        nodes=_stacked_nodes(one),
         parts=parts,
     )
 
@@ -254,6 +258,12 @@ def _stacked_vectors(found: Sequence[NDArray[Any] | None], parts: list[Constrain
         return None
     zero: list[NDArray[Any]] = [np.zeros(len(part), kind) for part in parts]
     return np.concatenate([own if vector is None else vector for own, vector in zip(zero, found, strict=True)])
+
+
+def _stacked_nodes(parts: list[Constraints]) -> NDArray[np.intp] | None:
+    """Return the nodes of all parts; None where a part has none."""
+    nodes = [part.nodes for part in parts if part.nodes is not None]
+    return np.concatenate(nodes) if len(nodes) == len(parts) else None
 
 
 def _stacked_slips(found: Sequence[Array | None], parts: list[Constraints]) -> Array | None:

@@ -38,6 +38,8 @@ class TiedPair:
         Where the equations hold, about, on the reference surface [length].
     nodal : NodalField
         What forces at the places of the formulation mean at its nodes.
+    nodes : ndarray of int (q,), optional
+        The secondary nodes that the gaps belong to, see `Constraints`.
     """
 
     moments: csr_array
@@ -45,13 +47,17 @@ class TiedPair:
     directions: tuple[Array, ...]
     positions: Array
     nodal: NodalField
+    nodes: NDArray[np.intp] | None = None
 
     def constraints(self) -> Constraints:
         """Return the equations."""
         B = csr_array(vstack(self.rows, format="csr"))
         positions = np.tile(self.positions, (len(self.rows), 1))
         always = np.ones(B.shape[0], bool)
-        return Constraints(B, np.zeros(B.shape[0]), positions, equality=always, nodal=self.nodal, tied=self)
+        nodes = None if self.nodes is None else np.tile(self.nodes, len(self.rows))
+        return Constraints(
+            B, np.zeros(B.shape[0]), positions, equality=always, nodes=nodes, nodal=self.nodal, tied=self
+        )
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
         """Return normal (m,) and tangential (m, k) forces at the places of the formulation."""
@@ -66,7 +72,7 @@ def tied(part: Constraints) -> TiedPair:
     positions = abs(moments) @ part.positions / size[:, None]
     rows = tuple(_cleaned(csr_array(moments @ along)) for along in (part.B, *part.tangents))
     assert part.nodal is not None
-    return TiedPair(moments, rows, part.directions, positions, part.nodal)
+    return TiedPair(moments, rows, part.directions, positions, part.nodal, part.nodes)
 
 
 def _moments(part: Constraints) -> csr_array:

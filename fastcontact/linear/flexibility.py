@@ -14,10 +14,22 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, lstsq
 from scipy.sparse import csr_array
 
+from fastcontact.errors import ConvergenceError
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 # Right-hand sides at a time: whole columns of K^-1 are long, and only short parts of them are kept.
 CHUNK = 32
+
+
+class TooManyColumnsError(ConvergenceError):
+    """Columns of the inverse would cost an iterative solver more than factors do."""
+
+    def __init__(self, count: int) -> None:
+        super().__init__(
+            f"the contact needs {count} columns of the inverse stiffness, a solution each, since its constraints cannot be "
+            'eliminated: use formulation="mortar" with multipliers="dual" and no penalty, or the direct solver'
+        )
 
 
 class FlexibilityColumns:
@@ -29,6 +41,8 @@ class FlexibilityColumns:
         Size of K.
     solve_many : method
         Of the solver that keeps these columns; maps right-hand sides (n, k) [force] to solutions (n, k) [length].
+    most : int, optional
+        Columns allowed; all by default.
 
     Attributes
     ----------
@@ -37,7 +51,8 @@ class FlexibilityColumns:
         depend on it.
     """
 
-    def __init__(self, n: int, solve_many: Callable[[Array], Array]) -> None:
+    def __init__(self, n: int, solve_many: Callable[[Array], Array], most: int | None = None) -> None:
+        self._most = n if most is None else most
         # A weak reference: solver and columns would keep each other, and the factors, the largest thing there is, alive.
         self._solve_many = weakref.WeakMethod(solve_many)
         self._place = np.full(n, -1, np.intp)
@@ -72,6 +87,8 @@ class FlexibilityColumns:
 
     def _extend(self, new: Indices) -> None:
         old = len(self._dofs)
+        if old + len(new) > self._most:
+            raise TooManyColumnsError(old + len(new))
         self.asked.append(new)
         self._dofs = np.concatenate([self._dofs, new])
         self._place[new] = np.arange(old, len(self._dofs))

@@ -45,13 +45,14 @@ class Loaded(Protocol):
 
     def solve(
         self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
-        monitor: Monitor | None = None, tolerance: float | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """Return (u, multiplier) with ``K u = f + B.T multiplier`` and ``B u + C multiplier = c``.
 
         B has full row rank where C, symmetric and positive semidefinite, is None or singular. Solvers that iterate start
         from `guess` (n,), call `monitor` from time to time and return the unfinished solution where that returns True;
-        they stop at a relative residual of `tolerance` where that is given and above their own.
+        they stop at a relative residual of `tolerance` where that is given and above their own. `nodes` (m,) are the nodes
+        that the equations belong to, a hint which unknowns to eliminate.
         """
         ...
 
@@ -107,13 +108,13 @@ class LoadedNonsymmetric(Loaded, Protocol):
         ...
 
     def solve_nonsymmetric(
-        self, B: csr_array, c: Array, groups: NDArray[np.intp], guess: Array, tolerance: float,
+        self, B: csr_array, c: Array, nodes: NDArray[np.intp], guess: Array, tolerance: float,
         friction: FrictionTerms | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """Return (u, multiplier) with ``B u = c`` and ``K u + S u = f + forces + rows.T multiplier``.
 
-        S, forces and rows are those of `friction`; without it they are zero and B. Equations of one of the `groups` (m,),
-        numbers such as those of nodes, may share unknowns. The iteration starts from `guess` (n,) and ends at a relative
+        S, forces and rows are those of `friction`; without it they are zero and B. Equations of one of the `nodes` (m,)
+        may share unknowns. The iteration starts from `guess` (n,) and ends at a relative
         residual of `tolerance`, or of the solver's own where that is larger.
 
         Raises

@@ -38,12 +38,6 @@ class ContactPair:
         return method(self.formulation, self.options)
 
     @property
-    def eliminable(self) -> bool:
-        """Whether closed constraints can be eliminated: not where they give way by themselves."""
-        soft = any(self.options.get(option) for option in ("penalty", "tangential_penalty"))
-        return self.formulation != "continuous" and not soft
-
-    @property
     def clearance_ramp(self) -> Table | None:
         """History of the clearance; None where it does not change."""
         return clearance_ramp(self.name, self.options)

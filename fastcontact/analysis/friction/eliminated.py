@@ -91,6 +91,7 @@ class Eliminated:
         usable, mu = constraints.usable, constraints.coefficients
         rows, free = (constraints.B, *constraints.tangents), constraints.gaps_at_rest()
         self._loaded, self._usable, self._tolerance = loaded, usable, tolerance
+        self._nodes = np.arange(len(constraints)) if constraints.nodes is None else constraints.nodes
         k, m = len(rows) - 1, len(constraints)
         yielding = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
         own = _own(rows, yielding)
@@ -147,7 +148,8 @@ class Eliminated:
         c = -np.concatenate([free[at] for free, at in zip(self._free, equations, strict=True)])
         sliding = self._sliding(y, gaps, np.flatnonzero(closed & ~sticking & (self.law.mu > 0.0)))
         drag = self._drag(B, shut, sliding) if len(sliding.at) else None
-        u, multiplier = self._loaded.solve_nonsymmetric(B, c, np.concatenate(equations), self.u, self._tolerance, drag)
+        nodes = self._nodes[np.concatenate(equations)]
+        u, multiplier = self._loaded.solve_nonsymmetric(B, c, nodes, self.u, self._tolerance, drag)
         new, first = np.zeros_like(y), 0
         for own, at in zip(new, equations, strict=True):
             own[at] = multiplier[first : first + len(at)]

@@ -95,6 +95,11 @@ class Formulation(ABC):
         if not self.projection_tolerance >= 0:
             raise ContactError(f"projection_tolerance = {self.projection_tolerance} must not be negative")
 
+    @property
+    def eliminable(self) -> bool:
+        """Whether iterative solvers can eliminate closed constraints: not where they give way by themselves."""
+        return self.options.penalty is None and self.options.tangential_penalty is None
+
     @classmethod
     def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:
         """Return the class that implements this formulation in 2 or 3 dimensions with the options of a user."""

@@ -172,6 +172,11 @@ class PressureFieldFormulation(Formulation):
 
     geometry_in_loop: ClassVar[bool] = True
 
+    @property
+    def eliminable(self) -> bool:
+        """See `Formulation`: the pressure field gives way."""
+        return False
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.augmentation > 0:

@@ -77,6 +77,11 @@ class WeightedMortar(Formulation):
             dA = facet_measure(block.facets, block.element, self.points, xi, self.axisymmetric) * weights
             self._whole.append(dA @ elements.get(block.element).shape(xi) @ T.T)
 
+    @property
+    def eliminable(self) -> bool:
+        """See `Formulation`; corners of quadratic facets with standard multipliers have next to no unknowns of their own."""
+        return super().eliminable and (self.multipliers == "dual" or self.secondary.order == 1)
+
     def _test_functions(self, name: str) -> Array:
         """Return the non-negative functions of a facet that sum to one, by its shape functions (n_nodes, n_nodes)."""
         if self.multipliers == "dual":
@@ -106,17 +111,18 @@ class WeightedMortar(Formulation):
         normal = self._mean_normals(overlap, deformed)
         B = rows_of(mean, normal)
         gap0 = B @ self.points.ravel() + at.clearance_factor * self._clearance(own, across, weight)
-        part = Constraints(B, gap0, self.points[self.secondary.points], areas=weight, nodal=self._nodal(weight))
+        points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
+        part = Constraints(B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=self._nodal(weight))
         if not (self.friction or self.options.tied):
             return part
         directions = tuple(tangents_by_axes(normal))
         sliding = self._sliding(overlap, covered, kept, mean, weight)
-        nodes = Candidates(self.secondary.points[:, None], np.ones((len(part), 1)))
+        candidates = Candidates(points[:, None], np.ones((len(part), 1)))
         return replace(
             part,
             tangents=tuple(self._along(direction, sliding) for direction in directions),
             directions=directions,
-            friction=self.options.coefficients(self.friction, nodes),
+            friction=self.options.coefficients(self.friction, candidates),
             drift=self._closing_slip_of_nodes(sliding, normal, directions, at) if self.slip == "symmetric" else None,
         )
 

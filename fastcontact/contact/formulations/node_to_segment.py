@@ -84,7 +84,8 @@ class NodeToSegment(Formulation):
         pairing.paired[self.options.out(self._candidates)] = False
         areas = self._nodal.nodal_areas
         usable = np.where(areas > 1e-12 * areas.max(), areas, np.inf)
-        return replace(self.assembled(self._candidates, pairing, None, at), areas=usable, nodal=self._nodal)
+        part = self.assembled(self._candidates, pairing, None, at)
+        return replace(part, areas=usable, nodes=self.secondary.points.astype(np.intp), nodal=self._nodal)
 
     @cached_property
     def _nodal(self) -> NodalForces:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact.linear.elimination import elimination_kernels, pivot_order
+from fastcontact.linear.elimination.coupled_pivots import CoupledPivots
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -16,7 +17,7 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class Elimination:
-    """``u[pivots] = weights @ u + offset``.
+    """``u[pivots] = weights @ u + offset``, or ``u[pivots] = P^-1 (weights @ u) + offset`` where pivots are coupled.
 
     Attributes
     ----------
@@ -28,39 +29,63 @@ class Elimination:
     force_weights : csr_array (m, n)
         Shares of the force at each pivot that go to the other unknowns: `weights`, unless multipliers act through other
         rows than B.
-    inverse : csr_array (m, m)
+    inverse : csr_array (m, m) or CoupledPivots
         Inverse of the pivots' columns of the rows that multipliers act through.
+    coupled : CoupledPivots, optional
+        P, the pivots' columns of the equations, where their inverse is full.
     """
 
     pivots: Indices
     weights: csr_array
     offset: Array
     force_weights: csr_array
-    inverse: csr_array
+    inverse: csr_array | CoupledPivots
+    coupled: CoupledPivots | None = None
 
     def multiplier(self, forces: Array) -> Array:
         """Return the multiplier (m,) with ``B.T multiplier = forces`` at the pivots; forces = (K u - f)[pivots]."""
-        return np.asarray(self.inverse.T @ forces)
+        inverse = self.inverse
+        return (
+            inverse.solve_transposed(forces) if isinstance(inverse, CoupledPivots) else np.asarray(inverse.T @ forces)
+        )
 
     def complete(self, x: Array, offset: Array | None = None) -> None:
         """Set the pivots of `x` (n,) to their weighted sums, plus `offset` (m,)."""
         elimination_kernels.complete(self.pivots, self.weights.indptr, self.weights.indices, self.weights.data, x)
+        if self.coupled is not None:
+            x[self.pivots] = self.coupled.solve(x[self.pivots])
         if offset is not None:
             x[self.pivots] += offset
 
     def move_forces(self, r: Array) -> None:
         """Move the forces `r` (n,) at the pivots to the other unknowns."""
         W = self.force_weights
+        if isinstance(self.inverse, CoupledPivots):
+            r[self.pivots] = self.inverse.solve_transposed(r[self.pivots])
         elimination_kernels.move_forces(self.pivots, W.indptr, W.indices, W.data, r)
 
     def restore_forces(self, r: Array, forces: Array) -> None:
         """Undo `move_forces`, given the `forces` (m,) that were at the pivots."""
-        W = self.force_weights
-        elimination_kernels.restore_forces(self.pivots, W.indptr, W.indices, W.data, forces, r)
+        W, inverse = self.force_weights, self.inverse
+        shared = inverse.solve_transposed(forces) if isinstance(inverse, CoupledPivots) else forces
+        elimination_kernels.restore_forces(self.pivots, W.indptr, W.indices, W.data, shared, r)
+        r[self.pivots] = forces
+
+    def full_weights(self) -> csr_array:
+        """Return the weights (m, n) of the other unknowns, a full matrix where pivots are coupled."""
+        return self.weights if self.coupled is None else csr_array(self.coupled.solve(self.weights.toarray()))
+
+    def with_sparse_weights(self) -> Elimination:
+        """Return this, or, where pivots are coupled, nearly the same with weights that a preconditioner can use."""
+        if self.coupled is None:
+            return self
+        inverse = self.coupled.sparse_inverse
+        weights = _product(inverse, self.weights)
+        return Elimination(self.pivots, weights, np.zeros(len(self.pivots)), weights, inverse)
 
 
 def eliminate(
-    B: csr_array, c: Array, force_rows: csr_array | None = None, groups: Indices | None = None
+    B: csr_array, c: Array, force_rows: csr_array | None = None, nodes: Indices | None = None, size: int = 1
 ) -> Elimination:
     """Choose the unknowns to eliminate from ``B u = c`` and express them by the others; see `pivot_order`.
 
@@ -70,8 +95,10 @@ def eliminate(
     c : ndarray (m,)
     force_rows : csr_array (m, n), optional
         Rows that multipliers act through, ``K u = f + force_rows.T multiplier``; B by default.
-    groups : ndarray of int (m,), optional
-        Number of the group of each equation, such as a node: those of a group may share unknowns of their own.
+    nodes : ndarray of int (m,), optional
+        The node that each equation belongs to: its equations may share unknowns of their own.
+    size : int
+        Unknowns of a node.
 
     Raises
     ------
@@ -82,20 +109,28 @@ def eliminate(
     if not B.has_canonical_format:
         B.sum_duplicates()
     B.eliminate_zeros()
-    pivots, inverse = pivot_order.chosen(B, groups)
-    weights, offset = _weights(B, pivots, inverse), np.asarray(inverse @ c, float)
+    pivots, inverse = pivot_order.chosen(B, nodes, size)
+    weights, coupled = _weights(B, pivots, inverse), None
+    if isinstance(inverse, CoupledPivots):
+        coupled, offset = inverse, inverse.solve(c)
+    else:
+        offset = np.asarray(inverse @ c, np.float64)
     if force_rows is None:
-        return Elimination(pivots, weights, offset, weights, inverse)
-    inverse = pivot_order.block_inverse(csr_array(force_rows[:, pivots]))
-    return Elimination(pivots, weights, offset, _weights(force_rows, pivots, inverse), inverse)
+        return Elimination(pivots, weights, offset, weights, inverse, coupled)
+    inverse = pivot_order.inverse_of(force_rows, pivots, size)
+    return Elimination(pivots, weights, offset, _weights(force_rows, pivots, inverse), inverse, coupled)
 
 
-def _weights(B: csr_array, pivots: Indices, inverse: csr_array) -> csr_array:
+def _weights(B: csr_array, pivots: Indices, inverse: csr_array | CoupledPivots) -> csr_array:
     """Return the weights (m, n) of the other unknowns, given the `inverse` (m, m) of the pivots' columns."""
     is_pivot = np.zeros(B.shape[1], bool)
     is_pivot[pivots] = True
     rest = csr_array((np.where(is_pivot[B.indices], 0.0, -B.data), B.indices, B.indptr), shape=B.shape, copy=True)
     rest.eliminate_zeros()
+    return rest if isinstance(inverse, CoupledPivots) else _product(inverse, rest)
+
+
+def _product(inverse: csr_array, rest: csr_array) -> csr_array:
     weights = csr_array(inverse @ rest)
     weights.sort_indices()
     return weights

@@ -42,13 +42,13 @@ class LoadedIteration:
 
     def solve(
         self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
-        monitor: Monitor | None = None, tolerance: float | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `Loaded`: equations that repeat each other or have a compliance go through columns of K^-1."""
         solver = self._solver
         if C is None or not B.shape[0]:
             try:
-                elimination = eliminate(B, c) if B.shape[0] else None
+                elimination = eliminate(B, c, None, nodes, solver.K.blocksize[0]) if B.shape[0] else None
             except RepeatedError as repeated:
                 log.info("%s: their compliance is formed", repeated)
             else:

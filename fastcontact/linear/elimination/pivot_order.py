@@ -1,8 +1,10 @@
 """Which unknown each equation eliminates, and the inverse of the columns of these pivots.
 
-Four ways, the first that succeeds: every equation has an unknown that no other equation has; groups of equations, such as
-those of a node, have unknowns that no other group has; layers of equations, each with an unknown that no later layer has;
-the assignment of unknowns to equations with the largest product of entries (Duff and Koster, 2001).
+Five ways, the first that succeeds: every equation has an unknown that no other equation has; the equations of a node have
+unknowns that those of no other node have; layers of equations, each with an unknown that no later layer has; the equations of
+a node have large enough entries in that node's unknowns; the assignment of unknowns to equations with the largest product of
+entries (Duff and Koster, 2001). The columns of the pivots are inverted in small independent blocks, or, where equations of
+many nodes share unknowns, factorised (`coupled_pivots`).
 """
 
 from __future__ import annotations
@@ -10,46 +12,40 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
-from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import connected_components, min_weight_full_bipartite_matching
 
-from fastcontact.errors import ConvergenceError
+from fastcontact.linear.elimination.coupled_pivots import CoupledPivots, RepeatedError, block_inverse
 
+Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+Mask = NDArray[np.bool_]
 # An unknown is taken as pivot where its entry is at least this part of the largest one of the equation.
 SMALLEST = 0.25
-# Equations whose inverse is larger, in units of their entries, repeat each other but for round-off.
-SINGULAR = 1e12
+# Up to so many equations that share unknowns are inverted as a block.
+LARGEST_BLOCK = 64
 # Up to so many equations, pivots are assigned by a dense factorisation.
 DENSE_UP_TO = 400
 # With more layers than this the sum of products costs more than it saves.
 MOST_LAYERS = 4
 
 
-class RepeatedError(ConvergenceError):
-    """Equations repeat each other."""
-
-    def __init__(self) -> None:
-        super().__init__(
-            "active contact constraints repeat each other, so that an iterative solver cannot eliminate them: leave out one "
-            "of two contacts on the same nodes, or use the direct solver"
-        )
-
-
-def chosen(B: csr_array, groups: Indices | None = None) -> tuple[Indices, csr_array]:
+def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[Indices, csr_array | CoupledPivots]:
     """Return the pivot of every equation and the inverse of their columns, ``B[:, pivots]^-1``.
 
     Parameters
     ----------
     B : csr_array (m, n)
         Equations, in canonical format, without stored zeros.
-    groups : ndarray of int (m,), optional
-        Number of the group of each equation, such as a node.
+    nodes : ndarray of int (m,), optional
+        The node that each equation belongs to.
+    size : int
+        Unknowns of a node.
 
     Returns
     -------
     pivots : ndarray of int (m,)
-    inverse : csr_array (m, m)
+    inverse : csr_array (m, m) or CoupledPivots
 
     Raises
     ------
@@ -60,34 +56,64 @@ def chosen(B: csr_array, groups: Indices | None = None) -> tuple[Indices, csr_ar
         return np.empty(0, np.intp), csr_array((0, 0))
     if (found := layered(B, layers=1)) is not None:
         return found
-    if groups is not None and (pivots := of_groups(B, groups)) is not None:
+    if nodes is not None and (pivots := of_groups(B, nodes)) is not None:
         return pivots, block_inverse(csr_array(B[:, pivots]))
     if (found := layered(B)) is not None:
         return found
+    if nodes is not None and (pivots := of_nodes(B, nodes, size)) is not None:
+        return pivots, inverse_of(B, pivots, size)
     pivots = assigned(B)
-    return pivots, block_inverse(csr_array(B[:, pivots]))
+    return pivots, inverse_of(B, pivots, size)
+
+
+def inverse_of(B: csr_array, pivots: Indices, size: int) -> csr_array | CoupledPivots:
+    """Return the inverse of the columns `pivots` (m,) of B, small blocks or factors; a node has `size` unknowns.
+
+    Raises
+    ------
+    RepeatedError
+        If it is singular.
+    """
+    P = csr_array(B[:, pivots])
+    label = connected_components(P, directed=False)[1]
+    if len(label) and np.bincount(label).max() > LARGEST_BLOCK:
+        return CoupledPivots(P, pivots, size)
+    return block_inverse(P)
 
 
 def of_groups(B: csr_array, groups: Indices) -> Indices | None:
-    """Return the unknown (m,) of each row among those of its group alone; None where there are too few.
-
-    Complete pivoting in each group, in all of them at once; a pivot is at least SMALLEST of the largest entry of its row.
-    """
+    """Return the unknown (m,) of each row among those of its group alone; None where there are too few."""
     m, n = B.shape
     group, row = np.unique(groups, return_inverse=True)[1], np.repeat(np.arange(m), np.diff(B.indptr))
     lowest, highest = np.full(n, m), np.full(n, -1)
     np.minimum.at(lowest, B.indices, group[row])
     np.maximum.at(highest, B.indices, group[row])
-    own = np.flatnonzero(lowest[B.indices] == highest[B.indices])
+    return _pivots_in_groups(B, group, lowest[B.indices] == highest[B.indices])
+
+
+def of_nodes(B: csr_array, nodes: Indices, size: int) -> Indices | None:
+    """Return the unknown (m,) of each row among those of its node; None where entries there are too small."""
+    row = np.repeat(np.arange(B.shape[0]), np.diff(B.indptr))
+    return _pivots_in_groups(B, np.unique(nodes, return_inverse=True)[1], B.indices // size == nodes[row])
+
+
+def _pivots_in_groups(B: csr_array, group: Indices, is_own: Mask) -> Indices | None:
+    """Return pivots (m,) among the entries of B that are its group's own, whose unknowns no two groups share.
+
+    Complete pivoting in each group, in all of them at once; a pivot is at least SMALLEST of the largest entry of its row.
+    """
+    m, n = B.shape
+    row, own = np.repeat(np.arange(m), np.diff(B.indptr)), np.flatnonzero(is_own)
     if not len(own):
         return None
     found = B.indices[np.sort(own[np.unique(B.indices[own], return_index=True)[1]])]
-    line, column = _place_in_group(group), np.zeros(n, np.intp)
-    column[found] = _place_in_group(lowest[found])
+    line, column, owner = _place_in_group(group), np.zeros(n, np.intp), np.zeros(n, np.intp)
+    owner[B.indices[own]] = group[row[own]]
+    column[found] = _place_in_group(owner[found])
     table = np.zeros((group.max() + 1, line.max() + 1, column.max() + 1))
     table[group[row[own]], line[row[own]], column[B.indices[own]]] = B.data[own]
     equation, unknown = np.zeros(table.shape[:2], np.intp), np.zeros((len(table), table.shape[2]), np.intp)
-    equation[group, line], unknown[lowest[found], column[found]] = np.arange(m), found
+    equation[group, line], unknown[owner[found], column[found]] = np.arange(m), found
     count, largest, pivots = np.bincount(group), abs(B).max(axis=1).toarray().ravel(), np.empty(m, np.intp)
     for made in range(table.shape[1]):
         left = np.flatnonzero(count > made)
@@ -166,32 +192,3 @@ def assigned(B: csr_array) -> Indices:
     except ValueError:
         raise RepeatedError() from None
     return np.asarray(pivots[np.argsort(row)], np.intp)
-
-
-def block_inverse(A: csr_array) -> csr_array:
-    """Return the inverse of a sparse matrix (m, m) of small independent blocks, one block after the other.
-
-    Raises
-    ------
-    RepeatedError
-        If a block is singular.
-    """
-    count, label = connected_components(A, directed=False)
-    order = np.argsort(label, kind="stable")
-    ends = np.cumsum(np.bincount(label, minlength=count))
-    columns = csc_array(A)
-    rows, cols, values = [], [], []
-    for first, end in zip(np.r_[0, ends[:-1]], ends, strict=True):
-        members = order[first:end]
-        block = columns[:, members].tocsr()[members].toarray()
-        try:
-            inverse = np.linalg.inv(block)
-        except np.linalg.LinAlgError:
-            raise RepeatedError() from None
-        if not np.abs(block).max() * np.abs(inverse).max() < SINGULAR:
-            raise RepeatedError()
-        rows.append(np.repeat(members, len(members)))
-        cols.append(np.tile(members, len(members)))
-        values.append(inverse.ravel())
-    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(cols)))
-    return csr_array(entries, shape=A.shape)

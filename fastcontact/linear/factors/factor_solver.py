@@ -165,7 +165,7 @@ class LoadedFactor:
 
     def solve(
         self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
-        monitor: Monitor | None = None, tolerance: float | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `Loaded`."""
         if B.shape[0] == 0:
@@ -224,7 +224,7 @@ class CondensedProblem:
 
     def solve(
         self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
-        monitor: Monitor | None = None, tolerance: float | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `Loaded`."""
         if B.shape[0] == 0:

@@ -1,7 +1,8 @@
 """A multigrid hierarchy under eliminated equations: local changes of its levels, made and taken back.
 
 The prolongators stay those without equations, except for the rows of the eliminated unknowns, the pivots. Only Galerkin
-products near the pivots change. The changes are stored beside the matrices of the levels, which stay as they are.
+products near the pivots change. The changes are stored beside the matrices of the levels, which stay as they are. On the
+finest level only diagonal blocks are formed: products with the matrix move displacements and forces at the pivots instead.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array
 
 from fastcontact.linear.elimination.elimination import Elimination
-from fastcontact.linear.multigrid import cycle_kernels
+from fastcontact.linear.multigrid import constrained_kernels, cycle_kernels
 from fastcontact.linear.multigrid.hierarchy import Hierarchy, Level
 from fastcontact.linear.multigrid.matrix import BlockMatrix, diagonal_blocks
 
@@ -60,15 +61,20 @@ class ConstrainedHierarchy:
         kind = top.b.dtype
         rounded = elimination.weights.astype(kind)
         top.eliminated = replace(elimination, weights=rounded, force_weights=rounded)
-        nodes, change = finest_change(self.A, elimination)
-        for level in self.hierarchy.levels:
+        first = CoarseChange(self.A, elimination)
+        if top.P is None:
+            self.hierarchy.coarse.set(first.on_finest())
+            return
+        self._change_top_diagonal(elimination)
+        nodes, change = first.on_coarse(top.P)
+        for level in self.hierarchy.levels[1:]:
             if level.P is None:
                 self.hierarchy.coarse.set(_scattered(nodes, change, level.n))
                 return
-            self._change_diagonal(level, nodes, change)
-            if level is not top:
-                columns = nodes[change.indices].astype(np.int32)
-                level.change = nodes, change.indptr, columns, change.data.astype(kind).ravel()
+            size = len(level.A.rows)
+            self._change_diagonal(level, nodes, diagonal_blocks(change.indptr, change.indices, change.data, size))
+            columns = nodes[change.indices].astype(np.int32)
+            level.change = nodes, change.indptr, columns, change.data.astype(kind).ravel()
             nodes, change = _coarser(nodes, change, level.P)
 
     def _undo(self) -> None:
@@ -78,11 +84,23 @@ class ConstrainedHierarchy:
         for level in self.hierarchy.levels:
             level.eliminated = level.change = None
 
-    def _change_diagonal(self, level: Level, nodes: Nodes, change: bsr_array) -> None:
-        """Set the inverses of the diagonal blocks of `nodes`, and remember what they were."""
+    def _change_top_diagonal(self, elimination: Elimination) -> None:
+        """Change the diagonal blocks of the finest level to those under the equations."""
+        A, W, pivots = self.A, elimination.weights, elimination.pivots
+        size, n_nodes = len(A.rows), len(A.indptr) - 1
+        nodes = np.unique(np.concatenate([pivots, W.indices]) // size)
+        number, place = np.full(n_nodes * size, -1, np.int32), np.full(n_nodes, -1, np.int32)
+        number[pivots], place[nodes] = np.arange(len(pivots)), np.arange(len(nodes))
+        change = np.zeros(len(nodes) * size * size)
+        constrained_kernels.diagonal_change(
+            pivots, number, W.indptr, W.indices, W.data, A.indptr, A.indices, A.exact, place, size, change
+        )
+        self._change_diagonal(self.hierarchy.levels[0], nodes, change)
+
+    def _change_diagonal(self, level: Level, nodes: Nodes, change: Array) -> None:
+        """Add `change` (k * size * size,) to the diagonal blocks of k `nodes`, and remember what the inverses were."""
         size = len(level.A.rows)
-        blocks = level.diagonal.reshape(-1, size**2)[nodes].astype(float).ravel()
-        blocks += diagonal_blocks(change.indptr, change.indices, change.data, size)
+        blocks = level.diagonal.reshape(-1, size**2)[nodes].astype(float).ravel() + change
         inverse = np.empty(blocks.size, level.inverse.dtype)
         cycle_kernels.invert_blocks(blocks, size, inverse)
         every = level.inverse.reshape(-1, size**2)
@@ -90,28 +108,55 @@ class ConstrainedHierarchy:
         every[nodes] = inverse.reshape(-1, size**2)
 
 
-def finest_change(A: BlockMatrix, elimination: Elimination) -> tuple[Nodes, bsr_array]:
-    """Return ``T.T A T - A``, ``u = T u`` the elimination: the nodes whose rows change, and the change on them.
+class CoarseChange:
+    """What equations change in the Galerkin product of the finest level, ``P.T (T.T A T - A) P``; they say ``u = T u``.
 
-    With D the rows ``weights - 1`` that pivots change by, and K the rows of A at the pivots, it is ``D.T H + H.T D``,
-    ``H = K + K[:, pivots] D / 2``.
+    With D the rows ``weights - 1`` that pivots change by, and K the rows of A at the pivots, it is ``E.T H + H.T E``,
+    ``E = D P``, ``H = K P + K[:, pivots] E / 2``.
+
+    Parameters
+    ----------
+    A : BlockMatrix
+    elimination : Elimination
     """
-    size, pivots, m = len(A.rows), elimination.pivots, len(elimination.pivots)
-    minus_one = csr_array((np.full(m, -1.0), pivots, np.arange(m + 1)), shape=elimination.weights.shape)
-    D = csr_array(elimination.weights + minus_one)
-    own, place = np.unique(pivots // size, return_inverse=True)
-    K = csr_array(block_rows(A, own, D.shape[1]).tocsr()[place * size + pivots % size])
-    K.eliminate_zeros()
-    nodes = np.unique(np.concatenate([D.indices, K.indices]) // size)
 
-    def numbered(columns: Any) -> Any:
-        return np.searchsorted(nodes, columns // size) * size + columns % size
+    def __init__(self, A: BlockMatrix, elimination: Elimination) -> None:
+        self._size, pivots, m = len(A.rows), elimination.pivots, len(elimination.pivots)
+        size, shape = self._size, elimination.weights.shape
+        D = csr_array(elimination.weights + csr_array((np.full(m, -1.0), pivots, np.arange(m + 1)), shape=shape))
+        own, place = np.unique(pivots // size, return_inverse=True)
+        K = csr_array(block_rows(A, own, shape[1]).tocsr()[place * size + pivots % size])
+        K.eliminate_zeros()
+        self._nodes = np.unique(np.concatenate([D.indices, K.indices]) // size)
+        self._D, self._K = (_renumbered(M, self._nodes, size) for M in (D, K))
+        self._among = self._K[:, _places(pivots, self._nodes, size)]
+        self._n = shape[1]
 
-    D, K = (csr_array((M.data, numbered(M.indices), M.indptr), shape=(m, len(nodes) * size)) for M in (D, K))
-    half = D.T @ (K + 0.5 * (K[:, numbered(pivots)] @ D))
-    change = (half + half.T).tobsr((size, size))
-    change.sort_indices()
-    return nodes, change
+    def on_finest(self) -> csc_array:
+        """Return ``T.T A T - A``, on all unknowns."""
+        half = self._D.T @ (self._K + 0.5 * (self._among @ self._D))
+        return _scattered(self._nodes, bsr_array((half + half.T).tobsr(2 * (self._size,))), self._n)
+
+    def on_coarse(self, P: BlockMatrix) -> tuple[Nodes, bsr_array]:
+        """Return the nodes of the next coarser level whose rows change, and the change on them."""
+        size, rows = len(P.cols), block_rows(P, self._nodes, (int(P.indices.max()) + 1) * len(P.cols)).tocsr()
+        E = csr_array(self._D @ rows)
+        H = csr_array(self._K @ rows + 0.5 * (self._among @ E))
+        nodes = np.unique(np.concatenate([E.indices, H.indices]) // size)
+        half = _renumbered(E, nodes, size).T @ _renumbered(H, nodes, size)
+        change = bsr_array((half + half.T).tobsr((size, size)))
+        change.sort_indices()
+        return nodes, change
+
+
+def _places(columns: Any, nodes: Nodes, size: int) -> Any:
+    """Return the numbers of `columns` where only those of `nodes`, ascending, are counted."""
+    return np.searchsorted(nodes, columns // size) * size + columns % size
+
+
+def _renumbered(M: csr_array, nodes: Nodes, size: int) -> csr_array:
+    """Return a matrix with columns of `nodes` alone."""
+    return csr_array((M.data, _places(M.indices, nodes, size), M.indptr), shape=(M.shape[0], len(nodes) * size))
 
 
 def block_rows(A: BlockMatrix, nodes: Nodes, n: int) -> bsr_array:

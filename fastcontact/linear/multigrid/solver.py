@@ -27,6 +27,8 @@ from fastcontact.linear.protocol import Counters, Monitor
 log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
 MAX_ITERATIONS, MAX_NONSYMMETRIC = 1000, 300
+# Columns of K^-1, each a solution, up to which they cost less than factors do.
+MOST_COLUMNS = 300
 # Iterations between two calls of a monitor.
 WATCH_EVERY = 2
 # Equations with the same pivots whose weights differ by less than this share a hierarchy.
@@ -76,7 +78,7 @@ class Multigrid:
         self._diagonal: Array | None = None
         self._solved: Array | None = None  # the right-hand side that iterate and residual belong to
         self._build(rigid_modes)
-        self.columns = FlexibilityColumns(n, self._solve_many)
+        self.columns = FlexibilityColumns(n, self._solve_many, MOST_COLUMNS)
 
     def _build(self, rigid_modes: Array) -> None:
         check_threads()
@@ -101,13 +103,14 @@ class Multigrid:
         """Change the hierarchy to that of the eliminated matrix.
 
         A hierarchy for the same pivots that follow others with nearly the same weights is kept: it preconditions as
-        well, since only the unknowns beside the pivots count.
+        well, since only the unknowns beside the pivots count. Pivots that are coupled have sparse weights there.
         """
         check_threads()  # every solution begins here, also that of a child forked after the hierarchy was built
         if elimination is not self._equations:
-            if not _alike(elimination, self._hierarchy_equations):
-                self._constrained.constrain(elimination)
-                self._hierarchy_equations = elimination
+            sparse = elimination and elimination.with_sparse_weights()
+            if not _alike(sparse, self._hierarchy_equations):
+                self._constrained.constrain(sparse)
+                self._hierarchy_equations = sparse
             self._equations = elimination
 
     def solution(

@@ -1,8 +1,8 @@
 """Multigrid as a linear solver, and the factorisation that replaces it where it does not converge.
 
 Equations ``B u = c`` are eliminated, see `multigrid.solver`. Those with a compliance of their own cannot be: they go through
-columns of K^-1, one solution each, kept for the whole analysis. Where the iteration stalls, on thin or nearly incompressible
-parts, a factorisation replaces it for the rest of the analysis, if the matrix is not too large.
+columns of K^-1, one solution each, kept for the whole analysis. Where those would be many, or the iteration stalls, on thin
+or nearly incompressible parts, a factorisation replaces it for the rest of the analysis, if the matrix is not too large.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from scipy.sparse import bsr_array, csr_array
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.elimination.loaded import LoadedIteration
+from fastcontact.linear.flexibility import TooManyColumnsError
 from fastcontact.linear.multigrid.solver import Multigrid, StallError
 from fastcontact.linear.protocol import FrictionTerms, LinearSolver, Loaded, Product
 from fastcontact.linear.solvers.direct import Direct
@@ -114,12 +115,12 @@ class Amg(Multigrid, LinearSolver):
         self.constrain(memory["tied"] and _elimination(memory["tied"], self.hierarchy.n))
         self.hierarchy.bounds = memory["bounds"]
 
-    def give_up(self, stalled: StallError) -> None:
-        """Factorise the matrix, since the iteration stalls.
+    def give_up(self, stalled: StallError | TooManyColumnsError) -> None:
+        """Factorise the matrix, since the iteration stalls or columns of its inverse cost more.
 
         Raises
         ------
-        StallError
+        StallError, TooManyColumnsError
             If the matrix is too large for that.
         """
         if not self._may_factorise:
@@ -153,7 +154,7 @@ def _or_by_factors(method: Callable[..., Any]) -> Callable[..., Any]:
         if self._solver.instead is None:
             try:
                 return method(self, *args, **options)
-            except StallError as stalled:
+            except (StallError, TooManyColumnsError) as stalled:
                 self._solver.give_up(stalled)
         return getattr(self._factored, method.__name__)(*args, **options)
 
@@ -176,17 +177,18 @@ class _Loaded(LoadedIteration):
         return self._solver.diagonal()
 
     def solve_nonsymmetric(
-        self, B: csr_array, c: Array, groups: NDArray[np.intp], guess: Array, tolerance: float,
+        self, B: csr_array, c: Array, nodes: NDArray[np.intp], guess: Array, tolerance: float,
         friction: FrictionTerms | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         solver, f = self._solver, self._f
         if solver.instead is not None:
             raise ConvergenceError("factors give the compliance of friction")
+        size = solver.K.blocksize[0]
         if friction is None:
-            elimination = eliminate(B, c, groups=groups) if B.shape[0] else None
+            elimination = eliminate(B, c, None, nodes, size) if B.shape[0] else None
             u = solver.solution(f, elimination, guess, tolerance=tolerance)
             return u, solver.multiplier(elimination, u, f)
-        elimination, springs = eliminate(B, c, friction.rows, groups), friction.springs
+        elimination, springs = eliminate(B, c, friction.rows, nodes, size), friction.springs
         f = f if friction.forces is None else f + friction.forces
         u = solver.nonsymmetric_solution(f, elimination, springs, guess, tolerance)
         return u, solver.multiplier(elimination, u, f - (springs @ u if springs is not None else 0.0))

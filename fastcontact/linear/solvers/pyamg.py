@@ -69,7 +69,7 @@ class Pyamg(LinearSolver):
             pivots, kept = elimination.pivots, np.ones(n)
             kept[pivots] = 0.0
             spread = csr_array((np.ones(len(pivots)), (pivots, np.arange(len(pivots)))), shape=(n, len(pivots)))
-            self._T = csr_array(diags_array(kept) + spread @ elimination.weights)
+            self._T = csr_array(diags_array(kept) + spread @ elimination.full_weights())
             A = self._T.T @ self.K @ self._T + diags_array((1.0 - kept) * self.K.diagonal())
             modes = kept[:, None] * modes
         self._A = bsr_matrix(A.tobsr(self.K.blocksize))

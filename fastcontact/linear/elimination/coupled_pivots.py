@@ -1,0 +1,149 @@
+"""The columns of pivots inverted: small independent blocks, or a factorisation where equations of many nodes are coupled.
+
+Gaps weighted with standard multipliers are coupled by a mass matrix of the secondary surface, whose inverse is full. Its
+factors are not: a solution costs next to nothing beside a product with the stiffness. Preconditioners need sparse weights
+and take a sparse inverse instead, that of one block a node which does the same to translations.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csc_array, csr_array
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+
+from fastcontact.errors import ConvergenceError
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+# Equations whose inverse is larger, in units of their entries, repeat each other but for round-off.
+SINGULAR = 1e12
+# Coupled columns whose inverse is larger than this, in units of their entries, suit no elimination: errors would grow.
+ILL_CONDITIONED = 1e6
+# Entries are added up on the blocks of nodes where at least this part of them does not cancel.
+LUMPED = 0.3
+
+
+class RepeatedError(ConvergenceError):
+    """Equations repeat each other."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "active contact constraints repeat each other, so that an iterative solver cannot eliminate them: leave out one "
+            "of two contacts on the same nodes, or use the direct solver"
+        )
+
+
+class CoupledError(RepeatedError):
+    """Equations of many nodes share unknowns in a way that cannot be eliminated."""
+
+    def __init__(self) -> None:
+        ConvergenceError.__init__(
+            self,
+            "active contact constraints of many nodes share unknowns, so that an iterative solver cannot eliminate them: use "
+            'multipliers="dual" or the direct solver',
+        )
+
+
+class CoupledPivots:
+    """A sparse matrix (m, m) with its factors.
+
+    Parameters
+    ----------
+    P : csr_array (m, m)
+    pivots : ndarray of int (m,)
+        The unknowns of its columns.
+    size : int
+        Unknowns of a node.
+
+    Attributes
+    ----------
+    sparse_inverse : csr_array (m, m)
+        Close enough to the inverse for a preconditioner: that of `lumped`.
+
+    Raises
+    ------
+    CoupledError
+        If it is singular, or there is no such sparse inverse.
+    """
+
+    def __init__(self, P: csr_array, pivots: Indices, size: int) -> None:
+        L = lumped(P, pivots, size)
+        kept = np.asarray(abs(L).sum(axis=1)) / np.asarray(abs(P).sum(axis=1))
+        if not kept.min() >= LUMPED:
+            raise CoupledError()
+        self.sparse_inverse = block_inverse(L)
+        try:
+            self._factors = splu(csc_array(P))
+        except RuntimeError:  # exactly singular
+            raise CoupledError() from None
+        diagonal = np.abs(self._factors.U.diagonal())
+        if not diagonal.max() < ILL_CONDITIONED * diagonal.min():
+            raise CoupledError()
+
+    def solve(self, b: Array) -> Array:
+        """Return ``P^-1 b``, shape (m,)."""
+        return np.asarray(self._factors.solve(b))
+
+    def solve_transposed(self, b: Array) -> Array:
+        """Return ``P^-T b``, shape (m,)."""
+        return np.asarray(self._factors.solve(b, "T"))
+
+
+def lumped(P: csr_array, pivots: Indices, size: int) -> csr_array:
+    """Return P (m, m) with its entries added up on the blocks of nodes: those of each row by the direction of its pivots.
+
+    Translations of the pivots, of which a node has `size` components, then need the same forces. Entries of directions that
+    are no pivots of the row's own node are left out.
+    """
+    node, direction = pivots // size, pivots % size
+    place = np.full((node.max() + 1) * size, -1, np.intp)
+    place[pivots] = np.arange(len(pivots))
+    entries = coo_array(P)
+    own = place[node[entries.row] * size + direction[entries.col]]
+    kept = own >= 0
+    return csr_array((entries.data[kept], (entries.row[kept], own[kept])), shape=P.shape)
+
+
+def block_inverse(A: csr_array) -> csr_array:
+    """Return the inverse of a sparse matrix (m, m) of small independent blocks, all blocks of a size at once.
+
+    Raises
+    ------
+    RepeatedError
+        If a block is singular.
+    """
+    m = A.shape[0]
+    label = connected_components(A, directed=False)[1]
+    order, size = np.argsort(label, kind="stable"), np.bincount(label)
+    first = np.cumsum(size) - size
+    place = np.empty(m, np.intp)
+    place[order] = np.arange(m) - first[label[order]]
+    entries = coo_array(A)
+    rows, cols, values = [], [], []
+    for k in np.unique(size):
+        alike = np.flatnonzero(size == k)
+        number = np.full(len(size), -1, np.intp)
+        number[alike] = np.arange(len(alike))
+        mine = number[label[entries.row]] >= 0
+        row, col = entries.row[mine], entries.col[mine]
+        blocks = np.zeros((len(alike), k, k))
+        np.add.at(blocks, (number[label[row]], place[row], place[col]), entries.data[mine])
+        members = order[first[alike][:, None] + np.arange(k)]
+        rows.append(np.repeat(members, k, axis=1).ravel())
+        cols.append(np.tile(members, k).ravel())
+        values.append(_inverses(blocks).ravel())
+    found = np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))
+    return csr_array(found, shape=A.shape)
+
+
+def _inverses(blocks: Array) -> Array:
+    """Return the inverses of `blocks` (n, k, k)."""
+    try:
+        inverses = np.asarray(np.linalg.inv(blocks), np.float64)
+    except np.linalg.LinAlgError:
+        raise RepeatedError() from None
+    if not (np.abs(blocks).max(axis=(1, 2)) * np.abs(inverses).max(axis=(1, 2)) < SINGULAR).all():
+        raise RepeatedError()
+    return inverses
