@@ -126,7 +126,18 @@ def _series(
     at_force, spread = _at_force(*theory[:2], limits.get("force"))
     exact = isinstance(theory[0], EXACT_THEORIES)
     return Series(
-        member, levels, failed, last["theory"], last["reference"], at_force, spread, names, limits, exact, theory[2]
+        member,
+        levels,
+        failed,
+        last["theory"],
+        last["reference"],
+        at_force,
+        spread,
+        names,
+        limits,
+        exact,
+        theory[2],
+        theory[1],
     )
 
 

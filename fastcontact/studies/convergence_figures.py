@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.studies.quantities import title
 from fastcontact.studies.render.figure import Curve, Line, Panel, marker
 from fastcontact.studies.series import Series
@@ -76,34 +77,41 @@ def pressure_panel(series: Series, theory: Any, units: Mapping[str, str]) -> Pan
     from matplotlib import colormaps
 
     profiles = [(np.array(level.profile["r"]), np.array(level.profile["pressure"])) for level in series.levels]
-    reach = 1.25 * max(r[pressure > 0].max(initial=0.0) for r, pressure in profiles[-2:])
+    reach = 1.25 * max(np.abs(r[pressure > 0]).max(initial=0.0) for r, pressure in profiles[-2:])
+    low = max(-reach, min(float(r.min(initial=0.0)) for r, _ in profiles))
     colors = colormaps["viridis_r"](np.linspace(0.1, 1.0, len(series.levels)))
     curves = []
     for color, level, (r, pressure) in zip(colors, series.levels, profiles, strict=True):
-        shown = r <= reach
+        shown = np.abs(r) <= reach
         style = "o-" if shown.sum() <= 60 else "-"
         label = f"level {level.number}, {level.n_dofs} DOF"
         curves.append(Curve(r[shown], pressure[shown], style, label, color, size=3))
     return Panel(
         f"Contact pressure, {series.combination}",
-        f"distance from the axis [{units['length']}]",
+        f"distance from the middle of the contact [{units['length']}]",
         f"contact pressure [{units['pressure']}]",
-        [*curves, *_theory_curves(theory, series, reach)],
+        [*curves, *_theory_curves(theory, series, low, reach)],
         x_end=reach,
+        x_start=low,
         grid=0.3,
     )
 
 
-def _theory_curves(theory: Any, series: Series, reach: float) -> list[Curve]:
-    if not hasattr(theory, "pressure"):
+def _theory_curves(theory: Any, series: Series, low: float, reach: float) -> list[Curve]:
+    own = pressure_curve(theory)
+    if own is None:
         return []
-    curves = [("approach", "k-", theory)]
+    curves = [("theory" if series.exact_theory else f"theory {series.compared}", "k-", own)]
     force = series.limits.get("force")
     if force is not None and force.value > 0 and hasattr(theory, "at_force"):
-        curves.append(("force", "k--", theory.at_force(force.value)))
-    x = np.linspace(0.0, reach, 600)
-    label = "theory, equal {} ($p_0$ = {:.1f})"
-    return [Curve(x, t.pressure(x), style, label.format(at, t.pressure_max), width=1.2) for at, style, t in curves]
+        same = pressure_curve(theory.at_force(force.value / series.share))
+        curves += [("theory at equal force", "k--", same)] if same is not None else []
+    x = np.linspace(low, reach, 600)
+    label = "{} ($p_0$ = {:.1f})"
+    return [
+        Curve(x, t.pressure(np.abs(x)), style, label.format(name, t.pressure_max), width=1.2)
+        for name, style, t in curves
+    ]
 
 
 def theory_panel(all_series: Sequence[Series], best: Series, quantity: str, units: Mapping[str, str]) -> Panel:
@@ -126,7 +134,7 @@ def theory_panel(all_series: Sequence[Series], best: Series, quantity: str, unit
     return Panel(
         f"Model and mesh error of the {title(quantity)}",
         f"facet length at the contact h [{units['length']}]",
-        "difference from theory at equal approach [%]",
+        "difference from theory [%]" if best.exact_theory else f"difference from theory {best.compared} [%]",
         curves,
         [*lines, Line(0.0, label="theory")],
         x_scale="plain log",

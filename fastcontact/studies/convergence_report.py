@@ -91,7 +91,7 @@ class Study(Report):
         found += [f"  {name} failed: {text}" for name, text in self.failed.items()]
         if len(self.series) > 1:
             names = [name for name in COMPARED if name in self.best.quantities]
-            found += ["", "all combinations: limits and model errors at equal approach"]
+            found += ["", f"all combinations: limits and model errors {self.best.compared}"]
             found += aligned(tables.comparison_rows(self.series, names, self.units))
         return [*found, "", *sentences(self.best)]
 

@@ -32,7 +32,7 @@ LABELS = {
     "contact_radius": ("contact radius", "length"),
     "von_mises_max": ("largest von Mises stress", "pressure"),
     "von_mises_depth": ("depth of the largest von Mises stress", "length"),
-    "pressure_error": ("pressure against theory at equal approach, relative L2 norm", ""),
+    "pressure_error": ("pressure against theory, relative L2 norm", ""),
     "pressure_error_equal_force": ("pressure against theory at equal force, relative L2 norm", ""),
 }
 

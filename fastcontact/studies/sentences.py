@@ -23,7 +23,8 @@ def _about_quantity(series: Series, quantity: str) -> list[str]:
     found, name = series.split(quantity), title(quantity)
     if found is None:
         off = percent(series.errors(quantity)[-1])
-        return [f"{series.combination}: the mesh error of the {name} is {off} on the finest mesh."]
+        told = f"{series.combination}: the mesh error of the {name} is {off} on the finest mesh."
+        return [told, *_about_settling(series, quantity, name)]
     start = (
         f"{series.combination}: the {name}"
         if series.exact_theory
@@ -44,12 +45,17 @@ def _about_quantity(series: Series, quantity: str) -> list[str]:
             f"{start} agrees with theory within the error bar of its limit, {percent(found.model)} +- {bar}; "
             f"{percent(found.mesh)} is mesh error on the finest mesh {finest}."
         ]
-    if not series.limits[quantity].converging:
-        texts.append(
-            f"The {name} does not settle: it changes on the finest mesh as much as before, so that its error bar proves "
-            "nothing; finer meshes are needed."
-        )
+    texts += _about_settling(series, quantity, name)
     return texts + _about_cancelling(series, quantity, found) + _about_reference(series, quantity)
+
+
+def _about_settling(series: Series, quantity: str, name: str) -> list[str]:
+    if series.limits[quantity].converging:
+        return []
+    return [
+        f"The {name} does not settle: it changes on the finest mesh as much as before, so that its error bar proves nothing. "
+        "It may have no limit, or finer meshes are needed."
+    ]
 
 
 def _not_to_theory(series: Series, quantity: str, start: str, found: Split) -> str:

@@ -112,6 +112,8 @@ class Series:
         By quantity; empty with fewer than three levels.
     exact_theory : bool
         Whether the theory is about the very bodies of the model, so that there is no model error.
+    share : float
+        Part of the theory's contact that the model holds [-].
     compared : str
         At what the theory is held against the values: "at equal approach" or "under the given load".
     """
@@ -127,6 +129,7 @@ class Series:
     limits: dict[str, Limit]
     exact_theory: bool = False
     compared: str = "at equal approach"
+    share: float = 1.0
 
     @property
     def finest(self) -> Level:

@@ -48,7 +48,8 @@ class Panel:
     lines: Sequence[Line] = ()
     x_scale: str = "linear"  # or "log", or "plain log": few plain numbers instead of powers of ten
     y_scale: str = "linear"  # or "log"
-    x_end: float | None = None  # end of the x axis, in its unit; both axes start from zero then
+    x_end: float | None = None  # end of the x axis, in its unit; the y axis starts from zero then
+    x_start: float = 0.0  # where the x axis then begins
     grid: float = 0.4  # opacity at major ticks; 0: no grid
     minor_grid: float = 0.0  # opacity at minor ticks
     title_size: float | None = None  # [point]
@@ -100,7 +101,7 @@ def _draw(panel: Panel, ax: Any) -> None:
     ax.set_ylabel(panel.y_label)
     ax.set_title(panel.title, fontsize=panel.title_size or "large")
     if panel.x_end is not None:
-        ax.set_xlim(0.0, panel.x_end or None)
+        ax.set_xlim(panel.x_start, panel.x_end or None)
         ax.set_ylim(bottom=0.0)
     if panel.grid:
         ax.grid(which="major", alpha=panel.grid)

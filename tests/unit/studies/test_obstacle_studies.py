@@ -166,3 +166,10 @@ def test_a_formulation_that_misses_an_exact_theory_is_told_so(root, tmp_path):
 )
 def test_values_settle_where_the_last_change_is_small(values, settles):
     assert fit_limit(0.5 ** np.arange(4.0), values).converging is settles
+
+
+def test_pictures_of_a_study_show_uniform_and_shared_theories(tmp_path):
+    for case in ("press-fit", "cylinder-on-block"):
+        words = ["converge", case, "--levels", "1", "--workers", "1", "--png", str(tmp_path / "s.png"), "-q"]
+        assert main([*words, "--html", str(tmp_path / "s.html")]) == 0
+        assert (tmp_path / "s.png").read_bytes()[:4] == b"\x89PNG"
