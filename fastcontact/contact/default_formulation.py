@@ -21,9 +21,14 @@ def default_formulation(secondary: Surface, primary: Surface, points: Array) -> 
         return "continuous", "a side mixes linear and quadratic facets"
     if max(secondary.order, primary.order) == 2:
         return "mortar", "facets are quadratic"
-    if not (_opposite(secondary, primary, points) and _opposite(primary, secondary, points)):
+    if not opposite(secondary, primary, points):
         return "mortar", "the nodes of the two sides do not lie opposite to each other"
     return "node_to_segment", "facets are linear and the nodes of the two sides lie opposite to each other"
+
+
+def opposite(secondary: Surface, primary: Surface, points: Array) -> bool:
+    """Return whether the nodes of two surfaces at reference `points` (n_points, dim) lie opposite to each other."""
+    return _opposite(secondary, primary, points) and _opposite(primary, secondary, points)
 
 
 def _opposite(side: Surface, other: Surface, points: Array) -> bool:
