@@ -113,7 +113,7 @@ def excess_of_stiffness(problem: Problem, u: Array, comparison: Comparison) -> f
     lower = 0.5 * float(u @ own)
     zero, still = np.zeros(len(u)), np.zeros(len(u))
     residual = system.reduced(own)
-    direction, before = zero, 0.0
+    direction, before, kept = zero, 0.0, problem.solver.snapshot()
     for _ in range(ITERATIONS):
         step = problem.solver.load(residual).full_solution(zero)
         slope = float(residual @ step)
@@ -128,6 +128,7 @@ def excess_of_stiffness(problem: Problem, u: Array, comparison: Comparison) -> f
         lower += 0.5 * slope**2 / curvature
         residual = residual - slope / curvature * product
         before = slope
+    problem.solver.put_back(kept)  # these loads are none of the analysis
     return lower / energy if energy > 0.0 else 0.0
 
 

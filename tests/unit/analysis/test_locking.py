@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.analysis.locking import SUSPICIOUS, Comparison
+from fastcontact.analysis.load_step import load_step
+from fastcontact.analysis.locking import SUSPICIOUS, Comparison, locking_warning
+from fastcontact.analysis.problem import prepare
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.mesh import elements
 
@@ -93,3 +95,12 @@ def test_the_surplus_is_a_stiffness(name, kinematics):
         K = stiffness(model.mesh, kinematics, moduli, material)
         averaged = stiffness(model.mesh, kinematics, moduli, material, averaged=np.array([True]))
         assert np.abs(S - (K - averaged).toarray()).max() < 1e-10 * np.abs(S).max()
+
+
+@pytest.mark.parametrize("linear_solver", ["direct", "amg"])
+def test_the_comparison_leaves_nothing_behind_in_the_solver(linear_solver):
+    problem = prepare(clamped("quad4", 0.499, "plain"), fc.linear_ramp(1), fc.Criteria(), linear_solver=linear_solver)
+    state, _ = load_step(problem, problem.initial_state(), 1, 1.0)
+    before = repr(problem.solver.memory())
+    assert locking_warning(problem, state.u)
+    assert repr(problem.solver.memory()) == before
