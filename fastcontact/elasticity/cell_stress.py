@@ -45,7 +45,10 @@ class CellStress:
         return out
 
     def fill(self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32], out: Array) -> None:
-        """Fill `out` (n_cells, n, n_components) [pressure] in place, shared by threads; arguments as for `at`."""
+        """Fill `out` (n_cells, n, n_components) [pressure] in place, shared by threads.
+
+        At points `xi` (n, dim) [-] of `cells` (n_cells, n_nodes) of int of an element, `material` (n_cells,) of int.
+        """
         element, split = elements.get(name), dilatation.split(name, self._moduli, self._averaged)
         moduli = self._moduli if split is None else split.moduli
         if xi is element.quadrature[0]:

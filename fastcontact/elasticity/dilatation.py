@@ -26,9 +26,14 @@ REMAINDER = 2.6 / 1.2
 
 
 class Split(NamedTuple):
-    """Moduli (n_materials, n, n) for the element loops, and bulk moduli (n_materials, 2) beside them [pressure].
+    """Moduli without and beside the part of the dilatation.
 
-    Bulk moduli are those of the mean dilatation of a cell and of the remainder, zero where the element loops have them.
+    Attributes
+    ----------
+    moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
+        For the element loops [pressure].
+    bulk : ndarray (n_materials, 2)
+        Bulk moduli of the mean dilatation of a cell and of the remainder, zero where the element loops have them [pressure].
     """
 
     moduli: Array

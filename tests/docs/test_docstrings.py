@@ -16,7 +16,7 @@ WITH_EXAMPLES = [path for path in sorted(PACKAGE.rglob("*.py")) if ">>>" in path
 ROOMS = ["analytic", "mesh/generate", "mesh/elements", "mesh/mesh.py", "mesh/quadrature.py", "mesh/quality.py"]
 ROOMS += ["mesh/topology.py", "model/checks.py"]
 ROOMS += [f"elasticity/{name}.py" for name in ("energy", "loads", "materials", "recovery", "relations", "springs")]
-ROOMS += ["elasticity/smoothed_stress.py", "elasticity/stiffness.py"]
+ROOMS += [f"elasticity/{name}.py" for name in ("cell_stress", "dilatation", "smoothed_stress", "stiffness")]
 
 
 @pytest.mark.parametrize("path", WITH_EXAMPLES, ids=lambda path: str(path.relative_to(PACKAGE)))

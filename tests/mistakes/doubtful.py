@@ -171,6 +171,31 @@ DOUBTS = [
         ),
     ),
     Doubt(
+        "nearly incompressible elements lock",
+        lambda: block((1.0, 1.0), (6, 6)),
+        of(
+            STEEL.replace("0.3", '0.499\nvolumetric = "plain"'),
+            held("BOTTOM", x=0.0, y=0.0),
+            '[[traction]]\ngroup = "TOP"\nx = 0.1\n',
+        ),
+        (
+            r'quad4 cells lock: at nu = 0\.499, nearly incompressible, they make the model about \d+% too stiff \(elastic energy under the same forces\); give the material volumetric="mean_dilatation"',
+        ),
+    ),
+    Doubt(
+        "an interference as small as the sag of facets",
+        lambda: generate.rings("quad4", divisions_inner=(2, 12), divisions_outer=(2, 8)),
+        of(
+            STEEL,
+            held("SYMMETRY_X", x=0.0),
+            held("SYMMETRY_Y", y=0.0),
+            '[contact.pair]\nsecondary = "CONT_INNER"\nprimary = "CONT_OUTER"\nformulation = "mortar"\nclearance = -0.2\n',
+        ),
+        (
+            r"contact 'pair': the interference of 0\.2 between its sides is not large beside the sag of the facets of 'CONT_OUTER', 0\.239 between chord and arc \(120%\): gaps are off by up to as much; facets of length 2\.8\d instead of 9\.7\d bring it to 10%, or quadratic elements",
+        ),
+    ),
+    Doubt(
         "nodes were not merged",
         lambda: generate.union(
             block((0.5, 1.0), (2, 2), name="A"), block((0.5, 1.0), (2, 2), origin=(0.5, 0.0), name="B")

@@ -117,6 +117,10 @@ OTHERWISE = {
         "a cell with an angle near 180 degrees", "a cell with a Jacobian near zero", "a cell is poor",
         "the quadrature of the stiffness is not exact", "a load that varies within an element",
     ),
+    "nothing is said: the model is several times too stiff, and forces are wrong by as much": (
+        "nearly incompressible elements lock",
+    ),
+    "nothing is said: pressures follow the facets, not the curve": ("an interference as small as the sag of facets",),
     "nothing is said: programs know no units, and the result is off by a factor of a thousand or a million": (
         "E of one body in Pa, of the other in MPa", "E in Pa where MPa is named", "E in GPa where Pa is named",
         "units that do not fit each other", "E in Pa with a force and mm", "a pressure in Pa with E in MPa",

@@ -1,0 +1,151 @@
+"""How much too stiff nearly incompressible elements make a model: a lower bound from its own solution.
+
+Let S be the stiffness that a reference without locking does not have: K is the stiffness of the model, K - S that of the
+reference. For the forces of the solution u, the potential energy of the reference is lower than that of the model by
+
+    D = u.S u / 2 + max over x of (x.S u - x.(K - S) x / 2),
+
+and D over the elastic energy u.K u / 2 is the part by which the reference yields more under the same forces: the excess of
+stiffness where forces act, and less than the excess where displacements are prescribed. A few conjugate gradients, with K^-1
+as preconditioner, approach the maximum from below. The contact forces stay as they are.
+
+The reference takes the projected dilatation of `elasticity.dilatation`; in linear triangles, tetrahedra, wedges and pyramids,
+which lock with it or have none, the mean dilatation of the cells at each node (Bonet and Burton, Commun. Numer. Meth. Engng
+14, 1998).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.analysis.problem import Problem
+from fastcontact.elasticity import recovery
+from fastcontact.elasticity.energy import cell_volumes
+from fastcontact.mesh import elements
+from fastcontact.model.model import Model
+
+Array = NDArray[np.float64]
+# Poisson's ratio from which on plain elements may lock, the excess of stiffness that is worth a warning, and the number of
+# conjugate gradients.
+SUSPICIOUS, EXCESS, ITERATIONS = 0.45, 0.05, 5
+# Elements whose dilatation is averaged at the nodes for comparison.
+AT_NODES = ("tri3", "tet4", "wedge6", "pyramid5")
+
+
+class Comparison:
+    """The forces S u of the stiffness that the reference does not have; see the module.
+
+    Parameters
+    ----------
+    model : Model
+
+    Attributes
+    ----------
+    elements : list of str
+        Those that may lock; there may be none.
+    nu : float
+        The largest Poisson's ratio of theirs [-].
+    """
+
+    def __init__(self, model: Model) -> None:
+        self._model, (self._moduli, self._material) = model, model.material_numbers()
+        self._averaged = model.averaged_materials()
+        nu = np.array([material.nu for material, _ in model.materials])
+        self._suspicious = (nu >= SUSPICIOUS) & (model.kinematics != "plane_stress")
+        self._cells = {name: rows for name in model.mesh.solids if (rows := self._may_lock(name)).any()}
+        self.elements = list(self._cells)
+        self.nu = max((float(nu[self._material[name][rows]].max()) for name, rows in self._cells.items()), default=0.0)
+
+    def _may_lock(self, name: str) -> NDArray[np.bool_]:
+        """Return which cells (n_cells,) of an element may lock."""
+        numbers = self._material[name]
+        return self._suspicious[numbers] & ((name in AT_NODES) | ~self._averaged[numbers])
+
+    def force(self, displacement: Array) -> Array:
+        """Return the nodal forces (n_points, dim) [force] of displacements (n_points, dim) [length]."""
+        mesh, kinematics = self._model.mesh, self._model.kinematics
+        given = mesh, kinematics, self._moduli, self._material, displacement
+        own = recovery.stress_at_points(*given, self._averaged)
+        reference = recovery.stress_at_points(*given, self._averaged | self._suspicious)
+        surplus = {name: np.zeros_like(own[name]) for name in self._cells}
+        for name in self._cells:
+            surplus[name][..., :3] = (own[name] - reference[name])[..., :3].mean(axis=2, keepdims=True)
+        self._add_beyond_nodal_mean(reference, surplus)
+        return recovery.internal_force(mesh, kinematics, surplus)
+
+    def _add_beyond_nodal_mean(self, reference: dict[str, Array], surplus: dict[str, Array]) -> None:
+        """Add to `surplus` what mean pressures of cells have beyond the means at their nodes, material by material."""
+        mesh, names = self._model.mesh, [name for name in self._cells if name in AT_NODES]
+        volume, pressure = {}, {}
+        for name in names:
+            N, dN, weights = elements.get(name).tables
+            corners = mesh.points[mesh.cells[name]]
+            part = cell_volumes(corners, N, dN, self._model.kinematics == "axisymmetric") * weights
+            volume[name] = part.sum(axis=1)
+            at_points = reference[name][..., :3].mean(axis=2)
+            pressure[name] = (at_points * part).sum(axis=1) / volume[name]
+        for number in np.flatnonzero(self._suspicious):
+            whole, work = np.zeros((2, mesh.n_points))
+            rows = {name: np.flatnonzero(self._material[name] == number) for name in names}
+            for name in names:
+                cells = mesh.cells[name][rows[name]]
+                for node in cells.T:
+                    np.add.at(whole, node, volume[name][rows[name]])
+                    np.add.at(work, node, (volume[name] * pressure[name])[rows[name]])
+            mean = work / np.where(whole > 0.0, whole, 1.0)
+            for name in names:
+                beyond = pressure[name][rows[name]] - mean[mesh.cells[name][rows[name]]].mean(axis=1)
+                surplus[name][rows[name], :, :3] += beyond[:, None, None]
+
+
+def excess_of_stiffness(problem: Problem, u: Array, comparison: Comparison) -> float:
+    """Return D over the elastic energy of displacements u (n_dofs,) [length], see the module [-]."""
+    system, n = problem.system, problem.model.n_dofs
+
+    def surplus(displacement: Array) -> Array:
+        force = np.zeros(len(u))
+        force[:n] = comparison.force(problem.displacement(displacement)).ravel()
+        return force
+
+    energy = 0.5 * float(u @ (system.K @ u))
+    own = surplus(u)
+    lower = 0.5 * float(u @ own)
+    zero, still = np.zeros(len(u)), np.zeros(len(u))
+    residual = system.reduced(own)
+    direction, before, kept = zero, 0.0, problem.solver.snapshot()
+    for _ in range(ITERATIONS):
+        step = problem.solver.load(residual).full_solution(zero)
+        slope = float(residual @ step)
+        if not slope > 1e-12 * energy:
+            break
+        direction = step + (slope / before if before else 0.0) * direction
+        moved = system.displacement(direction, still)
+        product = system.reduced(system.K @ moved - surplus(moved))
+        curvature = float(direction @ product)
+        if not curvature > 0.0:
+            break
+        lower += 0.5 * slope**2 / curvature
+        residual = residual - slope / curvature * product
+        before = slope
+    problem.solver.put_back(kept)  # these loads are none of the analysis
+    return lower / energy if energy > 0.0 else 0.0
+
+
+def locking_warning(problem: Problem, u: Array) -> list[str]:
+    """Return a warning where nearly incompressible elements are too stiff in the displacements u (n_dofs,)."""
+    comparison = Comparison(problem.model)
+    if not comparison.elements:
+        return []
+    excess = excess_of_stiffness(problem, u, comparison)
+    if excess <= EXCESS:
+        return []
+    names = " and ".join(comparison.elements)
+    if set(comparison.elements) <= set(AT_NODES):
+        remedy = "use quadrangles or hexahedra, or quadratic elements (generate.to_quadratic)"
+    else:
+        remedy = 'give the material volumetric="mean_dilatation"'
+    return [
+        f"{names} cells lock: at nu = {comparison.nu:g}, nearly incompressible, they make the model about "
+        f"{excess:.0%} too stiff (elastic energy under the same forces); {remedy}"
+    ]

@@ -1,0 +1,31 @@
+"""Whether the nodes of two surfaces lie opposite to each other."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.contact.projection import places
+from fastcontact.contact.search.closest import closest_of_kinds
+from fastcontact.contact.surface import Surface
+
+Array = NDArray[np.float64]
+# In facet lengths: how far from a node a projection may lie and still be opposite to it; how much farther apart than
+# the closest points others may be and still tell whether the sides match; and how far beyond an edge they may lie.
+OPPOSITE, NEAR, BESIDE = 0.2, 0.5, 0.05
+
+
+def opposite(secondary: Surface, primary: Surface, points: Array) -> bool:
+    """Return whether the nodes of two surfaces at reference `points` (n_points, dim) lie opposite to each other."""
+    return _opposite(secondary, primary, points) and _opposite(primary, secondary, points)
+
+
+def _opposite(side: Surface, other: Surface, points: Array) -> bool:
+    """Return whether the nodes of `side` that are nearly closest to `other` project on its nodes."""
+    found = closest_of_kinds(points[side.points], other.corners(points))
+    facing = points[places(other, found.facet, found.xi).nodes]
+    size = np.linalg.norm(np.ptp(facing, axis=1), axis=1)
+    away = np.linalg.norm(facing - found.position[:, None], axis=2).min(axis=1)
+    within = found.overhang <= BESIDE
+    near = within & (found.distance <= found.distance[within].min(initial=np.inf) + NEAR * size)
+    return bool(near.any() and (away[near] <= OPPOSITE * size[near]).all())

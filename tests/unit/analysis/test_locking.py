@@ -1,0 +1,106 @@
+"""The warning of locking: its number against two solutions, and no word where nothing locks."""
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.analysis.load_step import load_step
+from fastcontact.analysis.locking import SUSPICIOUS, Comparison, locking_warning
+from fastcontact.analysis.problem import prepare
+from fastcontact.elasticity.stiffness import stiffness
+from fastcontact.mesh import elements
+
+
+def clamped(name, nu, volumetric="auto", kinematics="plane_strain", n=6):
+    """A block clamped below and drawn sideways above, by the same forces in every model."""
+    if elements.get(name).dim == 2:
+        mesh = fc.generate.block((1.0, 2.0), (n, 2 * n), name, origin=(1.0, 0.0))
+        below, above = "BOTTOM", "TOP"
+    else:
+        mesh, kinematics = fc.generate.box((1.0, 1.0, 2.0), (n, n, 2 * n), name), "3d"
+        below, above = "ZMIN", "ZMAX"
+    model = fc.Model(mesh, kinematics)
+    model.add_material(fc.LinearElastic(E=1.0, nu=nu, volumetric=volumetric))
+    model.fix(below, "xyz"[: mesh.dim])
+    model.add_traction(above, x=0.001)
+    return model
+
+
+def solved(model, **options):
+    """The energy of the loads and the excess of stiffness that a warning names, nan without one."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        (step,) = fc.solve(model, fc.linear_ramp(1), **options)
+    texts = [str(w.message) for w in caught if " lock: " in str(w.message)]
+    found = [float(re.search(r"about (\d+)% too stiff", text)[1]) / 100 for text in texts]
+    force = sum(model.forces_by_ramp().values())
+    return float((force * step.displacement).sum()), (found or [np.nan])[0]
+
+
+@pytest.mark.parametrize("linear_solver", ["direct", "amg"])
+@pytest.mark.parametrize(("name", "n"), [("quad4", 6), ("quad8", 1), ("hex8", 3)])
+def test_the_excess_is_that_of_two_solutions(name, n, linear_solver):
+    plain, excess = solved(clamped(name, 0.499, "plain", n=n), linear_solver=linear_solver)
+    averaged, none = solved(clamped(name, 0.499, n=n))
+    actual = averaged / plain - 1
+    assert 0.85 * actual < excess <= actual + 0.005 + 1e-9  # rounded to per cent
+    assert np.isnan(none)
+
+
+def squeezed(name, n):
+    """A quarter disc pressed near its pole, or a block between walls that a pressure from one side to the other bends."""
+    if elements.get(name).dim == 2:
+        model = fc.Model(fc.generate.quarter_disc(name, R=1.0, size=1.0 / n), "axisymmetric")
+        model.fix("A1B1", "xy")
+        model.fix("A1A2", "x")
+        model.add_traction("CONT1", y=lambda x: -0.001 * np.exp(-((x[:, 0] / 0.2) ** 2)))
+    else:
+        model = fc.Model(fc.generate.box((1.0, 1.0, 0.5), (2 * n, 2 * n, n), name), "3d")
+        model.fix("ZMIN", "xyz")
+        for group in ("XMIN", "XMAX", "YMIN", "YMAX"):
+            model.fix(group, group[0].lower())
+        model.add_traction("ZMAX", z=lambda x: -0.001 * np.cos(np.pi * x[:, 0]))
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.4999))
+    return model
+
+
+@pytest.mark.parametrize(("name", "n", "better"), [("tri3", 8, "tri6"), ("tet4", 2, "tet10"), ("wedge6", 2, "wedge15")])
+def test_elements_without_remedy_are_told_with_a_figure_of_the_right_size(name, n, better):
+    own, excess = solved(squeezed(name, n))
+    quadratic, none = solved(squeezed(better, n))
+    assert np.isnan(none)
+    assert 0.45 * (quadratic / own - 1) < excess < quadratic / own - 1
+
+
+@pytest.mark.parametrize("name", ["tri3", "quad4", "tri6", "quad8"])
+def test_no_word_where_nothing_locks(name):
+    assert np.isnan(solved(clamped(name, 0.3, "plain"))[1])
+    assert np.isnan(solved(clamped(name, 0.499, "plain", "plane_stress"))[1])
+    assert Comparison(clamped(name, SUSPICIOUS - 0.01)).elements == []
+
+
+@pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric"])
+@pytest.mark.parametrize("name", ["quad4", "tri3", "tri6"])
+def test_the_surplus_is_a_stiffness(name, kinematics):
+    model = clamped(name, 0.499, "plain", kinematics, n=2)
+    comparison, shape = Comparison(model), model.mesh.points.shape
+    S = np.column_stack([comparison.force(unit.reshape(shape)).ravel() for unit in np.eye(model.n_dofs)])
+    assert np.abs(S - S.T).max() < 1e-12 * np.abs(S).max()
+    assert np.linalg.eigvalsh(S).min() > -1e-12 * np.abs(S).max()
+    if name == "quad4":  # what the averaged element does not have
+        moduli, material = model.material_numbers()
+        K = stiffness(model.mesh, kinematics, moduli, material)
+        averaged = stiffness(model.mesh, kinematics, moduli, material, averaged=np.array([True]))
+        assert np.abs(S - (K - averaged).toarray()).max() < 1e-10 * np.abs(S).max()
+
+
+@pytest.mark.parametrize("linear_solver", ["direct", "amg"])
+def test_the_comparison_leaves_nothing_behind_in_the_solver(linear_solver):
+    problem = prepare(clamped("quad4", 0.499, "plain"), fc.linear_ramp(1), fc.Criteria(), linear_solver=linear_solver)
+    state, _ = load_step(problem, problem.initial_state(), 1, 1.0)
+    before = repr(problem.solver.memory())
+    assert locking_warning(problem, state.u)
+    assert repr(problem.solver.memory()) == before
