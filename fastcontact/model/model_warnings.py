@@ -18,6 +18,7 @@ from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.elements import Element
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import poorest_cell
+from fastcontact.model.hanging_nodes import hanging_nodes_warning
 from fastcontact.model.prescribed_overlap import Supports, prescribed_overlap_warnings
 from fastcontact.model.ramp import Ramp
 
@@ -51,7 +52,7 @@ MIXED = np.array([0x1E3779B97F4A7C15, 0x3F58476D1CE4E5B9, 0x14D049BB133111EB], n
 def model_warnings(model: Model, ramp: Ramp) -> list[str]:
     """Return the warnings about a model that `Model.check` has found complete, for an analysis along a ramp."""
     found = _moduli(model) + _named_units(model) + _proportions(model)
-    found += [text for text in (poorest_cell(model.mesh), _coincident(model)) if text]
+    found += [text for text in (poorest_cell(model.mesh), _coincident(model), hanging_nodes_warning(model)) if text]
     found += _prescribed_overlaps(model, ramp)
     return found + _stiffness(model.mesh) + [text for load in model.loads for text in _load_integral(model, load)]
 

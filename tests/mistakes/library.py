@@ -87,6 +87,18 @@ def cracked():
     return model
 
 
+def torn():
+    """A coarse block and a fine one on it, of which only the nodes of both were merged."""
+    mesh = generate.union(
+        generate.renamed(block((1.0, 1.0), (2, 2)), {"BLOCK": "A_BLOCK", "BOTTOM": "A_BOTTOM"}),
+        block((1.0, 1.0), (4, 2), origin=(0.0, 1.0)),
+    )
+    model = fc.Model(generate.merge_points(mesh, 1e-9), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("A_BOTTOM", "xy")
+    return model
+
+
 def hanging_together():
     """A block on the corner of another one, whose common node was merged; only the lower one is held."""
     mesh = generate.union(
@@ -244,6 +256,12 @@ MESH = [
         lambda: solved(square_in_two()),
         fc.ModelError,
         r"3 rigid-body motions are not supported: body 'B': translation along x, .*rotation",
+    ),
+    Mistake(
+        "a fine mesh merged with a coarse one",
+        lambda: solved(torn()),
+        fc.FastcontactWarning,
+        r"2 nodes lie on facets of their own body that they do not belong to \(first: point \d+ at \(0\.25, 1\), on the facet around \(0\.25, 1\)\): the body is torn there\. Let cells share whole facets, or leave the two meshes apart and tie them by a contact of kind 'tied'; if a slit is meant, define its contact",
     ),
     Mistake(
         "bodies that hang together at one node",

@@ -111,7 +111,9 @@ OTHERWISE = {
     "memory of others is read: a crash, or numbers from nowhere": (
         "a cell names a point that is not there", "a group names a cell that is not there",
     ),
-    "nothing is said, or a line in a long list: the body has a crack": ("nodes that were not merged", "nodes were not merged"),
+    "nothing is said, or a line in a long list: the body has a crack": (
+        "nodes that were not merged", "nodes were not merged", "a fine mesh merged with a coarse one",
+    ),
     "nothing is said: stresses are wrong near the cell": (
         "a cell with an angle near 180 degrees", "a cell with a Jacobian near zero", "a cell is poor",
         "the quadrature of the stiffness is not exact", "a load that varies within an element",
