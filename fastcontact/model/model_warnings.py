@@ -53,7 +53,7 @@ def model_warnings(model: Model, ramp: Ramp) -> list[str]:
     """Return the warnings about a model that `Model.check` has found complete, for an analysis along a ramp."""
     found = _moduli(model) + _named_units(model) + _proportions(model)
     found += [text for text in (poorest_cell(model.mesh), _coincident(model), hanging_nodes_warning(model)) if text]
-    found += _prescribed_overlaps(model, ramp)
+    found += _prescribed_overlaps(model, ramp) + _lost_loads(model)
     return found + _stiffness(model.mesh) + [text for load in model.loads for text in _load_integral(model, load)]
 
 
@@ -62,6 +62,21 @@ def _prescribed_overlaps(model: Model, ramp: Ramp) -> list[str]:
     fixed, by_ramp = model.prescribed_by_ramp()
     supported = [pair for pair in model.contact if fixed[model.mesh.points_of(pair.secondary)].any()]
     return prescribed_overlap_warnings([(p, model.bind(p)) for p in supported], Supports(fixed, by_ramp, ramp))
+
+
+def _lost_loads(model: Model) -> list[str]:
+    """Return a warning for each load all of which acts on what supports prescribe."""
+    fixed, _ = model.prescribed()
+    texts = []
+    for load in model.loads:
+        forces = load.vector(model.mesh, model.kinematics)
+        total = float(np.abs(forces).sum())
+        if total > 0.0 and float(np.abs(forces[~fixed]).sum()) <= 1e-12 * total:
+            texts.append(
+                f"{load.name} acts on {int(forces.any(axis=1).sum())} points whose displacement is prescribed in its "
+                "direction: all of it goes into the supports. Load other points, or leave out the support"
+            )
+    return texts
 
 
 def _moduli(model: Model) -> list[str]:

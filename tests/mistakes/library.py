@@ -726,6 +726,12 @@ LOADS = [
         r"the traction on 'UPPER_RIGHT' varies within single elements, so that its quadrature is not exact: it is off by \d+\.\d+% of the whole; refine the mesh there",
     ),
     Mistake(
+        "a force where the displacement is prescribed",
+        lambda: solved(with_load("add_force", group="UPPER_TOP", y=-10.0)),
+        fc.FastcontactWarning,
+        r"the total force on 'UPPER_TOP' acts on \d+ points whose displacement is prescribed in its direction: all of it goes into the supports\. Load other points, or leave out the support",
+    ),
+    Mistake(
         "a force on an empty group",
         lambda: blocks(empty_group("NONE")).add_force("NONE", x=1.0),
         fc.ModelError,

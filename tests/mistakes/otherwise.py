@@ -95,6 +95,7 @@ OTHERWISE = {
     ),
     "nothing is said: the load acts on no element, and the result is that without it": (
         "a force on an empty group", "a support on an empty group", "a support on a node of no cell",
+        "a force where the displacement is prescribed",
     ),
     "nothing is said: forces that cancel over the circle are applied as if they did not": ("a radial force in axisymmetry",),
     "the coordinate is read as 0, and the job goes on with a spike in the mesh": (

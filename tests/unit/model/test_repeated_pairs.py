@@ -5,6 +5,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, block_on_block
+from fastcontact.model.model_warnings import model_warnings
 
 
 def parts(mesh, group):
@@ -108,3 +109,31 @@ def test_an_obstacle_and_a_pair_may_share_facets(mesh):
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER")
     model.add_obstacle("floor", secondary="CONT_UPPER", obstacle=fc.obstacles.HalfSpace((0.0, -5.0), (0.0, 1.0)))
     assert len(model.contact) == 2
+
+
+def test_a_facet_that_stands_in_a_group_twice_is_loaded_once(mesh):
+    line2 = mesh.cells["line2"]
+    copied = mesh.replace(cells={**mesh.cells, "line2": np.vstack([line2, line2[:, ::-1]])})
+    top = copied.cell_groups["UPPER_TOP"]
+    copied = copied.with_groups(cells={"TWICE": np.concatenate([top, top + len(line2)])})
+    model = model_of(copied)
+    model.add_pressure("TWICE", 2.0)
+    model.add_traction("TWICE", x=3.0)
+    model.add_force("TWICE", y=5.0)
+    width = np.ptp(copied.points[copied.points_of("UPPER_TOP"), 0])
+    assert model.forces_by_ramp()[None].sum(axis=0) == pytest.approx([3.0 * width, 5.0 - 2.0 * width])
+
+
+def test_a_load_that_supports_take_up_is_told(mesh):
+    def lost(**force):
+        model = model_of(mesh)
+        model.fix("UPPER_TOP", "y")
+        model.fix("UPPER_LEFT", "x")
+        model.fix("LOWER_BOTTOM", "xy")
+        model.add_force("UPPER_TOP", **force)
+        return [text for text in model_warnings(model, fc.linear_ramp(1)) if "goes into the supports" in text]
+
+    assert len(lost(y=1.0)) == 1
+    assert not lost(x=1.0)
+    assert not lost(x=1e-3, y=1.0)
+    assert not lost(y=0.0)
