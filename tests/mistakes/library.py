@@ -518,6 +518,15 @@ def contradicting():
     return model
 
 
+def split_in_two():
+    mesh = block_on_block()
+    facets = mesh.cell_groups["CONT_UPPER"]
+    model = blocks(mesh.with_groups(cells={"ONE": facets[:3], "OTHER": facets[3:]}), contact=False)
+    model.add_contact("left", secondary="ONE", primary="CONT_LOWER", formulation="mortar")
+    model.add_contact("right", secondary="OTHER", primary="CONT_LOWER", formulation="mortar")
+    return model
+
+
 def pairs_overlap():
     mesh = block_on_block()
     model = blocks(mesh.with_groups(cells={"SOME": mesh.cell_groups["CONT_UPPER"][:1]}))
@@ -580,6 +589,12 @@ CONTACT = [
         lambda: pairs_overlap(),
         fc.ContactError,
         r"contact 'some' joins facets of 'SOME' and 'CONT_LOWER' that contact 'pair' joins already: 'SOME' and 'CONT_UPPER' share facets with 2 nodes \(first: point \d+\), 'CONT_LOWER' and 'CONT_LOWER' share facets, too\. Leave out one of the two contacts, or make their groups apart",
+    ),
+    Mistake(
+        "one surface in two groups with a contact each",
+        lambda: solved(split_in_two()),
+        fc.FastcontactWarning,
+        r"contacts 'left' and 'right' go on in each other at 1 common nodes of their sides \(first: point \d+\): the pressure near these is not unique; make one contact of both, with one group for each side",
     ),
     Mistake(
         "the same obstacle twice",

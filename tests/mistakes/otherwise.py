@@ -25,7 +25,7 @@ OTHERWISE = {
         "a key twice", "one pair twice in a case", "the same pair twice", "two pairs of one name",
     ),
     "nothing is said: the pairs share the force at will, and each tells a part of the pressure": (
-        "two pairs over the same facets", "the same obstacle twice",
+        "two pairs over the same facets", "the same obstacle twice", "one surface in two groups with a contact each",
     ),
     "nothing is said: a hole opens along the axis, or its nodes pass through it": (
         "a support that moves the axis of symmetry", "a radial force on the axis of symmetry",
