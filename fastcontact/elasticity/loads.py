@@ -204,7 +204,7 @@ class TotalForce(Load):
 
 
 def facets_of(mesh: Mesh, group: str) -> dict[str, Indices]:
-    """Return the facets (n, n_nodes) of a group by element.
+    """Return the facets (n, n_nodes) of a group by element, each once, though it may stand in the mesh more often.
 
     MeshError if there is no such group of cells, ModelError if it has no facets.
     """
@@ -213,7 +213,8 @@ def facets_of(mesh: Mesh, group: str) -> dict[str, Indices]:
     blocks = mesh.cells_of(group, dim=mesh.dim - 1)
     if not blocks:
         raise ModelError(f"group '{group}' holds no facets (cells of dimension {mesh.dim - 1}) that a load can act on")
-    return blocks
+    once = {name: np.unique(np.sort(block, axis=1), axis=0, return_index=True)[1] for name, block in blocks.items()}
+    return {name: block[np.sort(once[name])] for name, block in blocks.items()}
 
 
 def outward(mesh: Mesh, group: str, element: str, block: Indices) -> Indices:

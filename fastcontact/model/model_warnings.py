@@ -19,8 +19,10 @@ from fastcontact.mesh.elements import Element
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import poorest_cell
 from fastcontact.model.facet_sag import sag_warnings
+from fastcontact.model.hanging_nodes import hanging_nodes_warning
 from fastcontact.model.prescribed_overlap import Supports, prescribed_overlap_warnings
 from fastcontact.model.ramp import Ramp
+from fastcontact.model.repeated_pairs import split_side_warnings
 
 if TYPE_CHECKING:
     from fastcontact.model.model import Model
@@ -52,8 +54,8 @@ MIXED = np.array([0x1E3779B97F4A7C15, 0x3F58476D1CE4E5B9, 0x14D049BB133111EB], n
 def model_warnings(model: Model, ramp: Ramp) -> list[str]:
     """Return the warnings about a model that `Model.check` has found complete, for an analysis along a ramp."""
     found = _moduli(model) + _named_units(model) + _proportions(model)
-    found += [text for text in (poorest_cell(model.mesh), _coincident(model)) if text]
-    found += _prescribed_overlaps(model, ramp) + sag_warnings(model)
+    found += [text for text in (poorest_cell(model.mesh), _coincident(model), hanging_nodes_warning(model)) if text]
+    found += _prescribed_overlaps(model, ramp) + _lost_loads(model) + _split_sides(model) + sag_warnings(model)
     return found + _stiffness(model.mesh) + [text for load in model.loads for text in _load_integral(model, load)]
 
 
@@ -62,6 +64,34 @@ def _prescribed_overlaps(model: Model, ramp: Ramp) -> list[str]:
     fixed, by_ramp = model.prescribed_by_ramp()
     supported = [pair for pair in model.contact if fixed[model.mesh.points_of(pair.secondary)].any()]
     return prescribed_overlap_warnings([(p, model.bind(p)) for p in supported], Supports(fixed, by_ramp, ramp))
+
+
+def _split_sides(model: Model) -> list[str]:
+    """Return a warning for each two contacts that go on in each other."""
+    touched = {
+        pair.name: np.union1d(*(model.mesh.points_of(side) for side in (pair.secondary, pair.primary)))
+        for pair in model.contact
+        if pair.primary
+    }
+    points, count = np.unique(np.concatenate([*touched.values(), np.empty(0, np.int32)]), return_counts=True)
+    common = points[count > 1]
+    near = [pair for pair in model.contact if pair.primary and np.isin(touched[pair.name], common).any()]
+    return split_side_warnings([(pair, model.bind(pair)) for pair in near])
+
+
+def _lost_loads(model: Model) -> list[str]:
+    """Return a warning for each load all of which acts on what supports prescribe."""
+    fixed, _ = model.prescribed()
+    texts = []
+    for load in model.loads:
+        forces = load.vector(model.mesh, model.kinematics)
+        total = float(np.abs(forces).sum())
+        if total > 0.0 and float(np.abs(forces[~fixed]).sum()) <= 1e-12 * total:
+            texts.append(
+                f"{load.name} acts on {int(forces.any(axis=1).sum())} points whose displacement is prescribed in its "
+                "direction: all of it goes into the supports. Load other points, or leave out the support"
+            )
+    return texts
 
 
 def _moduli(model: Model) -> list[str]:

@@ -1,13 +1,24 @@
-"""Facets that two contact pairs press on each other: their forces would be shared out at will."""
+"""Facets and nodes that two contact pairs press on each other: their forces would be shared out at will."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
+from itertools import combinations
 
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.side_checks import shared_facets
+from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.contact_pair import ContactPair
+
+Array = NDArray[np.float64]
+# Sides whose normals at a common node are within 45 degrees go on in each other there; others meet in a corner.
+GOES_ON = 0.7
 
 
 def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
@@ -55,3 +66,42 @@ def _check_obstacles(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
             f"'{other.name}' presses them already, with {len(nodes)} nodes (first: point {nodes[0]}): leave out one of the "
             "two"
         )
+
+
+def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> list[str]:
+    """Return a warning for each two pairs whose sides go on in each other at common nodes, on both bodies.
+
+    Each pair has a pressure of its own at such a node, and only the sum of both follows from the gap: it is spread over
+    the neighbours in a way that means nothing. Node-to-segment shares the force of a node by areas, which is right.
+    """
+    texts = []
+    for (one, ours), (other, theirs) in combinations(pairs, 2):
+        if {one.formulation, other.formulation} == {"node_to_segment"}:
+            continue
+        if not isinstance(ours.primary, Surface) or not isinstance(theirs.primary, Surface):
+            continue
+        roles = ((theirs.secondary, theirs.primary), (theirs.primary, theirs.secondary))
+        for secondary, primary in roles:
+            nodes = _common(ours.points, ours.secondary, secondary)
+            if len(nodes) and len(_common(ours.points, ours.primary, primary)):
+                texts.append(
+                    f"contacts '{one.name}' and '{other.name}' go on in each other at {len(nodes)} common nodes of their "
+                    f"sides (first: point {nodes[0]}): the pressure near these is not unique; make one contact of both, "
+                    "with one group for each side"
+                )
+    return texts
+
+
+def _common(points: Array, side: Surface, other: Surface) -> NDArray[np.int32]:
+    """Return the common nodes of two surfaces with nodes at `points` (n_points, dim) at which their normals agree."""
+    nodes = np.intersect1d(side.points, other.points)
+    if not len(nodes):
+        return nodes
+    normals = [nodal_normals(s, points)[_places(s, nodes)] for s in (side, other)]
+    return np.asarray(nodes[np.einsum("nd,nd->n", *normals) > GOES_ON])
+
+
+def _places(side: Surface, nodes: NDArray[np.int32]) -> NDArray[np.intp]:
+    """Return the places of nodes among the points of a side."""
+    order = np.argsort(side.points)
+    return np.asarray(order[np.searchsorted(side.points, nodes, sorter=order)])

@@ -87,6 +87,18 @@ def cracked():
     return model
 
 
+def torn():
+    """A coarse block and a fine one on it, of which only the nodes of both were merged."""
+    mesh = generate.union(
+        generate.renamed(block((1.0, 1.0), (2, 2)), {"BLOCK": "A_BLOCK", "BOTTOM": "A_BOTTOM"}),
+        block((1.0, 1.0), (4, 2), origin=(0.0, 1.0)),
+    )
+    model = fc.Model(generate.merge_points(mesh, 1e-9), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("A_BOTTOM", "xy")
+    return model
+
+
 def hanging_together():
     """A block on the corner of another one, whose common node was merged; only the lower one is held."""
     mesh = generate.union(
@@ -244,6 +256,12 @@ MESH = [
         lambda: solved(square_in_two()),
         fc.ModelError,
         r"3 rigid-body motions are not supported: body 'B': translation along x, .*rotation",
+    ),
+    Mistake(
+        "a fine mesh merged with a coarse one",
+        lambda: solved(torn()),
+        fc.FastcontactWarning,
+        r"2 nodes lie on facets of their own body that they do not belong to \(first: point \d+ at \(0\.25, 1\), on the facet around \(0\.25, 1\)\): the body is torn there\. Let cells share whole facets, or leave the two meshes apart and tie them by a contact of kind 'tied'; if a slit is meant, define its contact",
     ),
     Mistake(
         "bodies that hang together at one node",
@@ -500,6 +518,15 @@ def contradicting():
     return model
 
 
+def split_in_two():
+    mesh = block_on_block()
+    facets = mesh.cell_groups["CONT_UPPER"]
+    model = blocks(mesh.with_groups(cells={"ONE": facets[:3], "OTHER": facets[3:]}), contact=False)
+    model.add_contact("left", secondary="ONE", primary="CONT_LOWER", formulation="mortar")
+    model.add_contact("right", secondary="OTHER", primary="CONT_LOWER", formulation="mortar")
+    return model
+
+
 def pairs_overlap():
     mesh = block_on_block()
     model = blocks(mesh.with_groups(cells={"SOME": mesh.cell_groups["CONT_UPPER"][:1]}))
@@ -562,6 +589,12 @@ CONTACT = [
         lambda: pairs_overlap(),
         fc.ContactError,
         r"contact 'some' joins facets of 'SOME' and 'CONT_LOWER' that contact 'pair' joins already: 'SOME' and 'CONT_UPPER' share facets with 2 nodes \(first: point \d+\), 'CONT_LOWER' and 'CONT_LOWER' share facets, too\. Leave out one of the two contacts, or make their groups apart",
+    ),
+    Mistake(
+        "one surface in two groups with a contact each",
+        lambda: solved(split_in_two()),
+        fc.FastcontactWarning,
+        r"contacts 'left' and 'right' go on in each other at 1 common nodes of their sides \(first: point \d+\): the pressure near these is not unique; make one contact of both, with one group for each side",
     ),
     Mistake(
         "the same obstacle twice",
@@ -706,6 +739,12 @@ LOADS = [
         lambda: solved(with_load("add_traction", group="UPPER_RIGHT", x=lambda x: np.sin(40.0 * x[:, 1]))),
         fc.FastcontactWarning,
         r"the traction on 'UPPER_RIGHT' varies within single elements, so that its quadrature is not exact: it is off by \d+\.\d+% of the whole; refine the mesh there",
+    ),
+    Mistake(
+        "a force where the displacement is prescribed",
+        lambda: solved(with_load("add_force", group="UPPER_TOP", y=-10.0)),
+        fc.FastcontactWarning,
+        r"the total force on 'UPPER_TOP' acts on \d+ points whose displacement is prescribed in its direction: all of it goes into the supports\. Load other points, or leave out the support",
     ),
     Mistake(
         "a force on an empty group",

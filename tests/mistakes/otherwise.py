@@ -25,7 +25,7 @@ OTHERWISE = {
         "a key twice", "one pair twice in a case", "the same pair twice", "two pairs of one name",
     ),
     "nothing is said: the pairs share the force at will, and each tells a part of the pressure": (
-        "two pairs over the same facets", "the same obstacle twice",
+        "two pairs over the same facets", "the same obstacle twice", "one surface in two groups with a contact each",
     ),
     "nothing is said: a hole opens along the axis, or its nodes pass through it": (
         "a support that moves the axis of symmetry", "a radial force on the axis of symmetry",
@@ -96,6 +96,7 @@ OTHERWISE = {
     ),
     "nothing is said: the load acts on no element, and the result is that without it": (
         "a force on an empty group", "a support on an empty group", "a support on a node of no cell",
+        "a force where the displacement is prescribed",
     ),
     "nothing is said: forces that cancel over the circle are applied as if they did not": ("a radial force in axisymmetry",),
     "the coordinate is read as 0, and the job goes on with a spike in the mesh": (
@@ -112,7 +113,9 @@ OTHERWISE = {
     "memory of others is read: a crash, or numbers from nowhere": (
         "a cell names a point that is not there", "a group names a cell that is not there",
     ),
-    "nothing is said, or a line in a long list: the body has a crack": ("nodes that were not merged", "nodes were not merged"),
+    "nothing is said, or a line in a long list: the body has a crack": (
+        "nodes that were not merged", "nodes were not merged", "a fine mesh merged with a coarse one",
+    ),
     "nothing is said: stresses are wrong near the cell": (
         "a cell with an angle near 180 degrees", "a cell with a Jacobian near zero", "a cell is poor",
         "the quadrature of the stiffness is not exact", "a load that varies within an element",

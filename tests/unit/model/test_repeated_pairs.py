@@ -5,6 +5,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, block_on_block
+from fastcontact.model.model_warnings import model_warnings
 
 
 def parts(mesh, group):
@@ -108,3 +109,97 @@ def test_an_obstacle_and_a_pair_may_share_facets(mesh):
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER")
     model.add_obstacle("floor", secondary="CONT_UPPER", obstacle=fc.obstacles.HalfSpace((0.0, -5.0), (0.0, 1.0)))
     assert len(model.contact) == 2
+
+
+def test_a_facet_that_stands_in_a_group_twice_is_loaded_once(mesh):
+    line2 = mesh.cells["line2"]
+    copied = mesh.replace(cells={**mesh.cells, "line2": np.vstack([line2, line2[:, ::-1]])})
+    top = copied.cell_groups["UPPER_TOP"]
+    copied = copied.with_groups(cells={"TWICE": np.concatenate([top, top + len(line2)])})
+    model = model_of(copied)
+    model.add_pressure("TWICE", 2.0)
+    model.add_traction("TWICE", x=3.0)
+    model.add_force("TWICE", y=5.0)
+    width = np.ptp(copied.points[copied.points_of("UPPER_TOP"), 0])
+    assert model.forces_by_ramp()[None].sum(axis=0) == pytest.approx([3.0 * width, 5.0 - 2.0 * width])
+
+
+def test_a_load_that_supports_take_up_is_told(mesh):
+    def lost(**force):
+        model = model_of(mesh)
+        model.fix("UPPER_TOP", "y")
+        model.fix("UPPER_LEFT", "x")
+        model.fix("LOWER_BOTTOM", "xy")
+        model.add_force("UPPER_TOP", **force)
+        return [text for text in model_warnings(model, fc.linear_ramp(1)) if "goes into the supports" in text]
+
+    assert len(lost(y=1.0)) == 1
+    assert not lost(x=1.0)
+    assert not lost(x=1e-3, y=1.0)
+    assert not lost(y=0.0)
+
+
+def split(mesh, formulation, first, second, **options):
+    model = model_of(mesh)
+    model.add_contact("first", secondary=first[0], primary=first[1], formulation=formulation)
+    model.add_contact("second", secondary=second[0], primary=second[1], formulation=formulation, **options)
+    return [text for text in model_warnings(model, fc.linear_ramp(1)) if "go on in each other" in text]
+
+
+@pytest.mark.parametrize("formulation", ["continuous", "mortar"])
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        (("CONT_UPPER_LEFT", "CONT_LOWER"), ("CONT_UPPER_RIGHT", "CONT_LOWER")),
+        (("CONT_UPPER", "CONT_LOWER_LEFT"), ("CONT_UPPER", "CONT_LOWER_RIGHT")),
+        (("CONT_UPPER_LEFT", "CONT_LOWER_LEFT"), ("CONT_UPPER_RIGHT", "CONT_LOWER_RIGHT")),
+        (("CONT_UPPER_LEFT", "CONT_LOWER_LEFT"), ("CONT_LOWER_RIGHT", "CONT_UPPER_RIGHT")),
+    ],
+)
+def test_sides_that_are_split_give_a_warning(mesh, first, second, formulation):
+    (text,) = split(mesh, formulation, first, second)
+    assert text.startswith("contacts 'first' and 'second' go on in each other at ")
+
+
+def test_splitting_does_no_harm_where_nodes_carry_forces(mesh):
+    sides = ("CONT_UPPER_LEFT", "CONT_LOWER"), ("CONT_UPPER_RIGHT", "CONT_LOWER")
+    assert not split(mesh, "node_to_segment", *sides)
+    assert split(mesh, "mortar", *sides)
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "mortar"])
+def test_one_pair_of_both_halves_has_the_pressure_of_the_press(mesh, formulation):
+    """What the warning advises is right, and what is silent is right, too."""
+    model = model_of(mesh)
+    model.fix("LOWER_BOTTOM", "y")
+    model.fix("LOWER_LEFT", "x")
+    model.fix("UPPER_LEFT", "x")
+    model.add_pressure("UPPER_TOP", 1.0)
+    if formulation == "mortar":
+        model.add_contact("all", secondary="CONT_UPPER", primary="CONT_LOWER", formulation=formulation)
+    else:
+        matching = parts(
+            parts(block_on_block(divisions_lower=(6, 2), divisions_upper=(6, 2)), "CONT_UPPER"), "CONT_LOWER"
+        )
+        model = model_of(matching)
+        model.fix("LOWER_BOTTOM", "y")
+        model.fix("LOWER_LEFT", "x")
+        model.fix("UPPER_LEFT", "x")
+        model.add_pressure("UPPER_TOP", 1.0)
+        for half in ("LEFT", "RIGHT"):
+            side = f"CONT_UPPER_{half}"
+            model.add_contact(half, secondary=side, primary="CONT_LOWER", formulation=formulation)
+    (step,) = fc.solve(model, fc.linear_ramp(1))
+    for contact in step.contact.values():
+        assert contact.pressure == pytest.approx(np.ones(len(contact.points)), rel=1e-6)
+
+
+def test_sides_that_meet_in_a_corner_are_silent():
+    """A block in the corner of an angle touches it with two faces that have one node in common on both bodies."""
+    points = [[0, 0], [3, 0], [3, 1], [1, 1], [1, 3], [0, 3], [0, 1], [1, 0], [1.5, 1.5], [3, 1.5], [3, 3], [1.5, 3]]
+    angle = [[0, 7, 3, 6], [7, 1, 2, 3], [6, 3, 4, 5]]
+    mesh = fc.Mesh(
+        points, {"quad4": [*angle, [8, 9, 10, 11]], "line2": [[2, 3], [3, 4], [8, 9], [11, 8]]},
+        cell_groups={"FLOOR": [4], "WALL": [5], "LOW": [6], "LEFT": [7]},
+    )  # fmt: skip
+    assert not split(mesh, "mortar", ("LOW", "FLOOR"), ("LEFT", "WALL"))

@@ -1,0 +1,259 @@
+"""Nodes that lie on facets of their own body without belonging to them: there the body is torn.
+
+Where a coarse and a fine mesh meet, only the nodes of both are joined; the others hang, and their side opens or overlaps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from fastcontact.contact.search.box_tree_kernels import build, tree_order
+from fastcontact.mesh import elements
+from fastcontact.mesh.elements import Element
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import bodies, outer_facets
+from fastcontact.model import hanging_nodes_kernels
+from fastcontact.model.rigid_motions import node_at
+
+if TYPE_CHECKING:
+    from fastcontact.model.model import Model
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+# Nodes nearer to a facet than this, in facet lengths, lie on it; those as near to its nodes lie at them. Fine facets of an
+# arc leave a coarse one by more; there the facets at all corners of the coarse one tell that it is no slit.
+NEAR, ON_ARC = 0.02, 0.1
+# More facets than these face no node at such a distance.
+MOST = 8
+# Facets that follow each other in the order of the search are sorted down to so many.
+TOGETHER = 4
+
+
+@dataclass(frozen=True, eq=False)
+class OuterFacets:
+    """Facets of the outside of all bodies as if flat: nodes (n, k), -1 for none; the rest (n, ...) [length], [-].
+
+    `rise` is how far nodes between the corners stand out of the plane, `size` the diagonal of the box around the corners;
+    `kind` (n,) is which of the `elements` they are.
+    """
+
+    nodes: NDArray[np.int32]
+    corners: NDArray[np.int32]
+    centre: Array
+    normal: Array
+    rise: Array
+    size: Array
+    elements: tuple[str, ...]
+    kind: Indices
+
+
+def hanging_nodes_warning(model: Model) -> str:
+    """Return a warning if nodes hang on facets of their own body and neither contact nor relations join them to it."""
+    mesh = model.mesh
+    node, facet, outer = hanging_nodes(mesh)
+    kept = np.ones(len(node), bool)
+    held = np.zeros(mesh.n_points, bool)
+    held[model.holding_rows().indices // mesh.dim] = True
+    kept &= ~held[node]
+    for pair in model.contact if len(node) else ():
+        if pair.primary:
+            kept &= ~_joined(mesh, pair.secondary, pair.primary, node, outer.corners[facet])
+            kept &= ~_joined(mesh, pair.primary, pair.secondary, node, outer.corners[facet])
+    if not kept.any():
+        return ""
+    node, facet = node[kept], facet[kept]
+    where = ", ".join(f"{x:.6g}" for x in outer.centre[facet[0]])
+    return (
+        f"{len(np.unique(node))} nodes lie on facets of their own body that they do not belong to (first: "
+        f"{node_at(mesh, node[0])}, on the facet around ({where})): the body is torn there. Let cells share whole facets, or "
+        "leave the two meshes apart and tie them by a contact of kind 'tied'; if a slit is meant, define its contact"
+    )
+
+
+def _joined(mesh: Mesh, nodes_of: str, facets_of: str, node: Indices, corners: NDArray[np.int32]) -> Mask:
+    """Return whether nodes (m,) belong to one side of a contact, and facets (m, n_corners) to its other one."""
+    ours, theirs = np.zeros((2, mesh.n_points), bool)
+    ours[mesh.points_of(nodes_of)] = True
+    theirs[mesh.points_of(facets_of)] = True
+    return np.asarray(ours[node] & (theirs[corners] | (corners < 0)).all(axis=1))
+
+
+def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
+    """Return nodes (m,) that lie on facets (m,) of their own body without belonging to them, and all outer facets."""
+    outer = _outer(mesh)
+    if not len(outer.size):
+        return np.empty(0, np.intp), np.empty(0, np.intp), outer
+    outward = np.zeros(mesh.points.shape)
+    for column in outer.nodes.T:
+        used = column >= 0
+        np.add.at(outward, column[used], outer.normal[used])
+    length = np.linalg.norm(outward, axis=1)
+    outward /= np.where(length > 0.0, length, 1.0)[:, None]
+    reach = ON_ARC * outer.size + outer.rise
+    order = tree_order(outer.centre, TOGETHER)
+    low, high = _extent(mesh.points[outer.corners[order]])
+    tree = build(low - reach[order, None], high + reach[order, None])
+    nodes = np.flatnonzero(length > 0.0)
+    found = np.full((len(nodes), MOST), -1)
+    hanging_nodes_kernels.facing_facets(
+        mesh.points, nodes, outward, outer.nodes, outer.centre, outer.normal, reach, tree, order, found
+    )
+    row, column = np.nonzero(found >= 0)
+    node, facet = nodes[row], found[row, column]
+    _, body = bodies(mesh)
+    kept = body[node] == body[outer.corners[facet, 0]]
+    node, facet = node[kept], facet[kept]
+    on = _within(mesh.points, node, outer, facet)
+    node, facet = node[on], facet[on]
+    height = np.abs(_heights(mesh, node, outer, facet)) / outer.size[facet]
+    on = height <= NEAR
+    loose = ~on & (height <= ON_ARC)
+    on[loose] = _closed_at_corners(outer, facet[loose])
+    node, facet = node[on], facet[on]
+    on = ~_across(mesh, node, outer, facet)
+    return node[on], facet[on], outer
+
+
+def _heights(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Array:
+    """Return how far nodes (m,) stand above facets (m,), of which the middles of curved ones bulge [length]."""
+    height = np.einsum("md,md->m", outer.normal[facet], mesh.points[node] - outer.centre[facet])
+    for kind, name in enumerate(outer.elements):
+        element, rows = elements.get(name), np.flatnonzero(outer.kind[facet] == kind)
+        if element.order == 1 or not len(rows):
+            continue
+        # Reference coordinates of the nodes on the flat facets.
+        x = mesh.points[outer.nodes[facet[rows]][:, : element.n_nodes]]
+        corners, middle = x[:, : element.n_corners], element.nodes[: element.n_corners].mean(axis=0)
+        J = np.einsum("nk,mnd->mdk", elements.get(element.linear).gradient(middle[None])[0], corners)
+        away = np.einsum("mdk,md->mk", J, mesh.points[node[rows]] - corners.mean(axis=1))
+        xi = middle + np.linalg.solve(np.einsum("mdk,mdl->mkl", J, J), away[..., None])[..., 0]
+        there = np.einsum("mn,mnd->md", element.shape(xi), x)
+        height[rows] -= np.einsum("md,md->m", outer.normal[facet[rows]], there - outer.centre[facet[rows]])
+    return np.asarray(height)
+
+
+def _across(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:
+    """Return whether nodes (m,) belong to the cells behind facets (m,), or to their neighbours.
+
+    So they do on the far side of a thin sheet, and not where meshes meet: cells of both have no facet in common, but for one
+    whose middle nodes only one of them has.
+    """
+    corners = outer.corners[facet]
+    asked = np.zeros(mesh.n_points, bool)
+    asked[node], asked[corners] = True, True
+    cells: dict[int, list[tuple[frozenset[int], str]]] = {}
+    for name, block in mesh.solids.items() if len(node) else ():
+        for nodes in block[asked[block].any(axis=1)].tolist():
+            own = frozenset(nodes[: elements.get(name).n_corners]), name
+            for number in nodes:
+                cells.setdefault(number, []).append(own)
+    found = np.zeros(len(node), bool)
+    for k, (number, ends) in enumerate(zip(node.tolist(), corners.tolist(), strict=True)):
+        kind = outer.elements[outer.kind[facet[k]]]
+        behind = [c for c, name in cells[ends[0]] if c.issuperset(ends) and kind in elements.get(name).facet_elements]
+        shared = [cell & other for cell in behind for other, _ in cells[number]]
+        found[k] = any(len(common) >= mesh.dim and not common.issubset(ends) for common in shared)
+    return found
+
+
+def _closed_at_corners(outer: OuterFacets, facet: Indices) -> Mask:
+    """Return whether at every corner of facets (m,) another one looks the opposite way, as at both ends of a closed tear."""
+    if not len(facet):
+        return np.empty(0, bool)
+    n, width = outer.corners.shape
+    at = csr_array((np.ones(n * width), (outer.corners.ravel(), np.repeat(np.arange(n), width))))
+    # For each pair of a corner and a facet there, whether its normal is opposite to that of the facet asked about.
+    kinds, which = np.unique(facet, return_inverse=True)
+    closed = np.ones(len(kinds), bool)
+    for corner in outer.corners[kinds].T:
+        rows = at[corner]
+        asked = np.repeat(np.arange(len(kinds)), np.diff(rows.indptr))
+        along = np.einsum("kd,kd->k", outer.normal[kinds[asked]], outer.normal[rows.indices])
+        opposite = np.zeros(len(kinds), bool)
+        opposite[asked[along < -0.5]] = True
+        closed &= opposite
+    return np.asarray(closed[which.ravel()])
+
+
+def _outer(mesh: Mesh) -> OuterFacets:
+    found = outer_facets(mesh)
+    most = max((block.shape[1] for block in found.values()), default=1)
+    n_corners = 2 if mesh.dim == 2 else 4
+    nodes = [np.full((0, most), -1, np.int32)]
+    corners = [np.full((0, n_corners), -1, np.int32)]
+    rises = [np.zeros(0)]
+    for name, block in found.items():
+        element = elements.get(name)
+        nodes.append(np.pad(block, ((0, 0), (0, most - block.shape[1])), constant_values=-1))
+        # A triangle repeats its last corner.
+        corners.append(block[:, np.minimum(np.arange(n_corners), element.n_corners - 1)])
+        rises.append(_rise(element, mesh.points[block]))
+    corner = np.concatenate(corners)
+    x = mesh.points[corner]
+    normal = _normals(x)
+    length = np.linalg.norm(normal, axis=1)
+    normal /= np.where(length > 0.0, length, 1.0)[:, None]
+    centre = 0.5 * (x[:, 0] + x[:, 1]) if mesh.dim == 2 else _middles(x)
+    low, high = _extent(x)
+    return OuterFacets(
+        np.concatenate(nodes), corner, centre, normal, np.concatenate(rises), np.linalg.norm(high - low, axis=1),
+        tuple(found), np.repeat(np.arange(len(found)), [len(block) for block in found.values()]),
+    )  # fmt: skip
+
+
+def _rise(element: Element, x: Array) -> Array:
+    """Return how far the nodes of facets (n, n_nodes, dim) stand out of their flat shapes, (n,) [length]."""
+    if element.order == 1:
+        return np.zeros(len(x))
+    straight = elements.get(element.linear).shape(element.nodes) @ x[:, : element.n_corners]
+    return np.asarray(np.linalg.norm(x - straight, axis=2).max(axis=1))
+
+
+def _extent(x: Array) -> tuple[Array, Array]:
+    """Return the lowest and highest coordinates (n, dim) of facets (n, n_corners, dim)."""
+    low = high = x[:, 0]
+    for k in range(1, x.shape[1]):
+        low, high = np.minimum(low, x[:, k]), np.maximum(high, x[:, k])
+    return low, high
+
+
+def _normals(x: Array) -> Array:
+    """Return normals (n, dim), of any length, of lines (n, 2, 2) and faces (n, 4, 3)."""
+    if x.shape[2] == 2:
+        along = x[:, 1] - x[:, 0]
+        return np.column_stack([along[:, 1], -along[:, 0]])
+    return np.asarray(np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]) + np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]))
+
+
+def _middles(x: Array) -> Array:
+    """Return the mean corners (n, 3) of faces (n, 4, 3), of which triangles repeat the last."""
+    weight = np.where((x[:, 3] == x[:, 2]).all(axis=1), 0.0, 1.0)[:, None]
+    return np.asarray((x[:, 0] + x[:, 1] + x[:, 2] + weight * x[:, 3]) / (3.0 + weight))
+
+
+def _within(points: Array, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:
+    """Return whether nodes (m,) lie over the inside or an edge of facets (m,), away from all of their nodes."""
+    members, size = outer.nodes[facet], outer.size[facet]
+    apart = np.linalg.norm(points[members] - points[node][:, None], axis=2)
+    away = (np.where(members >= 0, apart, np.inf) > NEAR * size[:, None]).all(axis=1)
+    x, place = points[outer.corners[facet]], points[node]
+    if points.shape[1] == 2:
+        return np.asarray(away & _in_simplex(place, x))
+    return np.asarray(away & (_in_simplex(place, x[:, [0, 1, 2]]) | _in_simplex(place, x[:, [0, 2, 3]])))
+
+
+def _in_simplex(place: Array, x: Array) -> Mask:
+    """Return whether the projections of points (m, dim) lie in lines (m, 2, dim) or triangles (m, 3, dim)."""
+    sides = x[:, 1:] - x[:, :1]
+    metric = np.einsum("mid,mjd->mij", sides, sides)
+    flat = np.linalg.det(metric) <= 0.0
+    metric[flat] = np.eye(metric.shape[1])
+    coordinate = np.linalg.solve(metric, np.einsum("mid,md->mi", sides, place - x[:, 0])[..., None])[..., 0]
+    inside = (coordinate >= -NEAR).all(axis=1) & (coordinate.sum(axis=1) <= 1.0 + NEAR)
+    return np.asarray(inside & ~flat)
