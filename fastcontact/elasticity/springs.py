@@ -50,7 +50,10 @@ def grounded(
     along: Mapping[str, float] | None = None,
     direction: Array | None = None,
 ) -> Springs:
-    """Return springs from each of the `nodes` (n,) to the ground, as `between` describes them."""
+    """Return springs from each of the `nodes` (n,) to the ground, as `between` describes them.
+
+    Along every axis of `stiffness` [force / length], and `along` or across the unit vector `direction` (dim,) [-].
+    """
     directions, values = _frame(stiffness, along or {}, direction, dim)
     dofs = np.tile(nodes.astype(np.intp)[:, None] * dim + np.arange(dim), (len(values), 1))
     rows = _rows(np.repeat(directions, len(nodes), axis=0), dofs, n_dofs)
@@ -69,7 +72,7 @@ def between(
     """Return springs between two of the `points` (n_points, dim) [length].
 
     Along every axis of `stiffness` [force / length]; ``along["axial"]`` and ``along["transverse"]`` [force / length] act
-    along and across their line, or the unit vector `direction` (dim,). ModelError if the two are one, or are at one place
+    along and across their line, or the unit vector `direction` (dim,) [-]. ModelError if the two are one, or are at one place
     and have no line between them.
     """
     if first == second:
