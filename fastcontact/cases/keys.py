@@ -23,12 +23,20 @@ SOLVE: dict[str, Any] = {
 # Tables that may occur several times, by kind: the types of their keys, and the keys that are required.
 LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     "material": ({"E": NUMBER, "nu": NUMBER, "groups": (list, str), "volumetric": str}, ("E", "nu")),
-    "support": ({"group": str, **AXES, "ramp": list}, ("group",)),
+    "support": ({"group": str, **AXES, "normal": NUMBER, "ramp": list}, ("group",)),
     "pressure": ({"group": str, "value": NUMBER, "ramp": list}, ("group", "value")),
     "traction": ({"group": str, **AXES, "ramp": list}, ("group",)),
     "body_force": ({"groups": (list, str), **AXES, "ramp": list}, ()),
     "force": ({"group": str, **AXES, "distribute": bool, "ramp": list}, ("group",)),
     "couple": ({"group": str, "component": str}, ("group", "component")),
+    "group_relation": (
+        {
+            **dict.fromkeys(("first", "second", "component"), str),
+            **dict.fromkeys(("coefficients", "translation", "ramp"), list),
+            "value": NUMBER,
+        },
+        ("first", "second", "component"),
+    ),
     "relation": ({"terms": list, "value": NUMBER, "ramp": list}, ("terms",)),
     "spring": (
         {"group": (str, int), "to": (str, int), **AXES, "axial": NUMBER, "transverse": NUMBER, "direction": list},

@@ -31,6 +31,7 @@ _ADD: dict[str, Callable[..., None]] = {
     "force": Model.add_force,
     "couple": Model.couple,
     "relation": Model.relate,
+    "group_relation": Model.relate_groups,
     "spring": Model.add_spring,
 }
 

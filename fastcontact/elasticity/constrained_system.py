@@ -195,7 +195,7 @@ class ConstrainedMotion:
     def values(self, multiplier: Sequence[float]) -> Array:
         """Return the right-hand sides (m,) for the multiplier of each relation."""
         blocks = [
-            np.full(relation.rows.shape[0], relation.value * factor)
+            np.full(relation.rows.shape[0], np.asarray(relation.value) * factor)
             for relation, factor in zip(self.relations, multiplier, strict=True)
         ]
         return np.concatenate(blocks) if blocks else np.empty(0)

@@ -27,7 +27,7 @@ class Relation:
         For messages.
     rows : csr_array (m, n_dofs)
         Coefficients [unit of the caller].
-    value : float
+    value : float or ndarray (m,)
         At multiplier 1 of the ramp [length times the unit of the coefficients].
     ramp : tuple of (float, float), optional
         Points (instant, multiplier) of its own history; None: that of the analysis.
@@ -35,7 +35,7 @@ class Relation:
 
     name: str
     rows: csr_array
-    value: float = 0.0
+    value: float | Array = 0.0
     ramp: Table | None = None
 
 

@@ -57,6 +57,7 @@ from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
 from fastcontact.model.prescribed_overlap import Supports, check_prescribed
 from fastcontact.model.ramp import History, Ramp, Table, combined, multiplier, table_of
+from fastcontact.model.relation_rows import NORMAL, along, directions_of, matched, normals_of
 from fastcontact.model.repeated_pairs import check_repeated
 from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
 
@@ -157,17 +158,32 @@ class Model:
         self.materials.append((material, names))
 
     def fix(self, group: str, components: str) -> None:
-        """Hold displacement components (``"x"``, ``"y"``, ``"xy"``, in 3D also ``"z"``) of a group's nodes at zero."""
+        """Hold displacement components (``"x"``, ``"y"``, ``"xy"``, in 3D also ``"z"``) of a group's nodes at zero.
+
+        ``"normal"``: those along the normals of a group of facets.
+        """
         if not components:
             raise ModelError(f"fix('{group}', ...) names no component: give for example 'x' or 'xy'")
-        self._support(group, dict.fromkeys(components, 0.0), None)
+        if components == NORMAL:
+            self.prescribe(group, normal=0.0)
+        else:
+            self._support(group, dict.fromkeys(components, 0.0), None)
 
-    def prescribe(self, group: str, *, ramp: History = None, **components: Value) -> None:
+    def prescribe(self, group: str, *, normal: Value | None = None, ramp: History = None, **components: Value) -> None:
         """Prescribe displacement components of all nodes of a group, e.g. ``y=-2.0`` [length], times the ramp.
 
         A component is a number, or a function from reference positions (n, dim) [length] to displacements (n,) [length].
+        `normal` is the displacement out of the body along the mean normal of the facets at each node, for groups of facets.
         """
-        self._support(group, components, ramp)
+        if normal is not None:
+            name = f"the displacement normal prescribed on '{group}'"
+            check_value(name, normal)
+            nodes, directions = normals_of(self.mesh, group)
+            values = evaluated(normal, self.mesh.points[nodes], name)
+            table = table_of(ramp, f"the ramp of {name}")
+            self.relations.append(Relation(name, along(nodes, directions, self.n_dofs), values, table))
+        if components or normal is None:
+            self._support(group, components, ramp)
 
     def _support(self, group: str, components: Mapping[str, Value], ramp: History) -> None:
         if not len(self.mesh.points_of(group)):
@@ -246,15 +262,69 @@ class Model:
         self.loads.append(load)
 
     def couple(self, group: str, component: str) -> None:
-        """Let all nodes of a group move together in one displacement component, or several (``"xy"``)."""
+        """Let all nodes of a group move together in one displacement component, or several (``"xy"``).
+
+        ``"normal"``: by the same along the normals of a group of facets.
+        """
         nodes = self.mesh.points_of(group)
         if len(nodes) < 2:
             raise ModelError(f"group '{group}' holds {len(nodes)} points: at least two are needed to couple")
+        if component == NORMAL:
+            rows = along(*normals_of(self.mesh, group), self.n_dofs)
+            first = csr_array(vstack([rows[[0]]] * (rows.shape[0] - 1), format="csr"))
+            self.relations.append(Relation(f"couple('{group}', 'normal')", csr_array(rows[1:] - first)))
+            return
         for axis in axes_of(f"couple('{group}')", dict.fromkeys(component, 1.0), self.mesh.dim):
             m = len(nodes) - 1
             dofs = np.column_stack([np.full(m, nodes[0]), nodes[1:]]).astype(np.intp) * self.mesh.dim + axis
             rows = csr_array((np.tile([-1.0, 1.0], m), dofs.ravel(), 2 * np.arange(m + 1)), shape=(m, self.n_dofs))
             self.relations.append(Relation(f"couple('{group}', '{'xyz'[axis]}')", rows))
+
+    def relate_groups(
+        self,
+        first: str,
+        second: str,
+        component: str,
+        *,
+        coefficients: Sequence[float] = (1.0, -1.0),
+        value: float = 0.0,
+        translation: Sequence[float] | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Relate the displacements of every node of a group to those of the node of another group that lies upon it.
+
+        By default both move together, as the two ends of a part that repeats itself do.
+
+        Parameters
+        ----------
+        first, second : str
+            Groups with equally many nodes.
+        component : str
+            ``"x"``, ``"xy"``, ... or ``"normal"``: along the outward normals of each group's own facets.
+        coefficients : (float, float)
+            ``coefficients[0] * u_first + coefficients[1] * u_second = value``.
+        value : float
+            Times the ramp [length times the unit of the coefficients].
+        translation : sequence of float, optional
+            What brings the first group upon the second; by default the way from middle to middle [length].
+        ramp : Ramp or iterable of (float, float), optional
+        """
+        name = f"the relation of {component} of '{first}' and '{second}'"
+        if len(coefficients) != 2:
+            raise ModelError(f"{name} needs two coefficients, not {coefficients!r}")
+        for number in (value, *coefficients):
+            check_number(f"a number of {name}", number)
+        if component != NORMAL:
+            axes_of(name, dict.fromkeys(component, 1.0), self.mesh.dim)
+        sides = [directions_of(self.mesh, group, component) for group in (first, second)]
+        for (nodes, ours), (opposite, theirs) in zip(*sides, strict=True):
+            place = matched(self.mesh, (first, nodes), (second, opposite), translation)
+            rows = coefficients[0] * along(nodes, ours, self.n_dofs)
+            rows = csr_array(rows + coefficients[1] * along(opposite[place], theirs[place], self.n_dofs))
+            rows.eliminate_zeros()
+            self.relations.append(
+                Relation(name, rows[np.diff(rows.indptr) > 0], float(value), table_of(ramp, f"the ramp of {name}"))
+            )
 
     def relate(
         self, terms: Iterable[tuple[str | int, str, float]], value: float = 0.0, *, ramp: History = None

@@ -1,0 +1,94 @@
+"""Rows of linear relations: displacements along the normals of a surface, nodes of one group with those of another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
+
+from fastcontact.contact.projection import nodal_normals
+from fastcontact.contact.surface import FacetBlock, Surface
+from fastcontact.elasticity.loads import facets_of, outward
+from fastcontact.errors import ModelError
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+Nodes = NDArray[np.intp]
+NORMAL = "normal"
+# A component of a unit normal below this is round-off.
+ROUND_OFF = 1e-12
+# How far apart nodes may lie that belong together, in sizes of their group.
+APART = 1e-6
+
+
+def normals_of(mesh: Mesh, group: str) -> tuple[Nodes, Array]:
+    """Return the nodes (m,) of a group of outer facets, and the means (m, dim) of the facets' unit normals there.
+
+    Errors as for a pressure on the group.
+    """
+    facets = {name: outward(mesh, group, name, block) for name, block in facets_of(mesh, group).items()}
+    points = np.unique(np.concatenate([block.ravel() for block in facets.values()]))
+    position = np.full(mesh.n_points, -1, np.intp)
+    position[points] = np.arange(len(points))
+    blocks = tuple(FacetBlock(name, block, position[block]) for name, block in facets.items())
+    normal = nodal_normals(Surface(group, blocks, points, np.zeros(len(points))), mesh.points)
+    normal[np.abs(normal) < ROUND_OFF] = 0.0
+    return points.astype(np.intp), normal / np.linalg.norm(normal, axis=1, keepdims=True)
+
+
+def directions_of(mesh: Mesh, group: str, component: str) -> list[tuple[Nodes, Array]]:
+    """Return the nodes (m,) of a group, and unit vectors (m, dim), for each of the components that a name stands for.
+
+    The name is ``"normal"``, or some of the letters x, y, z.
+    """
+    if component == NORMAL:
+        return [normals_of(mesh, group)]
+    nodes = mesh.points_of(group).astype(np.intp)
+    return [(nodes, np.tile(np.eye(mesh.dim)["xyz".index(axis)], (len(nodes), 1))) for axis in component]
+
+
+def along(nodes: Nodes, directions: Array, n_dofs: int) -> csr_array:
+    """Return rows (m, n_dofs): the displacement of each node (m,) along its unit vector (m, dim) [-]."""
+    m, dim = directions.shape
+    dofs = nodes[:, None] * dim + np.arange(dim)
+    rows = csr_array((directions.ravel(), dofs.ravel(), dim * np.arange(m + 1)), shape=(m, n_dofs))
+    rows.eliminate_zeros()
+    return rows
+
+
+def matched(
+    mesh: Mesh, first: tuple[str, Nodes], second: tuple[str, Nodes], translation: Sequence[float] | None
+) -> Nodes:
+    """Return, for each node of the first group, the place among the nodes of the second where it lies after `translation`.
+
+    Without one, groups are moved middle upon middle.
+
+    Raises
+    ------
+    ModelError
+        If the groups have other numbers of nodes, or do not lie upon each other.
+    """
+    (name, nodes), (other, opposite) = first, second
+    if len(nodes) != len(opposite):
+        raise ModelError(
+            f"groups '{name}' and '{other}' have {len(nodes)} and {len(opposite)} nodes: relations need them one by one"
+        )
+    ours, theirs = mesh.points[nodes], mesh.points[opposite]
+    low, high = ours.min(axis=0), ours.max(axis=0)
+    shift = 0.5 * (theirs.min(axis=0) + theirs.max(axis=0) - low - high)
+    if translation is not None:
+        shift = np.asarray(translation, float)
+        if shift.shape != (mesh.dim,) or not np.isfinite(shift).all():
+            raise ModelError(f"the translation {translation} of '{name}' must be {mesh.dim} numbers")
+    distance, place = cKDTree(theirs).query(ours + shift)
+    size = max(float(np.ptp(ours, axis=0).max()), 1e-3 * float(np.ptp(mesh.points, axis=0).max()))
+    far = int(np.argmax(distance))
+    if distance[far] > APART * size or len(np.unique(place)) < len(place):
+        raise ModelError(
+            f"point {nodes[far]} of '{name}', moved by {shift}, lies {distance[far]:.3g} from the nearest node of '{other}': "
+            "relations between groups need nodes upon nodes; give the translation that brings them there, or another mesh"
+        )
+    return np.asarray(place, np.intp)

@@ -1,0 +1,239 @@
+"""Supports and relations along normals, and between groups: a turned model moves as the model, turned."""
+
+import tomllib
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.cases.case import build_case
+
+E, NU = 1000.0, 0.3
+ANGLE = 0.4
+FORMULATIONS = ["node_to_segment", "continuous", "mortar"]
+
+
+def turn(dim):
+    """A rotation, in space about an oblique axis."""
+    c, s = np.cos(ANGLE), np.sin(ANGLE)
+    if dim == 2:
+        return np.array([[c, -s], [s, c]])
+    x = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    z = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    return z @ x
+
+
+def block(dim, element=None):
+    if dim == 3:
+        return fc.generate.box((2.0, 3.0, 1.0), (2, 3, 1), element or "hex8")
+    return fc.generate.block((2.0, 3.0), (2, 3), element or "quad4")
+
+
+def sides(dim):
+    """Groups and their axes: three planes of symmetry, or two, and one face that is moved."""
+    if dim == 3:
+        return {"XMIN": "x", "YMIN": "y", "ZMIN": "z"}, "ZMAX"
+    return {"LEFT": "x", "BOTTOM": "y"}, "TOP"
+
+
+def model_of(mesh):
+    model = fc.Model(mesh, "3d" if mesh.dim == 3 else "plane_strain")
+    model.add_material(fc.LinearElastic(E=E, nu=NU))
+    return model
+
+
+def last(model, **options):
+    return fc.solve(model, fc.linear_ramp(2), **options)[-1]
+
+
+@pytest.mark.parametrize("element", ["tri3", "tri6", "quad4", "quad8", "tet4", "tet10", "hex8", "hex20", "wedge6"])
+def test_supports_along_normals_turn_with_the_body(element):
+    dim = 2 if element.startswith(("tri", "quad")) else 3
+    mesh, Q = block(dim, element), turn(dim)
+    held, moved = sides(dim)
+    axes, turned = model_of(mesh), model_of(mesh.replace(points=mesh.points @ Q.T))
+    for group, axis in held.items():
+        axes.fix(group, axis)
+        turned.fix(group, "normal")
+    axes.prescribe(moved, **{"xyz"[dim - 1]: -0.1})
+    turned.prescribe(moved, normal=-0.1)
+    one, other = last(axes), last(turned)
+    np.testing.assert_allclose(other.displacement, one.displacement @ Q.T, atol=1e-13)
+    np.testing.assert_allclose(other.reaction, one.reaction @ Q.T, atol=1e-9 * np.abs(one.reaction).max())
+
+
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_contact_between_turned_bodies_is_the_same(formulation, solver):
+    mesh, Q = fc.generate.block_on_block(divisions_lower=(5, 3), divisions_upper=(4, 3)), turn(2)
+    found = []
+    for turned in (False, True):
+        model = model_of(mesh.replace(points=mesh.points @ Q.T) if turned else mesh)
+        for group, axis in {"LOWER_LEFT": "x", "UPPER_LEFT": "x", "LOWER_BOTTOM": "y"}.items():
+            model.fix(group, "normal" if turned else axis)
+        model.prescribe("UPPER_TOP", ramp=[(0, 0), (0.5, 1), (1, 0.5)], **{"normal" if turned else "y": -0.05})
+        # Where supports hold nodes, the continuous one makes a shear field compliant that does no work: by axes alone.
+        friction = 0.0 if formulation == "continuous" else 0.1
+        model.add_contact(
+            "pair", secondary="CONT_UPPER", primary="CONT_LOWER", formulation=formulation, friction=friction
+        )
+        found.append(last(model, linear_solver=solver))
+    np.testing.assert_allclose(found[1].displacement, found[0].displacement @ Q.T, atol=1e-8 * 0.05)
+
+
+def test_a_smooth_mandrel_holds_a_ring_and_lame_tells_the_pressure():
+    """A ring on a rigid mandrel under a pressure from outside: zero radial displacement inside."""
+    errors = []
+    for n in (8, 16):
+        square = fc.generate.block((1.0, 1.0), (n, n // 2), "quad8")
+        angle, radius = 0.5 * np.pi * (1 - square.points[:, 0]), 1.0 + square.points[:, 1]
+        mesh = square.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
+        model = model_of(mesh)
+        model.fix("BOTTOM", "normal")
+        model.fix("LEFT", "x")
+        model.fix("RIGHT", "y")
+        model.add_pressure("TOP", 2.0)
+        step = last(model)
+        inside = mesh.points_of("BOTTOM")
+        radial = mesh.points[inside] / np.linalg.norm(mesh.points[inside], axis=1, keepdims=True)
+        assert np.abs((step.displacement[inside] * radial).sum(axis=1)).max() < 1e-5
+        # u = A r + B / r with u(1) = 0: the stresses at 1 and 2 follow from sigma_rr(2) = -2.
+        ratio = 1 - 2 * NU
+        inner = 2.0 * (1 + 1 / ratio) / (1 / ratio + 0.25)
+        stress = step.stress[mesh.points_of("BOTTOM")[0]]
+        n0 = radial[0]
+        found = n0[0] ** 2 * stress[0] + n0[1] ** 2 * stress[1] + 2 * n0[0] * n0[1] * stress[3]
+        errors.append(abs(found + inner) / inner)
+    assert errors[1] < 2e-3
+    assert errors[1] < 0.4 * errors[0]
+
+
+def test_a_value_may_vary_along_the_surface_and_have_its_own_history():
+    mesh = block(2)
+    axes, along = model_of(mesh), model_of(mesh)
+    for model in (axes, along):
+        model.fix("LEFT", "x")
+        model.fix("BOTTOM", "y")
+    ramp = [(0, 0), (0.5, 1), (1, 0.25)]
+
+    def depth(x):
+        return -0.1 * (1 + x[:, 0])
+
+    axes.prescribe("TOP", y=depth, ramp=ramp)
+    along.prescribe("TOP", normal=depth, ramp=ramp)
+    np.testing.assert_allclose(last(along).displacement, last(axes).displacement, atol=1e-14)
+
+
+def test_nodes_coupled_along_normals_move_by_the_same():
+    mesh, Q = block(2), turn(2)
+    axes, turned = model_of(mesh), model_of(mesh.replace(points=mesh.points @ Q.T))
+    for group, axis in {"LEFT": "x", "BOTTOM": "y"}.items():
+        axes.fix(group, axis)
+        turned.fix(group, "normal")
+    axes.couple("TOP", "y")
+    turned.couple("TOP", "normal")
+    for model in (axes, turned):
+        model.add_pressure("TOP", lambda x: 3.0 + 0.0 * x[:, 0])
+        model.add_pressure("RIGHT", 1.0)
+    np.testing.assert_allclose(last(turned).displacement, last(axes).displacement @ Q.T, atol=1e-13)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_part_that_repeats_itself_keeps_its_ends_together(dim):
+    """Ends that move together leave no strain across: uniaxial strain, though nothing else holds the ends."""
+    mesh = block(dim, "quad8" if dim == 2 else "hex8")
+    model = model_of(mesh)
+    low, high = ("LEFT", "RIGHT") if dim == 2 else ("XMIN", "XMAX")
+    model.relate_groups(low, high, "xyz"[:dim])
+    bottom, top = ("BOTTOM", "TOP") if dim == 2 else ("YMIN", "YMAX")
+    model.fix(bottom, "y")
+    model.prescribe(top, y=-0.3)
+    model.prescribe("BOTTOM_LEFT" if dim == 2 else "XMIN", **({"x": 0.0}))
+    if dim == 3:
+        model.fix("ZMIN", "z")
+        model.fix("ZMAX", "z")
+    step = last(model)
+    stiff = E * (1 - NU) / ((1 + NU) * (1 - 2 * NU))
+    np.testing.assert_allclose(step.stress[:, 1], -0.1 * stiff, rtol=1e-10)
+    np.testing.assert_allclose(step.stress[:, 0], -0.1 * stiff * NU / (1 - NU), rtol=1e-10)
+
+
+def test_ends_may_be_strained_by_a_value():
+    mesh = block(2)
+    model = model_of(mesh)
+    model.relate_groups("RIGHT", "LEFT", "x", value=0.02)
+    model.fix("BOTTOM", "y")
+    model.fix("BOTTOM_LEFT", "x")
+    step = last(model)
+    np.testing.assert_allclose(step.stress[:, 0], 0.01 * E / (1 - NU**2), rtol=1e-10)
+
+
+def test_groups_are_related_along_their_normals():
+    """Opposite faces of a block squeezed by equal amounts: their displacements out of the body are equal."""
+    mesh = block(2)
+    model = model_of(mesh)
+    model.relate_groups("BOTTOM", "TOP", "normal")
+    model.couple("TOP", "y")
+    model.fix("LEFT", "x")
+    model.add_force("TOP", y=-5.0)
+    step = last(model)
+    bottom, top = mesh.points_of("BOTTOM"), mesh.points_of("TOP")
+    np.testing.assert_allclose(step.displacement[bottom, 1], -step.displacement[top[0], 1], rtol=1e-12)
+    assert step.displacement[top[0], 1] < 0
+
+
+@pytest.mark.parametrize(("call", "words"), [
+    (lambda m: m.relate_groups("LEFT", "TOP", "x"), "have 4 and 3 nodes"),
+    (lambda m: m.relate_groups("LEFT", "RIGHT", "x", translation=(1.0, 0.0)), "lies 1 from the nearest node of 'RIGHT'"),
+    (lambda m: m.relate_groups("LEFT", "RIGHT", "x", translation=(1.0,)), "must be 2 numbers"),
+    (lambda m: m.relate_groups("LEFT", "RIGHT", "q"), "unknown component 'q'"),
+    (lambda m: m.relate_groups("LEFT", "RIGHT", "x", coefficients=(1.0,)), "needs two coefficients"),
+    (lambda m: m.relate_groups("LEFT", "RIGHT", "x", value=np.nan), "must be|finite|number"),
+    (lambda m: m.fix("TOP_LEFT", "normal"), "holds points only"),
+    (lambda m: m.prescribe("TOP", normal=np.nan), "must be|finite|number"),
+    (lambda m: m.prescribe("TOP"), "has no component"),
+])  # fmt: skip
+def test_what_cannot_be_related_is_refused(call, words):
+    with pytest.raises(fc.ModelError, match=words):
+        call(model_of(block(2)))
+
+
+def test_a_support_that_contradicts_a_normal_one_is_told():
+    model = model_of(block(2))
+    model.fix("LEFT", "x")
+    model.fix("BOTTOM", "y")
+    model.prescribe("BOTTOM", normal=0.1)
+    with pytest.raises(fc.ModelError, match="the displacement normal prescribed on 'BOTTOM' contradicts the supports"):
+        last(model)
+
+
+def test_a_case_file_takes_normals_and_groups():
+    text = """
+kinematics = "plane_strain"
+[mesh]
+generator = "block-on-block"
+[[material]]
+E = 1000.0
+nu = 0.3
+[[support]]
+group = "LOWER_BOTTOM"
+normal = 0.1
+[[couple]]
+group = "UPPER_TOP"
+component = "normal"
+[[group_relation]]
+first = "LOWER_LEFT"
+second = "LOWER_RIGHT"
+component = "x"
+coefficients = [2.0, -1.0]
+value = 0.02
+translation = [10.0, 0.0]
+"""
+    case = build_case(tomllib.loads(text), name="case")
+    model = model_of(case.model.mesh)
+    model.prescribe("LOWER_BOTTOM", normal=0.1)
+    model.couple("UPPER_TOP", "normal")
+    model.relate_groups("LOWER_LEFT", "LOWER_RIGHT", "x", coefficients=(2.0, -1.0), value=0.02)
+    for found, expected in zip(case.model.relations, model.relations, strict=True):
+        assert (found.rows != expected.rows).nnz == 0
+        np.testing.assert_array_equal(found.value, expected.value)
