@@ -29,6 +29,8 @@ SLIPS = ("symmetric", "primary")
 # Nodes on an axis or plane of symmetry stand out a little beyond facets that lean, nodes at the end of one side beyond
 # that of the other where the two strain differently, in facet lengths.
 ON_SYMMETRY = 0.05
+# In 3D a body that slides leaves edges and planes of symmetry node by node; a node that is dropped earlier comes and goes.
+LEAVING = 0.5
 
 
 @dataclass(eq=False)
@@ -49,9 +51,10 @@ class Formulation(ABC):
         Typical stiffness of the bodies, E / (1 - nu^2) [pressure].
     friction : float
         Coefficient of Coulomb friction, zero for none [-].
-    projection_tolerance : float
+    projection_tolerance : float, optional
         How far a point may stand out beyond the end of the primary side and still be paired, in facet lengths. A little by
-        default, lest points at the very end come and go as the bodies strain.
+        default, lest points at the very end come and go as the bodies strain; in 3D, where sliding bodies leave edges and
+        planes of symmetry point by point, half a facet.
     normals : str or sequence of float, optional
         Along which the gap is measured. ``"facet"``: that of the primary facet at the projection; ``"averaged"``:
         interpolated between nodal means. By default the former in 2D and the latter in 3D, where a point opposite an edge
@@ -74,7 +77,7 @@ class Formulation(ABC):
     modulus: float
 
     friction: float = 0.0
-    projection_tolerance: float = ON_SYMMETRY
+    projection_tolerance: float | None = None
     normals: Normals | None = None
     slip: str = "symmetric"
     options: PairOptions = field(default_factory=PairOptions, repr=False)
@@ -92,6 +95,8 @@ class Formulation(ABC):
             raise ContactError(unknown("kind of slip", self.slip, SLIPS))
         if not (np.isfinite(self.friction) and self.friction >= 0):
             raise ContactError(f"the coefficient of friction {self.friction} must be a number >= 0")
+        if self.projection_tolerance is None:
+            self.projection_tolerance = ON_SYMMETRY if self.points.shape[1] == 2 else LEAVING
         if not self.projection_tolerance >= 0:
             raise ContactError(f"projection_tolerance = {self.projection_tolerance} must not be negative")
 
@@ -166,6 +171,7 @@ class Formulation(ABC):
         deformed = self.points + at.displacement
         beyond = self.projection_tolerance if tolerance is None else tolerance
         assert self.normals is not None
+        assert beyond is not None
         pairing = pair(candidates.positions(deformed), self.primary, deformed, beyond, self.normals, at.obstacle)
         if self.normals != "secondary":
             return pairing
@@ -268,7 +274,7 @@ class Formulation(ABC):
         (n_points, dim) is given, the gaps are those that it leaves in the pairing of `at` [length].
         """
         nodes = Candidates(self.secondary.points[:, None], np.ones((len(self.secondary.points), 1)))
-        pairing = self.facing(nodes, at, max(self.projection_tolerance, ON_SYMMETRY))
+        pairing = self.facing(nodes, at, max(self.projection_tolerance or 0.0, ON_SYMMETRY))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
         if with_clearance:
             gap0 += self.options.added_gap(nodes, pairing, self.primary, self.points, at.clearance_factor)
