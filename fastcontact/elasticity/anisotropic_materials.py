@@ -103,8 +103,12 @@ class Orthotropic(Material):
             Poisson's ratio in the plane of isotropy [-]; its shear modulus is E_across / (2 (1 + nu_across)).
         G_along : float
             Shear modulus in planes that contain the first axis [pressure].
-        axes, density, expansion
-            As of `Orthotropic`.
+        axes : sequence or callable, optional
+            As of `Orthotropic`: unit vectors in rows (3, 3) [-], or a function.
+        density : float, optional
+            Mass per volume [mass / length^3].
+        expansion : float or (float, float, float), optional
+            Coefficients of thermal expansion [1 / temperature].
         """
         if not nu_across > -1.0:
             raise ModelError(f"Poisson's ratio nu_across = {nu_across} must be above -1")
@@ -140,8 +144,10 @@ class Anisotropic(Material):
     ----------
     D : array_like (6, 6)
         Stresses 11, 22, 33, 12, 23, 13 of strains 11, 22, 33, 2*12, 2*23, 2*13 in the material's axes [pressure].
-    axes, density : optional
-        As of `Orthotropic`.
+    axes : sequence or callable, optional
+        As of `Orthotropic`: unit vectors in rows (3, 3) [-], or a function.
+    density : float, optional
+        Mass per volume [mass / length^3].
     expansion : float or sequence of 3, optional
         As of `Orthotropic` [1 / temperature].
     """

@@ -35,7 +35,7 @@ class Material:
     expansion : float, tuple or None
         Coefficients of thermal expansion [1 / temperature].
     axes : sequence, callable or None
-        See `Orthotropic`; None: those of the mesh.
+        Unit vectors in rows (3, 3) [-], or a function, see `Orthotropic`; None: those of the mesh.
     averaged : bool
         Whether elements have a mean dilatation, where they can and kinematics are not plane stress.
     """

@@ -32,8 +32,16 @@ def smoothed_stress(
 ) -> dict[str, Array]:
     """Return by solid element the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each cell.
 
-    It is the same at a node for all cells of one material. `field` holds the materials of all cells, other arguments are as
-    for `recovery.stress_at_points`.
+    It is the same at a node for all cells of one material.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    kinematics : str
+    field : MaterialField
+        Materials of all cells.
+    displacement : ndarray (n_points, dim)
+        Of all points [length].
     """
     components = field.moduli.shape[1]
     stress = CellStress(mesh, kinematics, field.moduli, displacement, field.averaged)

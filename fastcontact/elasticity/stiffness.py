@@ -117,8 +117,12 @@ def stiffness(
 def of_special_form(moduli: Array) -> NDArray[np.bool_]:
     """Return for which moduli (n_materials,) the element loops have a shorter form, but for round-off.
 
-    In the plane, (n_materials, 4, 4), those without coupling of normal strains with shear; in 3D, (n_materials, 6, 6), those
-    of isotropic materials [pressure].
+    In the plane those without coupling of normal strains with shear, in 3D those of isotropic materials.
+
+    Parameters
+    ----------
+    moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
+        [pressure]
     """
     if moduli.shape[1] == 4:
         return np.asarray((moduli[:, :3, 3] == 0.0).all(axis=1) & (moduli[:, 3, :3] == 0.0).all(axis=1))
