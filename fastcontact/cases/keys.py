@@ -38,6 +38,11 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     "pressure": ({"group": str, "value": NUMBER, "ramp": list}, ("group", "value")),
     "traction": ({"group": str, **AXES, "ramp": list}, ("group",)),
     "body_force": ({"groups": (list, str), **AXES, "ramp": list}, ()),
+    "gravity": ({"groups": (list, str), **AXES, "ramp": list}, ()),
+    "centrifugal": (
+        {"speed": NUMBER, "groups": (list, str), "origin": list, "direction": list, "ramp": list},
+        ("speed",),
+    ),
     "force": ({"group": str, **AXES, "distribute": bool, "ramp": list}, ("group",)),
     "couple": ({"group": str, "component": str}, ("group", "component")),
     "group_relation": (

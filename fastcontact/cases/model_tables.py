@@ -63,6 +63,8 @@ _ADD: dict[str, Callable[..., None]] = {
     "pressure": Model.add_pressure,
     "traction": Model.add_traction,
     "body_force": Model.add_body_force,
+    "gravity": Model.add_gravity,
+    "centrifugal": Model.add_centrifugal,
     "force": Model.add_force,
     "couple": Model.couple,
     "relation": Model.relate,

@@ -23,6 +23,7 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.constrained_system import ConstrainedMotion
+from fastcontact.elasticity.inertia_loads import Centrifugal, Gravity, InertiaLoad
 from fastcontact.elasticity.loads import (
     BodyForce,
     Load,
@@ -233,6 +234,58 @@ class Model:
         names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
         axes = axes_of("the body force", {"x": x, "y": y, "z": z}, self.mesh.dim)
         self._add(BodyForce(names, axes, table_of(ramp, "the ramp of the body force")))
+
+    def add_gravity(
+        self,
+        groups: Sequence[str] | str | None = None,
+        *,
+        x: float | None = None,
+        y: float | None = None,
+        z: float | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Load groups of solid cells, by default all, with their weight: density times acceleration [length / time^2].
+
+        The densities are those of the materials; units must fit, as do N, mm, MPa with tonnes, seconds and y=-9810.0.
+        """
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        axes = axes_of("gravity", {"x": x, "y": y, "z": z}, self.mesh.dim)
+        self._add(Gravity(names, axes, table_of(ramp, "the ramp of gravity")))
+
+    def add_centrifugal(
+        self,
+        speed: float,
+        groups: Sequence[str] | str | None = None,
+        *,
+        origin: Sequence[float] = (0.0, 0.0, 0.0),
+        direction: Sequence[float] | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Load groups of solid cells with the centrifugal force of a rotation, from the densities of the materials.
+
+        Parameters
+        ----------
+        speed : float
+            Angular speed [radian / time].
+        groups : str or sequence of str, optional
+            By default all solid cells.
+        origin : sequence of 2 or 3 floats
+            A point of the axis [length].
+        direction : sequence of 3 floats, optional
+            Along the axis, of any length [-]. By default (0, 0, 1), in axisymmetry the axis (0, 1, 0).
+        ramp : Ramp or iterable of (float, float), optional
+            History of the force, that is of the square of the speed.
+        """
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        if direction is None:
+            direction = (0.0, 1.0, 0.0) if self.kinematics == "axisymmetric" else (0.0, 0.0, 1.0)
+        place = (*origin, 0.0) if len(origin) == 2 else tuple(origin)
+        if len(place) != 3 or len(direction) != 3:
+            raise ModelError(
+                f"the axis of the centrifugal force needs three components, not origin {origin} and direction {direction}"
+            )
+        table = table_of(ramp, "the ramp of the centrifugal force")
+        self._add(Centrifugal(names, speed, place, tuple(direction), table))  # type: ignore[arg-type]
 
     def add_force(
         self,
@@ -728,10 +781,18 @@ class Model:
         related = self._related()
         by_ramp: dict[Table | None, Array] = {}
         for load in self.loads:
-            forces = load.vector(self.mesh, self.kinematics)
+            forces = self.load_vector(load)
             check_forces(self.mesh, forces, related, load.name)
             by_ramp[load.ramp] = by_ramp.get(load.ramp, 0.0) + forces
         return by_ramp
+
+    def load_vector(self, load: Load) -> Array:
+        """Return the nodal forces (n_points, dim) of a load at multiplier 1 [force]."""
+        density = None
+        if isinstance(load, InertiaLoad):
+            known = np.array([np.nan if m.density is None else m.density for m, _ in self.materials], float)
+            density = {name: known[numbers] for name, numbers in self._material_of_cells().items()}
+        return load.vector(self.mesh, self.kinematics, density)
 
     def _related(self) -> NDArray[np.bool_]:
         """Return which points (n_points,) relations and springs hold."""

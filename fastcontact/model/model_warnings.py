@@ -84,7 +84,7 @@ def _lost_loads(model: Model) -> list[str]:
     fixed, _ = model.prescribed()
     texts = []
     for load in model.loads:
-        forces = load.vector(model.mesh, model.kinematics)
+        forces = model.load_vector(load)
         total = float(np.abs(forces).sum())
         if total > 0.0 and float(np.abs(forces[~fixed]).sum()) <= 1e-12 * total:
             texts.append(
