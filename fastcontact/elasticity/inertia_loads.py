@@ -21,9 +21,14 @@ class InertiaLoad(VolumeLoad):
     CONSTANT = True
 
     def vector(self, mesh: Mesh, kinematics: str, density: Mapping[str, Array] | None = None) -> Array:
-        """Return the nodal forces (n_points, dim) at multiplier 1 [force].
+        """Return the nodal forces (n_points, dim) at multiplier 1 [force]; ModelError if some of the cells have no density.
 
-        ModelError if `density` has none, by solid element (n_cells,) [mass / length^3], for some of the cells.
+        Parameters
+        ----------
+        mesh : Mesh
+        kinematics : str
+        density : mapping of str to ndarray (n_cells,), optional
+            By solid element the mass per volume, NaN where there is none; only `inertia_loads` need it [mass / length^3].
         """
         forces, missing = np.zeros((mesh.n_points, mesh.dim)), 0
         for element, rows in self.rows(mesh):

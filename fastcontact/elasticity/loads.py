@@ -64,8 +64,12 @@ class Load:
     def vector(self, mesh: Mesh, kinematics: str, density: Mapping[str, Array] | None = None) -> Array:
         """Return the nodal forces (n_points, dim) at multiplier 1 [force]; errors as for `check`.
 
-        `density` has by solid element the mass per volume (n_cells,) [mass / length^3], NaN where there is none; only
-        `inertia_loads` need it.
+        Parameters
+        ----------
+        mesh : Mesh
+        kinematics : str
+        density : mapping of str to ndarray (n_cells,), optional
+            By solid element the mass per volume, NaN where there is none; only `inertia_loads` need it [mass / length^3].
         """
         forces = np.zeros((mesh.n_points, mesh.dim))
         self._add_to(forces, mesh, kinematics)
