@@ -351,6 +351,6 @@ def _density(load: Traction | BodyForce, x: Array, measure: Array) -> Array:
 def add_density(forces: Array, cells: Indices, N: Array, density: Array) -> None:
     """Add the integrals of a density times the shape functions to nodal `forces` (n_points, dim) [force], in place.
 
-    Of `cells` (c, n) of int, shape values `N` (q, n) [-], and `density` (c, q, dim) times the volume of each point [force].
+    Of `cells` (c, n) of int, shape values `N` (q, n) [-], and `density` (c, q, dim) [force], times the volume of each point.
     """
     np.add.at(forces, cells, np.einsum("qn,cqd->cnd", N, density))
