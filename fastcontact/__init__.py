@@ -32,6 +32,8 @@ _MODULES = {
 _NAMES = {
     "analysis.criteria": ("Criteria",),
     "analysis.run": ("solve", "solve_steps"),
+    "elasticity.anisotropic_materials": ("Anisotropic", "Orthotropic"),
+    "elasticity.material_axes": ("CylindricalAxes",),
     "elasticity.materials": ("LinearElastic",),
     "errors": (
         "CaseError",

@@ -61,8 +61,16 @@ class Load:
         for value in self.values:
             (check_number if self.CONSTANT else check_value)(self.name, value)
 
-    def vector(self, mesh: Mesh, kinematics: str) -> Array:
-        """Return the nodal forces (n_points, dim) at multiplier 1 [force]; errors as for `check`."""
+    def vector(self, mesh: Mesh, kinematics: str, density: Mapping[str, Array] | None = None) -> Array:
+        """Return the nodal forces (n_points, dim) at multiplier 1 [force]; errors as for `check`.
+
+        Parameters
+        ----------
+        mesh : Mesh
+        kinematics : str
+        density : mapping of str to ndarray (n_cells,), optional
+            By solid element the mass per volume, NaN where there is none; only `inertia_loads` need it [mass / length^3].
+        """
         forces = np.zeros((mesh.n_points, mesh.dim))
         self._add_to(forces, mesh, kinematics)
         return forces
@@ -96,7 +104,7 @@ class Pressure(Load):
         for element, block in facets_of(mesh, self.group).items():
             facets = outward(mesh, self.group, element, block)
             x, N, normal = _facet_points(mesh, element, facets, kinematics)
-            _add(forces, facets, N, -evaluated(self.value, x, self.name)[:, :, None] * normal)
+            add_density(forces, facets, N, -evaluated(self.value, x, self.name)[:, :, None] * normal)
 
 
 @dataclass(frozen=True)
@@ -111,43 +119,56 @@ class Traction(Load):
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
         for element, facets in facets_of(mesh, self.group).items():
             x, N, normal = _facet_points(mesh, element, facets, kinematics)
-            _add(forces, facets, N, _density(self, x, np.linalg.norm(normal, axis=2)))
+            add_density(forces, facets, N, _density(self, x, np.linalg.norm(normal, axis=2)))
 
 
-@dataclass(frozen=True)
-class BodyForce(Load):
-    """Components of a force per volume [force / length^3] on groups of solid cells, or on all."""
+class VolumeLoad(Load):
+    """A load on groups of solid cells, or on all."""
 
     groups: tuple[str, ...] | None
-    components: Components
-    ramp: Table | None = None
 
     @property
     def name(self) -> str:
         """As for other loads."""
         where = ", ".join(f"'{group}'" for group in self.groups) if self.groups is not None else "all solid cells"
-        return f"the body force on {where}"
+        return f"{self.KIND} on {where}"
 
-    def cells(self, mesh: Mesh) -> Iterator[tuple[str, Indices]]:
-        """Yield each element and the solid cells (n_cells, n_nodes) on which the load acts."""
+    def rows(self, mesh: Mesh) -> Iterator[tuple[str, NDArray[np.intp]]]:
+        """Yield each element and the numbers (n,) of the solid cells on which the load acts."""
         if self.groups is None:
-            yield from mesh.solids.items()
+            yield from ((element, np.arange(len(block))) for element, block in mesh.solids.items())
             return
         numbers = np.unique(np.concatenate([mesh.cell_groups[group] for group in self.groups]))
         for element, rows in mesh.split(numbers).items():
             if element in mesh.solids:
-                yield element, mesh.cells[element][rows]
+                yield element, rows
+
+    def cells(self, mesh: Mesh) -> Iterator[tuple[str, Indices]]:
+        """Yield each element and the solid cells (n_cells, n_nodes) on which the load acts."""
+        for element, rows in self.rows(mesh):
+            yield element, mesh.cells[element][rows]
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         for group in self.groups or ():
             if not mesh.cells_of(group, dim=mesh.dim):
-                raise ModelError(f"group '{group}' holds no solid cells: no body force can act on it")
+                raise ModelError(
+                    f"group '{group}' holds no solid cells: no {self.KIND.removeprefix('the ')} can act on it"
+                )
+
+
+@dataclass(frozen=True)
+class BodyForce(VolumeLoad):
+    """Components of a force per volume [force / length^3] on groups of solid cells, or on all."""
+
+    KIND = "the body force"
+    groups: tuple[str, ...] | None
+    components: Components
+    ramp: Table | None = None
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
         for element, cells in self.cells(mesh):
-            x, N, J, weights = _mapped(mesh, element, cells)
-            volume = np.linalg.det(J) * weights
-            _add(forces, cells, N, _density(self, x, _turned(volume, x, kinematics)))
+            x, N, volume = cell_points(mesh, element, cells, kinematics)
+            add_density(forces, cells, N, _density(self, x, volume))
 
 
 @dataclass(frozen=True)
@@ -197,7 +218,7 @@ class TotalForce(Load):
         for element, facets in facets_of(mesh, self.group).items():
             _, N, normal = _facet_points(mesh, element, facets, kinematics)
             measure = np.linalg.norm(normal, axis=2)
-            _add(shares, facets, N, measure[:, :, None])
+            add_density(shares, facets, N, measure[:, :, None])
             area += float(measure.sum())
         for axis, value in self.components.items():
             forces[:, axis] = shares[:, 0] * (value / area)
@@ -292,6 +313,15 @@ def _mapped(mesh: Mesh, element: str, cells: Indices) -> tuple[Array, Array, Arr
     return x, N, np.einsum("qnk,cnd->cqdk", dN, corners), weights
 
 
+def cell_points(mesh: Mesh, element: str, cells: Indices, kinematics: str) -> tuple[Array, Array, Array]:
+    """Return positions (c, q, dim) [length], shape values (q, n) [-] and volumes (c, q) [length^dim] in cells.
+
+    At the quadrature points of `cells` (c, n) of int of an element; in axisymmetry over the full circle.
+    """
+    x, N, J, weights = _mapped(mesh, element, cells)
+    return x, N, _turned(np.linalg.det(J) * weights, x, kinematics)
+
+
 def _facet_points(mesh: Mesh, element: str, facets: Indices, kinematics: str) -> tuple[Array, Array, Array]:
     """Return positions (f, q, dim), shape values (q, n) and area vectors (f, q, dim) of the quadrature of facets."""
     x, N, J, weights = _mapped(mesh, element, facets)
@@ -318,6 +348,9 @@ def _density(load: Traction | BodyForce, x: Array, measure: Array) -> Array:
     return density
 
 
-def _add(forces: Array, cells: Indices, N: Array, density: Array) -> None:
-    """Add the integrals of a density (c, q, dim) times the shape functions to nodal forces."""
+def add_density(forces: Array, cells: Indices, N: Array, density: Array) -> None:
+    """Add the integrals of a density times the shape functions to nodal `forces` (n_points, dim) [force], in place.
+
+    Of `cells` (c, n) of int, shape values `N` (q, n) [-], and `density` (c, q, dim) [force], times the volume of each point.
+    """
     np.add.at(forces, cells, np.einsum("qn,cqd->cnd", N, density))

@@ -23,6 +23,7 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.constrained_system import ConstrainedMotion
+from fastcontact.elasticity.inertia_loads import Centrifugal, Gravity, InertiaLoad
 from fastcontact.elasticity.loads import (
     BodyForce,
     Load,
@@ -36,7 +37,8 @@ from fastcontact.elasticity.loads import (
     check_value,
     evaluated,
 )
-from fastcontact.elasticity.materials import KINEMATICS, LinearElastic
+from fastcontact.elasticity.material_field import MaterialField, material_field
+from fastcontact.elasticity.materials import KINEMATICS, Material
 from fastcontact.elasticity.relations import Relation, stacked_rows
 from fastcontact.elasticity.springs import Springs, between, grounded, stacked
 from fastcontact.elasticity.stiffness import stiffness
@@ -133,7 +135,7 @@ class Model:
         self.kinematics = kinematics
         self.case_text = case_text
         self.units: dict[str, str] = {}  # names of the units of length, force, pressure where they are known
-        self.materials: list[tuple[LinearElastic, tuple[str, ...] | None]] = []
+        self.materials: list[tuple[Material, tuple[str, ...] | None]] = []
         self.supports: list[Support] = []
         self.loads: list[Load] = []
         self.relations: list[Relation] = []
@@ -149,12 +151,16 @@ class Model:
         """Number of displacement components of all points."""
         return self.mesh.n_points * self.mesh.dim
 
-    def add_material(self, material: LinearElastic, groups: Sequence[str] | str | None = None) -> None:
+    def add_material(self, material: Material, groups: Sequence[str] | str | None = None) -> None:
         """Give a material to groups of solid cells, by default to all; groups override what was given to all before."""
         names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
         for name in names or ():
             if not self.mesh.cells_of(name, dim=self.mesh.dim):
                 raise ModelError(f"group '{name}' holds no solid cells, so it cannot have a material")
+        if not isinstance(material, Material):
+            raise ModelError(
+                f"{material!r} is no material: give LinearElastic(E=..., nu=...), Orthotropic(...) or Anisotropic(...)"
+            )
         self.materials.append((material, names))
 
     def fix(self, group: str, components: str) -> None:
@@ -228,6 +234,58 @@ class Model:
         names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
         axes = axes_of("the body force", {"x": x, "y": y, "z": z}, self.mesh.dim)
         self._add(BodyForce(names, axes, table_of(ramp, "the ramp of the body force")))
+
+    def add_gravity(
+        self,
+        groups: Sequence[str] | str | None = None,
+        *,
+        x: float | None = None,
+        y: float | None = None,
+        z: float | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Load groups of solid cells, by default all, with their weight: density times acceleration [length / time^2].
+
+        The densities are those of the materials; units must fit, as do N, mm, MPa with tonnes, seconds and y=-9810.0.
+        """
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        axes = axes_of("gravity", {"x": x, "y": y, "z": z}, self.mesh.dim)
+        self._add(Gravity(names, axes, table_of(ramp, "the ramp of gravity")))
+
+    def add_centrifugal(
+        self,
+        speed: float,
+        groups: Sequence[str] | str | None = None,
+        *,
+        origin: Sequence[float] = (0.0, 0.0, 0.0),
+        direction: Sequence[float] | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Load groups of solid cells with the centrifugal force of a rotation, from the densities of the materials.
+
+        Parameters
+        ----------
+        speed : float
+            Angular speed [radian / time].
+        groups : str or sequence of str, optional
+            By default all solid cells.
+        origin : sequence of 2 or 3 floats
+            A point of the axis [length].
+        direction : sequence of 3 floats, optional
+            Along the axis, of any length [-]. By default (0, 0, 1), in axisymmetry the axis (0, 1, 0).
+        ramp : Ramp or iterable of (float, float), optional
+            History of the force, that is of the square of the speed.
+        """
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        if direction is None:
+            direction = (0.0, 1.0, 0.0) if self.kinematics == "axisymmetric" else (0.0, 0.0, 1.0)
+        place = (*origin, 0.0) if len(origin) == 2 else tuple(origin)
+        if len(place) != 3 or len(direction) != 3:
+            raise ModelError(
+                f"the axis of the centrifugal force needs three components, not origin {origin} and direction {direction}"
+            )
+        table = table_of(ramp, "the ramp of the centrifugal force")
+        self._add(Centrifugal(names, speed, place, tuple(direction), table))  # type: ignore[arg-type]
 
     def add_force(
         self,
@@ -592,7 +650,7 @@ class Model:
         else:
             primary = surface(self.mesh, pair.primary)
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
-        modulus = min((m.E / (1 - m.nu**2) for m, _ in self.materials), default=1.0)
+        modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
         own = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
         axisymmetric = self.kinematics == "axisymmetric"
         return kind(
@@ -600,7 +658,21 @@ class Model:
         )
 
     def material_numbers(self) -> tuple[Array, dict[str, NDArray[np.int32]]]:
-        """Return moduli (n_materials, 4, 4), in 3D (n_materials, 6, 6), and by element every solid cell's material."""
+        """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and by element every solid cell's number there.
+
+        The first are those of the materials; materials with axes that depend on the position have further ones for each cell.
+        """
+        field = self.material_field()
+        return field.moduli, field.rows
+
+    def material_field(self) -> MaterialField:
+        """Return the materials of all solid cells; ModelError if a cell has none, or two."""
+        return material_field(
+            self.mesh, self.kinematics, [material for material, _ in self.materials], self._material_of_cells()
+        )
+
+    def _material_of_cells(self) -> dict[str, NDArray[np.int32]]:
+        """Return by element every solid cell's material (n_cells,)."""
         if not self.materials:
             raise ModelError("no material: call add_material(LinearElastic(E=..., nu=...)) for the solid cells")
         numbers = {name: np.full(len(block), -1, np.int32) for name, block in self.mesh.solids.items()}
@@ -614,12 +686,11 @@ class Model:
                         self._check_material(index, group, numbers[name][rows])
                         numbers[name][rows] = index
         self._check_all_have_material(numbers)
-        return np.stack([material.moduli(self.kinematics) for material, _ in self.materials]), numbers
+        return numbers
 
     def averaged_materials(self) -> NDArray[np.bool_]:
-        """Return which materials (n_materials,) have a mean dilatation; none in plane stress, where none locks."""
-        free = self.kinematics == "plane_stress"
-        return np.array([material.averaged and not free for material, _ in self.materials], bool)
+        """Return which moduli (n_moduli,) have a mean dilatation; none in plane stress, where none locks."""
+        return self.material_field().averaged
 
     def _check_material(self, index: int, group: str | None, given: NDArray[np.int32]) -> None:
         """Refuse a material for cells that have another one already, which was not given to all cells."""
@@ -629,7 +700,7 @@ class Model:
             if old != new and (groups is not None or group is None):
                 raise ModelError(
                     f"{int((given == number).sum())} cells of {'the mesh' if group is None else repr(group)} have two "
-                    f"materials, E = {old.E:g}, nu = {old.nu:g} and E = {new.E:g}, nu = {new.nu:g}: give each group one; "
+                    f"materials, {old.described} and {new.described}: give each group one; "
                     "one for all other cells comes first, without groups"
                 )
 
@@ -710,10 +781,18 @@ class Model:
         related = self._related()
         by_ramp: dict[Table | None, Array] = {}
         for load in self.loads:
-            forces = load.vector(self.mesh, self.kinematics)
+            forces = self.load_vector(load)
             check_forces(self.mesh, forces, related, load.name)
             by_ramp[load.ramp] = by_ramp.get(load.ramp, 0.0) + forces
         return by_ramp
+
+    def load_vector(self, load: Load) -> Array:
+        """Return the nodal forces (n_points, dim) of a load at multiplier 1 [force]."""
+        density = None
+        if isinstance(load, InertiaLoad):
+            known = np.array([np.nan if m.density is None else m.density for m, _ in self.materials], float)
+            density = {name: known[numbers] for name, numbers in self._material_of_cells().items()}
+        return load.vector(self.mesh, self.kinematics, density)
 
     def _related(self) -> NDArray[np.bool_]:
         """Return which points (n_points,) relations and springs hold."""

@@ -1,0 +1,123 @@
+"""Loads by mass: gravity and centrifugal forces, from the densities of the materials."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.elasticity.loads import Table, VolumeLoad, add_density, cell_points
+from fastcontact.errors import ModelError
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+
+class InertiaLoad(VolumeLoad):
+    """A load that is density times acceleration."""
+
+    CONSTANT = True
+
+    def vector(self, mesh: Mesh, kinematics: str, density: Mapping[str, Array] | None = None) -> Array:
+        """Return the nodal forces (n_points, dim) at multiplier 1 [force]; ModelError if some of the cells have no density.
+
+        Parameters
+        ----------
+        mesh : Mesh
+        kinematics : str
+        density : mapping of str to ndarray (n_cells,), optional
+            By solid element the mass per volume, NaN where there is none; only `inertia_loads` need it [mass / length^3].
+        """
+        forces, missing = np.zeros((mesh.n_points, mesh.dim)), 0
+        for element, rows in self.rows(mesh):
+            own = np.full(len(rows), np.nan) if density is None else density[element][rows]
+            missing += int(np.isnan(own).sum())
+            cells = mesh.cells[element][rows]
+            x, N, volume = cell_points(mesh, element, cells, kinematics)
+            add_density(forces, cells, N, self.acceleration(x, kinematics) * (volume * own[:, None])[:, :, None])
+        if missing:
+            raise ModelError(
+                f"{self.name} needs densities, but the materials of {missing} solid cells have none: give them density=..., "
+                "0.0 for a body without weight"
+            )
+        return forces
+
+    def acceleration(self, x: Array, kinematics: str) -> Array:
+        """Return the acceleration (..., dim) [length / time^2] at positions `x` (..., dim) [length]."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Gravity(InertiaLoad):
+    """Components of an acceleration [length / time^2] of groups of solid cells, or of all."""
+
+    KIND = "gravity"
+    groups: tuple[str, ...] | None
+    components: Mapping[int, float]
+    ramp: Table | None = None
+
+    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+        super()._check_place(mesh, kinematics)
+        if kinematics == "axisymmetric" and 0 in self.components:
+            raise ModelError(f"{self.name} has a radial component x: in axisymmetry it acts along the axis, y, alone")
+
+    def acceleration(self, x: Array, kinematics: str) -> Array:
+        """Return the same vector (..., dim) [length / time^2] at all positions `x` (..., dim) [length]."""
+        found = np.zeros(x.shape)
+        for axis, value in self.components.items():
+            found[..., axis] = value
+        return found
+
+
+@dataclass(frozen=True)
+class Centrifugal(InertiaLoad):
+    """The centrifugal force of a rotation.
+
+    Attributes
+    ----------
+    groups : tuple of str or None
+        Groups of solid cells; None: all.
+    speed : float
+        Angular speed [radian / time].
+    origin, direction : (float, float, float)
+        A point of the axis [length], and a vector along it [-].
+    ramp : tuple, optional
+        History of the force, that is of the square of the speed.
+    """
+
+    KIND = "the centrifugal force"
+    groups: tuple[str, ...] | None
+    speed: float
+    origin: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    ramp: Table | None = None
+
+    @property
+    def values(self) -> list[float]:  # type: ignore[override]
+        """The speed and what describes the axis."""
+        return [self.speed, *self.origin, *self.direction]
+
+    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+        super()._check_place(mesh, kinematics)
+        direction, origin = np.array(self.direction), np.array(self.origin)
+        if not direction.any():
+            raise ModelError(f"the axis of {self.name} has no length: give a direction such as (0, 0, 1)")
+        if kinematics == "axisymmetric" and (direction[[0, 2]].any() or origin[[0, 2]].any()):
+            raise ModelError(f"the axis of {self.name} is not that of the axisymmetry: its direction is (0, 1, 0)")
+        if mesh.dim == 2 and direction[2] and direction[:2].any():
+            raise ModelError(
+                f"the axis of {self.name} is oblique to the plane: it lies in the plane or is normal to it"
+            )
+        if mesh.dim == 2 and origin[2]:
+            raise ModelError(f"the axis of {self.name} has the origin z = {origin[2]:g} beside the plane of the mesh")
+
+    def acceleration(self, x: Array, kinematics: str) -> Array:
+        """Return speed^2 times the arm from the axis (..., dim) [length / time^2] at positions `x` (..., dim) [length]."""
+        arm = np.zeros((*x.shape[:-1], 3))
+        arm[..., : x.shape[-1]] = x
+        arm -= self.origin
+        along = np.array(self.direction) / np.linalg.norm(self.direction)
+        arm -= (arm @ along)[..., None] * along
+        return np.asarray(self.speed**2 * arm[..., : x.shape[-1]])

@@ -1,0 +1,154 @@
+"""Gravity and centrifugal forces against exact solutions."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.cases.case import read_case
+
+E, NU, RHO = 210e3, 0.3, 7.85e-9
+
+
+def block(kinematics, size=(2.0, 3.0), element="quad8", origin=(0.0, 0.0), density=RHO):
+    model = fc.Model(fc.generate.block(size, (8, 3), element, origin=origin), kinematics)
+    model.add_material(fc.LinearElastic(E, NU, density=density))
+    return model
+
+
+@pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress", "axisymmetric"])
+def test_a_hanging_body_carries_its_weight(kinematics):
+    """The mean stress falls linearly from the top; at nu = 0 it is exact everywhere."""
+    model = block(kinematics)
+    model.materials[0] = (fc.LinearElastic(E, 0.0, density=RHO), None)
+    model.fix("TOP", "y")
+    model.fix("LEFT", "x")
+    model.add_gravity(y=-9810.0)
+    step = fc.solve(model, fc.linear_ramp(1))[-1]
+    volume = np.pi * 2.0**2 * 3.0 if kinematics == "axisymmetric" else 6.0
+    assert step.reaction[:, 1].sum() == pytest.approx(9810.0 * RHO * volume, rel=1e-12)
+    np.testing.assert_allclose(step.stress[:, 1], 9810.0 * RHO * model.mesh.points[:, 1], atol=1e-12)
+
+
+def test_gravity_acts_on_its_groups_with_their_own_densities_and_history():
+    mesh = fc.generate.box((2.0, 1.0, 1.0), (2, 1, 1), "hex8").with_groups(cells={"HEAVY": [0], "LIGHT": [1]})
+    model = fc.Model(mesh, "3d")
+    model.add_material(fc.LinearElastic(E, NU, density=3.0), "HEAVY")
+    model.add_material(fc.Orthotropic((E,) * 3, (NU,) * 3, (E,) * 3, density=1.0), "LIGHT")
+    model.fix("XMIN", "xyz")
+    model.add_gravity(x=1.0, z=-10.0)
+    model.add_gravity("LIGHT", y=5.0, ramp=[(0.0, 2.0), (1.0, 2.0)])
+    total = [force.sum(axis=0) for force in model.forces_by_ramp().values()]
+    np.testing.assert_allclose(total, [[4.0, 0.0, -40.0], [0.0, 5.0, 0.0]], atol=1e-12)
+    step = fc.solve(model, fc.linear_ramp(1))[-1]
+    np.testing.assert_allclose(step.reaction.sum(axis=0), [-4.0, -10.0, 40.0], atol=1e-9)
+
+
+def disc(r, a, b, speed):
+    """Radial and hoop stress of a thin rotating disc with a hole (Timoshenko and Goodier, 1970, section 32)."""
+    c = (3 + NU) / 8 * RHO * speed**2
+    radial = c * (a**2 + b**2 - (a * b / r) ** 2 - r**2)
+    return radial, c * (a**2 + b**2 + (a * b / r) ** 2 - (1 + 3 * NU) / (3 + NU) * r**2)
+
+
+def test_a_rotating_disc():
+    mesh = fc.generate.block((40.0, np.pi / 2), (24, 20), "quad8", origin=(10.0, 0.0))
+    r, t = mesh.points.T
+    model = fc.Model(mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t)])), "plane_stress")
+    model.add_material(fc.LinearElastic(E, NU, density=RHO))
+    model.fix("BOTTOM", "y")
+    model.fix("TOP", "x")
+    model.add_centrifugal(1000.0)
+    step = fc.solve(model, fc.linear_ramp(1))[-1]
+    radial, hoop = disc(r, 10.0, 50.0, 1000.0)
+    np.testing.assert_allclose(step.stress[:, :2].sum(axis=1), radial + hoop, atol=0.004 * hoop.max())
+    u = (step.displacement * model.mesh.points).sum(axis=1) / r
+    np.testing.assert_allclose(u, r / E * (hoop - NU * radial), rtol=2e-4)
+
+
+def test_a_rotating_cylinder_that_cannot_lengthen():
+    """In axisymmetry, plane strain along the axis: the disc with E / (1 - nu^2) and nu / (1 - nu)."""
+    model = block("axisymmetric", (40.0, 1.0), origin=(10.0, 0.0))
+    model.fix("TOP", "y")
+    model.fix("BOTTOM", "y")
+    model.add_centrifugal(1000.0)
+    step = fc.solve(model, fc.linear_ramp(1))[-1]
+    r, nu = model.mesh.points[:, 0], NU / (1 - NU)
+    c = (3 + nu) / 8 * RHO * 1e6
+    radial = c * (2600.0 - (500.0 / r) ** 2 - r**2)
+    hoop = c * (2600.0 + (500.0 / r) ** 2 - (1 + 3 * nu) / (3 + nu) * r**2)
+    np.testing.assert_allclose(step.displacement[:, 0], r * (1 - NU**2) / E * (hoop - nu * radial), rtol=5e-3)
+
+
+def test_the_axis_may_lie_anywhere_in_space():
+    """The force on a body is that on its mass at its centre."""
+    mesh = fc.generate.box((2.0, 1.0, 1.0), (3, 2, 2), "hex8")
+    model = fc.Model(mesh, "3d")
+    model.add_material(fc.LinearElastic(E, NU, density=2.0))
+    model.add_centrifugal(3.0, origin=(5.0, 1.0, -2.0), direction=(1.0, 2.0, 3.0))
+    along = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
+    arm = np.array([1.0, 0.5, 0.5]) - (5.0, 1.0, -2.0)
+    expected = 4.0 * 9.0 * (arm - (arm @ along) * along)
+    np.testing.assert_allclose(next(iter(model.forces_by_ramp().values())).sum(axis=0), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("add", "words"),
+    [
+        (lambda m: m.add_gravity(), "has no component"),
+        (lambda m: m.add_gravity(y=np.inf), "is inf, which is not a finite number"),
+        (lambda m: m.add_gravity("TOP", y=1.0), "holds no solid cells: no gravity can act on it"),
+        (lambda m: m.add_gravity(x=1.0), "radial component x"),
+        (lambda m: m.add_centrifugal(1.0, direction=(0, 0, 1)), "not that of the axisymmetry"),
+        (lambda m: m.add_centrifugal(1.0, direction=(0, 0, 0)), "has no length"),
+        (lambda m: m.add_centrifugal(1.0, origin=(0,)), "needs three components"),
+        (lambda m: m.add_centrifugal("fast"), "not a finite number"),
+    ],
+)
+def test_what_cannot_act_is_refused(add, words):
+    with pytest.raises(fc.ModelError, match=words):
+        add(block("axisymmetric"))
+
+
+def test_oblique_axes_are_refused_in_the_plane():
+    with pytest.raises(fc.ModelError, match="oblique to the plane"):
+        block("plane_strain").add_centrifugal(1.0, direction=(1, 0, 1))
+    with pytest.raises(fc.ModelError, match="beside the plane"):
+        block("plane_strain").add_centrifugal(1.0, origin=(0, 0, 1), direction=(1, 0, 0))
+
+
+def test_a_missing_density_is_told_before_any_numerics():
+    model = block("plane_strain", density=None)
+    model.fix("TOP", "xy")
+    model.add_gravity(y=-1.0)
+    with pytest.raises(
+        fc.ModelError, match="gravity on all solid cells needs densities, but the materials of 24 solid"
+    ):
+        model.check()
+
+
+def test_loads_by_mass_in_a_case_file(tmp_path):
+    fc.write_mesh(tmp_path / "block.med", fc.generate.block(divisions=(2, 2)))
+    (tmp_path / "case.toml").write_text("""
+kinematics = "plane_strain"
+[mesh]
+file = "block.med"
+[[material]]
+E = 1.0
+nu = 0.3
+density = 2.0
+[[support]]
+group = "BOTTOM"
+x = 0.0
+y = 0.0
+[[gravity]]
+y = -3.0
+[[centrifugal]]
+speed = 2.0
+origin = [-1.0, 0.5]
+ramp = [[0.0, 0.0], [1.0, 0.5]]
+[ramp]
+steps = 1
+""")
+    model = read_case(tmp_path / "case.toml").model
+    found = [force.sum(axis=0) for force in model.forces_by_ramp().values()]
+    np.testing.assert_allclose(found, [[0.0, -6.0], [2.0 * 4.0 * 1.5, 0.0]], atol=1e-12)
