@@ -81,14 +81,9 @@ def test_soft_parts_balance_beside_parts_a_million_times_as_stiff(solver, option
 @pytest.mark.filterwarnings("ignore:Young's moduli", "ignore:multigrid gave up", "ignore:.*across its radius")
 @pytest.mark.parametrize("unit", UNITS)
 def test_friction_that_multigrid_does_not_settle_beside_a_stiff_body_is_an_error(unit):
-    """Node-to-segment friction on a body a million times as stiff: what is found balances, or nothing is said to be found."""
     model = stacked(1e6, unit=unit)
-    try:
-        step = solved(model, "amg")
-    except fc.ConvergenceError as error:
-        assert "the contact geometry did not settle" in str(error)
-    else:
-        assert out_of_balance(model, step) < 1e-6
+    with pytest.raises(fc.ConvergenceError, match="the contact geometry did not settle"):
+        solved(model, "amg")
 
 
 @pytest.mark.filterwarnings("ignore:Young's moduli", "ignore:.*across its radius")

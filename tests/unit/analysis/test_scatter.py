@@ -60,21 +60,16 @@ def side_by_side(element="tri6", unit=(1000.0, 1.0), **options):
 
 @pytest.mark.parametrize("unit", [(1000.0, 1.0), (2e11, 1e-3)], ids=["N-mm", "N-m"])
 @pytest.mark.parametrize("element", ["tri6", "quad8"])
-def test_round_off_ends_a_step_with_a_note_and_the_right_force(element, unit, caplog):
+def test_bilateral_contact_of_quadratic_facets_settles(element, unit):
     model = side_by_side(element, unit)
-    with caplog.at_level(logging.INFO, "fastcontact"):
-        (step,) = fc.solve(model, fc.linear_ramp(1), criteria=fc.Criteria(geometry=1e-15))
-    scatter = step.iterations["scatter"]
-    assert 0.0 < scatter["displacement"] < 1e-7
-    assert scatter["force"] < 1e-6
-    assert f"scatter by {scatter['displacement']:.1e}" in caplog.text
-    assert step.iterations["geometry_updates"] < 25
+    (step,) = fc.solve(model, fc.linear_ramp(1))
+    assert step.iterations["geometry_updates"] < 15
     (loose,) = fc.solve(model, fc.linear_ramp(1), criteria=fc.Criteria(geometry=1e-6))
-    assert "scatter" not in loose.iterations
     np.testing.assert_allclose(step.contact["c"].force[1], loose.contact["c"].force[1], rtol=1e-5)
 
 
-def test_a_slender_bar_settles_and_contact_carries_its_load():
+def slender():
+    """A bar of 400 by 1 that lies on a foundation under its weight of 0.4."""
     low = fc.generate.block((400.0, 2.0), (100, 2), "quad4", (0.0, -2.0))
     up = fc.generate.block((400.0, 1.0), (133, 2))
     mesh = fc.generate.union(
@@ -89,9 +84,22 @@ def test_a_slender_bar_settles_and_contact_carries_its_load():
     model.fix("U_LEFT", "x")
     model.add_body_force(["U_BLOCK"], y=-1e-3)
     model.add_contact("c", secondary="U_BOTTOM", primary="L_TOP")
-    (step,) = fc.solve(model, fc.linear_ramp(1))
+    return model
+
+
+@pytest.mark.parametrize("geometry", [1e-6, 1e-11])
+def test_a_slender_bar_settles_and_contact_carries_its_load(geometry, caplog):
+    """Round-off moves its end by more than a criterion of 1e-11 allows: that is told."""
+    with caplog.at_level(logging.INFO, "fastcontact"):
+        (step,) = fc.solve(slender(), fc.linear_ramp(1), criteria=fc.Criteria(geometry=geometry))
     assert step.contact["c"].force[1] == pytest.approx(0.4, rel=1e-6)
     assert step.iterations["geometry_updates"] < 25
+    scatter = step.iterations.get("scatter")
+    assert (scatter is not None) == (geometry < 1e-10)
+    if scatter is not None:
+        assert 0.0 < scatter["displacement"] < 1e-7
+        assert scatter["force"] < 1e-6
+        assert f"scatter by {scatter['displacement']:.1e}" in caplog.text
 
 
 def test_a_geometry_that_does_not_settle_names_the_criterion():
