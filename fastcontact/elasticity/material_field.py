@@ -87,7 +87,7 @@ class MaterialField:
 
     def without_expansion(self, mesh: Mesh, rise: Array) -> int:
         """Return how many cells have a rise of the temperature (n_points,) [temperature] and a material without expansion."""
-        unknown = np.asarray(np.isnan(self.expansion)).any(axis=1)
+        unknown = np.isnan(self.expansion[:, 0])
         count = 0
         for name, block in mesh.solids.items():
             heated = np.asarray(rise[block] != 0.0).any(axis=1)
