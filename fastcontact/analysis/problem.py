@@ -127,6 +127,10 @@ class Problem:
         force = combined(self.forces, self.ramp, instant, self.shape).ravel()
         return StepLoad(lift, force, obstacles, clearances)
 
+    def temperature_factors(self, instant: float) -> list[float]:
+        """Return what each temperature of the model is multiplied with at an instant of the ramp [-]."""
+        return [multiplier(own.ramp, self.ramp, instant) for own in self.model.temperatures]
+
     def displacement(self, u: Array) -> Array:
         """Return the displacements (n_points, dim) of the mesh of all displacements u (n_dofs,) [length]."""
         return u[: self.model.n_dofs].reshape(-1, self.model.mesh.dim)
@@ -206,8 +210,16 @@ def prepare(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies,
         SurfaceDofs(system, contact_dofs, involved) if pairs and bodies is None and solver.condenses
         else ActiveDofs(system, contact_dofs),
-        contact_dofs, driven, driven.prescribed(prescribed), driven.forces(model.forces_by_ramp()),
+        contact_dofs, driven, driven.prescribed(prescribed), driven.forces(_forces(model)),
     )  # fmt: skip
+
+
+def _forces(model: Model) -> dict[Table | None, Array]:
+    """Return by history the nodal forces (n_points, dim) of loads and temperatures at multiplier 1 [force]."""
+    forces = model.forces_by_ramp()
+    for own, values in model.thermal_forces_by_ramp().items():
+        forces[own] = forces[own] + values if own in forces else values
+    return forces
 
 
 def _prepare_solver(

@@ -49,6 +49,9 @@ def recover(
         Number of the step, and its pseudo-time.
     """
     mesh, u = problem.model.mesh, problem.displacement(end.u)
+    factors = problem.temperature_factors(place[1])
+    if factors:
+        iterations = {**iterations, "temperature_factors": factors}
     at_places = recovery.nodal_stress(
         mesh,
         problem.model.kinematics,
@@ -57,6 +60,7 @@ def recover(
         u,
         problem.field.averaged,
         problem.sides,
+        problem.field.thermal(problem.model.temperature_rise(factors)),
     )
     stress, by_material = by_largest_von_mises(problem.sides, problem.material_of_cells, at_places, mesh.n_points)
     von_mises = recovery.von_mises(stress)

@@ -43,6 +43,10 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         {"speed": NUMBER, "groups": (list, str), "origin": list, "direction": list, "ramp": list},
         ("speed",),
     ),
+    "temperature": (
+        {"value": NUMBER, "groups": (list, str), "reference": NUMBER, "ramp": list},
+        ("value",),
+    ),
     "force": ({"group": str, **AXES, "distribute": bool, "ramp": list}, ("group",)),
     "couple": ({"group": str, "component": str}, ("group", "component")),
     "group_relation": (

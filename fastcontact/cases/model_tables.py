@@ -65,6 +65,7 @@ _ADD: dict[str, Callable[..., None]] = {
     "body_force": Model.add_body_force,
     "gravity": Model.add_gravity,
     "centrifugal": Model.add_centrifugal,
+    "temperature": Model.add_temperature,
     "force": Model.add_force,
     "couple": Model.couple,
     "relation": Model.relate,

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from fastcontact._jit import parallel
 from fastcontact.elasticity import dilatation, dilatation_kernels, element_kernels
+from fastcontact.elasticity.temperature import ThermalStress
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
@@ -27,13 +28,22 @@ class CellStress:
         Of all points [length].
     averaged : ndarray of bool (n_materials,), optional
         Which materials have a mean dilatation, see `dilatation`; none by default.
+    thermal : ThermalStress, optional
+        What stresses lose by the temperature.
     """
 
     def __init__(
-        self, mesh: Mesh, kinematics: str, moduli: Array, displacement: Array, averaged: dilatation.Mask | None = None
+        self,
+        mesh: Mesh,
+        kinematics: str,
+        moduli: Array,
+        displacement: Array,
+        averaged: dilatation.Mask | None = None,
+        thermal: ThermalStress | None = None,
     ) -> None:
         self._mesh, self._axisymmetric, self._moduli = mesh, kinematics == "axisymmetric", moduli
         self._displacement, self._averaged = np.ascontiguousarray(displacement), averaged
+        self._thermal = thermal
 
     def at(self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32]) -> Array:
         """Return the stresses (n_cells, n, n_components) [pressure] at points `xi` (n, dim) [-] of cells of an element.
@@ -69,3 +79,25 @@ class CellStress:
                 )  # fmt: skip
 
         parallel.shared(part, parallel.portions(len(out), cells.shape[1]))
+        if self._thermal is not None:
+            self._subtract_thermal(self._thermal, name, xi, cells, material, out)
+
+    def _subtract_thermal(
+        self,
+        thermal: ThermalStress,
+        name: str,
+        xi: Array,
+        cells: NDArray[np.int32],
+        material: NDArray[np.int32],
+        out: Array,
+    ) -> None:
+        """Subtract the thermal stresses; the dilatation of the temperature is projected where that of the strain is."""
+        element, split = elements.get(name), dilatation.split(name, self._moduli, self._averaged)
+        rise = thermal.rise[cells] @ element.shape(xi).T
+        projected = np.zeros(len(cells), bool) if split is None else split.bulk[material, 0] != 0.0
+        out -= np.where(projected[:, None], 0.0, rise)[:, :, None] * thermal.per_degree[material][:, None, :]
+        if split is not None and projected.any():
+            own, numbers = cells[projected], material[projected]
+            parts = dilatation.projected(name, self._mesh.points[own], thermal.rise[own], xi, self._axisymmetric)
+            pressure = (split.bulk[numbers] * 3.0 * thermal.expansion[numbers, None])[:, :, None] * parts
+            out[projected, :, :3] -= pressure.sum(axis=1)[:, :, None]

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.elasticity.energy import cell_volumes
 from fastcontact.mesh import elements
 
 Array = NDArray[np.float64]
@@ -60,6 +61,32 @@ def split(name: str, moduli: Array, averaged: Mask | None) -> Split | None:
     whole = elements.get(name).dilatation == elements.get(name).order - 1
     rest = bulk if whole else np.minimum(bulk, REMAINDER * moduli[:, 3, 3])
     return Split(deviatoric, np.column_stack([bulk, rest]))
+
+
+def projected(name: str, corners: Array, nodal: Array, xi: Array, axisymmetric: bool) -> Array:
+    """Return mean and remainder (n_cells, 2, n) of a field, projected as the dilatation is [unit of the field].
+
+    Parameters
+    ----------
+    name : str
+        The element.
+    corners : ndarray (n_cells, n_nodes, dim)
+        Nodes of the cells [length].
+    nodal : ndarray (n_cells, n_nodes)
+        The field at them [unit of the field].
+    xi : ndarray (n, dim)
+        Points of the reference cell where it is wanted [-].
+    axisymmetric : bool
+    """
+    N, dN, weights = elements.get(name).tables
+    volume = cell_volumes(corners, N, dN, axisymmetric) * weights
+    at, values = basis(name, elements.get(name).quadrature[0]), nodal @ N.T
+    mass = np.einsum("cq,qm,qn->cmn", volume, at, at)
+    found = (
+        np.linalg.solve(mass, np.einsum("cq,qm,cq->cm", volume, at, values)[:, :, None])[:, :, 0] @ basis(name, xi).T
+    )
+    mean = np.broadcast_to(((volume * values).sum(axis=1) / volume.sum(axis=1))[:, None], found.shape)
+    return np.stack([mean, found - mean], axis=1)
 
 
 def basis(name: str, xi: Array) -> Array:

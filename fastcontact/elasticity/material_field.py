@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.elasticity.materials import Material
+from fastcontact.elasticity.temperature import ThermalStress
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -63,6 +64,35 @@ class MaterialField:
                 rows = rows[rows != number]  # the first is that of no cell
             found[rows] = material.compliance_at(self.places[rows], self.kinematics)
         return found
+
+    @cached_property
+    def expansion(self) -> Array:
+        """Thermal strains (n_moduli, n_components) [1 / temperature]; NaN of materials that have no expansion."""
+        found = np.empty(self.moduli.shape[:2])
+        for number, material in enumerate(self.materials):
+            rows = np.flatnonzero(self.owner == number)
+            if material.varies:
+                rows, found[number] = rows[rows != number], 0.0  # the first is that of no cell
+            found[rows] = material.expansion_at(self.places[rows], self.kinematics)
+        return found
+
+    def thermal(self, rise: Array | None) -> ThermalStress | None:
+        """Return what stresses lose by a rise of the temperature (n_points,) [temperature]; None where there is none."""
+        if rise is None:
+            return None
+        strain = np.nan_to_num(self.expansion)
+        averaged = self.averaged
+        per_degree = np.einsum("mij,mj->mi", self.moduli, strain)
+        return ThermalStress(rise, per_degree, np.where(averaged, strain[:, 0], 0.0))
+
+    def without_expansion(self, mesh: Mesh, rise: Array) -> int:
+        """Return how many cells have a rise of the temperature (n_points,) [temperature] and a material without expansion."""
+        unknown = np.isnan(self.expansion[:, 0])
+        count = 0
+        for name, block in mesh.solids.items():
+            heated = np.asarray(rise[block] != 0.0).any(axis=1)
+            count += int(np.count_nonzero(unknown[self.rows[name]] & heated))
+        return count
 
     @cached_property
     def distinct(self) -> dict[str, Indices]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.elasticity.material_axes import Axes, frames, rotations
+from fastcontact.elasticity.material_axes import PAIRS, Axes, frames, rotations
 from fastcontact.errors import ModelError, unknown
 
 Array = NDArray[np.float64]
@@ -102,6 +102,25 @@ class Material:
         """
         size = 6 if kinematics == "3d" else 4
         return np.asarray(self._compliance6(points, kinematics)[:, :size, :size])
+
+    def expansion_at(self, points: Array, kinematics: str) -> Array:
+        """Return the strains (n, 4), in 3D (n, 6) [1 / temperature] of a degree at `points` (n, dim) [length].
+
+        NaN without expansion. ModelError if it is a shear out of the plane, in kinematics that have none.
+        """
+        size = 6 if kinematics == "3d" else 4
+        if self.expansion is None:
+            return np.full((len(points), size), np.nan)
+        along = np.broadcast_to(np.asarray(self.expansion, float), (3,))
+        axes = frames(self.axes, points, kinematics)
+        tensor = np.einsum("nai,a,naj->nij", axes, along, axes)
+        strain = np.stack([tensor[:, i, j] * (1.0 if i == j else 2.0) for i, j in PAIRS], axis=1)
+        if np.abs(strain[:, size:]).max(initial=0.0) > ROUND_OFF * np.abs(along).max():
+            raise ModelError(
+                f"the expansion of the material with {self.described} shears it out of the plane: turn one axis along z, or "
+                "use a mesh in 3D"
+            )
+        return np.asarray(strain[:, :size])
 
     def _compliance6(self, points: Array, kinematics: str) -> Array:
         """Return the compliance (n, 6, 6) in the mesh's axes; ModelError where kinematics of the plane do not hold."""

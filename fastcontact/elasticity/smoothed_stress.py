@@ -29,6 +29,7 @@ def smoothed_stress(
     kinematics: str,
     field: MaterialField,
     displacement: Array,
+    rise: Array | None = None,
 ) -> dict[str, Array]:
     """Return by solid element the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each cell.
 
@@ -42,9 +43,11 @@ def smoothed_stress(
         Materials of all cells.
     displacement : ndarray (n_points, dim)
         Of all points [length].
+    rise : ndarray (n_points,), optional
+        Of the temperature [temperature].
     """
     components = field.moduli.shape[1]
-    stress = CellStress(mesh, kinematics, field.moduli, displacement, field.averaged)
+    stress = CellStress(mesh, kinematics, field.moduli, displacement, field.averaged, field.thermal(rise))
     found = {name: np.empty((*block.shape, components)) for name, block in mesh.solids.items()}
     for number in range(field.n_materials):
         average = recovery.NodalAverage(mesh.n_points, components)

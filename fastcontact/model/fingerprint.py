@@ -37,6 +37,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         "the materials": model.materials,
         "the supports": _unordered(model.supports, mesh),
         "the loads": _unordered(model.loads, mesh),
+        **({"the temperatures": _unordered(model.temperatures, mesh)} if model.temperatures else {}),
         "the relations": _unordered(model.relations, mesh),
         "the springs": _unordered(model.springs, mesh),
         "the list of contact pairs": [pair.name for pair in model.contact],

@@ -39,10 +39,12 @@ from fastcontact.elasticity.loads import (
 )
 from fastcontact.elasticity.material_field import MaterialField, material_field
 from fastcontact.elasticity.materials import KINEMATICS, Material
+from fastcontact.elasticity.recovery import internal_force, stress_at_points
 from fastcontact.elasticity.relations import Relation, stacked_rows
 from fastcontact.elasticity.springs import Springs, between, grounded, stacked
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
+from fastcontact.elasticity.temperature import Temperature, checked_value
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
@@ -138,6 +140,7 @@ class Model:
         self.materials: list[tuple[Material, tuple[str, ...] | None]] = []
         self.supports: list[Support] = []
         self.loads: list[Load] = []
+        self.temperatures: list[Temperature] = []
         self.relations: list[Relation] = []
         self.springs: list[Springs] = []
         self.contact: list[ContactPair] = []
@@ -286,6 +289,68 @@ class Model:
             )
         table = table_of(ramp, "the ramp of the centrifugal force")
         self._add(Centrifugal(names, speed, place, tuple(direction), table))  # type: ignore[arg-type]
+
+    def add_temperature(
+        self,
+        value: Value | Array,
+        groups: Sequence[str] | str | None = None,
+        *,
+        reference: float = 0.0,
+        ramp: History = None,
+    ) -> None:
+        """Heat or cool groups of solid cells, by default all; their materials expand by their `expansion`.
+
+        Temperatures are those of the nodes: cells beside a group have a gradient where they share nodes with it. The rises of
+        several add up.
+
+        Parameters
+        ----------
+        value : float, callable or ndarray (n_points,)
+            A number, a function from reference positions (n, dim) [length] to temperatures (n,), or one for each point of the
+            mesh [temperature].
+        groups : str or sequence of str, optional
+        reference : float
+            At which there is no thermal strain [temperature].
+        ramp : Ramp or iterable of (float, float), optional
+            History of the rise, value minus reference.
+        """
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        found = Temperature(names, checked_value(value), reference, table_of(ramp, "the ramp of the temperature"))
+        found.check(self.mesh)
+        self.temperatures.append(found)
+
+    def temperature_rise(self, factors: Sequence[float]) -> Array | None:
+        """Return the rise of the temperature (n_points,) [temperature], None without temperatures.
+
+        `factors` has a multiplier for each that was added, as ``step.iterations["temperature_factors"]`` of a step result.
+        """
+        if not self.temperatures or not len(factors):
+            return None
+        rises = [factor * own.rise(self.mesh) for factor, own in zip(factors, self.temperatures, strict=True)]
+        return np.asarray(np.sum(rises, axis=0))
+
+    def thermal_forces_by_ramp(self) -> dict[Table | None, Array]:
+        """Return by history the nodal forces (n_points, dim) at multiplier 1 by which temperatures load the cells [force].
+
+        ModelError if a material that is heated has no expansion.
+        """
+        by_ramp: dict[Table | None, Array] = {}
+        field = self.material_field() if self.temperatures else None
+        for own in self.temperatures:
+            assert field is not None
+            rise = own.rise(self.mesh)
+            missing = field.without_expansion(self.mesh, rise)
+            if missing:
+                raise ModelError(
+                    f"{own.name} acts on {missing} solid cells whose material has no coefficient of thermal expansion: give "
+                    "it expansion=..., 0.0 if it does not expand"
+                )
+            held = stress_at_points(
+                self.mesh, self.kinematics, field.moduli, field.rows, np.zeros(self.mesh.points.shape), field.averaged,
+                field.thermal(rise),
+            )  # fmt: skip
+            by_ramp[own.ramp] = by_ramp.get(own.ramp, 0.0) - internal_force(self.mesh, self.kinematics, held)
+        return by_ramp
 
     def add_force(
         self,
@@ -718,7 +783,8 @@ class Model:
     def internal_forces(self, displacement: Array) -> Array:
         """Return the nodal forces (n_points, dim) [force] that hold the solid cells deformed by `displacement`.
 
-        They are in balance with loads, contact, supports, relations and springs; axisymmetric: over the full circle.
+        They are in balance with loads, contact, supports, relations, springs and thermal forces (`thermal_forces_by_ramp`);
+        axisymmetric: over the full circle.
 
         Parameters
         ----------
@@ -806,8 +872,11 @@ class Model:
         fixed, prescribed = self.prescribed_by_ramp()
         self._tell_axis()
         forces = self.forces_by_ramp()
+        self.thermal_forces_by_ramp()
         if ramp is not None:
-            items: list[Support | Load | Relation] = [*self.supports, *self.loads, *self.relations]
+            items: list[Support | Load | Relation | Temperature] = [
+                *self.supports, *self.loads, *self.relations, *self.temperatures
+            ]  # fmt: skip
             named = [(item.name, item.ramp) for item in items]
             named += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]
             named += [(f"the clearance of contact '{p.name}'", p.clearance_ramp) for p in self.contact]

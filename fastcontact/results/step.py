@@ -174,6 +174,7 @@ class StepResult:
         ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``, ``history`` (list of dict). If contact
         alone holds bodies, ``regularised``: their springs and the forces in them. If round-off kept the contact geometry
         from settling to the criterion, ``scatter``: by how much ``displacement`` and contact ``force`` still vary [-].
+        With temperatures, ``temperature_factors``: what each of them is multiplied with [-].
     warnings : tuple of str
         Warnings of the step.
     cell_fields : dict of str to ndarray (n_solids,)

@@ -79,10 +79,11 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     >>> fc.estimate_error(model, step).relative < 1e-9  # the stress is uniform
     True
     """
-    smooth = smoothed_stress(model.mesh, model.kinematics, model.material_field(), step.displacement)
+    rise = model.temperature_rise(step.iterations.get("temperature_factors", ()))
+    smooth = smoothed_stress(model.mesh, model.kinematics, model.material_field(), step.displacement, rise)
     squares, energy = [], 0.0
     for name in model.mesh.solids:
-        own, whole = _differences(model, step.displacement, name, smooth[name])
+        own, whole = _differences(model, step.displacement, name, smooth[name], rise)
         squares.append(own)
         energy += whole
     contact = np.zeros(sum(map(len, squares)))
@@ -91,9 +92,13 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     return ErrorEstimate(np.sqrt(np.concatenate(squares) + contact), np.sqrt(contact), math.sqrt(energy))
 
 
-def _differences(model: Model, displacement: Array, name: str, smooth: Array) -> tuple[Array, float]:
+def _differences(
+    model: Model, displacement: Array, name: str, smooth: Array, rise: Array | None
+) -> tuple[Array, float]:
     """Return the squared energy norms (n_cells,) of smoothed minus own stress, and that of the own stress in all."""
-    N, stress, volume, elastic = stress_in_cells(model, name, slice(None), displacement, elements.get(name).order + 1)
+    N, stress, volume, elastic = stress_in_cells(
+        model, name, slice(None), displacement, elements.get(name).order + 1, rise
+    )
     off = np.einsum("qa,cai->cqi", N, smooth) - stress
     squares = (elastic_energy(off, elastic) * volume).sum(axis=1)
     return squares, float((elastic_energy(stress, elastic) * volume).sum())

@@ -77,6 +77,7 @@ def error_against(
     *,
     groups: Sequence[str] | str | None = None,
     n_points: int | None = None,
+    rise: Array | None = None,
 ) -> ErrorNorms:
     """Return the norms of the difference between a finite-element solution and a theory.
 
@@ -96,6 +97,8 @@ def error_against(
     n_points : int, optional
         Points along each direction of a cell, three more than the order of the element by default: more than
         the stiffness needs, so that the error is that of the solution.
+    rise : ndarray (n_points,), optional
+        Of the temperature at every point of the mesh, see `Model.temperature_rise` [temperature].
 
     Raises
     ------
@@ -123,7 +126,7 @@ def error_against(
     total = np.zeros(4)
     for name, rows in chosen.items():
         for part in _portions(rows, elements.get(name), n_points):
-            total += _squares(theory, model, u, name, part, n_points)
+            total += _squares(theory, model, u, name, part, n_points, rise)
     return ErrorNorms(*(math.sqrt(square) for square in total))
 
 
@@ -145,27 +148,41 @@ def _portions(rows: NDArray[np.intp], element: Element, n_points: int | None) ->
 
 
 def stress_in_cells(
-    model: Model, name: str, rows: NDArray[np.intp] | slice, displacement: Array, n_points: int | None
+    model: Model,
+    name: str,
+    rows: NDArray[np.intp] | slice,
+    displacement: Array,
+    n_points: int | None,
+    rise: Array | None = None,
 ) -> tuple[Array, Array, Array, Array]:
     """Return shape functions, stresses, volumes and elastic constants at the quadrature points of some cells of a kind.
 
     Shape functions (n_q, n_nodes) [-]; stresses (n_cells, n_q, n_components) [pressure]; volumes (n_cells, n_q) [length^dim];
-    compliances (n_cells, n_components, n_components) [1 / pressure]. `displacement` is (n_points, dim) [length].
+    compliances (n_cells, n_components, n_components) [1 / pressure]. `displacement` is (n_points, dim) [length],
+    `rise` (n_points,) that of the temperature [temperature].
     """
     mesh, element, axisymmetric = model.mesh, elements.get(name), model.kinematics == "axisymmetric"
     xi, weights = integration_rule(element, n_points)
     N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
     cells, field = mesh.cells[name][rows], model.material_field()
     numbers = field.rows[name][rows]
-    found = CellStress(mesh, model.kinematics, field.moduli, displacement, field.averaged)
+    found = CellStress(mesh, model.kinematics, field.moduli, displacement, field.averaged, field.thermal(rise))
     stress = found.at(name, xi, cells, numbers)
     elastic = field.compliance[numbers]
     return N, stress, cell_volumes(mesh.points[cells], N, dN, axisymmetric) * weights, elastic
 
 
-def _squares(theory: Theory, model: Model, u: Array, name: str, rows: NDArray[np.intp], n_points: int | None) -> Array:
+def _squares(
+    theory: Theory,
+    model: Model,
+    u: Array,
+    name: str,
+    rows: NDArray[np.intp],
+    n_points: int | None,
+    rise: Array | None,
+) -> Array:
     """Return the squares (4,) of the norms over some cells, in the order of `ErrorNorms`."""
-    N, stress, volume, elastic = stress_in_cells(model, name, rows, u, n_points)
+    N, stress, volume, elastic = stress_in_cells(model, name, rows, u, n_points, rise)
     cells = model.mesh.cells[name][rows]
     places = np.einsum("qa,cad->cqd", N, model.mesh.points[cells])
     exact_u, exact = _exact(theory, places, stress.shape[2])
