@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fastcontact.argument_types import typed
 from fastcontact.errors import ModelError
 
 # Criteria beyond this are none: a state that misses them has nothing to do with the solution.
 LOOSEST = 1e-2
 
 
+@typed(ModelError)
 @dataclass(frozen=True)
 class Criteria:
     """When a load step counts as converged.

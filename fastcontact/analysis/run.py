@@ -11,17 +11,19 @@ from fastcontact.analysis import restart, step_halving
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.problem import Problem, prepare
 from fastcontact.analysis.result_warnings import result_warnings
-from fastcontact.errors import warn
+from fastcontact.argument_types import typed
+from fastcontact.errors import ModelError, warn
 from fastcontact.linear.choice import check_tolerance
 from fastcontact.model.model import Model
 from fastcontact.model.model_warnings import model_warnings
-from fastcontact.model.ramp import Ramp, linear_ramp
+from fastcontact.model.ramp import Ramp, Steps, ramp_of
 from fastcontact.results.step import StepResult
 
 
+@typed(ModelError)
 def solve(
     model: Model,
-    ramp: Ramp | None = None,
+    ramp: Steps | None = None,
     *,
     linear_solver: str = "auto",
     linear_tolerance: float = 1e-10,
@@ -35,8 +37,9 @@ def solve(
     Parameters
     ----------
     model : Model
-    ramp : Ramp, optional
-        By default 20 equal steps.
+    ramp : Ramp, int or array, optional
+        A number of equal steps (20 by default), the load factors (n,) at which steps end, or points (instant, multiplier)
+        (n, 2) of the load function, each but the first the end of a step [-].
     linear_solver : str
         ``"direct"``, ``"cholmod"``, ``"amg"``, ``"pyamg"`` or ``"auto"``; see `linear.choice.make`.
     linear_tolerance : float
@@ -81,9 +84,10 @@ def solve(
     return steps
 
 
+@typed(ModelError)
 def solve_steps(
     model: Model,
-    ramp: Ramp | None = None,
+    ramp: Steps | None = None,
     *,
     linear_solver: str = "auto",
     linear_tolerance: float = 1e-10,
@@ -107,7 +111,7 @@ def solve_steps(
     >>> for step in solve_steps(model):  # doctest: +SKIP
     ...     out.write(step)
     """
-    ramp, criteria = ramp or linear_ramp(), criteria or Criteria()
+    ramp, criteria = ramp_of(ramp), criteria or Criteria()
     check_tolerance(linear_tolerance)
     case = restart.identity(model, ramp, criteria)
     last = resume[-1] if len(resume) else None

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.argument_types import typed
 from fastcontact.errors import ModelError, unknown
 
 KINEMATICS = ("axisymmetric", "plane_strain", "plane_stress", "3d")
@@ -17,6 +18,7 @@ VOLUMETRIC = ("auto", "plain", "mean_dilatation")
 NEARLY_INCOMPRESSIBLE = 0.49
 
 
+@typed(ModelError)
 @dataclass(frozen=True)
 class LinearElastic:
     """Isotropic linear elasticity.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.argument_types import typed
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements, quality_kernels
 from fastcontact.mesh.mesh import Mesh
@@ -62,6 +63,7 @@ class MeshQuality:
         )
 
 
+@typed(MeshError)
 def quality(mesh: Mesh) -> MeshQuality:
     """Return the quality figures of a mesh.
 

@@ -14,6 +14,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.argument_types import typed
 from fastcontact.errors import FileError
 from fastcontact.mesh.files.hdf5 import check_contents
 from fastcontact.mesh.files.packing import unpacked
@@ -26,6 +27,7 @@ from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.texts import read_text
 
 
+@typed(FileError)
 def open_results(path: PathLike) -> Results:
     """Open a result file.
 

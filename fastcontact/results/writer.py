@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact.argument_types import typed
 from fastcontact.elasticity.material_sides import distinct, material_sides
 from fastcontact.errors import ConvergenceError, FileError, ModelError
 from fastcontact.mesh.files.hdf5_driver import new_hdf5
@@ -87,6 +88,7 @@ class ResultWriter:
     ...     fastcontact.solve(model, ramp=fastcontact.linear_ramp(20), on_step=out.write)
     """
 
+    @typed(FileError)
     def __init__(
         self,
         path: PathLike,

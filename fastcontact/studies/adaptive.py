@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.argument_types import typed
 from fastcontact.cases.case import Case, build_case, read_case
 from fastcontact.errors import CaseError, FastcontactWarning, unknown
 from fastcontact.mesh import elements
@@ -31,6 +32,7 @@ BULK = 0.7
 SHRINKING = 3.0
 
 
+@typed(CaseError)
 def adaptive_study(
     case: Case | str | Path,
     quantity: str = "pressure_max",

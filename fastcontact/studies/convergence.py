@@ -7,6 +7,7 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
+from fastcontact.argument_types import typed
 from fastcontact.cases.case import Case, read_case
 from fastcontact.errors import CaseError, unknown
 from fastcontact.studies.affordable import check_levels, check_runs
@@ -19,6 +20,7 @@ from fastcontact.studies.series import Level, Series
 from fastcontact.studies.settings import Combination, Settings, combinations, settings
 
 
+@typed(CaseError)
 def convergence_study(
     case: Case | str | Path,
     levels: int = 5,

@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastcontact.argument_types import typed
 from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
 from fastcontact.errors import ModelError
@@ -70,6 +71,7 @@ class ErrorNorms:
         return self.displacement / self.displacement_of_theory
 
 
+@typed(ModelError)
 def error_against(
     theory: Theory,
     model: Model,

@@ -9,6 +9,7 @@ from concurrent.futures import Executor
 from math import prod
 from pathlib import Path
 
+from fastcontact.argument_types import typed
 from fastcontact.cases.case import Case, build_case, read_case
 from fastcontact.errors import CaseError
 from fastcontact.studies.affordable import check_runs
@@ -23,6 +24,7 @@ from fastcontact.studies.sweep_report import Point, Sweep, Value
 LEVEL = 2
 
 
+@typed(CaseError)
 def parameter_sweep(
     case: Case | str | Path,
     parameters: Mapping[str, Sequence[Value]],

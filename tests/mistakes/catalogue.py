@@ -155,7 +155,7 @@ CASES = [
         "contact side is a point",
         'secondary = "CONT1"',
         'secondary = "C1"',
-        r"unknown group of cells 'C1': did you mean 'CONT1'\?",
+        r"'C1' is a group of points, but here one of cells is needed \(lines, faces, solids\): name one such as 'CONT1' or 'SPHHAU'",
     ),
     (
         "both sides are the same",

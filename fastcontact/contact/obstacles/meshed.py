@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.argument_types import typed
 from fastcontact.contact.obstacles._facets import Block, SurfaceFacets, surface_facets
 from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.errors import ContactError
@@ -24,6 +25,7 @@ BEYOND, LEAN = 0.05, 0.27
 TOUCHING = 1e-6
 
 
+@typed(ContactError)
 @dataclass(frozen=True, eq=False)
 class MeshedSurface:
     """A rigid surface given by a group of facets of a mesh.

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.argument_types import typed
 from fastcontact.errors import FileError, MeshError, unknown
 from fastcontact.mesh import elements
 from fastcontact.mesh.files import med_families
@@ -286,6 +287,7 @@ def add_field(
     profile.create_dataset("CO", data=np.asarray(field, np.float64).T.ravel())
 
 
+@typed(FileError)
 def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
     """Read a nodal field at all its instants, from a file of MED 3 or later.
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.argument_types import typed
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate.quadratic import Curve, centres, edge_keys, edges_of, edges_on, ends_of
@@ -60,6 +61,7 @@ class Forest:
         True shapes of the boundary: new points on facets that lie on a curve are put on it.
     """
 
+    @typed(MeshError)
     def __init__(self, mesh: Mesh, curves: Iterable[Curve] = ()) -> None:
         for name, block in mesh.cells.items():
             if name not in CORNERS:

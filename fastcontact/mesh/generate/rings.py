@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.argument_types import typed
 from fastcontact.errors import MeshError
 from fastcontact.mesh.generate._blocks import structured
 from fastcontact.mesh.generate._check import FACES, TRIANGLES, affordable, count, each, one_of, positive
@@ -17,6 +18,7 @@ from fastcontact.mesh.mesh import Mesh
 Array = NDArray[np.float64]
 
 
+@typed(MeshError)
 def rings(
     element: str = "quad8",
     *,

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from fastcontact.errors import FastcontactError
+from fastcontact.errors import FastcontactError, unknown
+from fastcontact.results.step import ContactResult, StepResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Units = Mapping[str, str]
 UNITS: Units = {"length": "mm", "force": "N", "pressure": "MPa"}
+
+
+def contacts_of(steps: Sequence[StepResult], pair: str) -> list[ContactResult]:
+    """Return a contact pair of each step; raises FastcontactError if there are no steps, or none has such a pair."""
+    if not len(steps):
+        raise FastcontactError("there are no steps to draw")
+    for step in steps:
+        if pair not in step.contact:
+            raise FastcontactError(unknown("contact pair", pair, step.contact))
+    return [step.contact[pair] for step in steps]
 
 
 def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None = None) -> Any:

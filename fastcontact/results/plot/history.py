@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fastcontact.argument_types import typed
 from fastcontact.errors import FastcontactError
-from fastcontact.results.plot._axes import UNITS, Units, new_axes
+from fastcontact.results.plot._axes import UNITS, Units, contacts_of, new_axes
 from fastcontact.results.step import StepResult
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 STATES = {"open": "0.85", "closed": "C0", "sliding": "C1"}
 
 
+@typed(FastcontactError)
 def history(
     steps: Sequence[StepResult],
     pair: str,
@@ -47,8 +49,8 @@ def history(
         first.remove()
         axes = figure.subplots(2, 1, sharex=True)
     upper, lower = axes
+    contacts = contacts_of(steps, pair)
     x = np.array([step.load_factor for step in steps]) * (approach or 1.0)
-    contacts = [step.contact[pair] for step in steps]
     upper.plot(x, [np.linalg.norm(c.force) for c in contacts], "o-", ms=4, label="computed")
     bracket = np.array([c.radius for c in contacts])
     legend = "computed (between closed and open)"
@@ -68,6 +70,7 @@ def history(
     return axes
 
 
+@typed(FastcontactError)
 def contact_zones(
     steps: Sequence[StepResult], pair: str, *, title: str = "", units: Units = UNITS, ax: Axes | None = None
 ) -> Axes:
@@ -88,7 +91,7 @@ def contact_zones(
     if not steps:
         raise FastcontactError("there is no step whose contact could be plotted")
     axes = new_axes(ax, (7.4, 5.2))
-    contacts = [step.contact[pair] for step in steps]
+    contacts = contacts_of(steps, pair)
     x = np.concatenate([np.full(len(c.points), step.load_factor) for step, c in zip(steps, contacts, strict=True)])
     y = np.concatenate([c.place for c in contacts])
     closed = np.concatenate([c.active for c in contacts])

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
+from fastcontact.argument_types import typed
+from fastcontact.errors import FastcontactError
 from fastcontact.results.plot._axes import UNITS, Units, new_axes
 from fastcontact.results.step import ContactResult
 
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+@typed(FastcontactError)
 def pressure_profile(
     contact: ContactResult,
     theory: Any = None,

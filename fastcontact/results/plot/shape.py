@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.argument_types import typed
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.elasticity.recovery import von_mises
+from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import UNITS, Units, new_axes
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+@typed(FastcontactError)
 def deformed_shape(
     mesh: Mesh,
     step: StepResult,
