@@ -170,6 +170,8 @@ def _is_array_like(annotation: Any) -> bool:
 
 
 def _makes_an_array(value: Any) -> bool:
+    if isinstance(value, np.ndarray):
+        return value.dtype.kind in "biufV"  # V: a table
     if value is None or isinstance(value, str | bytes | abc.Mapping):
         return False
     try:

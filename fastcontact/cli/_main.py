@@ -13,8 +13,10 @@ import os
 import pkgutil
 import sys
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
+from fastcontact._jit import compiling
 from fastcontact._version import __version__
 from fastcontact.cli._terminal import add_loudness, encodable, printable, say
 from fastcontact.errors import ConvergenceError, FastcontactError
@@ -63,6 +65,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         handler = _Printable()
         log.handlers[:] = [handler]
         log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
+        if sys.stderr.isatty() and not (arguments.quiet or arguments.verbose):  # the log tells it with -v
+            compiling.listeners[:] = [partial(say, f"{compiling.TEXT} ...", error=True)]
         return int(arguments.run(arguments) or 0)
     except ConvergenceError as error:
         say("\n".join([f"no convergence: {error}", *history_lines(error.history), *_notes(error)]), error=True)

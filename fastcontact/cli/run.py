@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
-from fastcontact.cli._progress import Progress
 from fastcontact.cli._terminal import say
 from fastcontact.errors import CaseError, ConvergenceError, FastcontactWarning, ModelError
 
@@ -96,6 +95,7 @@ def _warnings_shown() -> Iterator[list[str]]:
 
 def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[list[Any], Any, list[dict[str, Any]]]:
     """Write all steps; return those that were there before, the last one, and the summaries of all."""
+    from fastcontact.analysis.progress import Progress
     from fastcontact.analysis.restart import remaining
     from fastcontact.analysis.run import solve_steps
     from fastcontact.cases.summary import of_step

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastcontact.argument_types import typed
 from fastcontact.errors import MeshError, unknown
+from fastcontact.html_table import html_table
 from fastcontact.mesh import elements
 
 Array = NDArray[np.float64]
@@ -116,6 +117,15 @@ class Mesh:
     def __repr__(self) -> str:
         counts = ", ".join(f"{len(block)} {name}" for name, block in self.cells.items())
         return f"Mesh({self.n_points} points, {counts}; groups: {', '.join(self.group_names) or 'none'})"
+
+    def _repr_html_(self) -> str:
+        """Return a table of cells and groups for notebooks."""
+        rows = [("points", self.n_points, f"{self.dim}D")]
+        rows += [(name, len(block), "cells") for name, block in self.cells.items()]
+        for name, members in self.cell_groups.items():
+            rows.append((name, len(members), "group of " + " and ".join(self.split(members))))
+        rows += [(name, len(members), "group of points") for name, members in self.point_groups.items()]
+        return html_table(rows, ("name", "number", "kind"), "Mesh")
 
     @property
     def n_points(self) -> int:

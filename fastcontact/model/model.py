@@ -43,6 +43,7 @@ from fastcontact.elasticity.springs import Springs, between, grounded, stacked
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
 from fastcontact.errors import ContactError, ModelError, unknown
+from fastcontact.html_table import html_table
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 from fastcontact.model.checks import (
@@ -146,6 +147,12 @@ class Model:
     def __repr__(self) -> str:
         pairs = ", ".join(f"{p.name}: {p.secondary} on {p.opposite}, {p.method}" for p in self.contact)
         return f"Model({self.kinematics}, {self.mesh!r}, {self.n_dofs} degrees of freedom; contact: {pairs or 'none'})"
+
+    def _repr_html_(self) -> str:
+        """Return `describe` as a table for notebooks."""
+        head, *parts = sentences(self)
+        rows = [part.split(": ", 1) for part in parts if ": " in part]
+        return html_table(rows, caption=head)
 
     def describe(self) -> str:
         """Return in words what will be solved: kinematics, materials, supports, loads, contact, a line each."""

@@ -110,10 +110,10 @@ def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:
     return Ramp(tuple(end * (i + 1) / int(steps) for i in range(int(steps))), ((0.0, 0.0), (end, 1.0)))
 
 
-Steps = Ramp | int | Iterable[float] | Iterable[Iterable[float]]
+RampLike = Ramp | int | Iterable[float] | Iterable[Iterable[float]]
 
 
-def ramp_of(steps: Steps | None) -> Ramp:
+def ramp_of(steps: RampLike | None) -> Ramp:
     """Return the ramp that a user means: a `Ramp` itself, a number of equal steps, or an array; None: 20 equal steps.
 
     Load factors (n,) are the ends of the steps, with loads in proportion to them, also beyond 1. Pairs (instant, multiplier)

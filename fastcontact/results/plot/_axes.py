@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from fastcontact.errors import FastcontactError, unknown
@@ -25,6 +27,28 @@ def contacts_of(steps: Sequence[StepResult], pair: str) -> list[ContactResult]:
     return [step.contact[pair] for step in steps]
 
 
+def png(figure: Any) -> bytes:
+    """Return a picture as the bytes of a PNG file."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png")
+    return buffer.getvalue()
+
+
+def displayed(figure: Any) -> None:
+    """Let a figure, and each of its axes, show itself where it ends a cell of a notebook."""
+    for part in (figure, *figure.axes):
+        part._repr_png_ = partial(png, figure)
+
+
+class Panels(tuple[Any, ...]):
+    """The axes of a figure with several; in a notebook they show the picture."""
+
+    __slots__ = ()
+
+    def _repr_png_(self) -> bytes:
+        return png(self[0].figure)
+
+
 def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None = None) -> Any:
     """Return `ax`, or new axes in a figure of their own, ``projection="3d"`` for solids."""
     if ax is not None:
@@ -36,4 +60,6 @@ def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None 
         raise FastcontactError("pictures need matplotlib: pip install 'fastcontact[plot]'") from error
     figure = Figure(figsize=size, layout="constrained", dpi=150)
     FigureCanvasAgg(figure)
-    return figure.add_subplot(projection=projection)
+    axes = figure.add_subplot(projection=projection)
+    displayed(figure)
+    return axes

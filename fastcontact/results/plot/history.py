@@ -9,7 +9,7 @@ import numpy as np
 
 from fastcontact.argument_types import typed
 from fastcontact.errors import FastcontactError
-from fastcontact.results.plot._axes import UNITS, Units, contacts_of, new_axes
+from fastcontact.results.plot._axes import UNITS, Panels, Units, contacts_of, new_axes
 from fastcontact.results.step import StepResult
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def history(
         first = new_axes(None, (7.0, 6.4))
         figure = first.figure
         first.remove()
-        axes = figure.subplots(2, 1, sharex=True)
+        axes = Panels(figure.subplots(2, 1, sharex=True))
     upper, lower = axes
     contacts = contacts_of(steps, pair)
     x = np.array([step.load_factor for step in steps]) * (approach or 1.0)
