@@ -222,7 +222,8 @@ def words(annotation: Any) -> str:
     if kind is os.PathLike:
         return "a path"
     if kind is tuple and members and members[-1] is not ...:
-        return "a sequence of " + (f"{len(members)} numbers" if set(members) <= {int, float} else f"{len(members)}")
+        count = {2: "two", 3: "three"}.get(len(members), str(len(members)))
+        return f"{count} numbers" if {*members} <= {int, float} else f"a sequence of {count}"
     if kind in (abc.Sequence, abc.Iterable, abc.Collection, list, tuple):
         return "a sequence" + (f" of {_plural(words(members[0]))}" if members else "")
     if kind in (abc.Mapping, dict):
@@ -234,6 +235,8 @@ def words(annotation: Any) -> str:
 
 
 def _plural(phrase: str) -> str:
+    if phrase.endswith(" numbers") and not phrase.startswith("a "):
+        return f"groups of {phrase}"
     if phrase.startswith("a sequence of"):
         return phrase.removeprefix("a ").replace("sequence", "sequences", 1)
     return " or ".join(

@@ -140,7 +140,7 @@ def test_what_fits_an_annotation(annotation, good, bad):
 
 def test_types_in_words():
     assert words(float | None) == "a number or None"
-    assert words(tuple[float, float]) == "a sequence of 2 numbers"
+    assert words(tuple[float, float]) == "two numbers"
     assert words(dict[str, float]) == "a dictionary of numbers by name"
     assert words(fc.Mesh) == "a Mesh"
 

@@ -15,6 +15,12 @@ if TYPE_CHECKING:
 
 Units = Mapping[str, str]
 UNITS: Units = {"length": "mm", "force": "N", "pressure": "MPa"}
+UNKNOWN: Units = {}
+
+
+def labelled(text: str, units: Units, quantity: str) -> str:
+    """Return the label of an axis, with the unit of its quantity where that is known."""
+    return f"{text} [{units[quantity]}]" if units.get(quantity) else text
 
 
 def contacts_of(steps: Sequence[StepResult], pair: str) -> list[ContactResult]:

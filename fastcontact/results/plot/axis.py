@@ -12,7 +12,7 @@ from fastcontact.argument_types import typed
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNITS, Units, contacts_of, new_axes
+from fastcontact.results.plot._axes import UNKNOWN, Units, contacts_of, labelled, new_axes
 from fastcontact.results.step import StepResult
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def axis_stress(
     theories: Mapping[str, Any] | None = None,
     *,
     title: str = "",
-    units: Units = UNITS,
+    units: Units = UNKNOWN,
     ax: Axes | None = None,
 ) -> Axes:
     """Plot the stresses at the nodes on the axis of a contact over the depth under its surface.
@@ -75,7 +75,10 @@ def axis_stress(
         axes.plot(fine, von_mises(exact), style, color="C2", lw=1.0)
         axes.plot([], [], f"k{style}", lw=1.0, label=label)
     title = title or f"Stresses on the axis, load factor {step.load_factor:g}"
-    depth_name, stress_name = f"depth under the surface [{units['length']}]", f"stress [{units['pressure']}]"
+    depth_name, stress_name = (
+        labelled("depth under the surface", units, "length"),
+        labelled("stress", units, "pressure"),
+    )
     axes.set(xlabel=depth_name, ylabel=stress_name, title=title)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)

@@ -9,7 +9,7 @@ import numpy as np
 
 from fastcontact.argument_types import typed
 from fastcontact.errors import FastcontactError
-from fastcontact.results.plot._axes import UNITS, Panels, Units, contacts_of, new_axes
+from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, contacts_of, labelled, new_axes
 from fastcontact.results.step import StepResult
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def history(
     law: Any = None,
     approach: float | None = None,
     title: str = "",
-    units: Units = UNITS,
+    units: Units = UNKNOWN,
     axes: Sequence[Axes] | None = None,
 ) -> Sequence[Axes]:
     """Plot force and contact radius of a contact pair over the load.
@@ -60,9 +60,9 @@ def history(
         curves = [law.at_approach(d) for d in fine]
         upper.plot(fine, [c.force for c in curves], "k-", lw=1, label="Hertz, equal approach")
         lower.plot(fine, [c.radius for c in curves], "k-", lw=1, label="Hertz, equal approach")
-    upper.set(ylabel=f"contact force [{units['force']}]", title=title or f"Contact '{pair}' over the load")
-    along = f"approach [{units['length']}]" if approach else "load factor"
-    lower.set(xlabel=along, ylabel=f"contact radius [{units['length']}]")
+    upper.set(ylabel=labelled("contact force", units, "force"), title=title or f"Contact '{pair}' over the load")
+    along = labelled("approach", units, "length") if approach else "load factor"
+    lower.set(xlabel=along, ylabel=labelled("contact radius", units, "length"))
     for ax in axes:
         ax.grid(alpha=0.3)
         ax.legend()
@@ -72,7 +72,7 @@ def history(
 
 @typed(FastcontactError)
 def contact_zones(
-    steps: Sequence[StepResult], pair: str, *, title: str = "", units: Units = UNITS, ax: Axes | None = None
+    steps: Sequence[StepResult], pair: str, *, title: str = "", units: Units = UNKNOWN, ax: Axes | None = None
 ) -> Axes:
     """Plot the state of every secondary node over the load: open, closed (sticking, with friction) or sliding.
 
@@ -106,7 +106,7 @@ def contact_zones(
     top = reach if 0.0 < reach < farthest else None
     axes.set_ylim((-top if top else None) if y.min(initial=0.0) < 0 else 0.0, top)
     start = "axis" if contacts[-1].measured_from_axis else "middle of the contact"
-    distance = f"distance from the {start} [{units['length']}]"
+    distance = labelled(f"distance from the {start}", units, "length")
     axes.set(xlabel="load factor (above: closed nodes)", ylabel=distance)
     axes.set_title(title or f"Contact '{pair}' over the load", pad=16)
     axes.legend(loc="upper left", fontsize=8)

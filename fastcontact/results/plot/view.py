@@ -6,12 +6,10 @@ import os
 import sys
 from typing import Any
 
-from fastcontact.argument_types import typed
 from fastcontact.errors import FastcontactError
 from fastcontact.results.step import StepResult
 
 
-@typed(FastcontactError)
 def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "", screenshot: str | None = None) -> None:
     """Show the deformed mesh coloured by its von Mises stress in a window that can be turned.
 
