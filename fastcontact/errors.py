@@ -76,7 +76,7 @@ LONGEST_NAME = 120
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     """Return the message for an unknown name: the name, and the nearest known names or, if none is near, the first ones."""
-    names = sorted(known)
+    names, name = sorted(known), str(name)
     name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     if not names:
         return f"unknown {kind} '{name}': there is none here"

@@ -13,8 +13,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numba
+from numba.core import event
 
-from fastcontact._jit import cache
+from fastcontact._jit import cache, compiling
 from fastcontact.errors import FastcontactError
 
 log = logging.getLogger("fastcontact")
@@ -23,6 +24,21 @@ log = logging.getLogger("fastcontact")
 FASTMATH = {"contract"}
 
 _cache_reported = False
+
+
+class _Compilations(event.Listener):  # type: ignore[misc]
+    """Hears of kernels of this package that are compiled; Numba tells nothing of those that it reads from the cache."""
+
+    def on_start(self, found: Any) -> None:
+        """Tell those who wait."""
+        if getattr(found.data["dispatcher"], "__module__", "").startswith("fastcontact."):
+            compiling.notify()
+
+    def on_end(self, found: Any) -> None:
+        """Do nothing."""
+
+
+event.register("numba:compile", _Compilations())
 _forked_without_threads = False
 
 

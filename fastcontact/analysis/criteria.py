@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fastcontact.errors import ModelError
+from fastcontact.mesh.argument_types import typed
 
 # Criteria beyond this are none: a state that misses them has nothing to do with the solution.
 LOOSEST = 1e-2
 
 
+@typed(ModelError)
 @dataclass(frozen=True)
 class Criteria:
     """When a load step counts as converged.

@@ -10,18 +10,22 @@ from typing import Any
 from fastcontact.analysis import restart, step_halving
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.problem import Problem, prepare
+from fastcontact.analysis.progress import Progress
 from fastcontact.analysis.result_warnings import result_warnings
-from fastcontact.errors import warn
+from fastcontact.errors import ModelError, warn
 from fastcontact.linear.choice import check_tolerance
+from fastcontact.mesh.argument_types import typed
 from fastcontact.model.model import Model
 from fastcontact.model.model_warnings import model_warnings
-from fastcontact.model.ramp import Ramp, linear_ramp
+from fastcontact.model.ramp import Ramp, RampLike, ramp_of
 from fastcontact.results.step import StepResult
+from fastcontact.results.steps import Steps
 
 
+@typed(ModelError)
 def solve(
     model: Model,
-    ramp: Ramp | None = None,
+    ramp: RampLike | None = None,
     *,
     linear_solver: str = "auto",
     linear_tolerance: float = 1e-10,
@@ -29,14 +33,16 @@ def solve(
     criteria: Criteria | None = None,
     on_step: Callable[[StepResult], None] | None = None,
     resume: Sequence[StepResult] = (),
-) -> list[StepResult]:
+    progress: bool = False,
+) -> Steps:
     """Solve a model along a load ramp, from its beginning or after steps that are there already.
 
     Parameters
     ----------
     model : Model
-    ramp : Ramp, optional
-        By default 20 equal steps.
+    ramp : Ramp, int or array, optional
+        A number of equal steps (20 by default), the load factors (n,) at which steps end, or points (instant, multiplier)
+        (n, 2) of the load function, each but the first the end of a step [-].
     linear_solver : str
         ``"direct"``, ``"cholmod"``, ``"amg"``, ``"pyamg"`` or ``"auto"``; see `linear.choice.make`.
     linear_tolerance : float
@@ -49,11 +55,13 @@ def solve(
     resume : sequence of StepResult
         Steps of the same case to continue: what `solve` returned, ``open_results(path)`` or ``ResultWriter.done``. The
         analysis ends as if it had never stopped. Linear solver, tolerances, limits and the rest of the ramp may be others.
+    progress : bool
+        Write a line on standard error that is drawn anew after every step, also in notebooks.
 
     Returns
     -------
-    list of StepResult
-        Those of `resume` and the new ones; only the last one has its `restart`.
+    Steps
+        A list of StepResult, those of `resume` and the new ones; only the last one has its `restart`.
 
     Raises
     ------
@@ -68,22 +76,26 @@ def solve(
         At the beginning about the model (`model.model_warnings`), at the end about the result (`analysis.result_warnings`):
         what is doubtful, with the value that shows it. The results of the first and of the last step keep the texts.
     """
-    steps = list(resume)
-    for step in solve_steps(
-        model, ramp, linear_solver=linear_solver, linear_tolerance=linear_tolerance, linear_precision=linear_precision,
-        criteria=criteria, resume=steps,
-    ):  # fmt: skip
-        if on_step is not None:
-            on_step(step)
-        if steps and steps[-1].restart is not None:
-            steps[-1] = replace(steps[-1], restart=None)
-        steps.append(step)
+    steps, ramp = Steps(resume), ramp_of(ramp)
+    total = len(steps) + len(restart.remaining(ramp, steps[-1] if steps else None))
+    with Progress(total, show=progress, done=len(steps)) as line:
+        for step in solve_steps(
+            model, ramp, linear_solver=linear_solver, linear_tolerance=linear_tolerance,
+            linear_precision=linear_precision, criteria=criteria, resume=steps,
+        ):  # fmt: skip
+            if on_step is not None:
+                on_step(step)
+            line.step(step)
+            if steps and steps[-1].restart is not None:
+                steps[-1] = replace(steps[-1], restart=None)
+            steps.append(step)
     return steps
 
 
+@typed(ModelError)
 def solve_steps(
     model: Model,
-    ramp: Ramp | None = None,
+    ramp: RampLike | None = None,
     *,
     linear_solver: str = "auto",
     linear_tolerance: float = 1e-10,
@@ -107,7 +119,7 @@ def solve_steps(
     >>> for step in solve_steps(model):  # doctest: +SKIP
     ...     out.write(step)
     """
-    ramp, criteria = ramp or linear_ramp(), criteria or Criteria()
+    ramp, criteria = ramp_of(ramp), criteria or Criteria()
     check_tolerance(linear_tolerance)
     case = restart.identity(model, ramp, criteria)
     last = resume[-1] if len(resume) else None

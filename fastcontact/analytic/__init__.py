@@ -69,3 +69,7 @@ __all__ = [
     "persson_limit_angle", "persson_pin", "power_law_punch", "press_fit_cylinders", "press_fit_spheres",
     "receding_layer", "spence_stick_ratio", "thick_cylinder", "thick_sphere",
 ]  # fmt: skip
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -55,7 +55,7 @@ def exactly_one(**given: float | None) -> tuple[str, float]:
 
 def one_of(name: str, value: str, known: tuple[str, ...]) -> str:
     """Return `value` if it is one of the `known` words."""
-    if value not in known:
+    if not isinstance(value, str) or value not in known:
         raise ModelError(unknown(name, str(value), known))
     return value
 

@@ -1,7 +1,7 @@
 """Dispatch to the sub-commands, and turn errors into exit codes.
 
-0: done; 1: wrong input, one clear line; 2: no convergence, the result file keeps all converged steps; 130: interrupted
-from the keyboard, likewise.
+0: done; 1: wrong input, one clear line; 2: no convergence, the result file keeps all converged steps; 3: a check of the case
+failed (``run --strict``); 130: interrupted from the keyboard, like 2.
 """
 
 from __future__ import annotations
@@ -11,15 +11,22 @@ import importlib
 import logging
 import os
 import pkgutil
+import re
 import sys
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
+from fastcontact._jit import compiling
 from fastcontact._version import __version__
 from fastcontact.cli._terminal import add_loudness, encodable, printable, say
-from fastcontact.errors import ConvergenceError, FastcontactError
+from fastcontact.errors import ConvergenceError, FastcontactError, unknown
 
 log = logging.getLogger("fastcontact")
+_FLAG = re.compile(r"(?<![\w-])--?[A-Za-z][\w-]*")
+# What argparse says of a wrong choice, and the names that it lists.
+_CHOICE = re.compile(r"argument (?P<kind>[\w-]+): invalid choice: '(?P<given>.*)' \(choose from (?P<known>.*)\)")
+_NAME = re.compile(r"[\w-]+")
 
 
 class _Printable(logging.StreamHandler[Any]):
@@ -35,8 +42,19 @@ class Parser(argparse.ArgumentParser):
     """An argument parser whose errors are those of the library: one line, exit code 1."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
-        """Raise instead of exiting with code 2, which means no convergence."""
+        """Raise instead of exiting with code 2, which means no convergence; of a wrong choice offer the nearest."""
+        wrong = _CHOICE.search(message)
+        if wrong:
+            message = unknown(wrong["kind"].lower(), wrong["given"], _NAME.findall(wrong["known"]))
         raise FastcontactError(f"{message}; see '{self.prog} --help'")
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Refuse a flag that this command does not know, and offer the nearest; argparse would ask the parser above."""
+        found, rest = super().parse_known_args(args, namespace)
+        for flag in (text.partition("=")[0] for text in rest if _FLAG.match(text)):
+            known = [*_FLAG.findall(self.format_usage()), "--help"]
+            self.error(unknown("option", flag, known))
+        return found, rest
 
 
 def parser(command: str | None = None) -> argparse.ArgumentParser:
@@ -63,6 +81,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         handler = _Printable()
         log.handlers[:] = [handler]
         log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
+        if sys.stderr.isatty() and not (arguments.quiet or arguments.verbose):  # the log tells it with -v
+            compiling.listeners[:] = [partial(say, f"{compiling.TEXT} ...", error=True)]
         return int(arguments.run(arguments) or 0)
     except ConvergenceError as error:
         say("\n".join([f"no convergence: {error}", *history_lines(error.history), *_notes(error)]), error=True)

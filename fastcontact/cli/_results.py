@@ -40,6 +40,14 @@ def chosen_contact(step: Any, name: str | None) -> str:
     return name or next(iter(step.contact))
 
 
+def other_contacts(step: Any, name: str, asked: str | None) -> str:
+    """Return a hint at the other contact pairs of a step where none was asked for; empty without others."""
+    others = [f"'{other}'" for other in step.contact if other != name]
+    if asked is not None or not others:
+        return ""
+    return f"contact '{name}', the first of {len(step.contact)}; also there: {', '.join(others)} (--contact NAME)"
+
+
 def case_data(results: Any) -> dict[str, Any]:
     """Return title, units, theories, approaches and ramp of the case text kept in the file; empty without one."""
     from fastcontact.cases.case import described

@@ -8,8 +8,8 @@ import sys
 from functools import partial
 from typing import Any
 
+from fastcontact.analysis.progress import StatusLine
 from fastcontact.cli import _study
-from fastcontact.cli._progress import StatusLine
 from fastcontact.errors import CaseError
 
 HELP = "mesh-convergence study: orders, limits with error bars, model error told from mesh error"

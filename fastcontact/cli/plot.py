@@ -58,6 +58,9 @@ def _drawn(options: argparse.Namespace, results: Any, step: Any, case: dict[str,
         labels["title"] = f"{case['title']}\n{loaded}, displacements x {options.scale:g}".strip()
         return plot.deformed_shape(results.mesh, step, scale=options.scale, mirrored=options.mirrored, **labels)
     name = _results.chosen_contact(step, options.contact)
+    hint = _results.other_contacts(step, name, options.contact)
+    if hint and not options.quiet:
+        say(hint, error=True)
     theories = case["theories"].get(name, {})
     if options.zones:
         return plot.contact_zones(list(results), name, **labels)

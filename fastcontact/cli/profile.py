@@ -33,6 +33,9 @@ def run(options: argparse.Namespace) -> int:
         step = _results.chosen_step(results, options.step)
         name = _results.chosen_contact(step, options.contact)
         case = _results.case_data(results)
+    hint = _results.other_contacts(step, name, options.contact)
+    if hint and not options.quiet:
+        say(hint, error=True)
     contact = step.contact[name]
     table = contact_table(contact, step)
     load = load_multiplier(case["ramp"], step)

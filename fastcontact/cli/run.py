@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
-from fastcontact.cli._progress import Progress
 from fastcontact.cli._terminal import say
 from fastcontact.errors import CaseError, ConvergenceError, FastcontactWarning, ModelError
 
@@ -41,6 +40,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--plot", metavar="PNG", help="plot the contact pressure of the last step against theory")
     parser.add_argument("--linear", metavar="SOLVER", help="auto, direct, amg, cholmod or pyamg (default: the case's)")
     parser.add_argument("--estimate-error", action="store_true", help="estimate the error of every cell, into the file")
+    parser.add_argument("--strict", action="store_true", help="exit with code 3 if a check of the case fails")
     parser.add_argument("--threads", type=int, metavar="N", help="threads of parallel kernels")
 
 
@@ -72,6 +72,10 @@ def run(options: argparse.Namespace) -> int:
     if not options.quiet:
         say("\n".join(summary.lines(numbers)))
         say("  " + _written(output, len(done), len(steps), [path for path in (options.json, options.plot) if path]))
+    failed = [check["name"] for check in numbers["checks"] if not check["passed"]]
+    if options.strict and failed:
+        say(f"{len(failed)} of {len(numbers['checks'])} checks of the case failed: {', '.join(failed)}", error=True)
+        return 3
     return 0
 
 
@@ -96,6 +100,7 @@ def _warnings_shown() -> Iterator[list[str]]:
 
 def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[list[Any], Any, list[dict[str, Any]]]:
     """Write all steps; return those that were there before, the last one, and the summaries of all."""
+    from fastcontact.analysis.progress import Progress
     from fastcontact.analysis.restart import remaining
     from fastcontact.analysis.run import solve_steps
     from fastcontact.cases.summary import of_step

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fastcontact.elasticity.material_axes import PAIRS, Axes, frames, rotations
 from fastcontact.errors import ModelError, unknown
+from fastcontact.mesh.argument_types import typed
 
 Array = NDArray[np.float64]
 
@@ -164,6 +165,7 @@ def check_expansion(value: Any, most: int) -> None:
         raise ModelError(f"the coefficient of thermal expansion = {value} must be {wanted}")
 
 
+@typed(ModelError)
 @dataclass(frozen=True)
 class LinearElastic(Material):
     """Isotropic linear elasticity.

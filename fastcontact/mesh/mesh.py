@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -12,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastcontact.errors import MeshError, unknown
 from fastcontact.mesh import elements
+from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.html_table import html_table
 
 Array = NDArray[np.float64]
 Indices = NDArray[Any]
@@ -35,6 +38,7 @@ def _numbers(what: str, values: ArrayLike) -> NDArray[Any]:
     return array
 
 
+@typed(MeshError)
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """Points, cells and named groups.
@@ -114,6 +118,15 @@ class Mesh:
         counts = ", ".join(f"{len(block)} {name}" for name, block in self.cells.items())
         return f"Mesh({self.n_points} points, {counts}; groups: {', '.join(self.group_names) or 'none'})"
 
+    def _repr_html_(self) -> str:
+        """Return a table of cells and groups for notebooks."""
+        rows = [("points", self.n_points, f"{self.dim}D")]
+        rows += [(name, len(block), "cells") for name, block in self.cells.items()]
+        for name, members in self.cell_groups.items():
+            rows.append((name, len(members), "group of " + " and ".join(self.split(members))))
+        rows += [(name, len(members), "group of points") for name, members in self.point_groups.items()]
+        return html_table(rows, ("name", "number", "kind"), "Mesh")
+
     @property
     def n_points(self) -> int:
         """Number of points."""
@@ -162,16 +175,26 @@ class Mesh:
                 rows[name] = (numbers[inside] - start).astype(np.intp)
         return rows
 
+    @typed(MeshError)
     def cells_of(self, group: str, dim: int | None = None) -> dict[str, Indices]:
         """Return the connectivity (n_cells, n_nodes) of a cell group by element, only that of dimension `dim` if given.
 
         MeshError if there is no cell group of that name.
         """
+        if group in self.point_groups and group not in self.cell_groups:
+            near = difflib.get_close_matches(group, self.cell_groups, n=2, cutoff=0.3) or [*self.cell_groups][:6]
+            remedy = (
+                f": name one such as {' or '.join(map(repr, near))}" if near else ", and the mesh has none of cells"
+            )
+            raise MeshError(
+                f"'{group}' is a group of points, but here one of cells is needed (lines, faces, solids){remedy}"
+            )
         if group not in self.cell_groups:
             raise MeshError(self._no_group("group of cells", group, self.cell_groups))
         rows = self.split(self.cell_groups[group])
         return {name: self.cells[name][r] for name, r in rows.items() if dim is None or elements.get(name).dim == dim}
 
+    @typed(MeshError)
     def points_of(self, group: str) -> Indices:
         """Return the sorted point numbers (n,) of a group: a point group, or else all nodes of a cell group.
 
@@ -189,6 +212,7 @@ class Mesh:
             return f"the mesh has no groups at all, so none is '{group}': name groups in the mesher, or with Mesh.with_groups"
         return unknown(kind, group, known)
 
+    @typed(MeshError)
     def point(self, group: str) -> int:
         """Return the number of the only point of a group.
 
@@ -204,6 +228,7 @@ class Mesh:
         kept = {name: getattr(self, name) for name in ("points", "cells", "cell_groups", "point_groups")}
         return Mesh(**{**kept, **changes})
 
+    @typed(MeshError)
     def with_groups(
         self, cells: Mapping[str, ArrayLike] | None = None, points: Mapping[str, ArrayLike] | None = None
     ) -> Mesh:
@@ -213,6 +238,7 @@ class Mesh:
             point_groups={**self.point_groups, **(points or {})},
         )
 
+    @typed(MeshError)
     def merged_groups(self, name: str, members: Iterable[str]) -> Mesh:
         """Return the mesh with a new cell group `name`, the union of the cell groups `members`."""
         parts = []

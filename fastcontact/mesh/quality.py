@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements, quality_kernels
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -62,6 +63,7 @@ class MeshQuality:
         )
 
 
+@typed(MeshError)
 def quality(mesh: Mesh) -> MeshQuality:
     """Return the quality figures of a mesh.
 

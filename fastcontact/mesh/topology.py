@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements, topology_kernels
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -46,6 +47,7 @@ def corner_volumes(mesh: Mesh, name: str) -> Array:
     return volumes
 
 
+@typed(MeshError)
 def oriented(mesh: Mesh) -> tuple[Mesh, int]:
     """Return the mesh with every solid cell oriented as it should be, and how many cells were turned.
 
@@ -112,6 +114,7 @@ def remembered(function: Callable[[Mesh], Found]) -> Callable[[Mesh], Found]:
     return remembered
 
 
+@typed(MeshError)
 @remembered
 def bodies(mesh: Mesh) -> tuple[int, NDArray[np.int32]]:
     """Return the number of bodies (sets of solid cells connected by nodes) and the body (n_points,) of each point.
@@ -135,11 +138,13 @@ def bodies(mesh: Mesh) -> tuple[int, NDArray[np.int32]]:
     return len(found), body
 
 
+@typed(MeshError)
 def outer_facets(mesh: Mesh) -> Mapping[str, Indices]:
     """Return by facet element the facets (n_facets, n_nodes) of exactly one solid cell, normals pointing outward."""
     return _facets(mesh)[0]
 
 
+@typed(MeshError)
 def cells_joined_by_facets(mesh: Mesh) -> NDArray[np.int32]:
     """Return for each cell (n_cells,) of the mesh the lowest one that common facets join it to, from cell to cell.
 
@@ -186,6 +191,7 @@ class OrderedLine:
     abscissa: Array
 
 
+@typed(MeshError)
 def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> OrderedLine:
     """Return the nodes of a line group in order, as code_aster's NOEUD_ORDO and ABSC_CURV.
 

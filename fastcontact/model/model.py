@@ -46,6 +46,8 @@ from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
 from fastcontact.elasticity.temperature import Temperature, checked_value
 from fastcontact.errors import ContactError, ModelError, unknown
+from fastcontact.mesh.argument_types import check_fields, typed
+from fastcontact.mesh.html_table import html_table
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 from fastcontact.model.checks import (
@@ -57,6 +59,7 @@ from fastcontact.model.checks import (
     check_supports,
 )
 from fastcontact.model.contact_pair import ContactPair, Driving, method
+from fastcontact.model.description import sentences
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
 from fastcontact.model.prescribed_overlap import Supports, check_prescribed
@@ -117,6 +120,7 @@ class Model:
     >>> model.add_contact("hertz", secondary="CONT1", primary="CONT2")
     """
 
+    @typed(ModelError)
     def __init__(self, mesh: Mesh, kinematics: str, case_text: str = "") -> None:
         if kinematics not in KINEMATICS:
             raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
@@ -149,11 +153,22 @@ class Model:
         pairs = ", ".join(f"{p.name}: {p.secondary} on {p.opposite}, {p.method}" for p in self.contact)
         return f"Model({self.kinematics}, {self.mesh!r}, {self.n_dofs} degrees of freedom; contact: {pairs or 'none'})"
 
+    def _repr_html_(self) -> str:
+        """Return `describe` as a table for notebooks."""
+        head, *parts = sentences(self)
+        rows = [part.split(": ", 1) for part in parts if ": " in part]
+        return html_table(rows, caption=head)
+
+    def describe(self) -> str:
+        """Return in words what will be solved: kinematics, materials, supports, loads, contact, a line each."""
+        return "\n".join(sentences(self))
+
     @property
     def n_dofs(self) -> int:
         """Number of displacement components of all points."""
         return self.mesh.n_points * self.mesh.dim
 
+    @typed(ModelError)
     def add_material(self, material: Material, groups: Sequence[str] | str | None = None) -> None:
         """Give a material to groups of solid cells, by default to all; groups override what was given to all before."""
         names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
@@ -166,6 +181,7 @@ class Model:
             )
         self.materials.append((material, names))
 
+    @typed(ModelError)
     def fix(self, group: str, components: str) -> None:
         """Hold displacement components (``"x"``, ``"y"``, ``"xy"``, in 3D also ``"z"``) of a group's nodes at zero.
 
@@ -178,6 +194,7 @@ class Model:
         else:
             self._support(group, dict.fromkeys(components, 0.0), None)
 
+    @typed(ModelError)
     def prescribe(self, group: str, *, normal: Value | None = None, ramp: History = None, **components: Value) -> None:
         """Prescribe displacement components of all nodes of a group, e.g. ``y=-2.0`` [length], times the ramp.
 
@@ -204,6 +221,7 @@ class Model:
             check_value(support.name, value)
             self.supports.append(support)
 
+    @typed(ModelError)
     def add_pressure(self, group: str, value: Value, *, ramp: History = None) -> None:
         """Press on a group of outer facets with `value` [pressure], positive along their normals into the body.
 
@@ -211,6 +229,7 @@ class Model:
         """
         self._add(Pressure(group, value, table_of(ramp, f"the ramp of the pressure on '{group}'")))
 
+    @typed(ModelError)
     def add_traction(
         self,
         group: str,
@@ -224,6 +243,7 @@ class Model:
         axes = axes_of(f"the traction on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
         self._add(Traction(group, axes, table_of(ramp, f"the ramp of the traction on '{group}'")))
 
+    @typed(ModelError)
     def add_body_force(
         self,
         groups: Sequence[str] | str | None = None,
@@ -352,6 +372,7 @@ class Model:
             by_ramp[own.ramp] = by_ramp.get(own.ramp, 0.0) - internal_force(self.mesh, self.kinematics, held)
         return by_ramp
 
+    @typed(ModelError)
     def add_force(
         self,
         group: str,
@@ -384,6 +405,7 @@ class Model:
         load.check(self.mesh, self.kinematics)
         self.loads.append(load)
 
+    @typed(ModelError)
     def couple(self, group: str, component: str) -> None:
         """Let all nodes of a group move together in one displacement component, or several (``"xy"``).
 
@@ -403,6 +425,7 @@ class Model:
             rows = csr_array((np.tile([-1.0, 1.0], m), dofs.ravel(), 2 * np.arange(m + 1)), shape=(m, self.n_dofs))
             self.relations.append(Relation(f"couple('{group}', '{'xyz'[axis]}')", rows))
 
+    @typed(ModelError)
     def relate_groups(
         self,
         first: str,
@@ -449,6 +472,7 @@ class Model:
                 Relation(name, rows[np.diff(rows.indptr) > 0], float(value), table_of(ramp, f"the ramp of {name}"))
             )
 
+    @typed(ModelError)
     def relate(
         self, terms: Iterable[tuple[str | int, str, float]], value: float = 0.0, *, ramp: History = None
     ) -> None:
@@ -480,6 +504,7 @@ class Model:
         rows = csr_array((values, dofs, np.array([0, len(dofs)])), shape=(1, self.n_dofs))
         self.relations.append(Relation(name, rows, float(value), table_of(ramp, f"the ramp of {name}")))
 
+    @typed(ModelError)
     def add_spring(
         self,
         group: str | int,
@@ -562,6 +587,7 @@ class Model:
             raise ModelError(f"point {place} is not in the mesh of {self.mesh.n_points} points (numbers from 0)")
         return np.array([place])
 
+    @typed(ModelError)
     def add_contact(
         self, name: str, *, secondary: str, primary: str, formulation: str | None = None, **options: Any
     ) -> None:
@@ -611,6 +637,7 @@ class Model:
             log.info("contact '%s': %s, since %s", name, method(formulation, options), reason)
         self._add_pair(ContactPair(name, secondary, primary, formulation, options))
 
+    @typed(ModelError)
     def add_obstacle(
         self,
         name: str,
@@ -701,6 +728,8 @@ class Model:
         for option in pair.options:
             if option not in known:
                 raise ContactError(unknown(f"option of {pair.formulation}", option, known))
+        own = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
+        check_fields(f"contact '{pair.name}'", own, kind, ContactError)
         secondary = surface(self.mesh, pair.secondary)
         options = pair_options(
             pair.name, pair.options, self.mesh, secondary, against_obstacle=pair.obstacle is not None
@@ -780,6 +809,7 @@ class Model:
         named = f", in {', '.join(repr(g) for g in groups)}" if groups else ""
         raise ModelError(f"{total} solid cells have no material{named}: add_material for their groups")
 
+    @typed(ModelError)
     def internal_forces(self, displacement: Array) -> Array:
         """Return the nodal forces (n_points, dim) [force] that hold the solid cells deformed by `displacement`.
 
@@ -792,6 +822,10 @@ class Model:
             Of a step result [length].
         """
         moduli, material = self.material_numbers()
+        if np.size(displacement) != self.n_dofs:
+            raise ModelError(
+                f"the displacement has the shape {np.shape(displacement)}, but the mesh {self.mesh.points.shape}"
+            )
         K = stiffness(self.mesh, self.kinematics, moduli, material, None, self.averaged_materials())
         return np.asarray(K @ np.ravel(displacement)).reshape(-1, self.mesh.dim)
 
@@ -866,6 +900,7 @@ class Model:
         related[self.holding_rows().indices // self.mesh.dim] = True
         return related
 
+    @typed(ModelError)
     def check(self, ramp: Ramp | None = None) -> None:
         """Check the whole model, and its histories against `ramp`; `solve` does so before any numerics."""
         self.material_numbers()

@@ -51,7 +51,7 @@ def pair_options(
 def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
     """Return the kind of contact, which other options must not contradict."""
     kind = options.get("kind", "unilateral")
-    if kind not in KINDS:
+    if not isinstance(kind, str) or kind not in KINDS:
         raise ContactError(unknown(f"kind of contact '{name}'", str(kind), KINDS))
     if kind != "unilateral" and options.get("friction"):
         raise ContactError(f"contact '{name}' is {kind}, which knows no friction: leave out 'friction' or 'kind'")

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import ModelError
+from fastcontact.mesh.argument_types import typed
 
 Array = NDArray[np.float64]
 # Points (instant, multiplier of the loads) of a piecewise linear function.
@@ -47,6 +49,7 @@ def table_value(table: Table, instant: float) -> float:
     return float(np.interp(instant, times, values))
 
 
+@typed(ModelError)
 @dataclass(frozen=True)
 class Ramp:
     """Instants and a piecewise linear load function.
@@ -55,7 +58,7 @@ class Ramp:
 
     Parameters
     ----------
-    instants : sequence of float
+    instants : sequence or array of float
         Load factors (pseudo-times) at which a step ends, ascending.
     table : sequence of (float, float)
         Points (instant, multiplier of the loads) of the function, ascending instants.
@@ -65,7 +68,7 @@ class Ramp:
     table: Table = ((0.0, 0.0), (1.0, 1.0))
 
     def __post_init__(self) -> None:
-        instants = np.asarray(self.instants, float)
+        instants = np.asarray(tuple(self.instants), float)
         table = checked_table(self.table)
         times = np.asarray([time for time, _ in table])
         if instants.ndim != 1 or not len(instants):
@@ -92,6 +95,7 @@ class Ramp:
 History = Ramp | Iterable[Iterable[float]] | None
 
 
+@typed(ModelError)
 def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:
     """Return a ramp of equal steps from zero to the full loads at `end`.
 
@@ -104,6 +108,36 @@ def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:
     if not end > 0:
         raise ModelError(f"the ramp must end at a positive load factor, not {end}")
     return Ramp(tuple(end * (i + 1) / int(steps) for i in range(int(steps))), ((0.0, 0.0), (end, 1.0)))
+
+
+RampLike = Ramp | int | Iterable[float] | Iterable[Iterable[float]]
+
+
+def ramp_of(steps: RampLike | None) -> Ramp:
+    """Return the ramp that a user means: a `Ramp` itself, a number of equal steps, or an array; None: 20 equal steps.
+
+    Load factors (n,) are the ends of the steps, with loads in proportion to them, also beyond 1. Pairs (instant, multiplier)
+    (n, 2) are the points of the load function, and each but the first ends a step.
+    """
+    if steps is None:
+        return linear_ramp()
+    if isinstance(steps, Ramp):
+        return steps
+    if isinstance(steps, int | Real):
+        return linear_ramp(steps)
+    try:
+        values = np.asarray(steps if isinstance(steps, np.ndarray) else list(steps), float)
+    except (TypeError, ValueError):
+        values = np.empty((0, 0, 0))
+    if values.ndim == 2 and values.shape[1] == 2:
+        table = checked_table(values)
+        return Ramp(tuple(instant for instant, _ in table[1:]), table)
+    if values.ndim != 1:
+        raise ModelError(
+            "the ramp must be a number of steps, load factors (n,), pairs (instant, multiplier) (n, 2), or a Ramp"
+        )
+    end = max(1.0, values.max(initial=1.0))
+    return Ramp(tuple(values), ((0.0, 0.0), (end, end)))
 
 
 def multiplier(own: Table | None, ramp: Ramp, instant: float) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import FileError, MeshError
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.med import AXES, add_field, add_mesh, new_file
 from fastcontact.mesh.files.paths import PathLike
 from fastcontact.mesh.mesh import Mesh
@@ -20,6 +21,7 @@ Array = NDArray[np.float64]
 STRESSES = {"SIXX": 0, "SIYY": 1, "SIZZ": 2, "SIXY": 3, "SIXZ": 5, "SIYZ": 4}
 
 
+@typed(FileError)
 def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *, mesh_name: str = "mesh") -> None:
     """Write a mesh and nodal results at all instants, for Salome and ParaVis.
 

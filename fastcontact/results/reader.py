@@ -6,6 +6,7 @@ import contextlib
 import io
 import json
 import os
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -15,17 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import FileError
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.hdf5 import check_contents
 from fastcontact.mesh.files.packing import unpacked
 from fastcontact.mesh.files.paths import PathLike, existing_file
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results import journal, layout
+from fastcontact.results import conversions, journal, layout
 from fastcontact.results.locking import is_being_written
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.texts import read_text
 
 
+@typed(FileError)
 def open_results(path: PathLike) -> Results:
     """Open a result file.
 
@@ -181,29 +184,61 @@ class Results(Sequence[StepResult]):
             self._file.close()
         self._raw.close()
 
-    def to_pyvista(self, step: int | StepResult) -> Any:
-        """Return a step, or that at a position, as a ``pyvista.UnstructuredGrid`` of the solid cells with fields and groups.
+    def to_pyvista(self, step: int | StepResult | None = None) -> Any:
+        """Return all steps as a ``pyvista.MultiBlock``, or one as a ``pyvista.UnstructuredGrid``.
 
-        Raises FileError if PyVista is not installed.
+        A grid has the solid cells with fields and groups, and ``field_data["load_factor"]``. Blocks are named ``"step 1"``,
+        ``"step 2"``, ...
+
+        Parameters
+        ----------
+        step : int or StepResult, optional
+            A step, or its position, from 0, or from the end if negative.
+
+        Raises
+        ------
+        FileError
+            If PyVista is not installed.
         """
+        if step is None:
+            return conversions.series(self.mesh, self)
+        return conversions.grid(self.mesh, step if isinstance(step, StepResult) else self[step])
+
+    def to_pandas(self) -> Any:
+        """Return the contact tables of all steps as one ``pandas.DataFrame``.
+
+        A row is a secondary node of a contact pair in a step: columns ``step``, ``load_factor``, ``contact``, then those of
+        `contact_table` with their units.
+
+        Raises
+        ------
+        FileError
+            If pandas is not installed.
+        """
+        return conversions.contact_frame(self)
+
+    def to_xarray(self) -> Any:
+        """Return the fields of all steps, in memory, as an ``xarray.Dataset``.
+
+        Its dimensions are ``step``, ``point``, ``axis``, ``stress_component`` and ``contact``: ``displacement`` [length],
+        ``stress``, ``von_mises``, ``contact_pressure`` [pressure], ``reaction`` [force] at the points; ``contact_force``
+        [force] and ``contact_pressure_max`` [pressure] of the pairs. ``x``, ``y`` (``z``) are reference coordinates
+        [length]. Names of units that the case gives are attributes.
+
+        Raises
+        ------
+        FileError
+            If xarray is not installed.
+        """
+        return conversions.dataset(self.mesh, self, self._units())
+
+    def _units(self) -> dict[str, str]:
+        """Return the names of the units of length, force and pressure that the case text gives."""
         try:
-            import pyvista
-        except ImportError as error:
-            raise FileError("PyVista is not installed: pip install 'fastcontact[view]'") from error
-        if not isinstance(step, StepResult):
-            step = self[step]
-        cells = layout.solid_cells(self.mesh)
-        # VTK's older flat layout, which every PyVista takes: each cell's size before its nodes.
-        flat = np.insert(cells.connectivity, cells.offsets[:-1], np.diff(cells.offsets))
-        grid = pyvista.UnstructuredGrid(flat, cells.types, layout.padded(self.mesh.points, 3))
-        for name, values in (layout.point_fields(self.mesh, step) | layout.point_flags(self.mesh)).items():
-            grid.point_data[name] = values
-        by_cell: dict[str, Any] = layout.cell_fields(self.mesh) | step.cell_fields
-        if step.material_stress is not None:
-            by_cell |= {"material": step.material_stress.cells, **layout.material_fields(self.mesh, step)}
-        for name, values in by_cell.items():
-            grid.cell_data[name] = values
-        return grid
+            named = tomllib.loads(self.case_text or "").get("units", {})
+        except tomllib.TOMLDecodeError:
+            return {}
+        return {key: str(value) for key, value in named.items()} if isinstance(named, dict) else {}
 
     def _notes(self, number: int) -> dict[str, Any]:
         row = self._rows[number]

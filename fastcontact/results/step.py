@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.mesh.html_table import html_table
 from fastcontact.results.material_stress import MaterialStress
 
 Array = NDArray[np.float64]
@@ -32,7 +33,7 @@ def half_width(place: Array, closed: NDArray[np.bool_]) -> tuple[float, float]:
     return 0.5 * (high - low), float(0.5 * (beyond - before))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ContactResult:
     """State of one contact pair at the end of a step, on the secondary nodes in order along the surface.
 
@@ -126,6 +127,25 @@ class ContactResult:
             object.__setattr__(self, "sticking", self.active.copy())
 
     @property
+    def shown(self) -> dict[str, str]:
+        """What reprs and tables tell, as texts: force, largest pressure, closed nodes, contact radius."""
+        low, high = self.radius
+        return {
+            "force": f"{float(np.linalg.norm(self.force)):.6g}",
+            "largest pressure": f"{self.pressure_max:.6g}",
+            "closed": f"{int(self.active.sum())} of {len(self.points)} nodes",
+            "contact radius": f"{low:.4g} to {high:.4g}" if np.isfinite(low) else "none",
+        }
+
+    def __repr__(self) -> str:
+        told = ", ".join(f"{name} {text}" for name, text in self.shown.items())
+        return f"ContactResult('{self.name}', {self.formulation}: {told})"
+
+    def _repr_html_(self) -> str:
+        """Return a table for notebooks."""
+        return html_table(self.shown.items(), caption=f"Contact '{self.name}', {self.formulation}")
+
+    @property
     def measured_from_axis(self) -> bool:
         """Whether places are radii, in axisymmetry, rather than lengths along a surface or distances in space."""
         flat = self.coordinates.shape[1] == 2
@@ -147,7 +167,7 @@ class ContactResult:
         return float(-self.gap[self.active].min(initial=0.0))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class StepResult:
     """State at the end of one load step.
 
@@ -198,6 +218,31 @@ class StepResult:
     cell_fields: dict[str, Array] = field(default_factory=dict)
     restart: dict[str, Any] | None = field(default=None, repr=False)
     material_stress: MaterialStress | None = None
+
+    @property
+    def shown(self) -> dict[str, str]:
+        """What reprs and tables tell, as texts: load factor, largest displacement and stress, iterations."""
+        found = {
+            "load factor": f"{self.load_factor:.6g}",
+            "largest displacement": f"{float(np.abs(self.displacement).max(initial=0.0)):.6g}",
+            "largest von Mises stress": f"{float(np.max(self.von_mises, initial=0.0)):.6g}",
+        }
+        named = {"geometry_updates": "geometry updates", "active_set_iterations": "active-set iterations"}
+        return found | {text: str(self.iterations[key]) for key, text in named.items() if key in self.iterations}
+
+    def __repr__(self) -> str:
+        pairs = [
+            f"'{c.name}': force {c.shown['force']}, largest pressure {c.shown['largest pressure']}"
+            for c in self.contact.values()
+        ]
+        told = [f"largest displacement {self.shown['largest displacement']}", *pairs]
+        return f"StepResult({self.index}, load factor {self.load_factor:.6g}; {'; '.join(told)})"
+
+    def _repr_html_(self) -> str:
+        """Return tables of the step and of its contact pairs for notebooks."""
+        warnings = [("warning", text) for text in self.warnings]
+        own = html_table([*self.shown.items(), *warnings], caption=f"Step {self.index}")
+        return own + "".join(contact._repr_html_() for contact in self.contact.values())
 
     def stress_of_material(self, number: int) -> Array:
         """Return the nodal stress (n_points, 4) or (n_points, 6) with the side of one material where several meet [pressure].

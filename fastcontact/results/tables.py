@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import CaseError, unknown
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.paths import PathLike, replacing
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import ordered_line
@@ -22,6 +23,7 @@ AXES = ("x", "y", "z")
 STRESS_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 
+@typed(CaseError)
 def contact_table(contact: ContactResult, step: StepResult | None = None) -> Table:
     """Return the state of a contact pair, one row for each secondary node in order along the surface.
 
@@ -76,6 +78,7 @@ def normal_stress(contact: ContactResult, step: StepResult) -> NDArray[np.float6
     return np.where(np.linalg.norm(contact.normal, axis=1) > 0.5, across, np.nan)
 
 
+@typed(CaseError)
 def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None = None) -> Table:
     """Return the fields along a line of nodes, one row a node, in order.
 
@@ -112,6 +115,7 @@ def with_column(table: Table, name: str, values: NDArray[Any]) -> Table:
     return _table({**_columns(table), name: values})
 
 
+@typed(CaseError)
 def write_csv(path: PathLike, table: Table, units: Mapping[str, str] | None = None) -> None:
     """Write a table as comma-separated values (RFC 4180) with one header line.
 

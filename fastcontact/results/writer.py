@@ -20,6 +20,7 @@ import numpy as np
 
 from fastcontact.elasticity.material_sides import material_sides
 from fastcontact.errors import ConvergenceError, FileError, ModelError
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.hdf5_driver import new_hdf5
 from fastcontact.mesh.files.packing import packed
 from fastcontact.mesh.files.paths import PathLike, checked_target, replacing
@@ -87,6 +88,7 @@ class ResultWriter:
     ...     fastcontact.solve(model, ramp=fastcontact.linear_ramp(20), on_step=out.write)
     """
 
+    @typed(FileError)
     def __init__(
         self,
         path: PathLike,

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.errors import CaseError, unknown
+from fastcontact.errors import CaseError, FileError, unknown
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.paths import PathLike, replacing
 
 STYLES = ("line", "symbols", "line+symbols")
@@ -69,6 +70,7 @@ class Curve:
         object.__setattr__(self, "y", y[finite])
 
 
+@typed(FileError)
 def write_agr(
     path: PathLike, curves: Sequence[Curve], *, title: str, subtitle: str = "", xlabel: str, ylabel: str
 ) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fastcontact.cases.case import Case, build_case, read_case
 from fastcontact.errors import CaseError, FastcontactWarning, unknown
 from fastcontact.mesh import elements
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate import Forest, circles, linearised, to_quadratic
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import StepResult
@@ -31,6 +32,7 @@ BULK = 0.7
 SHRINKING = 3.0
 
 
+@typed(CaseError)
 def adaptive_study(
     case: Case | str | Path,
     quantity: str = "pressure_max",

@@ -52,7 +52,7 @@ class Round:
         return abs(self.values[quantity] / exact - 1.0) if exact else math.nan
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AdaptiveStudy(Report):
     """A finished adaptive study; its case and units as in `Report`.
 
@@ -115,6 +115,10 @@ class AdaptiveStudy(Report):
         counts = {name: [getattr(found, name) for found in self.rounds] for name in ("n_dofs", "n_cells")}
         values = [found.values[self.quantity] for found in self.rounds]
         return structured({**counts, self.quantity: values, **self._errors()})
+
+    def tables(self) -> list[tuple[str, Rows]]:
+        """See `Report`."""
+        return [(self.combination, self._rows())]
 
     def lines(self) -> list[str]:
         """Return a table and a sentence for a person, as ``fastcontact converge --adaptive`` prints them."""

@@ -9,6 +9,7 @@ from typing import Any
 
 from fastcontact.cases.case import Case, read_case
 from fastcontact.errors import CaseError, unknown
+from fastcontact.mesh.argument_types import typed
 from fastcontact.studies.affordable import check_levels, check_runs
 from fastcontact.studies.convergence_report import Study
 from fastcontact.studies.execute import Progress, Result, raise_first, run_all
@@ -19,6 +20,7 @@ from fastcontact.studies.series import Level, Series
 from fastcontact.studies.settings import Combination, Settings, combinations, settings
 
 
+@typed(CaseError)
 def convergence_study(
     case: Case | str | Path,
     levels: int = 5,

@@ -12,7 +12,7 @@ from fastcontact.studies.convergence_figures import error_panel, pressure_panel,
 from fastcontact.studies.fit import CONFIDENCE
 from fastcontact.studies.render import page
 from fastcontact.studies.render.figure import Panel, figure
-from fastcontact.studies.render.table import aligned, structured
+from fastcontact.studies.render.table import Rows, aligned, structured
 from fastcontact.studies.report import Report
 from fastcontact.studies.sentences import MAIN, sentences
 from fastcontact.studies.series import Series
@@ -30,7 +30,7 @@ EXPLANATIONS = (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Study(Report):
     """A finished mesh-convergence study; its case and units as in `Report`.
 
@@ -78,6 +78,10 @@ class Study(Report):
         there is a theory of it, ``..._from_theory`` [-] (relative to the theory).
         """
         return structured(tables.csv_columns(self.series))
+
+    def tables(self) -> list[tuple[str, Rows]]:
+        """See `Report`."""
+        return [(str(series.combination), tables.level_rows(series, self.units)) for series in self.series]
 
     def lines(self) -> list[str]:
         """Return tables and sentences for a person, as ``fastcontact converge`` prints them."""

@@ -17,7 +17,9 @@ from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.surface import surface
 from fastcontact.elasticity.energy import elastic_energy
 from fastcontact.elasticity.smoothed_stress import smoothed_stress
+from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
+from fastcontact.mesh.argument_types import typed
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.studies.error_norms import stress_in_cells
@@ -54,6 +56,7 @@ class ErrorEstimate:
         return self.total / math.hypot(self.energy, self.total) if self.total else 0.0
 
 
+@typed(ModelError)
 def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     """Return the estimated error of a step.
 

@@ -18,6 +18,7 @@ from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.elements import Element
 from fastcontact.model.model import Model
 
@@ -70,6 +71,7 @@ class ErrorNorms:
         return self.displacement / self.displacement_of_theory
 
 
+@typed(ModelError)
 def error_against(
     theory: Theory,
     model: Model,

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from fastcontact.cases.summary import versions
+from fastcontact.mesh.html_table import html_table
+from fastcontact.studies.render.table import Rows
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Report:
     """A finished study of a case.
 
@@ -24,6 +26,23 @@ class Report:
     title: str
     text: str
     units: dict[str, str]
+
+    def lines(self) -> list[str]:
+        """Return tables and sentences for a person."""
+        raise NotImplementedError
+
+    def tables(self) -> list[tuple[str, Rows]]:
+        """Return the main tables, each with its caption; the first row is a header."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return "\n".join([f"{type(self).__name__} of '{self.name}'", *self.lines()])
+
+    def _repr_html_(self) -> str:
+        """Return the main tables for notebooks."""
+        return "".join(
+            html_table(rows[1:], rows[0], f"{self.title}: {caption}".strip(": ")) for caption, rows in self.tables()
+        )
 
     def framed(self, numbers: dict[str, Any]) -> dict[str, Any]:
         """Return the numbers of a study as ``--json`` writes them, between its case and the versions."""

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from fastcontact.cases.case import Case, build_case, read_case
 from fastcontact.errors import CaseError
+from fastcontact.mesh.argument_types import typed
 from fastcontact.studies.affordable import check_runs
 from fastcontact.studies.case_parameters import substituted
 from fastcontact.studies.execute import Progress, raise_first, run_all
@@ -23,6 +24,7 @@ from fastcontact.studies.sweep_report import Point, Sweep, Value
 LEVEL = 2
 
 
+@typed(CaseError)
 def parameter_sweep(
     case: Case | str | Path,
     parameters: Mapping[str, Sequence[Value]],

@@ -64,7 +64,7 @@ class Point:
         return self.values.get(quantity, math.nan) / other if other else math.nan
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Sweep(Report):
     """A finished sweep; its case and units as in `Report`.
 
@@ -116,6 +116,10 @@ class Sweep(Report):
                 if any(map(math.isfinite, off)):
                     columns[f"{name}_{key}"] = off
         return structured(columns)
+
+    def tables(self) -> list[tuple[str, Rows]]:
+        """See `Report`."""
+        return [(self.combination, self._rows())]
 
     def lines(self) -> list[str]:
         """Return a table for a person, as ``fastcontact sweep`` prints it."""

@@ -68,7 +68,7 @@ class WeightedMortar(Formulation):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.multipliers not in MULTIPLIERS:
+        if str(self.multipliers) not in MULTIPLIERS:
             raise ContactError(unknown("kind of multipliers", self.multipliers, MULTIPLIERS))
         self._test = [self._test_functions(block.element) for block in self.secondary.blocks]
         self._whole = []

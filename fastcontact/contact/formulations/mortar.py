@@ -20,7 +20,7 @@ class Mortar(SegmentMortar):
     @classmethod
     def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:
         """Return the method for lines or faces and for the kind of multipliers."""
-        weighted = dim == 3 or options.get("multipliers", "standard") != "standard"
+        weighted = dim == 3 or str(options.get("multipliers", "standard")) != "standard"
         return WeightedMortar if weighted else SegmentMortar
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fastcontact.contact.obstacles._facets import Block, SurfaceFacets, surface_facets
 from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.errors import ContactError
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -24,6 +25,7 @@ BEYOND, LEAN = 0.05, 0.27
 TOUCHING = 1e-6
 
 
+@typed(ContactError)
 @dataclass(frozen=True, eq=False)
 class MeshedSurface:
     """A rigid surface given by a group of facets of a mesh.

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastcontact.errors import ContactError
+from fastcontact.mesh.argument_types import typed
 
 Array = NDArray[np.float64]
 
@@ -36,6 +37,7 @@ def _direction(side: str) -> float:
     return 1.0 if side == "below" else -1.0
 
 
+@typed(ContactError)
 @dataclass(frozen=True)
 class HalfSpace:
     """Everything behind a plane.
@@ -62,6 +64,7 @@ class HalfSpace:
         return (points - _vector("point", self.point, dim)) @ normal, np.broadcast_to(normal, points.shape).copy()
 
 
+@typed(ContactError)
 @dataclass(frozen=True)
 class Sphere:
     """A ball, or with ``hollow`` everything but one. In two dimensions a circular cylinder, or a sphere on the axis.
@@ -93,6 +96,7 @@ class Sphere:
         return (self.R - length, -away) if self.hollow else (length - self.R, away)
 
 
+@typed(ContactError)
 @dataclass(frozen=True)
 class Cylinder:
     """A circular cylinder of any direction in three dimensions, or with ``hollow`` everything but one.
@@ -125,6 +129,7 @@ class Cylinder:
         return Sphere((0.0, 0.0, 0.0), self.R, self.hollow).distance(apart)
 
 
+@typed(ContactError)
 @dataclass(frozen=True)
 class Height:
     """Everything below (or above) a height over the other coordinates.
@@ -152,6 +157,7 @@ class Height:
         return sign * (points[:, -1] - height) / length, sign * normal / length[:, None]
 
 
+@typed(ContactError)
 def paraboloid(R: float, tip: float = 0.0, side: str = "above") -> Height:
     """Return a paraboloid of revolution (a parabola in two dimensions) of radius `R` [length] at its tip.
 
@@ -166,6 +172,7 @@ def paraboloid(R: float, tip: float = 0.0, side: str = "above") -> Height:
     return Height(height, side)
 
 
+@typed(ContactError)
 def cone(slope: float, tip: float = 0.0, side: str = "above") -> Height:
     """Return a cone (a wedge in two dimensions) that rises by `slope` from its tip.
 
@@ -182,6 +189,7 @@ def cone(slope: float, tip: float = 0.0, side: str = "above") -> Height:
     return Height(height, side)
 
 
+@typed(ContactError)
 @dataclass(frozen=True)
 class FlatPunch:
     """A flat punch of a given radius (half-width in plane problems): a face, and nothing beyond its edge.

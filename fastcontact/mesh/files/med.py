@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import FileError, MeshError, unknown
 from fastcontact.mesh import elements
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files import med_families
 from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_known
 from fastcontact.mesh.files.hdf5 import attribute, opened, values
@@ -286,6 +287,7 @@ def add_field(
     profile.create_dataset("CO", data=np.asarray(field, np.float64).T.ravel())
 
 
+@typed(FileError)
 def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
     """Read a nodal field at all its instants, from a file of MED 3 or later.
 

@@ -9,6 +9,7 @@ from types import MappingProxyType
 
 from fastcontact.errors import FileError
 from fastcontact.mesh import topology
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files import med, meshio_files
 from fastcontact.mesh.files.paths import PathLike, checked_target, existing_file, replacing
 from fastcontact.mesh.mesh import Mesh
@@ -40,6 +41,7 @@ class MeshReport:
         return f"{self.path} ({self.format}{name}): {self.n_turned} cells turned{left_out}"
 
 
+@typed(FileError)
 def read_mesh(path: PathLike, *, mesh_name: str | None = None, orient: bool = True) -> Mesh:
     """Read a mesh with its named groups.
 
@@ -94,6 +96,7 @@ def read_mesh_report(path: PathLike, *, mesh_name: str | None = None, orient: bo
     return mesh, report
 
 
+@typed(FileError)
 def write_mesh(path: PathLike, mesh: Mesh) -> None:
     """Write a mesh; the format follows from the suffix, and the file appears only when it is complete.
 

@@ -40,3 +40,7 @@ __all__ = [
     "quarter_disc", "refined", "renamed", "rings", "sphere_octant", "sphere_on_block", "to_quadratic", "transformed",
     "union",
 ]  # fmt: skip
+
+
+def __dir__() -> list[str]:
+    return __all__

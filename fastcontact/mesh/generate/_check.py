@@ -99,7 +99,7 @@ def each(check: Callable[[str, Any], Number], name: str, value: Any, count: int 
 
 def one_of(name: str, value: Any, known: Sequence[str]) -> str:
     """Return `value`; MeshError that offers the near names unless it is one of `known`."""
-    if value not in known:
+    if not isinstance(value, str) or value not in known:
         raise MeshError(unknown(name, str(value)[:80], known))
     return str(value)
 

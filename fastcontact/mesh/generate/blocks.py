@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import MeshError
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate._blocks import SIDES, rectangular, structured
 from fastcontact.mesh.generate._check import FACES, TRIANGLES, count, each, number, one_of, positive, within
 from fastcontact.mesh.generate._spacing import Spacing, divided, geometric, segments_for, straight
@@ -21,6 +22,7 @@ from fastcontact.mesh.mesh import Mesh
 Array = NDArray[np.float64]
 
 
+@typed(MeshError)
 def block(
     size: tuple[float, float] = (1.0, 1.0),
     divisions: tuple[int, int] = (4, 4),
@@ -76,6 +78,7 @@ def _pattern(n: int, m: int) -> Array:
     return shift
 
 
+@typed(MeshError)
 def block_on_block(
     element: str = "quad4",
     *,
@@ -127,6 +130,7 @@ def _side_name(name: str, body: str, contact: str) -> str:
     return name if name == body else f"{body}_{name}"
 
 
+@typed(MeshError)
 def cylinder_on_block(
     element: str = "quad4",
     *,

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.elements import Element
 from fastcontact.mesh.generate._check import affordable, count, each, number, one_of, positive
 from fastcontact.mesh.generate.blocks import block as rectangle
@@ -31,6 +33,7 @@ _CUTS = {
 SOLIDS = tuple(name for name, element in elements.ELEMENTS.items() if element.linear in _CUTS)
 
 
+@typed(MeshError)
 def box(
     size: tuple[float, float, float] = (1.0, 1.0, 1.0),
     divisions: tuple[int, int, int] = (4, 4, 4),

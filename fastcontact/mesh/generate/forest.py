@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate.quadratic import Curve, centres, edge_keys, edges_of, edges_on, ends_of
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
@@ -60,6 +61,7 @@ class Forest:
         True shapes of the boundary: new points on facets that lie on a curve are put on it.
     """
 
+    @typed(MeshError)
     def __init__(self, mesh: Mesh, curves: Iterable[Curve] = ()) -> None:
         for name, block in mesh.cells.items():
             if name not in CORNERS:

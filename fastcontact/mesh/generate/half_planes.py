@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate._check import FACES, QUADRANGLES, growth_of, one_of, positive, segments, unused
 from fastcontact.mesh.generate._spacing import Spacing, graded, growing
 from fastcontact.mesh.generate.box import SOLIDS, on_lines
@@ -23,6 +24,7 @@ _CORNERS = ("BOTTOM_LEFT", "BOTTOM_RIGHT", "TOP_RIGHT", "TOP_LEFT")
 _NAMES_CROWNED = {"LOWER": "LOWER", "TOP": "CONT_LOWER", "BOTTOM": "FAR_LOWER"}
 
 
+@typed(MeshError)
 def graded_block(
     element: str = "quad4",
     *,
@@ -97,6 +99,7 @@ def _named(mesh: Mesh, lines: list[Array], radii: list[float]) -> Mesh:
     return with_points_at(mesh, {"POLE": [0.0] * mesh.dim})
 
 
+@typed(MeshError)
 def punched_block(
     element: str = "quad4",
     *,
@@ -145,6 +148,7 @@ def punched_block(
     return with_points_at(mesh, {"POLE": (0.0, 0.0), "EDGE": (radius, 0.0)})
 
 
+@typed(MeshError)
 def crowned_blocks(
     element: str = "quad4",
     *,

@@ -8,6 +8,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.errors import MeshError
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate._blocks import structured, transfinite
 from fastcontact.mesh.generate._check import FACES, TRIANGLES, count, each, one_of, positive, unused, within
 from fastcontact.mesh.generate._spacing import Spacing, arc, divided, geometric, straight
@@ -23,6 +25,7 @@ _UPPER = {"SPHBAS": "SPHHAU", "A1B1": "A2B2", "CONT1": "CONT2", "D1B1": "D2B2"}
 _UPPER |= {f"{letter}1": f"{letter}2" for letter in "ABCD"} | {f"{letter}1": letter for letter in "MNP"}
 
 
+@typed(MeshError)
 def half_spheres(
     element: str = "tri3",
     *,
@@ -79,6 +82,7 @@ def half_spheres(
     return union(lower, mirrored(lower, "y", rename=_UPPER))
 
 
+@typed(MeshError)
 def quarter_disc(
     element: str = "tri3",
     *,

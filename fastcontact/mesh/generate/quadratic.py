@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 from fastcontact.mesh.topology import outer_facets
@@ -38,6 +39,7 @@ class Curve(Protocol):
         ...
 
 
+@typed(MeshError)
 @dataclass(frozen=True)
 class Circle:
     """A circle in the plane.
@@ -68,6 +70,7 @@ class Circle:
         return np.asarray(self.centre) + arms * (self.radius / np.where(length > 0.0, length, 1.0))[:, None]
 
 
+@typed(MeshError)
 def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool = False) -> Mesh:
     """Return the mesh with a mid node on every edge: tri3 to tri6, quad4 to quad8 or quad9, hex8 to hex20 ...
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate.quadratic import ON_CURVE, Circle, Curve, all_on, facets_of
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
@@ -80,6 +81,7 @@ def _pattern(name: str) -> _Pattern:
     return _Pattern(element.shape(lattice), np.array(children), on_edge, along)
 
 
+@typed(MeshError)
 def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
     """Return the mesh with every line divided in two and every triangle and quadrangle in four.
 
@@ -214,6 +216,7 @@ def _point_groups(mesh: Mesh, where: dict[str, Indices]) -> dict[str, Indices]:
     return groups
 
 
+@typed(MeshError)
 def linearised(mesh: Mesh) -> Mesh:
     """Return the mesh on its corners alone: tri6 to tri3, quad8 and quad9 to quad4, line3 to line2.
 
@@ -241,6 +244,7 @@ def linearised(mesh: Mesh) -> Mesh:
     )
 
 
+@typed(MeshError)
 def circles(mesh: Mesh) -> list[Circle]:
     """Return the circles on which groups of outer facets lie, one a group, so that `refined` can keep to them.
 

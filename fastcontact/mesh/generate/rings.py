@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import MeshError
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate._blocks import structured
 from fastcontact.mesh.generate._check import FACES, TRIANGLES, affordable, count, each, one_of, positive
 from fastcontact.mesh.generate.quadratic import Circle, in_element
@@ -17,6 +18,7 @@ from fastcontact.mesh.mesh import Mesh
 Array = NDArray[np.float64]
 
 
+@typed(MeshError)
 def rings(
     element: str = "quad8",
     *,

@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.errors import MeshError
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate._check import count, each, one_of, positive
 from fastcontact.mesh.generate._spacing import Spacing, graded, segments_for
 from fastcontact.mesh.generate.box import on_lines
@@ -25,6 +27,7 @@ SOLIDS = ("hex8", "hex20", "hex27", "tet4", "tet10")
 INNER, BULGE = 0.45, 0.5
 
 
+@typed(MeshError)
 def sphere_on_block(
     element: str = "hex8",
     *,
@@ -84,6 +87,7 @@ def sphere_on_block(
     return union(sphere, with_points_at(block, {"POLE_BLOCK": (0.0, 0.0, 0.0)}))
 
 
+@typed(MeshError)
 def sphere_octant(
     element: str = "hex8",
     *,

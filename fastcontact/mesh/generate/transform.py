@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate._check import number, one_of
 from fastcontact.mesh.mesh import Mesh
 
@@ -23,6 +24,7 @@ Names = Mapping[str, str | None] | Callable[[str], str | None]
 _AXES = ("x", "y", "z")
 
 
+@typed(MeshError)
 def renamed(mesh: Mesh, names: Names) -> Mesh:
     """Return the mesh with its groups renamed.
 
@@ -45,6 +47,7 @@ def renamed(mesh: Mesh, names: Names) -> Mesh:
     return mesh.replace(cell_groups=groups(mesh.cell_groups), point_groups=groups(mesh.point_groups))
 
 
+@typed(MeshError)
 def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None) -> Mesh:
     """Return the mirror image; cells and facets are turned so that they stay oriented as they were.
 
@@ -68,6 +71,7 @@ def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None
     return image if rename is None else renamed(image, rename)
 
 
+@typed(MeshError)
 def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float = 1.0, rotate: float = 0.0) -> Mesh:
     """Return the mesh scaled about the origin, then rotated about it (2D only), then translated.
 
@@ -99,6 +103,7 @@ def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float 
     return mesh.replace(points=points)
 
 
+@typed(MeshError)
 def union(*meshes: Mesh) -> Mesh:
     """Return one mesh of several: points one after the other, none merged, groups of the same name united.
 
@@ -146,6 +151,7 @@ def _renumbering(mesh: Mesh, starts: dict[str, int]) -> Indices:
     return numbers
 
 
+@typed(MeshError)
 def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
     """Return the mesh with points closer than `tolerance` welded into one, the first of them.
 

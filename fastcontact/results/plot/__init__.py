@@ -13,3 +13,7 @@ from fastcontact.results.plot.shape import deformed_shape
 from fastcontact.results.plot.view import view
 
 __all__ = ["UNITS", "axis_stress", "contact_zones", "deformed_shape", "history", "pressure_profile", "view"]
+
+
+def __dir__() -> list[str]:
+    return __all__

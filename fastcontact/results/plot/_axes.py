@@ -2,16 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import io
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from fastcontact.errors import FastcontactError
+from fastcontact.errors import FastcontactError, unknown
+from fastcontact.results.step import ContactResult, StepResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Units = Mapping[str, str]
 UNITS: Units = {"length": "mm", "force": "N", "pressure": "MPa"}
+UNKNOWN: Units = {}
+
+
+def labelled(text: str, units: Units, quantity: str) -> str:
+    """Return the label of an axis, with the unit of its quantity where that is known."""
+    return f"{text} [{units[quantity]}]" if units.get(quantity) else text
+
+
+def contacts_of(steps: Sequence[StepResult], pair: str) -> list[ContactResult]:
+    """Return a contact pair of each step; raises FastcontactError if there are no steps, or none has such a pair."""
+    if not len(steps):
+        raise FastcontactError("there are no steps to draw")
+    for step in steps:
+        if pair not in step.contact:
+            raise FastcontactError(unknown("contact pair", pair, step.contact))
+    return [step.contact[pair] for step in steps]
+
+
+def png(figure: Any) -> bytes:
+    """Return a picture as the bytes of a PNG file."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png")
+    return buffer.getvalue()
+
+
+def displayed(figure: Any) -> None:
+    """Let a figure, and each of its axes, show itself where it ends a cell of a notebook."""
+    for part in (figure, *figure.axes):
+        part._repr_png_ = partial(png, figure)
+
+
+class Panels(tuple[Any, ...]):
+    """The axes of a figure with several; in a notebook they show the picture."""
+
+    __slots__ = ()
+
+    def _repr_png_(self) -> bytes:
+        return png(self[0].figure)
 
 
 def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None = None) -> Any:
@@ -25,4 +66,6 @@ def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None 
         raise FastcontactError("pictures need matplotlib: pip install 'fastcontact[plot]'") from error
     figure = Figure(figsize=size, layout="constrained", dpi=150)
     FigureCanvasAgg(figure)
-    return figure.add_subplot(projection=projection)
+    axes = figure.add_subplot(projection=projection)
+    displayed(figure)
+    return axes

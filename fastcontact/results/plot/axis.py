@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FastcontactError
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNITS, Units, new_axes
+from fastcontact.results.plot._axes import UNKNOWN, Units, contacts_of, labelled, new_axes
 from fastcontact.results.step import StepResult
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ DEEP = 4.0
 COMPONENTS = {"along the axis": 1, "across the axis": 0}
 
 
+@typed(FastcontactError)
 def axis_stress(
     mesh: Mesh,
     step: StepResult,
@@ -30,7 +32,7 @@ def axis_stress(
     theories: Mapping[str, Any] | None = None,
     *,
     title: str = "",
-    units: Units = UNITS,
+    units: Units = UNKNOWN,
     ax: Axes | None = None,
 ) -> Axes:
     """Plot the stresses at the nodes on the axis of a contact over the depth under its surface.
@@ -58,7 +60,7 @@ def axis_stress(
     upright = abs(_axis(step, pair)[1][1]) > 0.5
     bodies = ("upper body", "lower body") if upright else ("right body", "left body")
     axes = new_axes(ax, (7.4, 5.4))
-    reach = DEEP * np.nan_to_num(step.contact[pair].radius[0]) or float(depth.max())
+    reach = DEEP * np.nan_to_num(contacts_of([step], pair)[0].radius[0]) or float(depth.max())
     shown = depth <= reach
     for number, (name, marker) in enumerate(zip(bodies, ("^", "v"), strict=True)):
         here = shown & (side == 1 - 2 * number)
@@ -73,7 +75,10 @@ def axis_stress(
         axes.plot(fine, von_mises(exact), style, color="C2", lw=1.0)
         axes.plot([], [], f"k{style}", lw=1.0, label=label)
     title = title or f"Stresses on the axis, load factor {step.load_factor:g}"
-    depth_name, stress_name = f"depth under the surface [{units['length']}]", f"stress [{units['pressure']}]"
+    depth_name, stress_name = (
+        labelled("depth under the surface", units, "length"),
+        labelled("stress", units, "pressure"),
+    )
     axes.set(xlabel=depth_name, ylabel=stress_name, title=title)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
@@ -110,7 +115,7 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, ND
 
 def _axis(step: StepResult, pair: str) -> tuple[Array, Array]:
     """Return where the axis of a contact leaves the surface (2,) [length], and its direction upward (2,) [-]."""
-    contact = step.contact[pair]
+    contact = contacts_of([step], pair)[0]
     nearest = int(np.argmin(np.abs(contact.place)))
     normal = contact.normal[nearest]
     if contact.measured_from_axis or not np.linalg.norm(normal) > 0.5:

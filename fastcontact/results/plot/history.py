@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fastcontact.errors import FastcontactError
-from fastcontact.results.plot._axes import UNITS, Units, new_axes
+from fastcontact.mesh.argument_types import typed
+from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, contacts_of, labelled, new_axes
 from fastcontact.results.step import StepResult
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 STATES = {"open": "0.85", "closed": "C0", "sliding": "C1"}
 
 
+@typed(FastcontactError)
 def history(
     steps: Sequence[StepResult],
     pair: str,
@@ -24,7 +26,7 @@ def history(
     law: Any = None,
     approach: float | None = None,
     title: str = "",
-    units: Units = UNITS,
+    units: Units = UNKNOWN,
     axes: Sequence[Axes] | None = None,
 ) -> Sequence[Axes]:
     """Plot force and contact radius of a contact pair over the load.
@@ -45,10 +47,10 @@ def history(
         first = new_axes(None, (7.0, 6.4))
         figure = first.figure
         first.remove()
-        axes = figure.subplots(2, 1, sharex=True)
+        axes = Panels(figure.subplots(2, 1, sharex=True))
     upper, lower = axes
+    contacts = contacts_of(steps, pair)
     x = np.array([step.load_factor for step in steps]) * (approach or 1.0)
-    contacts = [step.contact[pair] for step in steps]
     upper.plot(x, [np.linalg.norm(c.force) for c in contacts], "o-", ms=4, label="computed")
     bracket = np.array([c.radius for c in contacts])
     legend = "computed (between closed and open)"
@@ -58,9 +60,9 @@ def history(
         curves = [law.at_approach(d) for d in fine]
         upper.plot(fine, [c.force for c in curves], "k-", lw=1, label="Hertz, equal approach")
         lower.plot(fine, [c.radius for c in curves], "k-", lw=1, label="Hertz, equal approach")
-    upper.set(ylabel=f"contact force [{units['force']}]", title=title or f"Contact '{pair}' over the load")
-    along = f"approach [{units['length']}]" if approach else "load factor"
-    lower.set(xlabel=along, ylabel=f"contact radius [{units['length']}]")
+    upper.set(ylabel=labelled("contact force", units, "force"), title=title or f"Contact '{pair}' over the load")
+    along = labelled("approach", units, "length") if approach else "load factor"
+    lower.set(xlabel=along, ylabel=labelled("contact radius", units, "length"))
     for ax in axes:
         ax.grid(alpha=0.3)
         ax.legend()
@@ -68,8 +70,9 @@ def history(
     return axes
 
 
+@typed(FastcontactError)
 def contact_zones(
-    steps: Sequence[StepResult], pair: str, *, title: str = "", units: Units = UNITS, ax: Axes | None = None
+    steps: Sequence[StepResult], pair: str, *, title: str = "", units: Units = UNKNOWN, ax: Axes | None = None
 ) -> Axes:
     """Plot the state of every secondary node over the load: open, closed (sticking, with friction) or sliding.
 
@@ -88,7 +91,7 @@ def contact_zones(
     if not steps:
         raise FastcontactError("there is no step whose contact could be plotted")
     axes = new_axes(ax, (7.4, 5.2))
-    contacts = [step.contact[pair] for step in steps]
+    contacts = contacts_of(steps, pair)
     x = np.concatenate([np.full(len(c.points), step.load_factor) for step, c in zip(steps, contacts, strict=True)])
     y = np.concatenate([c.place for c in contacts])
     closed = np.concatenate([c.active for c in contacts])
@@ -103,7 +106,7 @@ def contact_zones(
     top = reach if 0.0 < reach < farthest else None
     axes.set_ylim((-top if top else None) if y.min(initial=0.0) < 0 else 0.0, top)
     start = "axis" if contacts[-1].measured_from_axis else "middle of the contact"
-    distance = f"distance from the {start} [{units['length']}]"
+    distance = labelled(f"distance from the {start}", units, "length")
     axes.set(xlabel="load factor (above: closed nodes)", ylabel=distance)
     axes.set_title(title or f"Contact '{pair}' over the load", pad=16)
     axes.legend(loc="upper left", fontsize=8)

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
-from fastcontact.results.plot._axes import UNITS, Units, new_axes
+from fastcontact.errors import FastcontactError
+from fastcontact.mesh.argument_types import typed
+from fastcontact.results.plot._axes import UNKNOWN, Units, labelled, new_axes
 from fastcontact.results.step import ContactResult
 
 if TYPE_CHECKING:
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+@typed(FastcontactError)
 def pressure_profile(
     contact: ContactResult,
     theory: Any = None,
@@ -25,7 +28,7 @@ def pressure_profile(
     other_theories: Mapping[str, Any] | None = None,
     stress: Array | None = None,
     title: str = "",
-    units: Units = UNITS,
+    units: Units = UNKNOWN,
     ax: Axes | None = None,
 ) -> Axes:
     """Plot the contact pressure over the distance from the middle of the contact, with theory beside it.
@@ -45,7 +48,7 @@ def pressure_profile(
         `normal_stress`.
     title : str
     units : mapping
-        Names of the units of ``length`` and ``pressure`` for the labels.
+        Names of the units of ``length``, ``force`` and ``pressure`` for the labels, which have none without; see `UNITS`.
     ax : matplotlib Axes, optional
     """
     ax = new_axes(ax, (7.0, 4.6))
@@ -68,7 +71,10 @@ def pressure_profile(
     _mark_edges(ax, contact, place)
     start = "axis" if contact.measured_from_axis else "middle of the contact"
     along = "distance along the surface" if flat and not contact.measured_from_axis else "distance"
-    x_name, y_name = f"{along} from the {start} [{units['length']}]", f"contact pressure [{units['pressure']}]"
+    x_name, y_name = (
+        labelled(f"{along} from the {start}", units, "length"),
+        labelled("contact pressure", units, "pressure"),
+    )
     ax.set(xlabel=x_name, ylabel=y_name, title=title or f"Contact '{contact.name}'", xlim=(low, high))
     ax.set_ylim(min(0.0, 1.05 * float(pressure.min(initial=0.0))), 1.05 * ax.dataLim.y1 or None)
     ax.grid(alpha=0.3)

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.elasticity.recovery import von_mises
+from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNITS, Units, new_axes
+from fastcontact.results.plot._axes import UNKNOWN, Units, labelled, new_axes
 from fastcontact.results.plot.solid import MOST_EDGES, draw_solid
 from fastcontact.results.separated import separated
 from fastcontact.results.step import StepResult
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+@typed(FastcontactError)
 def deformed_shape(
     mesh: Mesh,
     step: StepResult,
@@ -30,7 +33,7 @@ def deformed_shape(
     edges: bool | None = None,
     mirrored: bool = False,
     title: str = "",
-    units: Units = UNITS,
+    units: Units = UNKNOWN,
     view: tuple[float, float] = (25.0, -60.0),
     ax: Axes | None = None,
 ) -> Axes:
@@ -66,13 +69,15 @@ def deformed_shape(
     if both is not place:
         _draw(axes, mesh, place * [-1.0, 1.0], values, edges)
     top = int(np.argmax(step.von_mises))
-    where = ", ".join(f"{x:.2f}" for x in mesh.points[top])
-    label = f"maximum {step.von_mises[top]:.1f} at ({where})"
+    where = ", ".join(f"{x:.4g}" for x in mesh.points[top])
+    label = f"maximum {step.von_mises[top]:.5g} at ({where})"
     axes.plot(*([x] for x in place[top]), "o", mfc="none", mec="red", ms=9, mew=1.5, label=label, zorder=10)
-    axes.figure.colorbar(field, ax=axes, label=f"von Mises stress [{units['pressure']}]", shrink=0.6 if solid else 0.8)
+    axes.figure.colorbar(
+        field, ax=axes, label=labelled("von Mises stress", units, "pressure"), shrink=0.6 if solid else 0.8
+    )
     axes.set_aspect("equal")
     axes.set_title(title or f"Deformed shape (displacements x {scale:g}), load factor {step.load_factor:g}")
-    axes.set(**{f"{axis}label": f"{axis} [{units['length']}]" for axis in "xyz"[: mesh.dim]})
+    axes.set(**{f"{axis}label": labelled(f"{axis}", units, "length") for axis in "xyz"[: mesh.dim]})
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.02 if solid else -0.09 if ax is not None else _below(both)))
     return axes
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from typing import Any
 
 from fastcontact.errors import FastcontactError
@@ -25,12 +27,14 @@ def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "",
     Raises
     ------
     FastcontactError
-        If PyVista is not installed.
+        If PyVista is not installed, or a window is asked for without a display.
     """
     try:
         import pyvista
     except ImportError as error:
         raise FastcontactError("the interactive view needs PyVista: pip install 'fastcontact[view]'") from error
+    if screenshot is None and not _has_display():
+        raise FastcontactError("there is no display to open a window on: write a picture instead, with --png FILE")
     grid = results.to_pyvista(step)
     grid.points = grid.points + scale * grid.point_data["displacement"]
     plotter: Any = pyvista.Plotter(off_screen=screenshot is not None)
@@ -43,3 +47,10 @@ def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "",
         plotter.view_xy()
     plotter.add_axes()
     plotter.show(screenshot=screenshot or False)
+
+
+def _has_display() -> bool:
+    """Return whether a window can be opened, as far as the environment tells."""
+    if sys.platform in ("win32", "darwin"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fastcontact.errors import FastcontactError
+from fastcontact.results.plot._axes import displayed
 
 MARKERS = "osD^v<>ph*"
 
@@ -77,6 +78,7 @@ def figure(panels: Sequence[Sequence[Panel]], size: tuple[float, float], title: 
         _draw(panel, ax)
     if title:
         made.suptitle(title, **style)
+    displayed(made)
     return made
 
 

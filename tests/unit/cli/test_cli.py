@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -125,7 +126,7 @@ def test_a_mesh_is_made_and_described(tmp_path, capsys):
     ("arguments", "message"),
     [
         (["run", "missing.toml"], "does not exist"),
-        (["runn"], "invalid choice"),
+        (["runn"], "unknown command"),
         (["info", "missing.vtkhdf"], "missing.vtkhdf"),
         (["info", "missing.med"], "missing.med"),
         (["mesh", "half-spheres", "--size", "-1", "-o", "x.med"], "size"),
@@ -320,3 +321,81 @@ def test_import_is_light():
 
 def test_a_failure_without_history_shows_none():
     assert history_lines([]) == []
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (["rum", "case.toml"], "unknown command 'rum': did you mean 'run'?"),
+        (["profil", "x.vtkhdf"], "unknown command 'profil': did you mean 'profile'?"),
+        (["run", "case.toml", "--resme"], "unknown option '--resme': did you mean '--resume'"),
+        (["run", "case.toml", "--jsn=a.json"], "unknown option '--jsn': did you mean '--json'"),
+        (["mesh", "half-sphere", "-o", "a.med"], "unknown generator 'half-sphere': did you mean 'half-spheres'"),
+        (["mesh", "box", "-o", "a.med", "--elment", "hex8"], "unknown option '--elment': did you mean '--element'"),
+        (["plot", "a.vtkhdf", "--histroy"], "unknown option '--histroy': did you mean '--history'"),
+    ],
+)
+def test_commands_and_flags_that_are_misspelt(given, told, capsys):
+    assert main(given) == 1
+    error = capsys.readouterr().err
+    assert told in error
+    assert len(error.splitlines()) == 1
+    assert "--help'" in error
+
+
+@pytest.mark.parametrize("place", [["-q", "box"], ["box", "-q"], ["box", "--quiet"]])
+def test_quiet_before_and_behind_the_name_of_a_generator(place, tmp_path, capsys):
+    assert main(["mesh", *place, "-o", str(tmp_path / "a.vtu")]) == 0
+    assert capsys.readouterr() == ("", "")
+    assert (tmp_path / "a.vtu").exists()
+
+
+def test_a_strict_run_tells_the_checks_that_fail(tmp_path, capsys):
+    wrong = CASE.replace("tolerance = 0.2", "tolerance = 1e-9").replace("steps = 3", "steps = 1")
+    (tmp_path / "case.toml").write_text(wrong)
+    command = ["run", str(tmp_path / "case.toml"), "-o", str(tmp_path / "a.vtkhdf")]
+    assert main(command) == 0
+    assert "NOT within 1e-09" in capsys.readouterr().out
+    assert main([*command, "--strict", "-q"]) == 3
+    assert "1 of 1 checks of the case failed: pole" in capsys.readouterr().err
+    (tmp_path / "case.toml").write_text(CASE.replace("steps = 3", "steps = 1"))
+    assert main([*command, "--strict", "-q"]) == 0
+
+
+@pytest.mark.filterwarnings("ignore:contact 'ceiling' never closed")
+def test_the_contact_that_was_taken_is_told_where_there_are_two(tmp_path, capsys):
+    case = fc.Model(fc.generate.half_spheres(size=25.0), kinematics="axisymmetric")
+    case.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    case.fix("A1A2", "x")
+    case.prescribe("A2B2", y=-2.0)
+    case.prescribe("A1B1", y=2.0)
+    case.add_contact("hertz", secondary="CONT1", primary="CONT2")
+    far = fc.obstacles.HalfSpace((0.0, 500.0), (0.0, -1.0))
+    case.add_obstacle("ceiling", secondary="A2B2", obstacle=far)
+    path = tmp_path / "two.vtkhdf"
+    with fc.ResultWriter(path, case) as out:
+        fc.solve(case, 1, on_step=out.write)
+    capsys.readouterr()
+    hint = "contact 'hertz', the first of 2; also there: 'ceiling'"
+    assert main(["profile", str(path)]) == 0
+    assert hint in capsys.readouterr().err
+    assert main(["profile", str(path), "--contact", "hertz"]) == 0
+    assert capsys.readouterr().err == ""
+    assert main(["profile", str(path), "-q", "--csv", str(tmp_path / "a.csv")]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_a_window_without_a_display_is_refused(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setitem(sys.modules, "pyvista", SimpleNamespace())  # it is asked for a window in no case
+    case = fc.Model(fc.generate.half_spheres(size=25.0), kinematics="axisymmetric")
+    with fc.ResultWriter(tmp_path / "a.vtkhdf", case) as out:
+        case.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+        case.prescribe("A2B2", y=-2.0)
+        case.prescribe("A1B1", y=2.0)
+        case.add_contact("hertz", secondary="CONT1", primary="CONT2")
+        fc.solve(case, 1, on_step=out.write)
+    assert main(["plot", str(tmp_path / "a.vtkhdf"), "--view"]) == 1
+    assert "there is no display to open a window on" in capsys.readouterr().err

@@ -13,8 +13,8 @@ import pytest
 from test_cli import CASE
 
 import fastcontact as fc
+from fastcontact.analysis.progress import Progress
 from fastcontact.cli import main
-from fastcontact.cli._progress import Progress
 
 DOUBT = "warning: contact 'hertz' has only 3 elements across its radius"
 STEPS = 6
@@ -299,7 +299,7 @@ def test_two_runs_begun_at_once_leave_one_good_file(whole, path):
 def test_the_progress_of_a_resumed_run_counts_what_it_solves(whole, capsys, monkeypatch):
     """Two of six steps were there; the third took a second, so that three seconds are left."""
     seconds = iter((10.0, 11.0, 12.0))
-    monkeypatch.setattr("fastcontact.cli._progress.time.perf_counter", lambda: next(seconds))
+    monkeypatch.setattr("fastcontact.analysis.progress.time.perf_counter", lambda: next(seconds))
     progress = Progress(STEPS, show=True, done=2)
     progress.step(whole[1][2])
     assert f"step 3/{STEPS}, " in (told := capsys.readouterr().err)

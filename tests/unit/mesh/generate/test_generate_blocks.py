@@ -130,7 +130,7 @@ def test_generators_need_no_argument_and_take_plain_values_only(name):
     ("make", "words"),
     [
         (lambda: block((1.0, 0.0)), r"size\[1\] = 0"),
-        (lambda: block((1.0,)), "size must be two numbers"),
+        (lambda: block((1.0,)), "size of block must be two numbers"),
         (lambda: block(divisions=(0, 2)), r"divisions\[0\] = 0"),
         (lambda: block(distortion=0.5), "distortion = 0.5 .* between 0 and 0.24"),
         (lambda: block(element="quad44"), "did you mean 'quad4'"),

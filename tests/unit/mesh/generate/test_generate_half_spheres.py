@@ -252,7 +252,7 @@ def test_default_quadrangles_have_positive_jacobians_and_reasonable_angles(eleme
         ({"element": "tri5"}, ["element 'tri5'", "tri3"]),
         ({"R": 0.0}, ["R = 0", "greater than 0"]),
         ({"R": math.nan}, ["R must be a finite number"]),
-        ({"R": "wide"}, ["R must be a number", "wide"]),
+        ({"R": "wide"}, ["R of half_spheres must be a number", "wide"]),
         ({"size": -1.0}, ["size = -1", "greater than 0"]),
         ({"size": 51.0}, ["size = 51", "at most R = 50"]),
         ({"size": 2.0, "contact_size": 3.0}, ["contact_size = 3", "at most size = 2"]),

@@ -88,7 +88,7 @@ def test_equal_arguments_give_equal_meshes():
         ({"size": 60.0}, "size = 60 is out of range"),
         ({"contact_size": 20.0}, r"contact_size = 20 .* size = 12.5"),
         ({"contact_radius": 30.0}, "contact_radius = 30 is out of range"),
-        ({"block_size": (1.0, 2.0, 3.0)}, "block_size must be two numbers"),
+        ({"block_size": (1.0, 2.0, 3.0)}, "block_size of sphere_on_block must be two numbers"),
         ({"block_size": (1.0, 0.0)}, r"block_size\[1\] = 0 is out of range"),
     ],
 )

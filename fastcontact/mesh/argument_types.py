@@ -1,0 +1,245 @@
+"""Types of the arguments of public calls: a wrong one is told by name, before it goes anywhere.
+
+What an argument may be is what its annotation says, so no call has a list of its own. Numbers are any real numbers, NumPy's
+too, but no truth values; sequences are also arrays and iterators, but no strings; arrays are all that NumPy makes one of.
+Whether a value makes sense is left to the call.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import math
+import os
+import sys
+import types
+import typing
+from collections import abc
+from collections.abc import Callable
+from numbers import Real
+from reprlib import Repr
+from typing import Any, TypeVar, Union
+
+import numpy as np
+import numpy.typing
+
+from fastcontact.errors import FastcontactError
+
+F = TypeVar("F", bound=Callable[..., Any])
+_ARRAY_LIKE = {*typing.get_args(np.typing.ArrayLike)}
+_SHORT = Repr()
+_SHORT.maxstring = _SHORT.maxother = 60
+
+
+def typed(error: type[FastcontactError]) -> Callable[[F], F]:
+    """Return a decorator of functions and dataclasses that raises `error` for an argument that its annotation excludes."""
+
+    def decorate(call: F) -> F:
+        if isinstance(call, type):
+            call.__init__ = _checked(call.__init__, call.__name__, error)  # type: ignore[misc]
+            return call
+        return typing.cast(F, _checked(call, call.__qualname__.removesuffix(".__init__"), error))
+
+    return decorate
+
+
+def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError]) -> Callable[..., Any]:
+    signature = inspect.signature(call)
+
+    @functools.wraps(call)
+    def checking(*args: Any, **kwargs: Any) -> Any:
+        try:
+            given = signature.bind(*args, **kwargs).arguments
+        except TypeError:  # Python says best which argument is missing, or is none
+            return call(*args, **kwargs)
+        for key, value in given.items():
+            parameter = signature.parameters[key]
+            if parameter.kind is parameter.VAR_KEYWORD:
+                each = {**value}
+            elif parameter.kind is parameter.VAR_POSITIONAL:
+                each = {f"{key}[{i}]": member for i, member in enumerate(value)}
+            elif value is parameter.default:
+                continue
+            else:
+                each = {key: value}
+            for argument, member in each.items():
+                check_type(f"the argument {argument} of {name}", member, types_of(call).get(key, Any), error)
+        return call(*args, **kwargs)
+
+    return checking
+
+
+def check_fields(what: str, values: abc.Mapping[str, Any], kind: type, error: type[FastcontactError]) -> None:
+    """Raise `error` if a value by name is none of the type of that field of a dataclass; `what` tells whose they are."""
+    known = {name: text for base in reversed(kind.__mro__) for name, text in types_of(base).items()}
+    for name, value in values.items():
+        check_type(f"{name} of {what}", value, known.get(name, Any), error)
+
+
+@functools.cache
+def types_of(call: Callable[..., Any]) -> dict[str, Any]:
+    """Return the types of the arguments of a function, or of the fields of a class itself, by name."""
+    found = {}
+    own = inspect.get_annotations(call)
+    space = vars(sys.modules[call.__module__])
+    for name, text in own.items():
+        try:
+            found[name] = eval(text, space) if isinstance(text, str) else text
+        except NameError:  # imported for type checkers alone
+            continue
+    return found
+
+
+def check_type(what: str, value: Any, annotation: Any, error: type[FastcontactError]) -> None:
+    """Raise `error` if a value is none of the annotated type; the message calls it `what`."""
+    if fits(value, annotation):
+        return
+    shown = f"an object of the class {type(value).__name__}"
+    if isinstance(value, str | bytes):
+        shown = f"the string {_SHORT.repr(value)}"
+    elif value is None or isinstance(value, bool | Real | complex | list | tuple | dict | set):
+        shown = f"the {type(value).__name__} {_SHORT.repr(value)}" if value is not None else "None"
+    elif isinstance(value, type):
+        shown = f"the class {value.__name__}"
+    elif isinstance(value, np.ndarray):
+        shown = f"an array of shape {value.shape}"
+    remedy = ""
+    if isinstance(value, str) and _is_number(value) and fits(1, annotation):
+        remedy = f": write {value.strip()} without quotation marks"
+    raise error(f"{what} must be {words(annotation)}, not {shown}{remedy}")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def fits(value: Any, annotation: Any) -> bool:
+    """Return whether a value is of the annotated type, as far as that can be seen without using it up."""
+    origin, members = typing.get_origin(annotation), typing.get_args(annotation)
+    if annotation in (Any, inspect.Parameter.empty, object) or isinstance(annotation, TypeVar):
+        return True
+    if _is_array_like(annotation):
+        return _makes_an_array(value)
+    if origin in (Union, types.UnionType):
+        if {*members} >= _ARRAY_LIKE:  # a union of its own, to which others were added
+            return _makes_an_array(value) or any(fits(value, member) for member in {*members} - _ARRAY_LIKE)
+        return any(fits(value, member) for member in members)
+    if annotation is None or annotation is type(None):
+        return value is None
+    if annotation in (bool, int, float):
+        return _is_real(value, annotation)
+    if origin is typing.Literal:
+        return isinstance(value, str) if all(isinstance(m, str) for m in members) else value in members
+    kind = origin or annotation
+    if kind is os.PathLike:
+        return isinstance(value, os.PathLike) and isinstance(os.fspath(value), str)
+    if kind is tuple:
+        return _fits_tuple(value, members)
+    if kind in (abc.Sequence, abc.Iterable, abc.Collection, list):
+        return _is_series(value) and _members_fit(value, members[:1])
+    if kind in (abc.Mapping, dict):
+        return isinstance(value, abc.Mapping) and (not members or all(_item_fits(i, members) for i in value.items()))
+    if kind is abc.Callable:
+        return callable(value)
+    if getattr(kind, "_is_protocol", False):
+        return all(hasattr(value, name) for name in _asked(kind)) and not isinstance(value, type)
+    return isinstance(value, kind) if isinstance(kind, type) else True
+
+
+def _asked(protocol: type) -> list[str]:
+    """Return the attributes that a protocol asks for."""
+    own = [*vars(protocol), *inspect.get_annotations(protocol)]
+    return [name for name in own if not name.startswith("_")]
+
+
+def _is_real(value: Any, kind: type) -> bool:
+    if isinstance(value, np.ndarray) and value.shape == () and value.dtype.kind in "iuf":
+        return True
+    truth = isinstance(value, bool | np.bool_)
+    if kind is bool:
+        return truth or (isinstance(value, Real) and value in (0, 1))
+    return isinstance(value, Real) and not truth and (kind is float or math.isfinite(value))
+
+
+def _is_array_like(annotation: Any) -> bool:
+    return annotation == np.typing.ArrayLike or typing.get_origin(annotation) is np.ndarray or annotation is np.ndarray
+
+
+def _makes_an_array(value: Any) -> bool:
+    if isinstance(value, np.ndarray):
+        return value.dtype.kind in "biufV"  # V: a table
+    if value is None or isinstance(value, str | bytes | abc.Mapping):
+        return False
+    try:
+        return np.asarray(value).dtype.kind in "biuf"
+    except (TypeError, ValueError):
+        return False
+
+
+def _is_series(value: Any) -> bool:
+    if isinstance(value, np.ndarray):
+        return value.ndim > 0
+    return isinstance(value, abc.Iterable) and not isinstance(value, str | bytes | abc.Mapping)
+
+
+def _members_fit(value: Any, members: tuple[Any, ...]) -> bool:
+    """Return whether the members of a series fit; an iterator is not looked into, nor a long array."""
+    if not members or not isinstance(value, list | tuple | set | frozenset | np.ndarray):
+        return True
+    return all(fits(member, members[0]) for member in (value[:1] if isinstance(value, np.ndarray) else value))
+
+
+def _fits_tuple(value: Any, members: tuple[Any, ...]) -> bool:
+    if not _is_series(value):
+        return False
+    if members[1:] == (...,) or not members:
+        return _members_fit(value, members[:1])
+    return hasattr(value, "__len__") and len(value) == len(members) and all(map(fits, value, members))
+
+
+def _item_fits(item: tuple[Any, Any], members: tuple[Any, ...]) -> bool:
+    return fits(item[0], members[0]) and fits(item[1], members[1])
+
+
+def words(annotation: Any) -> str:
+    """Return an annotated type in words: "a number or a function"."""
+    origin, members = typing.get_origin(annotation), typing.get_args(annotation)
+    if _is_array_like(annotation):
+        return "an array of numbers"
+    if origin in (Union, types.UnionType):
+        if {*members} >= _ARRAY_LIKE:
+            members = (np.typing.ArrayLike, *({*members} - _ARRAY_LIKE))
+        parts = list(dict.fromkeys(words(member) for member in members if member is not type(None)))
+        return " or ".join([*parts, *["None"] * (type(None) in members)])
+    simple = {bool: "True or False", int: "a whole number", float: "a number", str: "a string", None: "None"}
+    if annotation in simple:
+        return simple[annotation]
+    kind = origin or annotation
+    if kind is os.PathLike:
+        return "a path"
+    if kind is tuple and members and members[-1] is not ...:
+        count = {2: "two", 3: "three"}.get(len(members), str(len(members)))
+        return f"{count} numbers" if {*members} <= {int, float} else f"a sequence of {count}"
+    if kind in (abc.Sequence, abc.Iterable, abc.Collection, list, tuple):
+        return "a sequence" + (f" of {_plural(words(members[0]))}" if members else "")
+    if kind in (abc.Mapping, dict):
+        return "a dictionary" + (f" of {_plural(words(members[1]))} by name" if members else "")
+    if kind is abc.Callable:
+        return "a function"
+    name = str(getattr(kind, "__name__", kind))
+    return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
+
+
+def _plural(phrase: str) -> str:
+    if phrase.endswith(" numbers") and not phrase.startswith("a "):
+        return f"groups of {phrase}"
+    if phrase.startswith("a sequence of"):
+        return phrase.removeprefix("a ").replace("sequence", "sequences", 1)
+    return " or ".join(
+        part.removeprefix("a ").removeprefix("an ") + "s" * part.startswith(("a ", "an "))
+        for part in phrase.split(" or ")
+    )

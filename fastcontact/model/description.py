@@ -1,0 +1,91 @@
+"""A model in words: what will be solved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from fastcontact.model.contact_pair import ContactPair
+
+KINDS = {
+    "axisymmetric": "axisymmetric model (x is the radius, y the axis; forces are those over the full circle)",
+    "plane_strain": "model in plane strain (forces are those for a depth of 1)",
+    "plane_stress": "model in plane stress (forces are those for a thickness of 1)",
+    "3d": "model in three dimensions",
+}
+
+
+def sentences(model: Any) -> Iterator[str]:
+    """Yield what a `Model` is made of, a line each: kinematics and mesh, materials, supports, loads, contact, solution."""
+    mesh = model.mesh
+    cells = " and ".join(f"{len(block)} {name}" for name, block in mesh.solids.items())
+    article = "An" if model.kinematics == "axisymmetric" else "A"
+    yield f"{article} {KINDS[model.kinematics]} of {mesh.n_points} points, {cells}: {model.n_dofs} degrees of freedom."
+    for material, groups in model.materials:
+        where = "all solid cells" if groups is None else _listed(groups)
+        locking = ", with a mean dilatation against locking" if material.averaged else ""
+        yield f"Material: E = {material.E:g}, nu = {material.nu:g} in {where}{locking}."
+    if not model.materials:
+        yield "Material: none yet."
+    yield from _supports(model)
+    for load in model.loads:
+        yield f"Load: {load.name}: {_load(load)}{_history(load.ramp)}."
+    for relation in model.relations:
+        yield f"Relation: {relation.name}{_history(relation.ramp)}."
+    for spring in model.springs:
+        yield f"Spring: {spring.name.removeprefix('the spring ')}."
+    for pair in model.contact:
+        yield f"Contact '{pair.name}': {_contact(model, pair)}."
+    if not model.contact:
+        yield "Contact: none."
+    yield (
+        "Solved are small strains and linear elasticity, without inertia, step by step along the ramp given to solve "
+        "(20 equal steps without one)" + ("; the contact geometry follows the deformation." if model.contact else ".")
+    )
+
+
+def _supports(model: Any) -> Iterator[str]:
+    by_place: dict[tuple[str, Any], list[str]] = {}
+    for support in model.supports:
+        value = "a function of position" if callable(support.value) else f"{support.value:g}"
+        component = f"{'xyz'[support.component]} = {value}"
+        by_place.setdefault((support.group, support.ramp), []).append(component)
+    for (group, ramp), components in by_place.items():
+        count = len(model.mesh.points_of(group))
+        yield f"Support: {', '.join(components)} on '{group}' ({count} points){_history(ramp)}."
+    on_axis = len(model.axis_nodes)
+    if on_axis:
+        yield f"Support: x = 0 at the {on_axis} points on the axis, by symmetry."
+    if not (by_place or model.relations or model.springs or on_axis):
+        yield "Support: none."
+
+
+def _load(load: Any) -> str:
+    components: Mapping[int, Any] | None = getattr(load, "components", None)
+    if components is None:
+        return _value(load.value)
+    return ", ".join(f"{'xyz'[axis]} = {_value(value)}" for axis, value in components.items())
+
+
+def _value(value: Any) -> str:
+    return "a function of position" if callable(value) else f"{value:g}"
+
+
+def _history(ramp: Any) -> str:
+    return "" if ramp is None else ", with a history of its own"
+
+
+def _contact(model: Any, pair: ContactPair) -> str:
+    nodes = len(model.mesh.points_of(pair.secondary))
+    friction = pair.options.get("friction")
+    law = f"with friction {friction:g}" if friction else "without friction"
+    kind = pair.options.get("kind", "unilateral")
+    law = {"tied": "tied", "gap_only": "only watched, without forces"}.get(kind, law if kind == "unilateral" else kind)
+    opposite = f"'{pair.primary}'" if pair.obstacle is None else pair.opposite
+    others = sorted({*pair.options} - {"friction", "kind", "multipliers"})
+    told = f" (further options: {', '.join(others)})" if others else ""
+    return f"'{pair.secondary}' ({nodes} points) on {opposite}, {pair.method}, {law}{told}"
+
+
+def _listed(groups: tuple[str, ...]) -> str:
+    return ", ".join(f"'{group}'" for group in groups)

@@ -1,0 +1,121 @@
+"""Results for other libraries: PyVista, pandas, xarray, each imported when it is asked for."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from fastcontact.errors import FileError
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.results import layout
+from fastcontact.results.step import StepResult
+from fastcontact.results.tables import AXES, STRESS_COMPONENTS, contact_table
+
+
+def library(name: str, title: str, install: str) -> Any:
+    """Return a library; raises FileError that says how to install it where it is missing."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise FileError(f"{title} is not installed: pip install {install}") from error
+
+
+def _pyvista() -> Any:
+    return library("pyvista", "PyVista", "'fastcontact[view]'")
+
+
+def grid(mesh: Mesh, step: StepResult) -> Any:
+    """Return a step as a ``pyvista.UnstructuredGrid`` of the solid cells with fields and groups."""
+    pyvista = _pyvista()
+    cells = layout.solid_cells(mesh)
+    # VTK's older flat layout, which every PyVista takes: each cell's size before its nodes.
+    flat = np.insert(cells.connectivity, cells.offsets[:-1], np.diff(cells.offsets))
+    made = pyvista.UnstructuredGrid(flat, cells.types, layout.padded(mesh.points, 3))
+    for name, values in (layout.point_fields(mesh, step) | layout.point_flags(mesh)).items():
+        made.point_data[name] = values
+    by_cell: dict[str, Any] = layout.cell_fields(mesh) | step.cell_fields
+    if step.material_stress is not None:
+        by_cell |= {"material": step.material_stress.cells, **layout.material_fields(mesh, step)}
+    for name, values in by_cell.items():
+        made.cell_data[name] = values
+    made.field_data["load_factor"] = np.array([step.load_factor])
+    return made
+
+
+def series(mesh: Mesh, steps: Iterable[StepResult]) -> Any:
+    """Return steps as a ``pyvista.MultiBlock``, a block each, named by its number, ``"step 1"`` first."""
+    blocks = _pyvista().MultiBlock()
+    for step in steps:
+        blocks.append(grid(mesh, step), f"step {step.index}")
+    return blocks
+
+
+def contact_frame(steps: Iterable[StepResult]) -> Any:
+    """Return the contact tables of steps as one ``pandas.DataFrame``; columns as in `contact_table`, before them the step."""
+    pandas = library("pandas", "pandas", "pandas")
+    frames = []
+    for step in steps:
+        for name, contact in step.contact.items():
+            frame = pandas.DataFrame(contact_table(contact, step))
+            for column, value in (("contact", name), ("load_factor", step.load_factor), ("step", step.index)):
+                frame.insert(0, column, value)
+            frames.append(frame)
+    return (
+        pandas.concat(frames, ignore_index=True)
+        if frames
+        else pandas.DataFrame(columns=["step", "load_factor", "contact"])
+    )
+
+
+def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> Any:
+    """Return steps as an ``xarray.Dataset`` with the dimensions step, point, axis, stress_component and contact."""
+    xarray = library("xarray", "xarray", "xarray")
+    found = list(steps)
+    pairs = list(dict.fromkeys(name for step in found for name in step.contact))
+    width, dim = 4 if mesh.dim == 2 else 6, mesh.dim
+
+    def over_steps(values: list[Any], shape: tuple[int, ...]) -> Any:
+        return np.array(values, np.float64).reshape(len(found), *shape)
+
+    def of_pairs(name: str, shape: tuple[int, ...]) -> Any:
+        missing = np.full(shape, np.nan)
+        rows = [[getattr(s.contact[p], name) if p in s.contact else missing for p in pairs] for s in found]
+        return over_steps(rows, (len(pairs), *shape))
+
+    n = mesh.n_points
+    by_name = {
+        "displacement": (("axis",), (dim,), "length"),
+        "stress": (("stress_component",), (width,), "pressure"),
+        "von_mises": ((), (), "pressure"),
+        "von_mises_signed": ((), (), "pressure"),
+        "reaction": (("axis",), (dim,), "force"),
+    }
+    data = {
+        name: (
+            ("step", "point", *dims),
+            over_steps([getattr(s, name) for s in found], (n, *shape)),
+            _unit(units, quantity),
+        )
+        for name, (dims, shape, quantity) in by_name.items()
+    }
+    nodal = over_steps([layout.contact_pressure(mesh, step) for step in found], (n,))
+    data["contact_pressure"] = (("step", "point"), nodal, _unit(units, "pressure"))
+    data["contact_force"] = (("step", "contact", "axis"), of_pairs("force", (dim,)), _unit(units, "force"))
+    data["contact_pressure_max"] = (("step", "contact"), of_pairs("pressure_max", ()), _unit(units, "pressure"))
+    coordinates = {
+        "step": [step.index for step in found],
+        "load_factor": ("step", [step.load_factor for step in found]),
+        "axis": list(AXES[:dim]),
+        "stress_component": list(STRESS_COMPONENTS[:width]),
+        "contact": pairs,
+    }
+    places = {AXES[k]: (("point",), mesh.points[:, k], _unit(units, "length")) for k in range(dim)}
+    return xarray.Dataset(data, coordinates | places)
+
+
+def _unit(units: dict[str, str], quantity: str) -> dict[str, str]:
+    """Return the attributes of a field: its unit where it is known."""
+    return {"units": units[quantity]} if quantity in units else {}

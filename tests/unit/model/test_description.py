@@ -1,0 +1,85 @@
+"""What will be solved, in words."""
+
+import pytest
+
+import fastcontact as fc
+
+
+def blocks():
+    model = fc.Model(fc.generate.block_on_block(), kinematics="plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3), groups=["LOWER"])
+    model.add_material(fc.LinearElastic(E=2000.0, nu=0.499), groups=["UPPER"])
+    model.fix("LOWER_BOTTOM", "xy")
+    model.prescribe("UPPER_TOP", y=-0.1, ramp=[(0.0, 0.0), (1.0, 1.0)])
+    return model
+
+
+def test_every_part_is_told():
+    model = blocks()
+    model.add_pressure("UPPER_LEFT", lambda x: x[:, 1])
+    model.add_traction("UPPER_RIGHT", x=3.0)
+    model.add_spring("UPPER", y=2.0)
+    model.couple("UPPER_TOP", "x")
+    model.add_contact(
+        "joint", secondary="CONT_UPPER", primary="CONT_LOWER", formulation="mortar", friction=0.25, clearance=0.1
+    )
+    lines = model.describe().splitlines()
+    assert lines[0].startswith(
+        "A model in plane strain (forces are those for a depth of 1) of 73 points, 50 quad4: 146"
+    )
+    told = "\n".join(lines[1:])
+    for text in (
+        "Material: E = 1000, nu = 0.3 in 'LOWER'.",
+        "Material: E = 2000, nu = 0.499 in 'UPPER', with a mean dilatation against locking.",
+        "Support: x = 0, y = 0 on 'LOWER_BOTTOM' (9 points).",
+        "Support: y = -0.1 on 'UPPER_TOP' (7 points), with a history of its own.",
+        "Load: the pressure on 'UPPER_LEFT': a function of position.",
+        "Load: the traction on 'UPPER_RIGHT': x = 3.",
+        "Relation: couple('UPPER_TOP', 'x').",
+        "Spring: on 'UPPER'.",
+        "Contact 'joint': 'CONT_UPPER' (7 points) on 'CONT_LOWER', mortar, with friction 0.25 "
+        "(further options: clearance).",
+    ):
+        assert text in told
+
+
+def test_what_is_missing_is_told():
+    told = fc.Model(fc.generate.box(), kinematics="3d").describe()
+    assert "three dimensions" in told
+    assert "Material: none yet." in told
+    assert "Support: none." in told
+    assert "Contact: none." in told
+
+
+def test_axis_obstacle_and_kinds():
+    model = fc.Model(fc.generate.half_spheres(size=25.0), kinematics="axisymmetric")
+    model.add_contact("glue", secondary="CONT1", primary="CONT2", kind="tied")
+    model.add_obstacle("floor", secondary="A2B2", obstacle=fc.obstacles.HalfSpace((0.0, 60.0), (0.0, -1.0)))
+    told = model.describe()
+    assert "points on the axis, by symmetry" in told
+    assert "mortar with dual multipliers, tied" in told
+    assert "on a rigid obstacle, continuous, without friction" in told
+
+
+def test_a_number_of_steps_solves_so_many():
+    model = blocks()
+    model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    model.fix("UPPER_TOP", "x")
+    by_number, by_ramp = fc.solve(model, 2), fc.solve(model, fc.linear_ramp(2))
+    by_array = fc.solve(model, [0.5, 1.0])
+    assert [step.load_factor for step in by_number] == [0.5, 1.0]
+    for steps in (by_number, by_array):
+        assert all((a.displacement == b.displacement).all() for a, b in zip(steps, by_ramp, strict=True))
+
+
+@pytest.mark.parametrize("call", ["add_contact", "add_pressure", "add_traction"])
+def test_a_group_of_points_is_no_surface(call):
+    model = fc.Model(fc.generate.half_spheres(size=25.0), kinematics="axisymmetric")
+    arguments = {
+        "add_contact": ("pair",),
+        "add_pressure": ("C1", 1.0),
+        "add_traction": ("C1",),
+    }[call]
+    more = {"add_contact": {"secondary": "C1", "primary": "CONT2"}, "add_traction": {"y": 1.0}}.get(call, {})
+    with pytest.raises(fc.FastcontactError, match=r"'C1' (is a group of|holds) points"):
+        getattr(model, call)(*arguments, **more)

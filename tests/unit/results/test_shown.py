@@ -1,0 +1,180 @@
+"""What notebooks and terminals show of results, meshes, models, studies and pictures: short, and right."""
+
+import io
+import os
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.mesh.html_table import html_table
+from fastcontact.results.steps import HEAD, SHOWN, Steps
+
+# Longest repr of anything [characters]: a screen.
+SCREEN = 4000
+
+
+@pytest.fixture(scope="module")
+def model():
+    found = fc.Model(fc.generate.half_spheres(size=10.0), kinematics="axisymmetric")
+    found.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    found.fix("A1A2", "x")
+    found.prescribe("A2B2", y=-2.0)
+    found.prescribe("A1B1", y=2.0)
+    found.add_contact("hertz & co", secondary="CONT1", primary="CONT2", formulation="node_to_segment")
+    return found
+
+
+@pytest.fixture(scope="module")
+def steps(model):
+    return fc.solve(model, 3)
+
+
+def test_steps_are_a_list_with_a_short_repr(steps):
+    assert isinstance(steps, list)
+    assert [step.index for step in steps] == [1, 2, 3]
+    assert isinstance(steps[:2], Steps)
+    assert [step.index for step in steps[-2:]] == [2, 3]
+    text = repr(steps)
+    assert text.startswith("3 steps\n")
+    assert len(text.splitlines()) == 4
+    assert len(text) < SCREEN
+    contact = steps[-1].contact["hertz & co"]
+    assert f"{float(np.linalg.norm(contact.force)):.6g}" in text
+    assert f"{contact.pressure.max():.6g}" in text
+    assert [s.index for s in pickle.loads(pickle.dumps(steps))] == [1, 2, 3]
+
+
+def test_a_long_analysis_shows_its_last_steps(steps):
+    many = Steps([steps[0]] * (SHOWN + 9) + [steps[2]])
+    assert len(many) == SHOWN + 10
+    assert len(repr(many)) < 3 * SCREEN
+    assert f"{SHOWN + 10} steps, 10 of them not shown" in many._repr_html_()
+    assert many._repr_html_().count("<tr>") == SHOWN + 1
+    assert "StepResult(3" in repr(many)
+
+
+def test_one_step_and_one_contact(steps):
+    step, contact = steps[-1], steps[-1].contact["hertz & co"]
+    assert len(repr(step)) < 300
+    assert len(repr(contact)) < 300
+    closed = f"{int(contact.active.sum())} of {len(contact.points)} nodes"
+    assert closed in repr(contact)
+    assert f"{np.abs(step.displacement).max():.6g}" in repr(step)
+    html = step._repr_html_()
+    assert closed in html
+    assert str(step.iterations["geometry_updates"]) in html
+    assert "hertz &amp; co" in html
+    assert "hertz & co" not in html
+    assert len(html) < SCREEN
+
+
+def test_the_table_of_steps_has_a_row_a_pair(steps):
+    html = steps._repr_html_()
+    assert html.count("<tr>") == 1 + len(steps)
+    for name in HEAD:
+        assert f">{name}</th>" in html
+    for step in steps:
+        assert f">{step.contact['hertz & co'].pressure_max:.6g}</td>" in html
+
+
+def test_a_step_without_contact_is_shown():
+    block = fc.Model(fc.generate.block(), kinematics="plane_strain")
+    block.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    left = block.mesh.group_names
+    for name in left:
+        if name.endswith(("BOTTOM", "TOP")):
+            block.prescribe(name, x=0.0, y=0.1 if name.endswith("TOP") else 0.0)
+    solved = fc.solve(block, 1)
+    assert "1 steps" in repr(solved)
+    assert solved._repr_html_().count("<tr>") == 2
+
+
+def test_meshes_and_models(model):
+    html = model.mesh._repr_html_()
+    for name in model.mesh.group_names:
+        assert f">{name}</td>" in html
+    assert f">{model.mesh.n_points}</td>" in html
+    assert ">group of line2</td>" in html
+    assert ">group of points</td>" in html
+    told = model._repr_html_()
+    assert "axisymmetric" in told
+    assert "node_to_segment" in told
+    assert "hertz &amp; co" in told
+    assert len(repr(model)) < SCREEN
+
+
+def test_what_names_hold_is_text():
+    assert "<script>" not in html_table([("<script>", 1)], ("<b>",), "<i>&")
+    assert "&lt;script&gt;" in html_table([("<script>", 1)])
+
+
+@pytest.mark.parametrize("name", ["pressure_profile", "deformed_shape", "axis_stress", "history", "contact_zones"])
+def test_pictures_display_themselves_and_take_axes(name, model, steps):
+    plt = pytest.importorskip("matplotlib.figure")
+    pair = "hertz & co"
+    arguments = {
+        "pressure_profile": (steps[-1].contact[pair],),
+        "deformed_shape": (model.mesh, steps[-1]),
+        "axis_stress": (model.mesh, steps[-1], pair),
+        "history": (steps, pair),
+        "contact_zones": (steps, pair),
+    }[name]
+    drawn = getattr(fc.plot, name)(*arguments)
+    png = drawn._repr_png_()
+    assert png.startswith(b"\x89PNG")
+    from matplotlib.image import imread
+
+    pixels = imread(io.BytesIO(png))
+    assert min(pixels.shape[:2]) > 300
+    assert len(np.unique(pixels[..., :3])) > 10  # not blank
+    own = plt.Figure()
+    axes = own.subplots(1, 2)
+    if name == "history":
+        assert getattr(fc.plot, name)(*arguments, axes=axes)[0] is axes[0]
+    else:
+        assert getattr(fc.plot, name)(*arguments, ax=axes[0]) is axes[0]
+        assert axes[0].has_data()
+        assert not axes[1].has_data()
+
+
+def test_progress_is_written_where_it_is_asked_for(model, capsys):
+    fc.solve(model, 2)
+    assert capsys.readouterr().err == ""
+    fc.solve(model, 2, progress=True)
+    told = capsys.readouterr().err
+    assert "step 1/2" in told
+    assert "step 2/2" in told
+    assert "nodes in contact" in told
+
+
+COMPILED = """
+import logging, sys
+logging.basicConfig(level=logging.INFO, stream=sys.stdout, format="%(message)s")
+from fastcontact._jit import compiling
+from fastcontact.analysis.progress import Progress
+with Progress(3, show=True):
+    import numba
+    import fastcontact._jit.decorators
+    def double(x):
+        return 2.0 * x
+    double.__module__ = "fastcontact.example"
+    compiled = numba.njit(double)
+    assert compiled(2.0) == 4.0
+    assert compiled(2) == 4
+print("listeners", len(compiling.listeners))
+"""
+
+
+def test_compiling_is_told_once(tmp_path):
+    """To the log, and on the line of the progress; Numba's own functions and cached ones say nothing."""
+    run = subprocess.run(
+        [sys.executable, "-c", COMPILED], capture_output=True, text=True, timeout=300, check=True,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "0"},
+    )  # fmt: skip
+    assert run.stdout.count("compiling kernels") == 1, run.stdout
+    assert run.stderr.count("compiling kernels") == 1, run.stderr
+    assert "listeners 0" in run.stdout

@@ -1,0 +1,161 @@
+"""Arguments of a wrong type: every public call tells which one it is, by one of our errors."""
+
+import inspect
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike, NDArray
+
+import fastcontact as fc
+from fastcontact.mesh.argument_types import check_type, fits, typed, words
+
+WRONG = (None, "5", "abc", 5, [1, 2], {"a": 1}, object(), b"x", [None], 1j, np.array([1.0, 2.0]))
+
+
+def model(contact=True):
+    found = fc.Model(fc.generate.half_spheres(size=25.0), kinematics="axisymmetric")
+    found.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    found.fix("A1A2", "x")
+    found.prescribe("A2B2", y=-2.0)
+    found.prescribe("A1B1", y=2.0)
+    if contact:
+        found.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="node_to_segment")
+    return found
+
+
+def of_model(method):
+    return lambda **given: getattr(model(contact=False), method)(**given)
+
+
+def defaults(call, **given):
+    """Return the arguments of a call: those given, the defaults of the others."""
+    known = inspect.signature(call).parameters.values()
+    return {p.name: p.default for p in known if p.default is not p.empty} | given
+
+
+SIDES = {"name": "h", "secondary": "CONT1", "primary": "CONT2"}
+CALLS = {
+    "LinearElastic": (fc.LinearElastic, {"E": 1.0, "nu": 0.3, "volumetric": "auto"}),
+    "linear_ramp": (fc.linear_ramp, {"steps": 3, "end": 1.0}),
+    "Ramp": (fc.Ramp, {"instants": (1.0,), "table": ((0.0, 0.0), (1.0, 1.0))}),
+    "Criteria": (fc.Criteria, defaults(fc.Criteria)),
+    "Model": (lambda **k: fc.Model(**k), {"mesh": fc.generate.block(), "kinematics": "plane_strain"}),
+    "add_material": (of_model("add_material"), {"material": fc.LinearElastic(1.0, 0.3), "groups": None}),
+    "fix": (of_model("fix"), {"group": "A1A2", "components": "x"}),
+    "prescribe": (of_model("prescribe"), {"group": "A1A2", "normal": None, "ramp": None, "x": 0.0}),
+    "add_pressure": (of_model("add_pressure"), {"group": "A1B1", "value": 1.0, "ramp": None}),
+    "add_traction": (of_model("add_traction"), {"group": "A1B1", "y": 1.0, "ramp": None}),
+    "add_body_force": (of_model("add_body_force"), {"groups": None, "y": 1.0, "ramp": None}),
+    "add_force": (of_model("add_force"), {"group": "A1B1", "y": 1.0, "distribute": None, "ramp": None}),
+    "couple": (of_model("couple"), {"group": "A1B1", "component": "y"}),
+    "relate": (of_model("relate"), {"terms": [("A1", "y", 1.0), ("B1", "y", -1.0)], "value": 0.0, "ramp": None}),
+    "relate_groups": (of_model("relate_groups"), {"first": "A1B1", "second": "A2B2", "component": "y"}),
+    "add_spring": (of_model("add_spring"), {"group": "A1", "to": None, "x": 1.0, "direction": None}),
+    **{
+        f"add_contact {formulation}": (
+            of_model("add_contact"),
+            SIDES | {"formulation": formulation, "friction": 0.1, "slip": "symmetric", "projection_tolerance": 0.05},
+        )
+        for formulation in ("node_to_segment", "continuous", "mortar")
+    },
+    "add_obstacle": (
+        of_model("add_obstacle"),
+        {"name": "o", "secondary": "CONT1", "obstacle": fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0)), "friction": 0.1},
+    ),
+    "solve": (lambda **k: fc.solve(model(), **k), {"ramp": fc.linear_ramp(1), "criteria": None, "resume": ()}),
+    "open_results": (fc.open_results, {"path": "none.vtkhdf"}),
+    "read_mesh": (fc.read_mesh, {"path": "none.med"}),
+    "half_spheres": (fc.generate.half_spheres, {"element": "tri3", "R": 50.0, "size": 25.0}),
+    "box": (fc.generate.box, defaults(fc.generate.box)),
+    "mirrored": (fc.generate.mirrored, {"mesh": fc.generate.block(), "axis": "x", "at": 0.0, "rename": None}),
+    "Sphere": (fc.obstacles.Sphere, {"centre": (0.0, 0.0), "R": 1.0, "hollow": False}),
+    "convergence_study": (fc.convergence_study, {"case": "none.toml", "levels": 2, "elements": None}),
+    "parameter_sweep": (fc.parameter_sweep, {"case": "none.toml", "parameters": {"approach": [1.0]}}),
+    "points_of": (fc.generate.half_spheres(size=25.0).points_of, {"group": "CONT1"}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CALLS)
+@pytest.mark.filterwarnings("ignore")
+def test_nothing_but_our_own_errors(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    call, good = CALLS[name]
+    told = 0
+    for argument in good:
+        for wrong in WRONG:
+            try:
+                call(**{**good, argument: wrong})
+            except fc.FastcontactError:
+                told += 1
+    assert told >= 4 * len(good)  # at least strings, dictionaries, complex numbers and any object, mostly
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: fc.LinearElastic(E="2e5", nu=0.3), "the argument E of LinearElastic must be a number, not the string '2e5'"),
+        (lambda: fc.linear_ramp("5"), "the argument steps of linear_ramp must be a whole number, not the string '5'"),
+        (lambda: fc.open_results(None), "the argument path of open_results must be a string or a path, not None"),
+        (lambda: model().add_material({"E": 1}), "the argument material of Model.add_material must be a LinearElastic"),
+        (lambda: fc.solve(model(), resume=[1, 2]), "the argument resume of solve must be a sequence of StepResults"),
+        (lambda: model(False).add_contact(**SIDES, friction="0.3"), "friction of contact 'h' must be a number"),
+        (lambda: fc.generate.half_spheres(size="2"), "size of half_spheres must be a number or None, not the string '2'"),
+        (lambda: fc.solve("model"), "the argument model of solve must be a Model, not the string 'model'"),
+        (lambda: fc.generate.union(fc.generate.block(), 3), r"argument meshes\[1\] of union must be a Mesh, not the int 3"),
+    ],
+)  # fmt: skip
+def test_the_message_names_the_argument(make, text):
+    with pytest.raises(fc.FastcontactError, match=text):
+        make()
+
+
+def test_numbers_in_quotation_marks_are_recognised():
+    with pytest.raises(fc.ModelError, match="write 2e5 without quotation marks"):
+        fc.LinearElastic(E="2e5", nu=0.3)
+
+
+@pytest.mark.parametrize(
+    ("annotation", "good", "bad"),
+    [
+        (float, (1, 2.0, np.float32(1), np.int64(3), np.array(2.0)), (True, "1", None, [1.0], 1j)),
+        (bool, (True, np.bool_(False), 0, 1), ("yes", None, 2)),
+        (int | None, (None, 3), ("3", [])),
+        (tuple[float, float], ((1, 2), [1.0, 2.0], np.array([1.0, 2.0])), ((1, 2, 3), "ab", 1.0, ("a", "b"))),
+        (tuple[float, ...], ((1, 2, 3), []), ("abc", 1.0)),
+        (dict[str, float], ({}, {"a": 1}), ({"a": "b"}, [("a", 1)])),
+        (ArrayLike, (1.0, [1, 2], np.zeros(3)), ("abc", None, {"a": 1}, object())),
+        (NDArray[np.float64], (np.zeros(3), [1.0]), ("abc", None)),
+        (fc.obstacles.Obstacle, (fc.obstacles.HalfSpace((0, 0), (0, 1)),), (3, "sphere", fc.obstacles.Sphere)),
+    ],
+)
+def test_what_fits_an_annotation(annotation, good, bad):
+    for value in good:
+        assert fits(value, annotation), value
+        check_type("it", value, annotation, fc.ModelError)
+    for value in bad:
+        assert not fits(value, annotation), value
+        with pytest.raises(fc.ModelError, match="it must be "):
+            check_type("it", value, annotation, fc.ModelError)
+
+
+def test_types_in_words():
+    assert words(float | None) == "a number or None"
+    assert words(tuple[float, float]) == "two numbers"
+    assert words(dict[str, float]) == "a dictionary of numbers by name"
+    assert words(fc.Mesh) == "a Mesh"
+
+
+def test_what_is_no_wrong_type_stays_python_s():
+    @typed(fc.ModelError)
+    def call(first: float, second: "Unknown" = None) -> float:  # noqa: F821
+        return first
+
+    assert call(1, second="anything") == 1
+    assert call.__name__ == "call"
+    with pytest.raises(TypeError, match="missing"):
+        call()
+
+
+def test_only_public_names_are_listed():
+    for namespace in (fc, fc.analytic, fc.generate, fc.obstacles, fc.plot):
+        assert set(dir(namespace)) <= {*namespace.__all__, "__version__"}, namespace

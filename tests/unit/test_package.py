@@ -1,0 +1,42 @@
+"""What is packed: nothing of other folders of the same names, and what the package says of itself."""
+
+import re
+import tomllib
+
+import pytest
+
+
+@pytest.fixture
+def project(root):
+    return tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+def test_patterns_of_the_source_archive_hold_at_the_root_alone(project, root):
+    """Without the first stroke a virtual environment in the tree has folders of these names, too."""
+    for pattern in project["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]:
+        assert pattern.startswith("/"), pattern
+        assert (root / pattern[1:]).exists(), pattern
+
+
+def test_the_pythons_that_are_named_are_allowed(project):
+    least = tuple(map(int, re.findall(r"\d+", project["project"]["requires-python"])))
+    named = re.findall(r"Python :: (\d+)\.(\d+)", "\n".join(project["project"]["classifiers"]))
+    assert named
+    assert min((int(a), int(b)) for a, b in named) == least
+
+
+def test_the_version_is_the_same_everywhere(project, root):
+    version = project["project"]["version"]
+    assert f"\nversion: {version}\n" in (root / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"## {version}" in (root / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_figures_beside_others_are_those_of_the_benchmarks(root):
+    """Each number of seconds that README gives for another program stands on the page of the benchmarks."""
+    readme = (root / "README.md").read_text(encoding="utf-8")
+    table = readme.split("## Beside others")[1].split("## ")[0]
+    measured = (root / "bench" / "README.md").read_text(encoding="utf-8")
+    figures = re.findall(r"\b(\d+(?:\.\d+)?) s\b", table)
+    assert len(figures) >= 6
+    for figure in figures:
+        assert re.search(rf"(?<![\d.]){re.escape(figure)}(?![\d.])", measured), figure
