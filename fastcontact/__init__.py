@@ -32,6 +32,7 @@ _MODULES = {
 _NAMES = {
     "analysis.criteria": ("Criteria",),
     "analysis.run": ("solve", "solve_steps"),
+    "cases.decks.deck": ("Deck", "read_deck"),
     "elasticity.materials": ("LinearElastic",),
     "errors": (
         "CaseError",

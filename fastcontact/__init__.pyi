@@ -5,6 +5,8 @@ from fastcontact._version import __version__ as __version__
 from fastcontact.analysis.criteria import Criteria as Criteria
 from fastcontact.analysis.run import solve as solve
 from fastcontact.analysis.run import solve_steps as solve_steps
+from fastcontact.cases.decks.deck import Deck as Deck
+from fastcontact.cases.decks.deck import read_deck as read_deck
 from fastcontact.contact import obstacles as obstacles
 from fastcontact.elasticity import recovery as recovery
 from fastcontact.elasticity.materials import LinearElastic as LinearElastic
