@@ -60,7 +60,33 @@ def forma04c(dofs):
     return model
 
 
-PROBLEMS = {"sphere-on-block": (sphere_on_block, "amg"), "forma04c": (forma04c, "auto")}
+def pressed_blocks(dofs, friction=0.0, multipliers="standard"):
+    """Two blocks that do not match, pressed together over the whole interface and pushed along it."""
+
+    def block(divisions, z, name):
+        mesh = fc.generate.box((1.0, 1.0, 0.5), (divisions, divisions, divisions // 2), "hex8", (0.0, 0.0, z))
+        return fc.generate.renamed(mesh, {group: name + group for group in mesh.group_names})
+
+    n = max(4, round((dofs / 2.52) ** (1 / 3)))
+    model = fc.Model(fc.generate.union(block(n, -0.5, "LOWER_"), block(n * 4 // 5, 0.0, "UPPER_")), kinematics="3d")
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    model.fix("LOWER_ZMIN", "xyz")
+    model.prescribe("UPPER_ZMAX", x=0.001 if friction else 0.0, y=0.0, z=-0.01)
+    options = {"formulation": "mortar", "multipliers": multipliers, "friction": friction}
+    model.add_contact("c", secondary="UPPER_ZMIN", primary="LOWER_ZMAX", **options)
+    return model
+
+
+def pushed_blocks(dofs):
+    return pressed_blocks(dofs, friction=0.3)
+
+
+PROBLEMS = {
+    "sphere-on-block": (sphere_on_block, "amg"),
+    "forma04c": (forma04c, "auto"),
+    "pressed-blocks": (pressed_blocks, "amg"),
+    "pushed-blocks": (pushed_blocks, "amg"),
+}
 
 
 def matrix_of(problem):

@@ -24,7 +24,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", metavar="FILE", help="write figures and environment")
     parser.add_argument("--png", metavar="FOLDER", help="draw time and memory against unknowns, a picture a benchmark")
     parser.add_argument("--compare", metavar="FILE", help="compare with a run stored by --json")
-    parser.add_argument("--problem", metavar="NAME", help="with contact: sphere-on-block or forma04c, in detail")
+    parser.add_argument("--problem", metavar="NAME", help="with contact, in detail: sphere-on-block, forma04c ...")
     parser.add_argument("--dofs", type=int, metavar="N", help="with --problem: about how many unknowns")
     parser.add_argument("--linear", metavar="SOLVER", help="with --problem: linear solver (default: the problem's)")
     parser.add_argument("--tolerance", type=float, metavar="T", help="with --problem: of solver and geometry (1e-8)")

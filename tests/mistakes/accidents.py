@@ -41,7 +41,7 @@ ACCIDENTS = [
         "the disk is full",
         full_disk,
         ["run", "case.toml"],
-        r"'.*case\.vtkhdf' cannot be begun \(No space left on device\), 0 steps are complete: see whether the disk is full",
+        r"'.*case\.vtkhdf' cannot be written \(No space left on device\): see whether the disk is full",
     ),
     (
         "the folder is write-protected",

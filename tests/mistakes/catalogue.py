@@ -401,7 +401,7 @@ COMMANDS = [
     (
         "results over the mesh",
         ["run", "case.toml", "-o", "forma04a.med"],
-        r"'.*forma04a\.med' exists and is no result file: name another file or remove it first",
+        r"'.*forma04a\.med' is what this command reads: name another file to write",
     ),
     (
         "threads in words",

@@ -143,7 +143,7 @@ DOUBTS = [
             held("LOWER_BOTTOM", x=0.0, y=0.0),
             held("UPPER_TOP", x=0.0),
             '[[couple]]\ngroup = "UPPER_TOP"\ncomponent = "y"\n',
-            '[[force]]\ngroup = "UPPER_TOP_LEFT"\ny = -1e-6\n',
+            '[[force]]\ngroup = "UPPER_TOP_LEFT"\ny = -1e-7\n',
             PAIR,
         ),
         (

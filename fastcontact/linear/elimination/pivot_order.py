@@ -15,15 +15,15 @@ from scipy.linalg import qr
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import connected_components, min_weight_full_bipartite_matching
 
-from fastcontact.linear.elimination.coupled_pivots import CoupledPivots, RepeatedError, block_inverse
+from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, RepeatedError, block_inverse
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 # An unknown is taken as pivot where its entry is at least this part of the largest one of the equation.
 SMALLEST = 0.25
-# Up to so many equations that share unknowns are inverted as a block.
-LARGEST_BLOCK = 64
+# Up to so many equations that share unknowns are inverted as a block; and where factors do not suit them.
+LARGEST_BLOCK, FULL_UP_TO = 64, 500
 # Up to so many equations, pivots are assigned by a dense factorisation.
 DENSE_UP_TO = 400
 # With more layers than this the sum of products costs more than it saves.
@@ -76,8 +76,13 @@ def inverse_of(B: csr_array, pivots: Indices, size: int) -> csr_array | CoupledP
     """
     P = csr_array(B[:, pivots])
     label = connected_components(P, directed=False)[1]
-    if len(label) and np.bincount(label).max() > LARGEST_BLOCK:
-        return CoupledPivots(P, pivots, size)
+    largest = np.bincount(label).max(initial=0)
+    if largest > LARGEST_BLOCK:
+        try:
+            return CoupledPivots(P, pivots, size)
+        except CoupledError:
+            if largest > FULL_UP_TO:
+                raise
     return block_inverse(P)
 
 

@@ -76,7 +76,7 @@ def replacing(path: PathLike) -> Iterator[Path]:
         _synchronise(target.parent)
     except OSError as error:
         raise FileError(
-            f"'{target}' cannot be written ({error.strerror or error}): see whether the disk is full or the folder protected"
+            f"'{path}' cannot be written ({error.strerror or error}): see whether the disk is full or the folder protected"
         ) from error
     finally:
         with contextlib.suppress(OSError):

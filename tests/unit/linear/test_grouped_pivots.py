@@ -56,5 +56,5 @@ def test_forces_move_along_the_rows_that_multipliers_act_through():
     np.testing.assert_allclose(moved, r - through.T @ multiplier, atol=1e-12)
     assert np.abs(moved[tied.pivots]).max() < 1e-12
     assert np.abs((tied.force_weights - tied.weights).data).max() > 0.01
-    symmetric = eliminate(B, np.zeros(B.shape[0]), groups=label)
+    symmetric = eliminate(B, np.zeros(B.shape[0]), nodes=label)
     assert symmetric.force_weights is symmetric.weights

@@ -28,7 +28,7 @@ def test_smallest_size_runs_and_is_recorded(name, tmp_path, capsys):
     assert name in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("problem", ["sphere-on-block", "forma04c"])
+@pytest.mark.parametrize("problem", ["sphere-on-block", "forma04c", "pressed-blocks", "pushed-blocks"])
 def test_contact_in_detail(problem, tmp_path):
     path = tmp_path / "contact.json"
     assert main(["bench", "contact", "--problem", problem, "--dofs", "1500", "--json", str(path), "-q"]) == 0

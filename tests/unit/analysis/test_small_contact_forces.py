@@ -1,0 +1,41 @@
+"""Friction whose forces linear solutions leave less accurate than asked for: multigrid settles at what they are worth."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.analysis.friction import eliminated
+from fastcontact.analysis.load_step import load_step
+from fastcontact.analysis.problem import prepare
+
+
+def light_contact_beside_a_large_force(shift):
+    """Return two blocks pressed together and pushed along each other, and a third one far away that is stretched hard."""
+
+    def part(z, k, name):
+        mesh = fc.generate.box((1.0, 1.0, 0.5), (k, k, k // 2), "hex8", (0.0, 0.0, z))
+        return fc.generate.renamed(mesh, {group: name + group for group in mesh.group_names})
+
+    model = fc.Model(fc.generate.union(part(-0.5, 6, "L_"), part(0.0, 5, "U_"), part(5.0, 6, "FAR_")), "3d")
+    model.add_material(fc.LinearElastic(1.0, 0.3))
+    model.fix("L_ZMIN", "xyz")
+    model.prescribe("U_ZMAX", x=shift, y=0.0, z=-0.001)
+    model.fix("FAR_XMIN", "xyz")
+    model.prescribe("FAR_XMAX", x=0.2, y=0.0, z=0.0)
+    model.add_contact("c", secondary="U_ZMIN", primary="L_ZMAX", formulation="mortar", multipliers="dual", friction=0.2)
+    return model
+
+
+@pytest.mark.parametrize("acceptable", [eliminated.ACCEPTABLE, 0.0])
+def test_forces_that_cannot_be_more_accurate_settle_without_a_compliance(acceptable, monkeypatch):
+    monkeypatch.setattr(eliminated, "EXACT", 0.0)
+    monkeypatch.setattr(eliminated, "ENOUGH", 1e-9)  # more than linear solutions to 1e-10 can give
+    monkeypatch.setattr(eliminated, "ACCEPTABLE", acceptable)
+    model, found = light_contact_beside_a_large_force(6e-4), {}
+    for name in ("amg", "direct"):
+        problem = prepare(model, fc.linear_ramp(1), fc.Criteria(), linear_solver=name)
+        found[name] = load_step(problem, problem.initial_state(), 1, 1.0)[1].contact["c"]
+        if name == "amg":
+            assert bool(problem.solver.columns.asked) == (acceptable == 0.0)
+    assert np.abs(found["amg"].force - found["direct"].force).max() < 1e-6 * np.abs(found["direct"].force).max()
+    assert found["amg"].active.sum() > found["amg"].sticking.sum()
