@@ -33,6 +33,8 @@ _NAMES = {
     "analysis.criteria": ("Criteria",),
     "analysis.run": ("solve", "solve_steps"),
     "cases.decks.deck": ("Deck", "read_deck"),
+    "elasticity.anisotropic_materials": ("Anisotropic", "Orthotropic"),
+    "elasticity.material_axes": ("CylindricalAxes",),
     "elasticity.materials": ("LinearElastic",),
     "errors": (
         "CaseError",

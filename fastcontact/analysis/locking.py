@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from fastcontact.analysis.problem import Problem
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.energy import cell_volumes
+from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.mesh import elements
 from fastcontact.model.model import Model
 
@@ -51,7 +52,9 @@ class Comparison:
     def __init__(self, model: Model) -> None:
         self._model, (self._moduli, self._material) = model, model.material_numbers()
         self._averaged = model.averaged_materials()
-        nu = np.array([material.nu for material, _ in model.materials])
+        nu = np.full(len(self._moduli), -1.0)  # only isotropic materials have a mean dilatation
+        for number, (material, _) in enumerate(model.materials):
+            nu[number] = material.nu if isinstance(material, LinearElastic) else -1.0
         self._suspicious = (nu >= SUSPICIOUS) & (model.kinematics != "plane_stress")
         self._cells = {name: rows for name in model.mesh.solids if (rows := self._may_lock(name)).any()}
         self.elements = list(self._cells)

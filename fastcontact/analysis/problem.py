@@ -19,7 +19,8 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.elasticity.constrained_system import System
-from fastcontact.elasticity.material_sides import MaterialSides, distinct, material_sides
+from fastcontact.elasticity.material_field import MaterialField
+from fastcontact.elasticity.material_sides import MaterialSides, material_sides
 from fastcontact.elasticity.springs import stiffened
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.linear import choice
@@ -68,10 +69,8 @@ class Problem:
         Prepared with the stiffness matrix; its snapshot is part of the state.
     pairs : dict of str to Formulation
         The contact pairs.
-    moduli : ndarray (n_materials, n_components, n_components)
-        Elastic moduli [pressure].
-    material : dict of str to ndarray of int (n_cells,)
-        By element, the material of every solid cell.
+    field : MaterialField
+        Materials of all solid cells.
     system : System
         Stiffness, supports and relations.
     bodies : UnsupportedBodies, optional
@@ -93,8 +92,7 @@ class Problem:
     criteria: Criteria
     solver: LinearSolver
     pairs: Mapping[str, Formulation]
-    moduli: Array
-    material: dict[str, NDArray[np.int32]]
+    field: MaterialField
     sides: MaterialSides
     system: System
     bodies: UnsupportedBodies | None
@@ -107,7 +105,7 @@ class Problem:
     @cached_property
     def material_of_cells(self) -> NDArray[np.int32]:
         """Material of every solid cell (n_solids,), equal ones under one number."""
-        return np.concatenate(list(distinct(self.moduli, self.material).values()))
+        return np.concatenate(list(self.field.distinct.values()))
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -189,9 +187,10 @@ def prepare(
         tolerance=choice.tight_enough(linear_tolerance, criteria.relative),
         columns=not all(pair.eliminable for pair in pairs.values()),
     )  # fmt: skip
-    moduli, material = model.material_numbers()
-    sides = material_sides(mesh, distinct(moduli, material))
-    K = stiffened(stiffness(mesh, model.kinematics, moduli, material, None, model.averaged_materials()), model.springs)
+    field = model.material_field()
+    sides = material_sides(mesh, field.distinct)
+    K = stiffness(mesh, model.kinematics, field.moduli, field.rows, None, field.averaged)
+    K = stiffened(K, model.springs)
     system = System(
         driven.stiffness(K),
         driven.supported(supported).ravel(),
@@ -204,7 +203,7 @@ def prepare(
     bodies = UnsupportedBodies(motions, system, involved) if len(motions) else None
     involved = _prepare_solver(solver, system, bodies, driven.near_nullspace(near_nullspace(model)), involved)
     return Problem(
-        model, ramp, criteria, solver, pairs, moduli, material, sides, system, bodies,
+        model, ramp, criteria, solver, pairs, field, sides, system, bodies,
         SurfaceDofs(system, contact_dofs, involved) if pairs and bodies is None and solver.condenses
         else ActiveDofs(system, contact_dofs),
         contact_dofs, driven, driven.prescribed(prescribed), driven.forces(model.forces_by_ramp()),

@@ -52,10 +52,10 @@ def recover(
     at_places = recovery.nodal_stress(
         mesh,
         problem.model.kinematics,
-        problem.moduli,
-        problem.material,
+        problem.field.moduli,
+        problem.field.rows,
         u,
-        problem.model.averaged_materials(),
+        problem.field.averaged,
         problem.sides,
     )
     stress, by_material = by_largest_von_mises(problem.sides, problem.material_of_cells, at_places, mesh.n_points)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +13,7 @@ from fastcontact.analysis.state import State
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import element_kernels, recovery
+from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies
@@ -135,17 +138,23 @@ def _carrying_springs(problem: Problem, state: State) -> list[str]:
 
 
 def _large_strain(problem: Problem, last: StepResult) -> list[str]:
-    shear = np.array([material.shear_modulus for material, _ in problem.model.materials])
+    laws, field = [material for material, _ in problem.model.materials], problem.field
+    isotropic = np.array([isinstance(law, LinearElastic) for law in laws])
+    shear = np.array([law.shear_modulus if isinstance(law, LinearElastic) else math.inf for law in laws])
     strain, border = 0.0, last.material_stress
     inside = np.ones(len(last.stress), bool)
     if border is not None:
         inside[border.points] = False
         strain = float((recovery.von_mises(border.stress) / (3 * shear[border.material])).max())
     for name, block in problem.model.mesh.solids.items():
-        for number in np.unique(problem.material[name]):
-            nodes = np.unique(block[problem.material[name] == number])
+        for number in np.unique(field.number[name]):
+            nodes = np.unique(block[field.number[name] == number])
             stress = last.von_mises[nodes[inside[nodes]]]
             strain = max(strain, float(stress.max(initial=0.0) / (3 * shear[number])))
+        others = np.flatnonzero(~isotropic[field.number[name]])
+        mean = last.stress[block[others]].mean(axis=1)
+        strains = np.einsum("cij,cj->ci", field.compliance[field.rows[name][others]], mean)
+        strain = max(strain, float(recovery.equivalent_strain(strains).max(initial=0.0)))
     if strain <= STRAIN:
         return []
     return [f"the largest equivalent strain is {strain:.3f}, beyond the {STRAIN} where linear kinematics hold well"]

@@ -22,7 +22,18 @@ SOLVE: dict[str, Any] = {
 }
 # Tables that may occur several times, by kind: the types of their keys, and the keys that are required.
 LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
-    "material": ({"E": NUMBER, "nu": NUMBER, "groups": (list, str), "volumetric": str}, ("E", "nu")),
+    "material": (
+        {
+            **dict.fromkeys(("E", "nu"), (int, float, list)),
+            "groups": (list, str),
+            "volumetric": str,
+            **dict.fromkeys(("G", "D"), list),
+            "axes": (list, dict),
+            "density": NUMBER,
+            "expansion": (int, float, list),
+        },
+        (),
+    ),
     "support": ({"group": str, **AXES, "normal": NUMBER, "ramp": list}, ("group",)),
     "pressure": ({"group": str, "value": NUMBER, "ramp": list}, ("group", "value")),
     "traction": ({"group": str, **AXES, "ramp": list}, ("group",)),

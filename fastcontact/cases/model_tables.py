@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from pathlib import Path
 from reprlib import repr
@@ -9,7 +10,9 @@ from typing import Any
 
 from fastcontact.cases.keys import AXES, LISTS, NUMBER, SURFACE, at, called, check_keys, tables
 from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
-from fastcontact.elasticity.materials import LinearElastic
+from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
+from fastcontact.elasticity.material_axes import CylindricalAxes
+from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.errors import CaseError, unknown
 from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.mesh import Mesh
@@ -17,8 +20,40 @@ from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
 
-def _add_material(model: Model, E: float, nu: float, groups: Any = None, volumetric: str = "auto") -> None:
-    model.add_material(LinearElastic(float(E), float(nu), volumetric), groups)
+def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
+    """Add the material whose constants are given: isotropic, orthotropic where E, nu or G are lists, anisotropic with D."""
+    kind = _material_law(constants)
+    if isinstance(constants.get("axes"), dict):
+        constants["axes"] = called("material.axes", CylindricalAxes, constants["axes"])
+    if kind is LinearElastic:
+        for key in constants:
+            if key != "volumetric" and not isinstance(constants[key], (list, tuple)) and key != "axes":
+                constants[key] = float(constants[key])
+    for key in constants:
+        if key not in inspect.signature(kind).parameters:
+            raise CaseError(f"the key 'material.{key}' is none of a material that is {_LAWS[kind]}")
+    model.add_material(kind(**constants), groups)
+
+
+def _material_law(entry: dict[str, Any]) -> type[Material]:
+    if "D" in entry:
+        return Anisotropic
+    return (
+        Orthotropic if "G" in entry or any(isinstance(entry.get(key), list) for key in ("E", "nu")) else LinearElastic
+    )
+
+
+# What each law is called, and the keys of a case file that it needs.
+_LAWS: dict[type[Material], str] = {
+    LinearElastic: "isotropic",
+    Orthotropic: "orthotropic (E, nu and G are lists of three)",
+    Anisotropic: "anisotropic (D is a matrix)",
+}
+_NEEDED: dict[type[Material], tuple[str, ...]] = {
+    LinearElastic: ("E", "nu"),
+    Orthotropic: ("E", "nu", "G"),
+    Anisotropic: ("D",),
+}
 
 
 # By kind of table, in the order in which they are added to the model.
@@ -45,7 +80,7 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
         for i, entry in enumerate(tables(kind, data.get(kind, []))):
             where = f"{kind}[{i}]"
             check_keys(where, entry, known)
-            for key in needed:
+            for key in _NEEDED[_material_law(entry)] if kind == "material" else needed:
                 if key not in entry:
                     raise CaseError(f"{where} needs '{key}'")
             with at(where):

@@ -43,12 +43,41 @@ def _owned(cells, c, owner, part, mine):
 
 
 @kernel
-def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric, slots, owner, part, data):
+def _general_cell(points, cell, N, dN, weights, D, axisymmetric, gradient, local):
+    """Fill `local` (n_nodes, n_nodes, 2, 2), zero before, for any moduli; return whether the Jacobian is positive."""
+    n_nodes = cell.shape[0]
+    for q in range(weights.shape[0]):
+        det, radius = _map(points, cell, N, dN, q, gradient)
+        if not det > 0.0:
+            return False
+        weight = weights[q] * det
+        if axisymmetric:
+            weight *= TWO_PI * radius
+        for b in range(n_nodes):
+            bx, by = weight * gradient[b, 0], weight * gradient[b, 1]
+            bh = weight * N[q, b] / radius if axisymmetric else 0.0
+            xx_x, xx_y = D[0, 0] * bx + D[0, 2] * bh + D[0, 3] * by, D[0, 1] * by + D[0, 3] * bx
+            yy_x, yy_y = D[1, 0] * bx + D[1, 2] * bh + D[1, 3] * by, D[1, 1] * by + D[1, 3] * bx
+            zz_x, zz_y = D[2, 0] * bx + D[2, 2] * bh + D[2, 3] * by, D[2, 1] * by + D[2, 3] * bx
+            xy_x, xy_y = D[3, 0] * bx + D[3, 2] * bh + D[3, 3] * by, D[3, 1] * by + D[3, 3] * bx
+            for a in range(b + 1):
+                ax, ay = gradient[a, 0], gradient[a, 1]
+                ah = N[q, a] / radius if axisymmetric else 0.0
+                local[a, b, 0, 0] += ax * xx_x + ah * zz_x + ay * xy_x
+                local[a, b, 0, 1] += ax * xx_y + ah * zz_y + ay * xy_y
+                local[a, b, 1, 0] += ay * yy_x + ax * xy_x
+                local[a, b, 1, 1] += ay * yy_y + ax * xy_y
+    return True
+
+
+@kernel
+def add_stiffness(points, cells, N, dN, weights, moduli, special, material, axisymmetric, slots, owner, part, data):
     """Add element stiffness blocks to `data` (n_blocks, 2, 2), in the rows of nodes with ``owner[node] == part``.
 
     `data` is written in place at `slots`. Threads share the nodes; each adds to its rows in the order of the cells.
-    Returns the number of the first cell with a Jacobian that is not positive, or -1. Only the terms of the moduli
-    that couple normal strains with each other and shear with itself are used (isotropy, or orthotropy along x, y).
+    Returns the number of the first cell with a Jacobian that is not positive, or -1. Where ``special`` (n_materials,) holds,
+    only the terms of the moduli that couple normal strains with each other and shear with itself are used (isotropy, or
+    orthotropy along x, y).
     """
     n_cells, n_nodes = cells.shape
     gradient = np.empty((n_nodes, 2))
@@ -60,7 +89,11 @@ def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric,
         D = moduli[material[c]]
         shear = D[3, 3]
         local[:] = 0.0
-        for q in range(weights.shape[0]):
+        if not special[material[c]] and not _general_cell(
+            points, cells[c], N, dN, weights, D, axisymmetric, gradient, local
+        ):
+            return c
+        for q in range(weights.shape[0] if special[material[c]] else 0):
             det, radius = _map(points, cells[c], N, dN, q, gradient)
             if not det > 0.0:
                 return c

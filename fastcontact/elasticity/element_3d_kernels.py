@@ -2,7 +2,7 @@
 """Element loops of three-dimensional solids: stiffness, stresses, rotations.
 
 Shared arguments: ``points`` (n_points, 3) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes), ``dN`` (n_q,
-n_nodes, 3), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 6, 6) [pressure], isotropic, for strains
+n_nodes, 3), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 6, 6) [pressure], symmetric, for strains
 (xx, yy, zz, 2xy, 2yz, 2xz); ``material`` (n_cells,). `N` and `axisymmetric` have no effect here: the loops of both dimensions
 have the same arguments. What they share is written in both files, since Numba's cache does not see changes in other files.
 """
@@ -60,6 +60,25 @@ def _map(x, slopes, q, gradient):
         gradient[1, a] = c01 * r + c11 * s + c21 * t
         gradient[2, a] = c02 * r + c12 * s + c22 * t
     return det
+
+
+@kernel
+def _component(i, j):
+    """Return the number of a stress component in the order xx, yy, zz, xy, yz, xz."""
+    if i == j:
+        return i
+    if i + j == 1:
+        return 3
+    return 4 if i + j == 3 else 5
+
+
+@kernel
+def _tensor(D, tensor):
+    """Fill `tensor` (9, 9) with moduli (6, 6): row 3 i + j, column 3 k + l holds D_ikjl, for K_ij = D_ikjl g_kl."""
+    for row in range(9):
+        for column in range(9):
+            i, j, k, n = row // 3, row % 3, column // 3, column % 3
+            tensor[row, column] = D[_component(i, k), _component(j, n)]
 
 
 @kernel
@@ -154,6 +173,27 @@ def _add_isotropic(g, coupling, shear, slots, c, mine, flat):
 
 
 @kernel
+def _add_general(g, tensor, products, block, slots, c, mine, flat):
+    """Add the blocks of a cell for any moduli: K_ij = D_ikjl g_kl; `products` and `block` (9,) are overwritten."""
+    for b in range(g.shape[1]):
+        for a in range(b + 1):
+            products[0], products[4], products[8] = g[0, a, b], g[3, a, b], g[5, a, b]
+            products[1], products[2], products[5] = g[1, a, b], g[2, a, b], g[4, a, b]
+            products[3], products[6], products[7] = g[1, b, a], g[2, b, a], g[4, b, a]
+            for row in range(9):
+                total = 0.0
+                for column in range(9):
+                    total += tensor[row, column] * products[column]
+                block[row] = total
+            if a == b:  # equal but for round-off; K is symmetric to the last bit
+                block[3], block[6], block[7] = block[1], block[2], block[5]
+            _add_block(
+                flat, mine[a], mine[b], slots[c, a, b], slots[c, b, a],
+                block[0], block[1], block[2], block[3], block[4], block[5], block[6], block[7], block[8],
+            )  # fmt: skip
+
+
+@kernel
 def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, gradient, flat):
     """Add the blocks of a linear tetrahedron for Lame's constants: its gradients (4, 3) are constant.
 
@@ -187,16 +227,18 @@ def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, gra
 
 
 @kernel
-def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric, slots, owner, part, data):
+def add_stiffness(points, cells, N, dN, weights, moduli, special, material, axisymmetric, slots, owner, part, data):
     """Add element stiffness blocks to `data` (n_blocks, 3, 3), in the rows of nodes with ``owner[node] == part``.
 
     `data` is written in place at `slots`. Threads share the nodes; each adds to its rows in the order of the cells.
     Returns the number of the first cell with a Jacobian that is not positive, or -1. The products of gradients are
-    integrated first; Lame's constants of the cell, ``D[0, 1]`` and ``D[3, 3]``, come in once at the end.
+    integrated first; the moduli of the cell come in once at the end. Where ``special`` (n_materials,) holds these are Lame's
+    constants, ``D[0, 1]`` and ``D[3, 3]``.
     """
     n_cells, n_nodes = cells.shape
     slopes, x, gradient = _transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
     g, mine, corners = np.empty((6, n_nodes, n_nodes)), np.empty(n_nodes, np.bool_), np.empty((4, 3))
+    tensor, products, block = np.empty((9, 9)), np.empty(9), np.empty(9)
     volume = 0.0
     for weight in weights:
         volume += weight
@@ -205,14 +247,19 @@ def add_stiffness(points, cells, N, dN, weights, moduli, material, axisymmetric,
         if not _owned(cells, c, owner, part, mine):
             continue
         coupling, shear = moduli[material[c], 0, 1], moduli[material[c], 3, 3]
-        if n_nodes == 4:
+        isotropic = special[material[c]]
+        if n_nodes == 4 and isotropic:
             if not _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, corners, flat):
                 return c
             continue
         _gather(points, cells, c, x)
         if not _integrate_products(x, slopes, weights, gradient, g):
             return c
-        _add_isotropic(g, coupling, shear, slots, c, mine, flat)
+        if isotropic:
+            _add_isotropic(g, coupling, shear, slots, c, mine, flat)
+        else:
+            _tensor(moduli[material[c]], tensor)
+            _add_general(g, tensor, products, block, slots, c, mine, flat)
     return -1
 
 

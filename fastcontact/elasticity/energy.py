@@ -11,14 +11,13 @@ from fastcontact.mesh.elements import Element
 Array = NDArray[np.float64]
 
 
-def elastic_energy(stress: Array, E: Array, nu: Array) -> Array:
-    """Return stress : strain (...) [pressure] of an isotropic material (Timoshenko and Goodier, 1970, eq. 86, twice).
+def elastic_energy(stress: Array, compliance: Array) -> Array:
+    """Return stress : strain (n_cells, n) [pressure] at points of cells.
 
-    From `stress` (..., n_components) [pressure], `E` (...) [pressure] and `nu` (...) [-].
+    From `stress` (n_cells, n, n_components) [pressure] and `compliance` (n_cells, n_components, n_components) [1 / pressure],
+    see `Material.compliance_at`.
     """
-    trace = stress[..., :3].sum(axis=-1)
-    square = (stress[..., :3] ** 2).sum(axis=-1) + 2.0 * (stress[..., 3:] ** 2).sum(axis=-1)
-    return np.asarray(((1.0 + nu) * square - nu * trace**2) / E)
+    return np.asarray(((stress @ compliance) * stress).sum(axis=-1))
 
 
 def cell_volumes(corners: Array, N: Array, dN: Array, axisymmetric: bool) -> Array:

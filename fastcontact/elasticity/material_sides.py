@@ -64,10 +64,3 @@ def material_sides(mesh: Mesh, material: Mapping[str, Indices]) -> MaterialSides
         cells[name][here] = place[np.searchsorted(rows, wanted)]
     node = np.concatenate([np.arange(n, dtype=np.int32), points[further]])
     return MaterialSides(cells, node, points, numbers, place)
-
-
-def distinct(moduli: Array, material: Mapping[str, Indices]) -> dict[str, Indices]:
-    """Return the materials of all cells, those of equal moduli (n_materials, n_components, n_components) under one number."""
-    _, first, same = np.unique(moduli.reshape(len(moduli), -1), axis=0, return_index=True, return_inverse=True)
-    number = first[same.ravel()].astype(np.int32)
-    return {name: number[values] for name, values in material.items()}

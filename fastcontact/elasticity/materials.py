@@ -1,24 +1,152 @@
-"""Material laws: small-strain linear elasticity."""
+"""Material laws: small-strain linear elasticity. What all have in common, and the isotropic one."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.elasticity.material_axes import Axes, frames, rotations
 from fastcontact.errors import ModelError, unknown
+
+Array = NDArray[np.float64]
 
 KINEMATICS = ("axisymmetric", "plane_strain", "plane_stress", "3d")
 # What elements make of the dilatation.
 VOLUMETRIC = ("auto", "plain", "mean_dilatation")
 # Poisson's ratio from which on a material has a mean dilatation by itself.
 NEARLY_INCOMPRESSIBLE = 0.49
+# Couplings of plane strains with others, relative to the largest modulus, that are round-off of a rotation.
+ROUND_OFF = 1e-12
+
+
+class Material:
+    """A linear elastic material: its moduli in axes of its own, and what loads and temperature need to know of it.
+
+    Attributes
+    ----------
+    density : float or None
+        Mass per volume [mass / length^3].
+    expansion : float, tuple or None
+        Coefficients of thermal expansion [1 / temperature].
+    axes : sequence, callable or None
+        Unit vectors in rows (3, 3) [-], or a function, see `Orthotropic`; None: those of the mesh.
+    averaged : bool
+        Whether elements have a mean dilatation, where they can and kinematics are not plane stress.
+    """
+
+    density: float | None
+    expansion: Any
+    axes: Axes = None
+    averaged: bool = False
+
+    @property
+    def young(self) -> tuple[float, float]:
+        """The smallest and the largest Young's modulus along the material's axes [pressure]."""
+        diagonal = 1.0 / np.diag(self.local_compliance)[:3]
+        return float(diagonal.min()), float(diagonal.max())
+
+    @property
+    def contact_modulus(self) -> float:
+        """The least plane-strain modulus E / (1 - nu^2) along the axes, by which contact is scaled [pressure]."""
+        D = np.linalg.inv(self.local_compliance)
+        free = [D[i, i] - D[i, j] * D[j, i] / D[j, j] for i, j in ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))]
+        return float(min(free))
+
+    @property
+    def local_compliance(self) -> Array:
+        """Compliance (6, 6) [1 / pressure] in the material's axes: strains 11, 22, 33, 2*12, 2*23, 2*13 of stresses."""
+        raise NotImplementedError
+
+    @property
+    def described(self) -> str:
+        """The material's constants, for messages."""
+        raise NotImplementedError
+
+    @property
+    def varies(self) -> bool:
+        """Whether the axes, and with them the moduli, depend on the position."""
+        return callable(self.axes)
+
+    def moduli(self, kinematics: str) -> Array:
+        """Return the matrix (4, 4), in 3D (6, 6) [pressure] from strains (xx, yy, zz, 2xy, in 3D 2yz, 2xz) to stresses.
+
+        In axisymmetry x, y, z are the radius, the axis and the circumference. Plane stress has no stress zz. ModelError if
+        the axes depend on the position.
+        """
+        if self.varies:
+            raise ModelError("the axes of the material depend on the position: ask for moduli_at(points, kinematics)")
+        return np.asarray(self.moduli_at(np.zeros((1, 3 if kinematics == "3d" else 2)), kinematics)[0])
+
+    def moduli_at(self, points: Array, kinematics: str) -> Array:
+        """Return the moduli (n, 4, 4), in 3D (n, 6, 6) [pressure] at `points` (n, dim) [length]; see `moduli`."""
+        compliance = self._compliance6(points, kinematics)
+        if kinematics == "3d":
+            return np.asarray(np.linalg.inv(compliance))
+        if kinematics != "plane_stress":
+            return np.asarray(np.linalg.inv(compliance)[:, :4, :4])
+        inner = np.ix_(range(len(compliance)), (0, 1, 3), (0, 1, 3))
+        D = np.zeros((len(compliance), 4, 4))
+        D[inner] = np.linalg.inv(compliance[inner])
+        return D
+
+    def compliance_at(self, points: Array, kinematics: str) -> Array:
+        """Return the compliance (n, 4, 4), in 3D (n, 6, 6) [1 / pressure] at `points` (n, dim) [length].
+
+        Stress : strain is that of the whole stress in any kinematics, since stresses yz and xz are zero in the plane.
+        """
+        size = 6 if kinematics == "3d" else 4
+        return np.asarray(self._compliance6(points, kinematics)[:, :size, :size])
+
+    def _compliance6(self, points: Array, kinematics: str) -> Array:
+        """Return the compliance (n, 6, 6) in the mesh's axes; ModelError where kinematics of the plane do not hold."""
+        if kinematics not in KINEMATICS:
+            raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
+        of_stress = rotations(frames(self.axes, points, kinematics))
+        # Strains turn by the inverse of the transpose, which for stresses in another frame is the rotation back.
+        back = np.linalg.inv(of_stress)
+        compliance = np.asarray(back.transpose(0, 2, 1) @ self.local_compliance @ back)
+        across = np.abs(compliance[:, :4, 4:]).max(initial=0.0)
+        if kinematics != "3d" and across > ROUND_OFF * np.abs(compliance).max():
+            raise ModelError(
+                f"the material with {self.described} couples strains in the plane with shear out of it, by its constants or "
+                f"by its axes: {kinematics} has no such shear; turn one axis along z, or use a mesh in 3D"
+            )
+        compliance[:, :4, 4:] = 0.0 if kinematics != "3d" else compliance[:, :4, 4:]
+        compliance[:, 4:, :4] = 0.0 if kinematics != "3d" else compliance[:, 4:, :4]
+        return compliance
+
+
+def check_positive(name: str, value: Any, what: str = "a positive number") -> None:
+    """Raise ModelError if a constant of a material, `name` in the message, is not a positive number."""
+    if not isinstance(value, Real) or isinstance(value, bool) or not 0.0 < float(value) < math.inf:
+        raise ModelError(f"{name} = {value} must be {what}")
+
+
+def check_density(value: Any) -> None:
+    """Raise ModelError if a density is given and is no number from zero on."""
+    if value is not None and (
+        not isinstance(value, Real) or isinstance(value, bool) or not 0.0 <= float(value) < math.inf
+    ):
+        raise ModelError(f"the density = {value} must be a number, zero or more")
+
+
+def check_expansion(value: Any, most: int) -> None:
+    """Raise ModelError if an expansion is given and is neither a finite number nor `most` of them along the axes."""
+    numbers = [value] if not isinstance(value, (Sequence, np.ndarray)) else list(value)
+    fit = all(isinstance(v, Real) and not isinstance(v, bool) and math.isfinite(v) for v in numbers)
+    if value is not None and not (fit and len(numbers) in (1, most)):
+        wanted = "a number" if most == 1 else "a number, or three along the material's axes"
+        raise ModelError(f"the coefficient of thermal expansion = {value} must be {wanted}")
 
 
 @dataclass(frozen=True)
-class LinearElastic:
+class LinearElastic(Material):
     """Isotropic linear elasticity.
 
     ModelError if a constant is outside its range.
@@ -34,11 +162,17 @@ class LinearElastic:
         each quadrangle, hexahedron, wedge and pyramid (in quadratic ones a linear function), so that they do not lock
         where the material is nearly incompressible. ``"auto"``: the latter from nu = 0.49 on. Nothing changes in
         triangles and tetrahedra, and in plane stress.
+    density : float, optional
+        Mass per volume [mass / length^3], for gravity and centrifugal loads; zero or more.
+    expansion : float, optional
+        Coefficient of thermal expansion [1 / temperature].
     """
 
     E: float
     nu: float
     volumetric: str = "auto"
+    density: float | None = None
+    expansion: float | None = None
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.E) and self.E > 0):
@@ -51,9 +185,33 @@ class LinearElastic:
             )
         if self.volumetric not in VOLUMETRIC:
             raise ModelError(unknown("volumetric", self.volumetric, VOLUMETRIC))
+        check_density(self.density)
+        check_expansion(self.expansion, 1)
 
     @property
-    def averaged(self) -> bool:
+    def described(self) -> str:
+        """E and nu, for messages."""
+        return f"E = {self.E:g}, nu = {self.nu:g}"
+
+    @property
+    def young(self) -> tuple[float, float]:
+        """Young's modulus, twice."""
+        return self.E, self.E
+
+    @property
+    def contact_modulus(self) -> float:
+        """E / (1 - nu^2) [pressure]."""
+        return self.E / (1 - self.nu**2)
+
+    @property
+    def local_compliance(self) -> Array:
+        """Compliance (6, 6) [1 / pressure]."""
+        S = np.diag([*[(1 + self.nu) / self.E] * 3, *[1 / self.shear_modulus] * 3])
+        S[:3, :3] -= self.nu / self.E
+        return S
+
+    @property
+    def averaged(self) -> bool:  # type: ignore[override]
         """Whether elements have a mean dilatation, where they can and kinematics are not plane stress."""
         return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and self.nu >= NEARLY_INCOMPRESSIBLE)
 
@@ -62,7 +220,7 @@ class LinearElastic:
         """Shear modulus [pressure]."""
         return self.E / (2 * (1 + self.nu))
 
-    def moduli(self, kinematics: str) -> NDArray[np.float64]:
+    def moduli(self, kinematics: str) -> Array:
         """Return the matrix (4, 4), in 3D (6, 6) [pressure] from strains (xx, yy, zz, 2xy, in 3D 2yz, 2xz) to stresses.
 
         Plane stress has no stress zz (Timoshenko and Goodier, 1970, section 16).

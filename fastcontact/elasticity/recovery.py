@@ -144,6 +144,15 @@ def von_mises(stress: Array) -> Array:
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * shear)
 
 
+def equivalent_strain(strain: Array) -> Array:
+    """Return the equivalent strain (...) [-] of `strain` (..., n_components) [-], of an isotropic material von Mises / 3 G.
+
+    Components xx, yy, zz, 2xy, in 3D also 2yz, 2xz.
+    """
+    tensor = strain * np.array([1.0] * 3 + [0.5] * (strain.shape[-1] - 3))
+    return np.asarray(2.0 / 3.0 * von_mises(tensor))
+
+
 def von_mises_signed(stress: Array, equivalent: Array | None = None) -> Array:
     """Return the von Mises stress (...) [pressure] with the sign of the trace, as VMIS_SG of code_aster.
 

@@ -13,8 +13,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.elasticity import dilatation, recovery
+from fastcontact.elasticity import recovery
 from fastcontact.elasticity.cell_stress import CellStress
+from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
@@ -26,24 +27,32 @@ SIMPLEX = {3: 0.5, 4: 1.0 / math.sqrt(5.0)}
 def smoothed_stress(
     mesh: Mesh,
     kinematics: str,
-    moduli: Array,
-    material: recovery.Materials,
+    field: MaterialField,
     displacement: Array,
-    averaged: dilatation.Mask | None = None,
 ) -> dict[str, Array]:
     """Return by solid element the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each cell.
 
-    It is the same at a node for all cells of one material. Arguments as for `recovery.stress_at_points`.
+    It is the same at a node for all cells of one material.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    kinematics : str
+    field : MaterialField
+        Materials of all cells.
+    displacement : ndarray (n_points, dim)
+        Of all points [length].
     """
-    stress = CellStress(mesh, kinematics, moduli, displacement, averaged)
-    found = {name: np.empty((*block.shape, moduli.shape[1])) for name, block in mesh.solids.items()}
-    for number in range(len(moduli)):
-        average = recovery.NodalAverage(mesh.n_points, moduli.shape[1])
-        rows = {name: np.flatnonzero(material[name] == number) for name in found}
+    components = field.moduli.shape[1]
+    stress = CellStress(mesh, kinematics, field.moduli, displacement, field.averaged)
+    found = {name: np.empty((*block.shape, components)) for name, block in mesh.solids.items()}
+    for number in range(field.n_materials):
+        average = recovery.NodalAverage(mesh.n_points, components)
+        rows = {name: np.flatnonzero(field.number[name] == number) for name in found}
         for name, chosen in rows.items():
             xi, outward = sampling(name)
             cells = mesh.cells[name][chosen]
-            average.add(cells, outward, stress.at(name, xi, cells, material[name][chosen]))
+            average.add(cells, outward, stress.at(name, xi, cells, field.rows[name][chosen]))
         nodal = average.result()
         for name, chosen in rows.items():
             found[name][chosen] = nodal[mesh.cells[name][chosen]]

@@ -99,10 +99,11 @@ def stiffness(
     """
     pattern = pattern or sparsity(mesh)
     data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))
+    special = of_special_form(moduli)
     for name, block in mesh.solids.items():
         split = dilatation.split(name, moduli, averaged)
         add = _Addition(mesh, name, kinematics == "axisymmetric", material[name], pattern, data)
-        found = parallel.shared(partial(add.part, moduli=moduli, split=split), range(add.n_parts))
+        found = parallel.shared(partial(add.part, moduli=moduli, special=special, split=split), range(add.n_parts))
         bad = min((number for number in found if number >= 0), default=-1)
         if bad >= 0:
             where = mesh.points[block[bad]].mean(axis=0)
@@ -111,6 +112,25 @@ def stiffness(
             )
     size = mesh.n_points * mesh.dim
     return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
+
+
+def of_special_form(moduli: Array) -> NDArray[np.bool_]:
+    """Return for which moduli (n_materials,) the element loops have a shorter form, but for round-off.
+
+    In the plane those without coupling of normal strains with shear, in 3D those of isotropic materials.
+
+    Parameters
+    ----------
+    moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
+        [pressure]
+    """
+    if moduli.shape[1] == 4:
+        return np.asarray((moduli[:, :3, 3] == 0.0).all(axis=1) & (moduli[:, 3, :3] == 0.0).all(axis=1))
+    isotropic = np.zeros_like(moduli)
+    isotropic[:, :3, :3] = moduli[:, 0, 1, None, None]
+    isotropic[:, range(3), range(3)] += 2.0 * moduli[:, 3, 3, None]
+    isotropic[:, range(3, 6), range(3, 6)] = moduli[:, 3, 3, None]
+    return np.asarray(np.abs(moduli - isotropic).max(axis=(1, 2)) <= 1e-14 * np.abs(moduli[:, 0, 0]))
 
 
 class _Addition:
@@ -129,13 +149,13 @@ class _Addition:
         """How many threads share the cells."""
         return len(self._parts)
 
-    def part(self, number: int, moduli: Array, split: dilatation.Split | None) -> int:
+    def part(self, number: int, moduli: Array, special: dilatation.Mask, split: dilatation.Split | None) -> int:
         """Add the rows of a part; return the number of the first cell with a Jacobian that is not positive, or -1."""
         rows = slice(*self._parts[number])
         cells, material, slots = self._cells[rows], self._material[rows], self._slots[rows]
         target = self._axisymmetric, slots, self._owner, number, self._data
         bad = element_kernels.loops(self._points.shape[1]).add_stiffness(
-            self._points, cells, *self._tables, moduli if split is None else split.moduli, material, *target
+            self._points, cells, *self._tables, moduli if split is None else split.moduli, special, material, *target
         )
         if bad >= 0:
             return int(bad) + rows.start

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fastcontact.elasticity.materials import LinearElastic
+from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.model import Model
@@ -96,6 +96,8 @@ def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: A
         fields = [field for field in fields if not callable(getattr(value, field.name))]
     elif not fields and callable(value):
         _take(_called(value, points), add, mesh, points)
+    if isinstance(value, Material):  # a density or expansion that is not given counts as little as in older files
+        fields = [field for field in fields if getattr(value, field.name) is not None]
     if isinstance(value, LinearElastic):  # what the choice comes to, and nothing where it is plain, as in older files
         fields = [field for field in fields if field.name != "volumetric"]
         add(b"mean dilatation" if value.averaged else b"")

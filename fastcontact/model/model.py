@@ -36,7 +36,8 @@ from fastcontact.elasticity.loads import (
     check_value,
     evaluated,
 )
-from fastcontact.elasticity.materials import KINEMATICS, LinearElastic
+from fastcontact.elasticity.material_field import MaterialField, material_field
+from fastcontact.elasticity.materials import KINEMATICS, Material
 from fastcontact.elasticity.relations import Relation, stacked_rows
 from fastcontact.elasticity.springs import Springs, between, grounded, stacked
 from fastcontact.elasticity.stiffness import stiffness
@@ -133,7 +134,7 @@ class Model:
         self.kinematics = kinematics
         self.case_text = case_text
         self.units: dict[str, str] = {}  # names of the units of length, force, pressure where they are known
-        self.materials: list[tuple[LinearElastic, tuple[str, ...] | None]] = []
+        self.materials: list[tuple[Material, tuple[str, ...] | None]] = []
         self.supports: list[Support] = []
         self.loads: list[Load] = []
         self.relations: list[Relation] = []
@@ -149,12 +150,16 @@ class Model:
         """Number of displacement components of all points."""
         return self.mesh.n_points * self.mesh.dim
 
-    def add_material(self, material: LinearElastic, groups: Sequence[str] | str | None = None) -> None:
+    def add_material(self, material: Material, groups: Sequence[str] | str | None = None) -> None:
         """Give a material to groups of solid cells, by default to all; groups override what was given to all before."""
         names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
         for name in names or ():
             if not self.mesh.cells_of(name, dim=self.mesh.dim):
                 raise ModelError(f"group '{name}' holds no solid cells, so it cannot have a material")
+        if not isinstance(material, Material):
+            raise ModelError(
+                f"{material!r} is no material: give LinearElastic(E=..., nu=...), Orthotropic(...) or Anisotropic(...)"
+            )
         self.materials.append((material, names))
 
     def fix(self, group: str, components: str) -> None:
@@ -592,7 +597,7 @@ class Model:
         else:
             primary = surface(self.mesh, pair.primary)
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
-        modulus = min((m.E / (1 - m.nu**2) for m, _ in self.materials), default=1.0)
+        modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
         own = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
         axisymmetric = self.kinematics == "axisymmetric"
         return kind(
@@ -600,7 +605,21 @@ class Model:
         )
 
     def material_numbers(self) -> tuple[Array, dict[str, NDArray[np.int32]]]:
-        """Return moduli (n_materials, 4, 4), in 3D (n_materials, 6, 6), and by element every solid cell's material."""
+        """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and by element every solid cell's number there.
+
+        The first are those of the materials; materials with axes that depend on the position have further ones for each cell.
+        """
+        field = self.material_field()
+        return field.moduli, field.rows
+
+    def material_field(self) -> MaterialField:
+        """Return the materials of all solid cells; ModelError if a cell has none, or two."""
+        return material_field(
+            self.mesh, self.kinematics, [material for material, _ in self.materials], self._material_of_cells()
+        )
+
+    def _material_of_cells(self) -> dict[str, NDArray[np.int32]]:
+        """Return by element every solid cell's material (n_cells,)."""
         if not self.materials:
             raise ModelError("no material: call add_material(LinearElastic(E=..., nu=...)) for the solid cells")
         numbers = {name: np.full(len(block), -1, np.int32) for name, block in self.mesh.solids.items()}
@@ -614,12 +633,11 @@ class Model:
                         self._check_material(index, group, numbers[name][rows])
                         numbers[name][rows] = index
         self._check_all_have_material(numbers)
-        return np.stack([material.moduli(self.kinematics) for material, _ in self.materials]), numbers
+        return numbers
 
     def averaged_materials(self) -> NDArray[np.bool_]:
-        """Return which materials (n_materials,) have a mean dilatation; none in plane stress, where none locks."""
-        free = self.kinematics == "plane_stress"
-        return np.array([material.averaged and not free for material, _ in self.materials], bool)
+        """Return which moduli (n_moduli,) have a mean dilatation; none in plane stress, where none locks."""
+        return self.material_field().averaged
 
     def _check_material(self, index: int, group: str | None, given: NDArray[np.int32]) -> None:
         """Refuse a material for cells that have another one already, which was not given to all cells."""
@@ -629,7 +647,7 @@ class Model:
             if old != new and (groups is not None or group is None):
                 raise ModelError(
                     f"{int((given == number).sum())} cells of {'the mesh' if group is None else repr(group)} have two "
-                    f"materials, E = {old.E:g}, nu = {old.nu:g} and E = {new.E:g}, nu = {new.nu:g}: give each group one; "
+                    f"materials, {old.described} and {new.described}: give each group one; "
                     "one for all other cells comes first, without groups"
                 )
 

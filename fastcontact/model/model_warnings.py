@@ -96,7 +96,7 @@ def _lost_loads(model: Model) -> list[str]:
 
 def _moduli(model: Model) -> list[str]:
     """Compare the moduli with each other."""
-    values = [material.E for material, _ in model.materials]
+    values = [value for material, _ in model.materials for value in material.young]
     ratio = max(values) / min(values)
     if ratio <= MODULI:
         return []
@@ -112,12 +112,15 @@ def _named_units(model: Model) -> list[str]:
     pascal = PASCALS.get(units.get("pressure", ""))
     if pascal is not None:
         for material, groups in model.materials:
-            if not SOLIDS[0] <= material.E * pascal <= SOLIDS[1]:
-                limit, what = (SOLIDS[1], "diamond") if material.E * pascal > SOLIDS[1] else (SOLIDS[0], "aerogel")
+            low, high = material.young
+            if low * pascal < SOLIDS[0] or high * pascal > SOLIDS[1]:
+                E, limit, what = (
+                    (high, SOLIDS[1], "diamond") if high * pascal > SOLIDS[1] else (low, SOLIDS[0], "aerogel")
+                )
                 where = "all cells" if groups is None else ", ".join(f"'{group}'" for group in groups)
                 texts.append(
-                    f"Young's modulus E = {material.E:g} {units['pressure']} of {where} is "
-                    f"{material.E * pascal / limit:.3g} times that of {what}: is it in another unit?"
+                    f"Young's modulus E = {E:g} {units['pressure']} of {where} is "
+                    f"{E * pascal / limit:.3g} times that of {what}: is it in another unit?"
                 )
     metre, newton = METRES.get(units.get("length", "")), NEWTONS.get(units.get("force", ""))
     if pascal is not None and metre is not None and newton is not None:
@@ -143,7 +146,7 @@ def _proportions(model: Model) -> list[str]:
         )
     forces = [np.abs(force).sum() for force in model.forces_by_ramp().values()]
     depth = 1.0 if model.mesh.dim == 2 and model.kinematics != "axisymmetric" else size
-    stiffness = min(material.E for material, _ in model.materials) * size * depth
+    stiffness = min(material.young[0] for material, _ in model.materials) * size * depth
     strain = max(forces, default=0.0) / stiffness
     if strain > STRAINED or 0.0 < strain < UNSTRAINED:
         texts.append(

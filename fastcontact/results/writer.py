@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact.elasticity.material_sides import distinct, material_sides
+from fastcontact.elasticity.material_sides import material_sides
 from fastcontact.errors import ConvergenceError, FileError, ModelError
 from fastcontact.mesh.files.hdf5_driver import new_hdf5
 from fastcontact.mesh.files.packing import packed
@@ -335,7 +335,7 @@ def _materials_that_meet(model: Any) -> Any:
     """Return the materials of all solid cells (n_solids,) of a model where some meet; None where none do."""
     if not getattr(model, "materials", None) or not hasattr(model, "material_numbers"):
         return None
-    material = distinct(*model.material_numbers())
+    material = model.material_field().distinct
     if not len(material_sides(model.mesh, material).points):
         return None
     return np.concatenate(list(material.values()))

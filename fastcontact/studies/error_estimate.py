@@ -79,10 +79,7 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     >>> fc.estimate_error(model, step).relative < 1e-9  # the stress is uniform
     True
     """
-    moduli, material = model.material_numbers()
-    smooth = smoothed_stress(
-        model.mesh, model.kinematics, moduli, material, step.displacement, model.averaged_materials()
-    )
+    smooth = smoothed_stress(model.mesh, model.kinematics, model.material_field(), step.displacement)
     squares, energy = [], 0.0
     for name in model.mesh.solids:
         own, whole = _differences(model, step.displacement, name, smooth[name])
@@ -98,8 +95,8 @@ def _differences(model: Model, displacement: Array, name: str, smooth: Array) ->
     """Return the squared energy norms (n_cells,) of smoothed minus own stress, and that of the own stress in all."""
     N, stress, volume, elastic = stress_in_cells(model, name, slice(None), displacement, elements.get(name).order + 1)
     off = np.einsum("qa,cai->cqi", N, smooth) - stress
-    squares = (elastic_energy(off, *elastic) * volume).sum(axis=1)
-    return squares, float((elastic_energy(stress, *elastic) * volume).sum())
+    squares = (elastic_energy(off, elastic) * volume).sum(axis=1)
+    return squares, float((elastic_energy(stress, elastic) * volume).sum())
 
 
 def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], contact: Array) -> None:
@@ -109,7 +106,7 @@ def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], 
     nodal = np.zeros(mesh.n_points)
     nodal[result.points] = result.pressure
     first = np.cumsum([0, *(len(block) for block in mesh.solids.values())])
-    stiffness, (_, material) = np.array([own.E for own, _ in model.materials]), model.material_numbers()
+    stiffness, material = np.array([own.young[0] for own, _ in model.materials]), model.material_field().number
     for block in surface(mesh, pair.secondary).blocks:
         xi, weights = fine_rule(block.element)
         reference = elements.get(block.element)

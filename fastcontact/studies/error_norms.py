@@ -150,16 +150,16 @@ def stress_in_cells(
     """Return shape functions, stresses, volumes and elastic constants at the quadrature points of some cells of a kind.
 
     Shape functions (n_q, n_nodes) [-]; stresses (n_cells, n_q, n_components) [pressure]; volumes (n_cells, n_q) [length^dim];
-    moduli and Poisson's ratios (2, n_cells, 1) [pressure], [-]. `displacement` is (n_points, dim) [length].
+    compliances (n_cells, n_components, n_components) [1 / pressure]. `displacement` is (n_points, dim) [length].
     """
     mesh, element, axisymmetric = model.mesh, elements.get(name), model.kinematics == "axisymmetric"
     xi, weights = integration_rule(element, n_points)
     N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
-    cells, (moduli, material) = mesh.cells[name][rows], model.material_numbers()
-    numbers = material[name][rows]
-    found = CellStress(mesh, model.kinematics, moduli, displacement, model.averaged_materials())
+    cells, field = mesh.cells[name][rows], model.material_field()
+    numbers = field.rows[name][rows]
+    found = CellStress(mesh, model.kinematics, field.moduli, displacement, field.averaged)
     stress = found.at(name, xi, cells, numbers)
-    elastic = np.array([(own.E, own.nu) for own, _ in model.materials])[numbers].T[:, :, None]
+    elastic = field.compliance[numbers]
     return N, stress, cell_volumes(mesh.points[cells], N, dN, axisymmetric) * weights, elastic
 
 
@@ -171,8 +171,8 @@ def _squares(theory: Theory, model: Model, u: Array, name: str, rows: NDArray[np
     exact_u, exact = _exact(theory, places, stress.shape[2])
     error_u = np.einsum("qa,cad->cqd", N, u[cells]) - exact_u
     densities = (
-        elastic_energy(stress - exact, *elastic), (error_u**2).sum(axis=-1),
-        elastic_energy(exact, *elastic), (exact_u**2).sum(axis=-1),
+        elastic_energy(stress - exact, elastic), (error_u**2).sum(axis=-1),
+        elastic_energy(exact, elastic), (exact_u**2).sum(axis=-1),
     )  # fmt: skip
     return np.array([(density * volume).sum() for density in densities])
 

@@ -79,7 +79,7 @@ CASES = [
         "E is a string",
         "E = 20000.0",
         'E = "20000"',
-        r"case\.toml: the value of 'material\[0\]\.E' must be of type int or float, not '20000'",
+        r"case\.toml: the value of 'material\[0\]\.E' must be of type int or float or list, not '20000'",
     ),
     ("E is missing", "E = 20000.0", "", r"case\.toml: material\[0\] needs 'E'"),
     (
@@ -100,7 +100,7 @@ CASES = [
         "key of a material misspelled",
         "nu = 0.3",
         "mu = 0.3",
-        r"case\.toml: unknown key 'material\[0\]\.mu': did you mean 'material\[0\]\.nu' or 'material\[0\]\.E' or 'material\[0\]\.groups'\?",
+        r"case\.toml: unknown key 'material\[0\]\.mu': did you mean 'material\[0\]\.nu' or 'material\[0\]\.G' or 'material\[0\]\.E'\?",
     ),
     (
         "key of a support misspelled",

@@ -11,12 +11,13 @@ from scipy.sparse import csr_array
 
 from fastcontact.cases.decks.assembled import Assembled, assembled
 from fastcontact.cases.decks.blocks import Place, folded
-from fastcontact.cases.decks.conditions import Component, Conditions, Distributed
+from fastcontact.cases.decks.conditions import Component, Conditions, Distributed, local_axes
 from fastcontact.cases.decks.content import Content, Material, Pair, Section, Step
 from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
 from fastcontact.contact.obstacles.shapes import HalfSpace
+from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.relations import Relation
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
@@ -84,28 +85,45 @@ class Building:
                     thickness = own
                 name = f"{scope}.{section.elements}" if scope else section.elements
                 for key in self.made.keys("element", name, section.place):
-                    if key in owner and owner[key][1] is not material:
+                    if key in owner and owner[key][0] is not section:
                         raise section.place.refuse(
                             f"element {key[1]} has a section already, in line {owner[key][0].place.line}"
                         )
                     owner[key] = (section, material)
         self._check_sections(owner)
-        by_material: dict[str, list[Any]] = {}
+        by_material: dict[tuple[str, str], list[Any]] = {}
         for key in self.made.solids:
-            by_material.setdefault(folded(owner[key][1].name), []).append(key)
+            section, material = owner[key]
+            by_material.setdefault((folded(material.name), folded(section.orientation)), []).append(key)
         self.densities = {key: owner[key][1] for key in self.made.solids}
         found = []
-        for name, keys in by_material.items():
+        for (name, turned), keys in by_material.items():
             material = self.content.materials[name]
-            found.append((material.elastic, self.found.add_solids(f"material {material.name}", keys)))
+            axes = self._axes(owner[keys[0]][0])
+            group = f"material {material.name}" + (f" along {turned.lower()}" if turned else "")
+            assert material.law is not None
+            found.append((material.law(axes), self.found.add_solids(group, keys)))
         return found, thickness or 1.0
+
+    def _axes(self, section: Section) -> Any:
+        """Return the axes of the material of a section, None for those of the mesh."""
+        if not section.orientation:
+            return None
+        axes = self.content.orientations.get(folded(section.orientation))
+        if axes is None:
+            known = ", ".join(self.content.orientations).lower() or "none"
+            raise section.place.refuse(f"orientation '{section.orientation}' is not defined; orientations: {known}")
+        if axes.cylindrical:
+            a, b = np.array(axes.points[:3]), np.array(axes.points[3:])
+            return CylindricalAxes(tuple(a.tolist()), tuple((b - a).tolist()))
+        return tuple(tuple(row) for row in local_axes(axes, np.zeros(3)).tolist())
 
     def _material(self, section: Section) -> Material:
         material = self.content.materials.get(folded(section.material))
         if material is None:
             known = ", ".join(m.name for m in self.content.materials.values()) or "none"
             raise section.place.refuse(f"material '{section.material}' is not defined; materials: {known}")
-        if material.elastic is None:
+        if material.law is None:
             raise material.place.refuse(f"material '{material.name}' has no *ELASTIC")
         return material
 

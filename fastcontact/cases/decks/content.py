@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 from fastcontact.cases.decks.blocks import Block, Place, folded
-from fastcontact.elasticity.materials import LinearElastic
 
 
 @dataclass(frozen=True)
@@ -94,11 +95,11 @@ class Instance:
 
 @dataclass
 class Material:
-    """A material of the deck."""
+    """A material of the deck; `law` makes one of the model from axes, None for those of the mesh."""
 
     name: str
     place: Place
-    elastic: LinearElastic | None = None
+    law: Callable[[Any], Any] | None = None
     density: float | None = None
 
 
@@ -156,7 +157,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Axes:
-    """Local axes of nodes: rectangular by two points of the first axis and the plane, or cylindrical about a line."""
+    """Local axes of nodes or materials: rectangular by points of the first axis and plane, or cylindrical about a line."""
 
     place: Place
     nodes: str
@@ -209,6 +210,7 @@ class Content:
     equations: list[Equation] = field(default_factory=list)
     links: list[Link] = field(default_factory=list)
     axes: list[Axes] = field(default_factory=list)
+    orientations: dict[str, Axes] = field(default_factory=dict)
     amplitudes: dict[str, Amplitude] = field(default_factory=dict)
     gaps: dict[str, tuple[Place, float, tuple[float, ...]]] = field(default_factory=dict)
     springs: dict[str, tuple[Place, float]] = field(default_factory=dict)

@@ -19,6 +19,7 @@ from fastcontact.cases.decks.blocks import Place, read_blocks
 from fastcontact.cases.decks.building import Building
 from fastcontact.cases.decks.content import Content
 from fastcontact.cases.decks.reading import read_content
+from fastcontact.elasticity import recovery
 from fastcontact.errors import MeshError, warn
 from fastcontact.mesh.files.paths import PathLike, existing_file
 from fastcontact.model.model import Model
@@ -137,11 +138,20 @@ class Deck:
         multipliers = lsqr(free.T, reaction.ravel()[~held], atol=1e-14, btol=1e-14, iter_lim=20 * sum(R.shape))[0]
         return (reaction.ravel() - R.T @ multipliers).reshape(reaction.shape)
 
+    def _largest_strain(self, step: StepResult) -> float:
+        """Return the largest equivalent strain of the solid cells, from their nodal stresses [-]."""
+        field, found = self.model.material_field(), 0.0
+        for name, block in self.model.mesh.solids.items():
+            strains = np.einsum("cij,cnj->cni", field.compliance[field.rows[name]], step.stress[block])
+            found = max(
+                found, float(recovery.equivalent_strain(strains.reshape(-1, strains.shape[2])).max(initial=0.0))
+            )
+        return found
+
     def _tell_nonlinear(self, step: StepResult) -> None:
         """Warn with the largest strain and rotation where the deck asks for large ones."""
         for asked in (s for s in self.building.content.steps if s.nonlinear):
-            shear = min(material.shear_modulus for material, _ in self.model.materials)
-            strain = float(step.von_mises.max(initial=0.0)) / (3 * shear)
+            strain = self._largest_strain(step)
             angle, _ = largest_rotation(self.model.mesh, step.displacement)
             warn(
                 f"{asked.place}: NLGEOM, but small strains and rotations were solved; found an equivalent strain up to "

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fastcontact.cases.decks.blocks import Block, Row, folded
-from fastcontact.cases.decks.content import Amplitude, Content, Interaction, Material, Part, Section
+from fastcontact.cases.decks.content import Amplitude, Axes, Content, Interaction, Material, Part, Section
+from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.errors import ModelError
+
+# Numbers of the constants of elastic materials.
+CONSTANTS = {"ISOTROPIC": 2, "ENGINEERING CONSTANTS": 9, "ORTHOTROPIC": 9, "ANISOTROPIC": 21}
 
 
 def material(content: Content, block: Block) -> Material:
@@ -20,18 +28,73 @@ def material(content: Content, block: Block) -> Material:
 
 
 def elastic(content: Content, current: Material, block: Block) -> None:
-    """*ELASTIC: isotropic constants."""
+    """*ELASTIC: constants of one temperature."""
     kind = " ".join(block.get("TYPE", "ISOTROPIC").upper().split())
-    if not (len(kind) >= 3 and "ISOTROPIC".startswith(kind)):
-        raise block.place.refuse(f"material '{current.name}': TYPE={kind[:40]} is not supported, only ISOTROPIC")
+    found = [known for known in CONSTANTS if len(kind) >= 3 and known.startswith(kind)]
+    if not found:
+        known = ", ".join(CONSTANTS)
+        raise block.place.refuse(f"material '{current.name}': TYPE={kind[:40]} is not supported; known are {known}")
+    if found[0] != "ISOTROPIC":
+        _with_axes(current, block, found[0])
+        return
     row = _only(block, "temperatures" if len(block.rows) > 1 else "")
     E, nu = row.number(0), row.number(1, 0.0)
     if row.text(2):
         content.note(row.place, "the temperature of the constants has no effect: there is one set of them")
     try:
-        current.elastic = LinearElastic(E=E, nu=nu)
+        law = LinearElastic(E=E, nu=nu)
     except ModelError as error:
         raise row.place.refuse(f"material '{current.name}': {error}") from None
+
+    current.law = lambda axes: law
+
+
+def _with_axes(current: Material, block: Block, kind: str) -> None:
+    """Take the constants of a material with axes, which may go on over lines; a temperature may follow them."""
+    numbers = [row.number(i) for row in block.rows for i in range(len(row.entries)) if row.entries[i]]
+    count = CONSTANTS[kind]
+    if not count <= len(numbers) <= count + 1:
+        raise block.place.refuse(
+            f"material '{current.name}': {len(numbers)} constants where {kind} has {count}, at one temperature"
+        )
+    values = numbers[:count]
+
+    def law(axes: Any) -> Orthotropic | Anisotropic:
+        if kind == "ENGINEERING CONSTANTS":
+            return Orthotropic(E=values[:3], nu=values[3:6], G=values[6:], axes=axes)
+        return Anisotropic(_moduli(values), axes=axes)
+
+    try:
+        law(None)
+    except ModelError as error:
+        raise block.place.refuse(f"material '{current.name}': {error}") from None
+    current.law = law
+
+
+def _moduli(values: list[float]) -> NDArray[np.float64]:
+    """Return moduli (6, 6) [pressure] from those of a deck, its upper triangle by columns 11, 22, 33, 12, 13, 23."""
+    D = np.zeros((6, 6))
+    places = [(i, j) for j in range(6) for i in range(j + 1)]
+    if len(values) == CONSTANTS["ORTHOTROPIC"]:
+        places = [(i, j) for i, j in places if i == j or j < 3]
+    for (i, j), value in zip(places, values, strict=True):
+        D[i, j] = D[j, i] = value
+    order = [0, 1, 2, 3, 5, 4]
+    return D[np.ix_(order, order)]
+
+
+def orientation(content: Content, block: Block) -> None:
+    """*ORIENTATION: axes of materials."""
+    name, system = block.required("NAME"), block.choice("SYSTEM", ("RECTANGULAR", "CYLINDRICAL"))
+    rows = block.rows
+    if not rows:
+        raise block.place.refuse("a data line with six coordinates is needed")
+    points = tuple(rows[0].number(i) for i in range(6))
+    if any(rows[0].entries[6:]) and any(rows[0].number(6 + i, 0.0) for i in range(3)):
+        raise rows[0].place.refuse("an origin of the axes is not supported: give points seen from 0, 0, 0")
+    if len(rows) > 1 and rows[1].number(1, 0.0):
+        raise rows[1].place.refuse("a further rotation of the axes is not supported: turn the points of the first line")
+    content.orientations[folded(name)] = Axes(block.place, "", system == "CYLINDRICAL", points)
 
 
 def density(content: Content, current: Material, block: Block) -> None:
@@ -56,9 +119,9 @@ def section(content: Content, part: Part, block: Block) -> None:
         if not thickness > 0:
             raise row.place.refuse(f"the thickness {thickness:g} must be positive")
     orientation = block.get("ORIENTATION")
-    if orientation:
-        raise block.place.refuse(f"ORIENTATION={orientation} is not supported: materials are isotropic")
-    part.sections.append(Section(block.place, block.required("ELSET"), block.required("MATERIAL"), thickness))
+    part.sections.append(
+        Section(block.place, block.required("ELSET"), block.required("MATERIAL"), thickness, orientation)
+    )
 
 
 def interaction(content: Content, block: Block) -> Interaction:

@@ -30,6 +30,7 @@ OF_INTERACTIONS: dict[str, Callable[[Content, Interaction, Block], None]] = {
 OF_MODELS: dict[str, Callable[[Content, Block], None]] = {
     "AMPLITUDE": properties.amplitude,
     "GAP": properties.gap,
+    "ORIENTATION": properties.orientation,
     "SPRING": properties.spring,
     "CONTACT PAIR": connections.contact_pair,
     "CLEARANCE": connections.clearance,

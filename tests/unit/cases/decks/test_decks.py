@@ -270,3 +270,21 @@ def test_a_node_or_set_that_is_not_there(tmp_path):
         deck.point(99)
     with pytest.raises(fc.MeshError, match="did you mean"):
         deck.points_of("botom")
+
+
+def test_materials_with_axes(tmp_path):
+    """A bar along z, the second axis of the material once it is turned: E2 counts."""
+    turned = "*Orientation, name=turned\n1., 0., 0., 0., 0., 1.\n"
+    law = "*Elastic, type=engineering constants\n1.e5, 5.e4, 2.e4, 0., 0., 0., 1.e4, 1.e4,\n1.e4\n"
+    text = WHOLE.replace(MATERIAL[:22], turned + MATERIAL[:22]).replace("*Elastic\n200000., 0.\n", law)
+    text = text.replace(", material=steel\n", ", material=steel, orientation=turned\n")
+    deck = deck_of(tmp_path, text)
+    assert height(deck, deck.solve()) == pytest.approx([-100.0 * 2 / 5e4])
+    moduli = "*Elastic, type=orthotropic\n1.e5, 0., 5.e4, 0., 0., 2.e4, 1.e4, 1.e4\n1.e4\n"
+    other = text.replace(law, moduli)
+    deck = deck_of(tmp_path, other)
+    assert height(deck, deck.solve()) == pytest.approx([-100.0 * 2 / 5e4])
+    with pytest.raises(fc.CaseError, match=r"\*ELASTIC: material 'steel': 8 constants where ORTHOTROPIC has 9"):
+        deck_of(tmp_path, other.replace("1.e4, 1.e4\n1.e4\n", "1.e4, 1.e4\n"))
+    with pytest.raises(fc.CaseError, match="orientation 'turned' is not defined; orientations: none"):
+        deck_of(tmp_path, other.replace(turned, ""))

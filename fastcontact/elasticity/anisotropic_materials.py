@@ -1,0 +1,223 @@
+"""Linear elastic materials that are not isotropic: with three planes of symmetry, or with none."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.elasticity.material_axes import Axes, checked_axes
+from fastcontact.elasticity.materials import Material, check_density, check_expansion, check_positive
+from fastcontact.errors import ModelError
+
+Array = NDArray[np.float64]
+NAMES = ("12", "13", "23")
+# Of the stiffness to be symmetric, relative to its largest entry.
+SYMMETRIC = 1e-9
+
+
+@dataclass(frozen=True)
+class Orthotropic(Material):
+    """Orthotropic linear elasticity: wood, rolled sheet, a laminate, a composite.
+
+    ModelError, with the condition that is broken, unless the elastic energy is positive for any strain.
+
+    Parameters
+    ----------
+    E : (float, float, float)
+        Young's moduli E1, E2, E3 along the material's axes [pressure].
+    nu : (float, float, float)
+        Poisson's ratios nu12, nu13, nu23 [-]: nu12 is minus the strain along 2 over that along 1, for a stress along 1.
+        The others follow: nu21 = nu12 E2 / E1.
+    G : (float, float, float)
+        Shear moduli G12, G13, G23 [pressure].
+    axes : sequence or callable, optional
+        The material's axes, by default those of the mesh (in axisymmetry: radius, axis, circumference). Two or three vectors
+        (x, y, z) at right angles, of any length; in the plane also the first one, (x, y), alone. Or a function from
+        positions (n, dim) [length] to unit vectors in rows (n, 3, 3), such as `CylindricalAxes`, taken at the middle of each
+        cell.
+    density : float, optional
+        Mass per volume [mass / length^3].
+    expansion : float or (float, float, float), optional
+        Coefficients of thermal expansion, one for all or one along each axis [1 / temperature].
+
+    Notes
+    -----
+    Conditions: Lempriere, AIAA J. 6, 1968; compliance: Lekhnitskii, Theory of elasticity of an anisotropic body, 1963.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> spruce = fc.Orthotropic(E=(10_800, 700, 430), nu=(0.45, 0.51, 0.54), G=(620, 580, 26))
+    >>> spruce.moduli("3d").shape
+    (6, 6)
+    """
+
+    E: Sequence[float]
+    nu: Sequence[float]
+    G: Sequence[float]
+    axes: Axes = None
+    density: float | None = None
+    expansion: float | Sequence[float] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("E", "nu", "G"):
+            object.__setattr__(self, name, _three(name, getattr(self, name)))
+        for value, number in zip(self.E, "123", strict=True):
+            check_positive(f"Young's modulus E{number}", value)
+        for value, number in zip(self.G, NAMES, strict=True):
+            check_positive(f"the shear modulus G{number}", value)
+        _check_ratios(self.E, self.nu)
+        object.__setattr__(self, "axes", checked_axes(self.axes))
+        check_density(self.density)
+        check_expansion(self.expansion, 3)
+        if isinstance(self.expansion, (Sequence, np.ndarray)):
+            object.__setattr__(self, "expansion", tuple(float(v) for v in self.expansion))
+
+    @classmethod
+    def transversely_isotropic(
+        cls,
+        E_along: float,
+        E_across: float,
+        nu_along: float,
+        nu_across: float,
+        G_along: float,
+        *,
+        axes: Axes = None,
+        density: float | None = None,
+        expansion: float | Sequence[float] | None = None,
+    ) -> Orthotropic:
+        """Return a material that is isotropic across its first axis, such as one with fibres along it.
+
+        Parameters
+        ----------
+        E_along, E_across : float
+            Young's moduli along the first axis and across it [pressure].
+        nu_along : float
+            Minus the strain across over that along the first axis, for a stress along it [-].
+        nu_across : float
+            Poisson's ratio in the plane of isotropy [-]; its shear modulus is E_across / (2 (1 + nu_across)).
+        G_along : float
+            Shear modulus in planes that contain the first axis [pressure].
+        axes : sequence or callable, optional
+            As of `Orthotropic`: unit vectors in rows (3, 3) [-], or a function.
+        density : float, optional
+            Mass per volume [mass / length^3].
+        expansion : float or (float, float, float), optional
+            Coefficients of thermal expansion [1 / temperature].
+        """
+        if not nu_across > -1.0:
+            raise ModelError(f"Poisson's ratio nu_across = {nu_across} must be above -1")
+        G_across = E_across / (2.0 * (1.0 + nu_across))
+        return cls(
+            (E_along, E_across, E_across), (nu_along, nu_along, nu_across), (G_along, G_along, G_across), axes, density,
+            expansion,
+        )  # fmt: skip
+
+    @property
+    def described(self) -> str:
+        """The constants, for messages."""
+        return ", ".join(f"{name} = ({', '.join(f'{v:g}' for v in getattr(self, name))})" for name in ("E", "nu", "G"))
+
+    @property
+    def local_compliance(self) -> Array:
+        """Compliance (6, 6) [1 / pressure] in the material's axes."""
+        (E1, E2, E3), (nu12, nu13, nu23), (G12, G13, G23) = self.E, self.nu, self.G
+        S = np.diag([1 / E1, 1 / E2, 1 / E3, 1 / G12, 1 / G23, 1 / G13])
+        S[0, 1] = S[1, 0] = -nu12 / E1
+        S[0, 2] = S[2, 0] = -nu13 / E1
+        S[1, 2] = S[2, 1] = -nu23 / E2
+        return S
+
+
+@dataclass(frozen=True)
+class Anisotropic(Material):
+    """Linear elasticity with any moduli.
+
+    ModelError unless the matrix is symmetric and positive definite.
+
+    Parameters
+    ----------
+    D : array_like (6, 6)
+        Stresses 11, 22, 33, 12, 23, 13 of strains 11, 22, 33, 2*12, 2*23, 2*13 in the material's axes [pressure].
+    axes : sequence or callable, optional
+        As of `Orthotropic`: unit vectors in rows (3, 3) [-], or a function.
+    density : float, optional
+        Mass per volume [mass / length^3].
+    expansion : float or sequence of 3, optional
+        As of `Orthotropic` [1 / temperature].
+    """
+
+    D: Any
+    axes: Axes = None
+    density: float | None = None
+    expansion: float | Sequence[float] | None = None
+
+    def __post_init__(self) -> None:
+        try:
+            D = np.asarray(self.D, float)
+        except (TypeError, ValueError):
+            D = np.empty(0)
+        if D.shape != (6, 6) or not np.isfinite(D).all():
+            raise ModelError(
+                f"the moduli D must be a matrix of 6 x 6 finite numbers, not of shape {np.shape(np.asarray(self.D, object))}"
+            )
+        off = np.abs(D - D.T).max()
+        if off > SYMMETRIC * np.abs(D).max():
+            i, j = np.unravel_index(np.abs(D - D.T).argmax(), D.shape)
+            raise ModelError(f"the moduli D are not symmetric: D[{i}, {j}] = {D[i, j]:g} and D[{j}, {i}] = {D[j, i]:g}")
+        D = (D + D.T) / 2.0
+        least = float(np.linalg.eigvalsh(D)[0])
+        if not least > 1e-14 * np.abs(D).max():
+            raise ModelError(
+                f"the moduli D are not positive definite, their least eigenvalue is {least:.6g}: some strain would cost no "
+                "energy; check the order of the components, 11, 22, 33, 12, 23, 13"
+            )
+        object.__setattr__(self, "D", tuple(tuple(row) for row in D.tolist()))
+        object.__setattr__(self, "axes", checked_axes(self.axes))
+        check_density(self.density)
+        check_expansion(self.expansion, 3)
+        if isinstance(self.expansion, (Sequence, np.ndarray)):
+            object.__setattr__(self, "expansion", tuple(float(v) for v in self.expansion))
+
+    @property
+    def described(self) -> str:
+        """The diagonal of the moduli, for messages."""
+        return f"D with the diagonal ({', '.join(f'{self.D[i][i]:g}' for i in range(6))})"
+
+    @property
+    def local_compliance(self) -> Array:
+        """Compliance (6, 6) [1 / pressure] in the material's axes."""
+        return np.asarray(np.linalg.inv(np.array(self.D)))
+
+
+def _three(name: str, values: Any) -> tuple[float, float, float]:
+    try:
+        a, b, c = (float(v) for v in values)
+    except (TypeError, ValueError):
+        order = "1, 2 and 3" if name == "E" else "12, 13 and 23"
+        raise ModelError(f"{name} = {values!r} of an orthotropic material must be three numbers, for {order}") from None
+    return a, b, c
+
+
+def _check_ratios(E: Sequence[float], nu: Sequence[float]) -> None:
+    """Raise ModelError unless Poisson's ratios leave the energy of any strain positive."""
+    for value, number, (i, j) in zip(nu, NAMES, ((0, 1), (0, 2), (1, 2)), strict=True):
+        limit = math.sqrt(E[i] / E[j])
+        if not abs(value) < limit:
+            raise ModelError(
+                f"Poisson's ratio nu{number} = {value:g} must be less than sqrt(E{i + 1} / E{j + 1}) = {limit:.6g} in size: "
+                f"is it nu{number[::-1]} = nu{number} E{j + 1} / E{i + 1}?"
+            )
+    nu12, nu13, nu23 = nu
+    nu21, nu31, nu32 = nu12 * E[1] / E[0], nu13 * E[2] / E[0], nu23 * E[2] / E[1]
+    determinant = 1.0 - nu12 * nu21 - nu23 * nu32 - nu13 * nu31 - 2.0 * nu21 * nu32 * nu13
+    if not determinant > 1e-12:
+        raise ModelError(
+            f"Poisson's ratios nu12, nu13, nu23 = {nu12:g}, {nu13:g}, {nu23:g} are too large together: 1 - nu12 nu21 - nu23 "
+            f"nu32 - nu13 nu31 - 2 nu21 nu32 nu13 = {determinant:.6g} must be positive"
+        )

@@ -1,0 +1,158 @@
+"""Axes of materials: fixed vectors, those of a cylinder, or any function of the position."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import ModelError
+
+Array = NDArray[np.float64]
+Axes = Sequence[Sequence[float]] | Callable[[Array], Array] | None
+# Components of stress and strain: xx, yy, zz, xy, yz, xz.
+PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+# Deviation from unit length and right angles, and distance from a cylinder's axis, that count as zero.
+ROUND_OFF = 1e-9
+
+
+@dataclass(frozen=True)
+class CylindricalAxes:
+    """Material axes around a line: 1 radial, 2 tangential, 3 along the line.
+
+    In the plane, the line crosses it at `origin`. In axisymmetry, the line is the axis: give ``direction=(0, 1, 0)``.
+    ModelError if a vector has not three components, or the direction no length.
+
+    Parameters
+    ----------
+    origin : (float, float, float)
+        A point of the line [length].
+    direction : (float, float, float)
+        Along the line, of any length [-].
+    """
+
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    direction: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        for name in ("origin", "direction"):
+            found = _vectors(getattr(self, name), f"the {name} of cylindrical axes")
+            if found.shape != (3,):
+                raise ModelError(
+                    f"the {name} of cylindrical axes must have three components, not {getattr(self, name)}"
+                )
+            object.__setattr__(self, name, tuple(found.tolist()))
+        if not any(self.direction):
+            raise ModelError("the direction of cylindrical axes has no length")
+
+    @property
+    def around_y(self) -> bool:
+        """Whether the line is the axis y."""
+        return not any((self.origin[0], self.origin[2], self.direction[0], self.direction[2]))
+
+    def __call__(self, points: Array) -> Array:
+        """Return the axes (n, 3, 3), unit vectors in rows [-], at `points` (n, dim) [length]."""
+        places = np.zeros((len(points), 3))
+        places[:, : points.shape[1]] = points
+        along = np.array(self.direction) / np.linalg.norm(self.direction)
+        arm = places - self.origin
+        radial = arm - (arm @ along)[:, None] * along
+        length = np.linalg.norm(radial, axis=1)
+        bad = np.flatnonzero(length <= ROUND_OFF * np.abs(places - self.origin).max(initial=0.0))
+        if len(bad):
+            raise ModelError(
+                f"the middle of a cell at {places[bad[0]]} lies on the line of the cylindrical axes, where no direction is "
+                "radial: give the cells there a material with other axes, or move a node"
+            )
+        radial /= length[:, None]
+        return np.stack([radial, np.cross(along, radial), np.broadcast_to(along, radial.shape)], axis=1)
+
+
+def checked_axes(axes: Any) -> Axes:
+    """Return axes given by vectors as three orthonormal ones, functions as they are.
+
+    ModelError if vectors are neither one of the plane, nor two or three in space at right angles.
+    """
+    if axes is None or callable(axes):
+        return axes  # type: ignore[no-any-return]
+    found = _vectors(axes, "the axes of a material")
+    if found.shape == (2,):
+        found = np.array([[*found, 0.0], [-found[1], found[0], 0.0]])
+    if found.shape not in ((2, 3), (3, 3)):
+        raise ModelError(
+            f"the axes of a material must be one vector (x, y) for the plane, two or three vectors (x, y, z), or a function; "
+            f"not numbers of shape {found.shape}"
+        )
+    lengths = np.linalg.norm(found, axis=1, keepdims=True)
+    if not lengths.min() > 0.0:
+        raise ModelError(f"the axes of a material {found.tolist()} have one without length")
+    found = found / lengths
+    off = np.abs(found @ found.T - np.eye(len(found))).max()
+    if off > 1e-6:
+        raise ModelError(
+            f"the axes of a material {found.tolist()} are not at right angles: the cosine between two is {off:.3g}"
+        )
+    first = found[0]
+    second = found[1] - (found[1] @ first) * first
+    second /= np.linalg.norm(second)
+    third = np.cross(first, second)
+    if len(found) == 3 and found[2] @ third < 0.0:
+        raise ModelError(
+            f"the axes of a material {found.tolist()} are left-handed: turn the sign of the third, or leave it out"
+        )
+    return tuple(tuple(row) for row in np.array([first, second, third]).tolist())
+
+
+def frames(axes: Axes, points: Array, kinematics: str) -> Array:
+    """Return checked axes at `points` (n, dim) [length] as unit vectors in rows, (n, 3, 3) [-].
+
+    ModelError if a function returns another shape or no orthonormal vectors, or a cylinder is not that of the axisymmetry.
+    """
+    if axes is None:
+        return np.broadcast_to(np.eye(3), (len(points), 3, 3))
+    if not callable(axes):
+        return np.broadcast_to(np.array(axes), (len(points), 3, 3))
+    if kinematics == "axisymmetric" and isinstance(axes, CylindricalAxes) and not axes.around_y:
+        raise ModelError(
+            f"{axes} are not around the axis of symmetry: in axisymmetry their origin is (0, 0, 0) and their direction "
+            "(0, 1, 0)"
+        )
+    found = np.asarray(axes(points), float)
+    if found.shape != (len(points), 3, 3):
+        raise ModelError(
+            f"the function of a material's axes returned numbers of shape {found.shape} for {len(points)} points: it must "
+            f"return three vectors in rows for each, shape ({len(points)}, 3, 3)"
+        )
+    off = np.abs(found @ found.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
+    bad = np.flatnonzero(~(off <= 1e-6))
+    if len(bad):
+        raise ModelError(
+            f"the function of a material's axes returned {found[bad[0]].tolist()} at {points[bad[0]]}: these are not unit "
+            "vectors at right angles"
+        )
+    return found
+
+
+def rotations(frame: Array) -> Array:
+    """Return the matrices (n, 6, 6) [-] from stresses in axes `frame` (n, 3, 3) to those in the axes of the mesh."""
+    found = np.empty((len(frame), 6, 6))
+    for row, (i, j) in enumerate(PAIRS):
+        for column, (a, b) in enumerate(PAIRS):
+            found[:, row, column] = frame[:, a, i] * frame[:, b, j]
+            if a != b:
+                found[:, row, column] += frame[:, b, i] * frame[:, a, j]
+    return found
+
+
+def _vectors(values: Any, name: str) -> Array:
+    """Return finite numbers as an array; ModelError names what they are otherwise."""
+    try:
+        found = np.asarray(values, float)
+    except (TypeError, ValueError):
+        found = np.array(np.nan)
+    if not np.isfinite(found).all():
+        raise ModelError(f"{name} = {values!r} must be finite numbers")
+    return found

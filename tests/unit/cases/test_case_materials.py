@@ -1,0 +1,68 @@
+"""Materials in case files: orthotropic and anisotropic ones, their axes, densities and expansions."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.cases.case import read_case
+
+CASE = """
+kinematics = "plane_strain"
+[mesh]
+file = "block.med"
+[[material]]
+{}
+[[support]]
+group = "BOTTOM"
+x = 0.0
+y = 0.0
+[[pressure]]
+group = "TOP"
+value = 1.0
+[ramp]
+steps = 1
+"""
+WOOD = "E = [10800, 700, 430]\nnu = [0.45, 0.51, 0.54]\nG = [620, 580, 26]\n"
+CONSTANTS = (10800, 700, 430), (0.45, 0.51, 0.54), (620, 580, 26)
+
+
+def material(tmp_path, text):
+    path = tmp_path / "case.toml"
+    fc.write_mesh(tmp_path / "block.med", fc.generate.block(divisions=(2, 2)))
+    path.write_text(CASE.format(text))
+    return read_case(path).model.materials[0][0]
+
+
+def test_materials_of_all_kinds_reach_the_model(tmp_path):
+    found = material(
+        tmp_path, WOOD + "axes = [[1, 1, 0], [-1, 1, 0]]\ndensity = 4.5e-10\nexpansion = [5e-6, 3e-5, 3e-5]"
+    )
+    assert found == fc.Orthotropic(
+        *CONSTANTS, axes=[(1, 1, 0), (-1, 1, 0)], density=4.5e-10, expansion=(5e-6, 3e-5, 3e-5)
+    )
+    found = material(tmp_path, WOOD + "axes = {origin = [0, -1, 0]}")
+    assert found == fc.Orthotropic(*CONSTANTS, axes=fc.CylindricalAxes(origin=(0, -1, 0)))
+    D = fc.Orthotropic(*CONSTANTS).moduli("3d")
+    np.testing.assert_array_equal(material(tmp_path, f"D = {D.tolist()}").D, (D + D.T) / 2)
+    found = material(tmp_path, "E = 210e3\nnu = 0.3\ndensity = 7.85e-9\nexpansion = 12e-6")
+    assert found == fc.LinearElastic(210e3, 0.3, density=7.85e-9, expansion=12e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("E = [1, 2, 3]\nnu = 0.3", r"material\[0\] needs 'G'"),
+        ("G = [1, 1, 1]\nnu = [0, 0, 0]", r"material\[0\] needs 'E'"),
+        (WOOD.replace("430]", "430, 1]"), r"material\[0\]: E = .* must be three numbers"),
+        (WOOD.replace("0.45", "4.5"), r"material\[0\]: Poisson's ratio nu12 = 4.5 must be less than"),
+        (WOOD + "volumetric = 'plain'", r"the key 'material.volumetric' is none of a material that is orthotropic"),
+        ("E = 1.0\nnu = 0.3\naxes = [[1, 0, 0], [0, 1, 0]]", r"the key 'material.axes' is none of .* isotropic"),
+        ("D = [[1, 2], [2, 1]]", r"material\[0\]: the moduli D must be a matrix of 6 x 6"),
+        (WOOD + "axes = {orgin = [0, 0, 0]}", r"'material.axes.orgin': did you mean 'material.axes.origin'"),
+        (WOOD + "axes = [[1, 0, 0], [1, 1, 0]]", r"material\[0\]: .* not at right angles"),
+        ("E = 1.0\nnu = 0.3\nexpansion = [1, 2, 3]", r"material\[0\]: .*must be a number"),
+    ],
+)
+def test_mistakes_in_materials_name_the_key(tmp_path, text, message):
+    with pytest.raises((fc.CaseError, fc.ModelError), match=message):
+        material(tmp_path, text)

@@ -1,0 +1,183 @@
+"""Orthotropic and anisotropic materials: moduli, conditions, axes, element loops against NumPy twins."""
+
+import numpy as np
+import pytest
+from test_assembly import SOLIDS as PLANE
+from test_assembly import patch as plane_patch
+from test_assembly import twin as plane_twin
+from test_assembly_3d import MESHES, twin
+
+import fastcontact as fc
+from fastcontact.elasticity.material_axes import PAIRS
+from fastcontact.elasticity.stiffness import of_special_form, stiffness
+
+KINEMATICS = ("plane_strain", "plane_stress", "axisymmetric", "3d")
+WOOD = {"E": (10_800.0, 700.0, 430.0), "nu": (0.45, 0.51, 0.54), "G": (620.0, 580.0, 26.0)}
+TILTED = [(1.0, 2.0, 0.5), (-2.0, 1.0, 0.0)]
+IN_PLANE = [(np.cos(0.4), np.sin(0.4), 0.0), (-np.sin(0.4), np.cos(0.4), 0.0)]
+
+
+def general():
+    """Moduli without any symmetry but that of the matrix."""
+    A = np.random.default_rng(4).normal(size=(6, 6))
+    return 100.0 * (A @ A.T + 6.0 * np.eye(6))
+
+
+def numbers(mesh):
+    return {name: np.zeros(len(block), np.int32) for name, block in mesh.solids.items()}
+
+
+@pytest.mark.parametrize("kinematics", KINEMATICS)
+def test_isotropic_constants_give_the_isotropic_moduli(kinematics):
+    E, nu = 210.0, 0.3
+    expected = fc.LinearElastic(E, nu).moduli(kinematics)
+    for material in (
+        fc.Orthotropic((E,) * 3, (nu,) * 3, (E / 2 / (1 + nu),) * 3, axes=IN_PLANE),
+        fc.Orthotropic.transversely_isotropic(E, E, nu, nu, E / 2 / (1 + nu)),
+        fc.Anisotropic(fc.LinearElastic(E, nu).moduli("3d"), axes=IN_PLANE),
+    ):
+        np.testing.assert_allclose(material.moduli(kinematics), expected, rtol=1e-13, atol=1e-11)
+
+
+def test_constants_mean_what_they_are_called():
+    """A stress along one axis strains the others by minus nu_ij, a shear stress by 1 / G."""
+    S = np.linalg.inv(fc.Orthotropic(**WOOD).moduli("3d"))
+    (E1, E2, E3), (nu12, nu13, nu23), (G12, G13, G23) = WOOD["E"], WOOD["nu"], WOOD["G"]
+    np.testing.assert_allclose(np.diag(S), [1 / E1, 1 / E2, 1 / E3, 1 / G12, 1 / G23, 1 / G13])
+    np.testing.assert_allclose([S[1, 0] / S[0, 0], S[2, 0] / S[0, 0], S[2, 1] / S[1, 1]], [-nu12, -nu13, -nu23])
+
+
+@pytest.mark.parametrize(
+    "make", [lambda axes: fc.Orthotropic(**WOOD, axes=axes), lambda a: fc.Anisotropic(general(), a)]
+)
+def test_turned_moduli_are_those_of_the_tensor_turned_index_by_index(make):
+    D, R = make(None).moduli("3d"), np.array([*TILTED, np.cross(*TILTED)])
+    R /= np.linalg.norm(R, axis=1, keepdims=True)
+    C = np.empty((3,) * 4)
+    for row, (i, j) in enumerate(PAIRS):
+        for column, (k, m) in enumerate(PAIRS):
+            C[i, j, k, m] = C[j, i, k, m] = C[i, j, m, k] = C[j, i, m, k] = D[row, column]
+    turned = np.einsum("ai,bj,ck,dl,abcd->ijkl", R, R, R, R, C)
+    expected = [[turned[i, j, k, m] for k, m in PAIRS] for i, j in PAIRS]
+    np.testing.assert_allclose(make(TILTED).moduli("3d"), expected, rtol=1e-10, atol=1e-9 * np.abs(D).max())
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"E": (1.0, 0.0, 1.0)}, "Young's modulus E2 = 0.0 must be a positive number"),
+        ({"E": (1.0, 1.0)}, "must be three numbers, for 1, 2 and 3"),
+        ({"nu": 0.3}, "must be three numbers, for 12, 13 and 23"),
+        ({"G": (1.0, np.nan, 1.0)}, "the shear modulus G13 = nan"),
+        ({"nu": (4.0, 0.1, 0.1)}, r"nu12 = 4 must be less than sqrt\(E1 / E2\) = 3.92"),
+        ({"E": (1.0,) * 3, "nu": (0.6,) * 3}, r"too large together: .* = -0.512 must be positive"),
+        ({"axes": [(1, 0, 0), (1, 1, 0)]}, "not at right angles: the cosine between two is 0.707"),
+        ({"axes": [(1, 0, 0), (0, 1, 0), (0, 0, -1)]}, "left-handed"),
+        ({"axes": [(1, 0, 0), (0, 0, 0)]}, "one without length"),
+        ({"axes": "x"}, "must be finite numbers"),
+        ({"axes": (1.0, 0.0, 0.0)}, "must be one vector"),
+        ({"density": -1.0}, "the density = -1.0 must be a number, zero or more"),
+        ({"expansion": (1.0, 2.0)}, "must be a number, or three along the material's axes"),
+    ],
+)
+def test_what_cannot_be_is_refused(change, words):
+    with pytest.raises(fc.ModelError, match=words):
+        fc.Orthotropic(**{**WOOD, **change})
+
+
+@pytest.mark.parametrize(
+    ("D", "words"),
+    [
+        (np.eye(3), r"6 x 6 finite numbers, not of shape \(3, 3\)"),
+        (np.diag([1.0, 1, 1, 1, 1, -1e-3]), "not positive definite, their least eigenvalue is -0.001"),
+        (np.eye(6) + np.eye(6, k=2), r"not symmetric: D\[0, 2\] = 1 and D\[2, 0\] = 0"),
+    ],
+)
+def test_moduli_without_energy_are_refused(D, words):
+    with pytest.raises(fc.ModelError, match=words):
+        fc.Anisotropic(D)
+
+
+@pytest.mark.parametrize("kinematics", KINEMATICS[:3])
+def test_shear_out_of_the_plane_is_refused_there(kinematics):
+    for material in (fc.Orthotropic(**WOOD, axes=[(1, 0, 1), (0, 1, 0)]), fc.Anisotropic(general())):
+        with pytest.raises(fc.ModelError, match="couples strains in the plane with shear out of it"):
+            material.moduli(kinematics)
+
+
+def test_plane_stress_has_no_stress_out_of_the_plane():
+    """The plane-stress moduli are those of 3D with the strain zz that makes the stress zz vanish."""
+    material = fc.Orthotropic(**WOOD, axes=IN_PLANE)
+    D, strain = material.moduli("3d"), np.array([1.0, -0.4, 0.0, 0.7, 0.0, 0.0])
+    strain[2] = -D[2] @ strain / D[2, 2]
+    np.testing.assert_allclose(material.moduli("plane_stress") @ strain[:4], (D @ strain)[:4], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_stiffness_in_space_equals_its_numpy_twin(name):
+    mesh = MESHES[name]()
+    for D in (fc.Orthotropic(**WOOD, axes=TILTED).moduli("3d"), general()):
+        K, expected = stiffness(mesh, "3d", D[None], numbers(mesh)).toarray(), twin(mesh, D)
+        np.testing.assert_allclose(K, expected, atol=1e-12 * np.abs(expected).max())
+        np.testing.assert_array_equal(K, K.T)
+
+
+@pytest.mark.parametrize("kinematics", KINEMATICS[:3])
+@pytest.mark.parametrize("element", PLANE)
+def test_stiffness_in_the_plane_equals_its_numpy_twin(element, kinematics):
+    mesh = plane_patch(element)
+    D = fc.Orthotropic(**WOOD, axes=IN_PLANE).moduli(kinematics)
+    assert not of_special_form(D[None]).any()
+    K, expected = stiffness(mesh, kinematics, D[None], numbers(mesh)).toarray(), plane_twin(mesh, kinematics, D)
+    np.testing.assert_allclose(K, expected, atol=1e-12 * np.abs(expected).max())
+    np.testing.assert_array_equal(K, K.T)
+
+
+def test_isotropic_moduli_keep_the_short_loops_however_incompressible():
+    for nu in (-0.9, 0.0, 0.3, 0.4999, 0.4999999):
+        assert of_special_form(fc.LinearElastic(3.3, nu).moduli("3d")[None]).all()
+    assert not of_special_form(fc.Orthotropic(**WOOD).moduli("3d")[None]).any()
+
+
+def test_axes_of_a_cylinder_are_radial_tangential_and_along():
+    axes = fc.CylindricalAxes(origin=(1.0, 0.0, 0.0), direction=(0.0, 0.0, 2.0))
+    found = axes(np.array([[3.0, 0.0], [1.0, 5.0]]))
+    np.testing.assert_allclose(found, [np.eye(3), [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]])
+    with pytest.raises(fc.ModelError, match="lies on the line of the cylindrical axes"):
+        axes(np.array([[1.0, 0.0], [2.0, 0.0]]))
+    with pytest.raises(fc.ModelError, match="no length"):
+        fc.CylindricalAxes(direction=(0.0, 0.0, 0.0))
+    with pytest.raises(fc.ModelError, match="three components"):
+        fc.CylindricalAxes(origin=(0.0, 0.0))
+    material = fc.Orthotropic(**WOOD, axes=axes)
+    with pytest.raises(fc.ModelError, match="depend on the position"):
+        material.moduli("3d")
+    with pytest.raises(fc.ModelError, match="not around the axis of symmetry"):
+        material.moduli_at(np.ones((1, 2)), "axisymmetric")
+
+
+def test_a_cylinder_in_axisymmetry_has_its_tangent_along_the_circumference():
+    D = fc.Orthotropic(**WOOD, axes=fc.CylindricalAxes(direction=(0, 1, 0))).moduli_at(np.ones((1, 2)), "axisymmetric")[
+        0
+    ]
+    expected = fc.Orthotropic(**WOOD).moduli("3d")[np.ix_([0, 2, 1, 5], [0, 2, 1, 5])]
+    np.testing.assert_allclose(D, expected, rtol=1e-12, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("axes", "words"),
+    [
+        (lambda x: np.ones((len(x), 3)), r"must return three vectors in rows for each, shape \(4, 3, 3\)"),
+        (lambda x: np.ones((len(x), 3, 3)), "these are not unit vectors at right angles"),
+    ],
+)
+def test_functions_that_return_no_axes_are_refused(axes, words):
+    model = fc.Model(fc.generate.block(divisions=(2, 2)), "plane_strain")
+    model.add_material(fc.Orthotropic(**WOOD, axes=axes))
+    with pytest.raises(fc.ModelError, match=words):
+        model.check()
+
+
+def test_what_is_no_material_is_refused():
+    with pytest.raises(fc.ModelError, match="is no material"):
+        fc.Model(fc.generate.block(divisions=(2, 2)), "plane_strain").add_material(210.0)
