@@ -64,12 +64,12 @@ TRANSLATED = {
     "TIE": _keyword("POSITION TOLERANCE; ADJUST", "NAME; TYPE; NO ROTATION"),
     "TRANSFORM": _keyword("NSET; TYPE"),
 }
-# Requests for output: everything they ask for is in the results.
+# Requests for output, all of which is in the results, and controls of convergence, which has criteria of its own.
 OUTPUT = (
     "CONTACT FILE", "CONTACT OUTPUT", "CONTACT PRINT", "EL FILE", "EL PRINT", "ELEMENT OUTPUT", "ENERGY FILE",
     "ENERGY OUTPUT",
     "ENERGY PRINT", "FACE PRINT", "FILE FORMAT", "FILE OUTPUT", "MONITOR", "NODE FILE", "NODE OUTPUT", "NODE PRINT", "OUTPUT",
-    "PREPRINT", "PRINT", "RESTART", "SECTION FILE", "SECTION PRINT", "TIME POINTS", "CONTROLS", "USER MATERIAL OUTPUT",
+    "PREPRINT", "PRINT", "RESTART", "SECTION FILE", "SECTION PRINT", "TIME POINTS", "CONTROLS",
 )  # fmt: skip
 # Why other keywords of the format are refused.
 LINEAR = "is outside of fastcontact (linear elastic)"

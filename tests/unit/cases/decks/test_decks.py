@@ -288,3 +288,22 @@ def test_materials_with_axes(tmp_path):
         deck_of(tmp_path, other.replace("1.e4, 1.e4\n1.e4\n", "1.e4, 1.e4\n"))
     with pytest.raises(fc.CaseError, match="orientation 'turned' is not defined; orientations: none"):
         deck_of(tmp_path, other.replace(turned, ""))
+
+
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
+def test_a_deck_with_a_line_left_out_cut_or_twice_is_read_or_refused_in_one_line(tmp_path):
+    lines, texts = WHOLE.splitlines(), []
+    for number, line in enumerate(lines):
+        for instead in (
+            [],
+            [line[: len(line) // 2]],
+            [line, line],
+            [line.replace("1", "x")],
+            [line.replace(",", ",,")],
+        ):
+            try:
+                deck_of(tmp_path, "\n".join([*lines[:number], *instead, *lines[number + 1 :]]))
+            except fc.FastcontactError as error:
+                texts.append(str(error))
+    assert len(texts) > len(lines)
+    assert not [text for text in texts if "\n" in text]
