@@ -32,6 +32,7 @@ _MODULES = {
 _NAMES = {
     "analysis.criteria": ("Criteria",),
     "analysis.run": ("solve", "solve_steps"),
+    "cases.decks.deck": ("Deck", "read_deck"),
     "elasticity.anisotropic_materials": ("Anisotropic", "Orthotropic"),
     "elasticity.material_axes": ("CylindricalAxes",),
     "elasticity.materials": ("LinearElastic",),

@@ -5,8 +5,13 @@ from fastcontact._version import __version__ as __version__
 from fastcontact.analysis.criteria import Criteria as Criteria
 from fastcontact.analysis.run import solve as solve
 from fastcontact.analysis.run import solve_steps as solve_steps
+from fastcontact.cases.decks.deck import Deck as Deck
+from fastcontact.cases.decks.deck import read_deck as read_deck
 from fastcontact.contact import obstacles as obstacles
 from fastcontact.elasticity import recovery as recovery
+from fastcontact.elasticity.anisotropic_materials import Anisotropic as Anisotropic
+from fastcontact.elasticity.anisotropic_materials import Orthotropic as Orthotropic
+from fastcontact.elasticity.material_axes import CylindricalAxes as CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic as LinearElastic
 from fastcontact.errors import CaseError as CaseError
 from fastcontact.errors import ContactError as ContactError

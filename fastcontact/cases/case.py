@@ -12,6 +12,7 @@ from typing import Any
 from fastcontact import analytic
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.cases.checks import CHECK, Check, read_check
+from fastcontact.cases.decks.deck import Deck, read_deck
 from fastcontact.cases.keys import NUMBER, RAMP, SOLVE, STUDY, TOP, UNITS, called, check_keys, tables
 from fastcontact.cases.model_tables import build_model, points
 from fastcontact.cases.shipped import case_path
@@ -22,7 +23,10 @@ from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, linear_ramp
+from fastcontact.results.step import StepResult
 
+# Suffix of input decks of Abaqus and CalculiX.
+DECK = ".inp"
 LARGEST = 1 << 23  # of a case file [bytes]
 # The parser takes a time that grows with the square of the parts of a dotted key.
 PARTS = 50
@@ -55,6 +59,8 @@ class Case:
         Approach of the theory by contact pair, where it was given [length].
     folder : pathlib.Path
         In which the files lie that the case names, absolute.
+    deck : Deck, optional
+        The input deck of which the case was made.
     """
 
     name: str
@@ -72,10 +78,15 @@ class Case:
     units: dict[str, str] = field(default_factory=dict)
     approach: dict[str, float] = field(default_factory=dict)
     folder: Path = Path()
+    deck: Deck | None = None
+
+    def finished(self, step: StepResult) -> StepResult:
+        """Return a step of the model as results have it: of a deck with forces of the whole thickness."""
+        return step if self.deck is None else self.deck.finished(step)
 
 
 def read_case(path: str | Path) -> Case:
-    """Read a case file, or a ready case by its name, and build its model.
+    """Read a case file, a ready case by its name, or an input deck (``.inp``), and build its model.
 
     Raises
     ------
@@ -85,6 +96,8 @@ def read_case(path: str | Path) -> Case:
         If its mesh or model is wrong.
     """
     path = case_path(path)
+    if path.suffix.lower() == DECK:
+        return _case_of_deck(path)
     text, data = _parsed(path)
     try:
         return build_case(data, name=path.stem, folder=path.parent, text=text)
@@ -96,9 +109,31 @@ def read_case(path: str | Path) -> Case:
         raise CaseError(f"{path}: a value is of the wrong kind or size ({reason}): see the ready cases") from error
 
 
+def _case_of_deck(path: Path) -> Case:
+    """Return an input deck of Abaqus or CalculiX as a case."""
+    deck = read_deck(path)
+    return Case(
+        name=path.stem,
+        title=deck.title,
+        text=deck.model.case_text,
+        mesh=deck.model.mesh,
+        model=deck.model,
+        ramp=deck.ramp,
+        criteria=deck.criteria,
+        linear_solver="auto",
+        linear_tolerance=1e-10,
+        probes={},
+        units=_units({}),
+        folder=path.parent.resolve(),
+        deck=deck,
+    )
+
+
 def files_of_case(path: str | Path) -> list[Path]:
     """Return a case file and the files of meshes that it names; raises CaseError if it cannot be read."""
     path = case_path(path)
+    if path.suffix.lower() == DECK:
+        return [path]
     found, waiting = [path], [_parsed(path)[1]]
     while waiting:
         for key, value in waiting.pop().items():

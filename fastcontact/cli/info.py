@@ -8,12 +8,12 @@ from typing import Any
 
 from fastcontact.cli._terminal import say
 
-HELP = "show what a mesh or result file holds: groups, sizes, steps, iterations, versions"
+HELP = "show what a mesh, deck or result file holds: groups, sizes, steps, iterations, versions"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
-    parser.add_argument("file", help="mesh file or result file (.vtkhdf)")
+    parser.add_argument("file", help="mesh file, deck (.inp) or result file (.vtkhdf)")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -24,12 +24,36 @@ def run(options: argparse.Namespace) -> int:
         with open_results(options.file) as results:
             say("\n".join([*_mesh_lines(results.mesh), *_result_lines(results)]))
         return 0
+    if Path(options.file).suffix.lower() == ".inp" and _is_deck(Path(options.file)):
+        from fastcontact.cases.decks.deck import read_deck
+
+        deck = read_deck(options.file)
+        say("\n".join([*_deck_lines(deck), *_mesh_lines(deck.model.mesh)]))
+        return 0
     from fastcontact.mesh.files.mesh_files import read_mesh_report
     from fastcontact.mesh.quality import quality
 
     mesh, report = read_mesh_report(options.file)
     say("\n".join([str(report), *_mesh_lines(mesh), str(quality(mesh))]))
     return 0
+
+
+def _is_deck(path: Path) -> bool:
+    """Whether an Abaqus file holds more than a mesh: steps, parts, or other files."""
+    from fastcontact.mesh.files.paths import existing_file
+
+    words = ("*STEP", "*PART", "*INCLUDE")
+    with open(existing_file(path), encoding="utf-8", errors="replace") as file:
+        return any(line.lstrip().upper().startswith(words) for line in file)
+
+
+def _deck_lines(deck: Any) -> list[str]:
+    found = [
+        f"{deck.path}: {deck.title}",
+        repr(deck.model),
+        f"load factors: {', '.join(f'{t:g}' for t in deck.ramp.instants)}",
+    ]
+    return found + [f"  note: {text}" for text in deck.notes]
 
 
 def _mesh_lines(mesh: Any) -> list[str]:

@@ -21,7 +21,7 @@ from fastcontact.errors import CaseError, ConvergenceError, FastcontactWarning, 
 if TYPE_CHECKING:
     from fastcontact.cases.case import Case
 
-HELP = "solve a case file and write the results of all steps"
+HELP = "solve a case file or an input deck (.inp) and write the results of all steps"
 log = logging.getLogger("fastcontact")
 # Cell field of the estimated error.
 ERROR = "error"
@@ -29,7 +29,9 @@ ERROR = "error"
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
-    parser.add_argument("case", help="case file (TOML), or the name of a ready case: see 'fastcontact cases'")
+    parser.add_argument(
+        "case", help="case file (TOML), the name of a ready case (see 'fastcontact cases'), or a deck (.inp)"
+    )
     parser.add_argument("-o", "--output", help="result file (default: the case's name with .vtkhdf, here)")
     parser.add_argument(
         "--resume", action="store_true", help="go on after the last complete step of the result file, if it holds any"
@@ -52,12 +54,14 @@ def run(options: argparse.Namespace) -> int:
     started = time.perf_counter()
     if options.threads is not None:
         _set_threads(options.threads)
-    case = read_case(options.case)
+    with _warnings_shown() as early:
+        case = read_case(options.case)
     output = Path(options.output or f"{case.name}.vtkhdf")
     check_outputs(files_of_case(options.case), [output, options.json], [options.plot])
     read = time.perf_counter()
     case.model.check(case.ramp)  # a wrong model must not replace the results of a right one
     with _warnings_shown() as caught:
+        caught += early
         done, last, steps = _solved(options, case, output)
     texts = list(dict.fromkeys([*(text for step in done for text in step.warnings), *caught]))
     timings = {"read": read - started, "solve": time.perf_counter() - read, "cpu": time.process_time()}
@@ -122,6 +126,7 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[list
                 criteria=case.criteria,
                 resume=done,
             ):
+                last = case.finished(last)
                 writer.write(_estimated(case.model, last) if fields else last)
                 progress.step(last)
                 steps.append(of_step(last))

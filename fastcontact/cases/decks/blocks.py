@@ -1,0 +1,254 @@
+"""Keyword blocks of a deck: keyword, parameters and data lines, each with its file and line; included files in place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fastcontact.errors import CaseError, FileError
+
+# Bytes of a deck and all files it includes, and how many these are: more is an error of whoever wrote it.
+LARGEST = 1 << 28
+MOST_FILES = 200
+LONGEST_QUOTED = 80
+
+
+@dataclass(frozen=True)
+class Place:
+    """A line of a file, and the keyword to which it belongs."""
+
+    file: str
+    line: int
+    keyword: str
+
+    def refuse(self, text: str) -> CaseError:
+        """Return the error that says what is wrong here."""
+        return CaseError(f"{self}: {text}")
+
+    def __str__(self) -> str:
+        return f"{self.file}, line {self.line}, *{self.keyword}"
+
+
+@dataclass(frozen=True)
+class Row:
+    """A data line: its entries without blanks around them, and its place."""
+
+    place: Place
+    entries: tuple[str, ...]
+    goes_on: bool = False
+
+    def text(self, index: int) -> str:
+        """Return an entry, empty where the line ends before it."""
+        return self.entries[index] if index < len(self.entries) else ""
+
+    def number(self, index: int, default: float | None = None) -> float:
+        """Return an entry as a number, `default` where there is none; CaseError if it is no number or missing."""
+        text = self.text(index)
+        if not text:
+            if default is None:
+                raise self.place.refuse(f"entry {index + 1} is missing: a number is needed")
+            return default
+        return as_number(self.place, text)
+
+    def whole(self, index: int, default: int | None = None) -> int:
+        """Return an entry as a whole number; errors as for `number`."""
+        value = self.number(index, default)
+        if value != int(value):
+            raise self.place.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is no whole number")
+        return int(value)
+
+
+@dataclass(frozen=True)
+class Block:
+    """A keyword with its parameters (names in upper case, without values None) and all its data lines."""
+
+    place: Place
+    parameters: dict[str, str | None]
+    lines: tuple[Row, ...] = ()
+
+    @property
+    def keyword(self) -> str:
+        """Return the keyword in upper case, without its asterisk."""
+        return self.place.keyword
+
+    @property
+    def rows(self) -> list[Row]:
+        """Return the data lines that hold anything."""
+        return [row for row in self.lines if any(row.entries)]
+
+    def get(self, name: str, default: str = "") -> str:
+        """Return the value of a parameter, `default` where it is not given or has none."""
+        return self.parameters.get(name) or default
+
+    def choice(self, name: str, known: tuple[str, ...]) -> str:
+        """Return the value of a parameter in upper case, the first of `known` by default; CaseError if it is another."""
+        value = " ".join(self.get(name, known[0]).upper().split())
+        if value not in known:
+            raise self.place.refuse(f"{name}={value[:LONGEST_QUOTED]} is not supported; known are {', '.join(known)}")
+        return value
+
+    def required(self, name: str) -> str:
+        """Return the value of a parameter; CaseError if there is none."""
+        value = self.parameters.get(name)
+        if not value:
+            raise self.place.refuse(f"the parameter {name} is missing")
+        return value
+
+
+@dataclass
+class Source:
+    """The deck that is read: its folder, what was read so far, and which files are open."""
+
+    folder: Path
+    size: int = 0
+    files: int = 0
+    open: list[Path] = field(default_factory=list)
+
+
+def as_number(place: Place, text: str) -> float:
+    """Return a text as a finite number, also as Fortran writes it (1.D5); CaseError otherwise."""
+    try:
+        value = float(text.upper().replace("D", "E")) if text[:1].upper() not in "IN" else float("nan")
+    except ValueError:
+        raise place.refuse(f"'{text[:LONGEST_QUOTED]}' is no number") from None
+    if "_" in text or value != value or value in (float("inf"), float("-inf")):
+        raise place.refuse(f"'{text[:LONGEST_QUOTED]}' is no number that could be used")
+    return value
+
+
+def unquoted(text: str) -> str:
+    """Return a name without the quotation marks around it."""
+    return text[1:-1] if len(text) > 1 and text[0] == text[-1] == '"' else text
+
+
+def folded(name: str) -> str:
+    """Return a name as sets and others are looked up: in upper case, without quotation marks."""
+    return name.replace('"', "").strip().upper()
+
+
+def read_blocks(path: Path) -> list[Block]:
+    """Return all blocks of a deck, those of included files in place.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be read or all of them are too large.
+    CaseError
+        If a line is no part of a deck, or an *INCLUDE is refused; the message names file and line.
+    """
+    source = Source(path.resolve().parent)
+    return list(_blocks(path, path.name, source))
+
+
+def _text(path: Path, source: Source) -> str:
+    source.files += 1
+    try:
+        source.size += path.stat().st_size
+        if source.size > LARGEST or source.files > MOST_FILES:
+            raise FileError(
+                f"'{path}' with what it includes is more than {LARGEST >> 20} MiB or {MOST_FILES} files: too much for a deck"
+            )
+        return path.read_text(encoding="utf-8-sig", errors="replace")
+    except OSError as error:
+        raise FileError(f"cannot read '{path}': {error.strerror or error}") from error
+
+
+def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
+    """Yield the blocks of one file; data lines at its beginning belong to no keyword and are refused."""
+    source.open.append(path.resolve())
+    current: Block | None = None
+    rows: list[Row] = []
+    lines = iter(enumerate(_text(path, source).splitlines(), start=1))
+    for number, raw in lines:
+        line = raw.strip()
+        if line.startswith("**"):
+            continue
+        if not line.startswith("*"):
+            if current is not None:
+                rows.append(_row(Place(name, number, current.keyword), line))
+            elif line:
+                raise Place(name, number, "").refuse("a data line before any keyword")
+            continue
+        if current is not None:
+            yield Block(current.place, current.parameters, tuple(rows))
+        place, line = Place(name, number, _keyword(line)), _continued(line, lines)
+        current, rows = Block(place, _parameters(place, line)), []
+        if place.keyword == "INCLUDE":
+            yield from _included(current, name, source)
+            current = None
+    if current is not None:
+        yield Block(current.place, current.parameters, tuple(rows))
+    source.open.pop()
+
+
+def _continued(line: str, lines: Iterator[tuple[int, str]]) -> str:
+    """Return a keyword line with the lines on which it goes on, after a comma."""
+    while line.endswith(","):
+        _, more = next(lines, (0, ""))
+        if not more.strip().startswith("**"):
+            line = f"{line} {more.strip()}"
+        if not more:
+            break
+    return line
+
+
+def _keyword(line: str) -> str:
+    return " ".join(line[1:].partition(",")[0].upper().split())[:LONGEST_QUOTED]
+
+
+def _parts(line: str) -> list[str]:
+    """Return what stands between the commas of a line, without blanks around; quoted names keep their commas."""
+    if '"' not in line:
+        return [part.strip() for part in line.split(",")]
+    parts = [""]
+    for number, piece in enumerate(line.split('"')):
+        if number % 2:  # inside quotation marks
+            parts[-1] += f'"{piece}"'
+        else:
+            first, *others = piece.split(",")
+            parts[-1] += first
+            parts += others
+    return [part.strip() for part in parts]
+
+
+def _parameters(place: Place, line: str) -> dict[str, str | None]:
+    found: dict[str, str | None] = {}
+    for part in _parts(line)[1:]:
+        key, equal, value = part.partition("=")
+        key = " ".join(key.upper().split())
+        if key in found:
+            raise place.refuse(f"the parameter {key} stands there twice")
+        if key:
+            found[key] = unquoted(value.strip()) if equal else None
+    return found
+
+
+def _row(place: Place, line: str) -> Row:
+    goes_on = line.endswith(",")
+    return Row(place, tuple(_parts(line[:-1] if goes_on else line)), goes_on)
+
+
+def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
+    """Yield the blocks of the file that *INCLUDE names, which must lie below the folder of the deck."""
+    given = block.required("INPUT")
+    for parameter in block.parameters:
+        if parameter != "INPUT":
+            raise block.place.refuse(f"the parameter {parameter} is not supported")
+    shown, path = given[:LONGEST_QUOTED], source.folder / given.replace("\\", "/")
+    try:
+        target = path.resolve()
+        inside = target.is_relative_to(source.folder)
+        there = inside and target.is_file()
+    except (OSError, ValueError, RuntimeError):
+        raise block.place.refuse(f"'{shown}' is no name of a file") from None
+    if not inside:
+        raise block.place.refuse(
+            f"'{shown}' is outside of the folder of the deck: refused, copy the file below '{source.folder}'"
+        )
+    if not there:
+        raise block.place.refuse(f"file '{shown}' not found beside the deck, in '{source.folder}'")
+    if target in source.open:
+        what = "the deck" if target == source.open[0] else f"'{shown}'"
+        raise block.place.refuse(f"{what} includes itself")
+    yield from _blocks(target, given, source)

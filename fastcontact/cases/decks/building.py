@@ -1,0 +1,412 @@
+"""From the content of a deck to a model and a ramp."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from fastcontact.cases.decks.assembled import Assembled, assembled
+from fastcontact.cases.decks.blocks import Place, folded
+from fastcontact.cases.decks.conditions import Component, Conditions, Distributed, local_axes
+from fastcontact.cases.decks.content import Content, Material, Pair, Section, Step
+from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface
+from fastcontact.cases.decks.relating import make_rotations, relations_of
+from fastcontact.cases.decks.stepping import MOST_PARTS
+from fastcontact.contact.obstacles.shapes import HalfSpace
+from fastcontact.elasticity.material_axes import CylindricalAxes
+from fastcontact.elasticity.relations import Relation
+from fastcontact.model.model import Model
+from fastcontact.model.ramp import Ramp, Table
+
+Array = NDArray[np.float64]
+# What a gap of the undeformed sides may be, relative to the size of the model, and still count as none.
+TOUCHING = 1e-6
+LONGEST_RAMP = 100_000
+
+
+class Building:
+    """A model in the making.
+
+    Attributes
+    ----------
+    made, found : the assembly and its mesh
+    model : Model
+    thickness : float
+        Of a plane model; forces of the model are those of a unit of it [length].
+    local_supports : list of Relation
+        Relations that are supports along local axes.
+    gap_ends : dict of str to dict of int to int
+        By the name of a contact made of gap elements: its nodes, and the nodes behind the gaps.
+    """
+
+    def __init__(self, content: Content, case_text: str) -> None:
+        self.content = content
+        self.made: Assembled = assembled(content)
+        self.found: DeckMesh = begun(self.made)
+        make_rotations(self.found)
+        materials, self.thickness = self._materials()
+        conditions = Conditions(self.found)
+        self._check_pairs()
+        conditions.run()
+        groups = self._groups(conditions)
+        gaps = self._gap_groups()
+        self.model = Model(self.found.mesh(), self.found.kinematics, case_text)
+        for material, group in materials:
+            self.model.add_material(material, group)
+        self.local_supports: list[Relation] = []
+        self._supports(conditions)
+        self.links = relations_of(self.found, self.model.mesh)
+        self.model.relations.extend(self.links)
+        self._forces(conditions)
+        self._pressures(groups)
+        self._body_forces(conditions)
+        self._springs()
+        self._contact()
+        self.gap_ends = self._gaps(gaps, conditions)
+        self.ramp = self._ramp(conditions)
+
+    def _materials(self) -> tuple[list[tuple[Any, str]], float]:
+        """Return materials with groups of solids, and the thickness; every solid needs a section."""
+        owner: dict[Any, tuple[Section, Material]] = {}
+        thickness: float | None = None
+        for scope in self.made.scopes:
+            for section in self.made.part(scope).sections:
+                material = self._material(section)
+                if self.found.dim == 2 and self.found.kinematics != "axisymmetric":
+                    own = 1.0 if section.thickness is None else section.thickness
+                    if thickness is not None and own != thickness:
+                        raise section.place.refuse(
+                            f"thickness {own:g} after {thickness:g}: plane models have one thickness"
+                        )
+                    thickness = own
+                name = f"{scope}.{section.elements}" if scope else section.elements
+                for key in self.made.keys("element", name, section.place):
+                    if key in owner and owner[key][0] is not section:
+                        raise section.place.refuse(
+                            f"element {key[1]} has a section already, in line {owner[key][0].place.line}"
+                        )
+                    owner[key] = (section, material)
+        self._check_sections(owner)
+        by_material: dict[tuple[str, str], list[Any]] = {}
+        for key in self.made.solids:
+            section, material = owner[key]
+            by_material.setdefault((folded(material.name), folded(section.orientation)), []).append(key)
+        self.densities = {key: owner[key][1] for key in self.made.solids}
+        found = []
+        for (name, turned), keys in by_material.items():
+            material = self.content.materials[name]
+            axes = self._axes(owner[keys[0]][0])
+            group = f"material {material.name}" + (f" along {turned.lower()}" if turned else "")
+            assert material.law is not None
+            found.append((material.law(axes), self.found.add_solids(group, keys)))
+        return found, thickness or 1.0
+
+    def _axes(self, section: Section) -> Any:
+        """Return the axes of the material of a section, None for those of the mesh."""
+        if not section.orientation:
+            return None
+        axes = self.content.orientations.get(folded(section.orientation))
+        if axes is None:
+            known = ", ".join(self.content.orientations).lower() or "none"
+            raise section.place.refuse(f"orientation '{section.orientation}' is not defined; orientations: {known}")
+        if axes.cylindrical:
+            a, b = np.array(axes.points[:3]), np.array(axes.points[3:])
+            return CylindricalAxes(tuple(a.tolist()), tuple((b - a).tolist()))
+        return tuple(tuple(row) for row in local_axes(axes, np.zeros(3)).tolist())
+
+    def _material(self, section: Section) -> Material:
+        material = self.content.materials.get(folded(section.material))
+        if material is None:
+            known = ", ".join(m.name for m in self.content.materials.values()) or "none"
+            raise section.place.refuse(f"material '{section.material}' is not defined; materials: {known}")
+        if material.law is None:
+            raise material.place.refuse(f"material '{material.name}' has no *ELASTIC")
+        return material
+
+    def _check_sections(self, owner: Mapping[Any, Any]) -> None:
+        without = [key for key in self.made.solids if key not in owner]
+        if without:
+            cell = self.made.solids[without[0]].cell
+            many = "1 element" if len(without) == 1 else f"{len(without)} elements"
+            named = f" of set '{cell.set}'" if cell.set else ""
+            raise cell.place.refuse(f"{many} ({without[0][1]}){named} has no section, so no material")
+
+    def _check_pairs(self) -> None:
+        """Refuse pairs whose surfaces or interaction are not there."""
+        seen: set[str] = set()
+        for pair in self.content.pairs:
+            for name in (pair.secondary, pair.primary):
+                self.made.surface(name, pair.place)
+            if not pair.tied and folded(pair.interaction) not in self.content.interactions:
+                known = ", ".join(i.name for i in self.content.interactions.values()) or "none"
+                raise pair.place.refuse(
+                    f"surface interaction '{pair.interaction}' is not defined; interactions: {known}"
+                )
+            if folded(pair.name) in seen:
+                raise pair.place.refuse(f"the pair {pair.name} stands there twice")
+            seen.add(folded(pair.name))
+
+    def _groups(self, conditions: Conditions) -> list[tuple[str, Table]]:
+        """Make groups of the facets with the same history of pressure; return them."""
+        by_table: dict[tuple[str, Table], list[Any]] = {}
+        for name in conditions.loads.tracks:
+            if name.face is not None:
+                by_table.setdefault((name.keyword, conditions.loads.table(name)), []).append(name.face)
+        return [
+            (self.found.add_facets(f"pressure {number}", faces), table)
+            for number, ((_, table), faces) in enumerate(by_table.items(), start=1)
+        ]
+
+    def _point_group(self, kind: str, points: Iterable[int]) -> str:
+        """Return the name of a group of points of the mesh, which is made where there is none."""
+        before = len(self.found.point_groups)
+        name = self.found.add_points(f"{kind} {before}", points)
+        if name not in self.model.mesh.point_groups:
+            self.model.mesh = self.model.mesh.with_groups(points={name: sorted(set(points))})
+        return name
+
+    def _supports(self, conditions: Conditions) -> None:
+        mesh, alike = self.model.mesh, {}  # type: tuple[Any, dict[tuple[int, Table], list[int]]]
+        for name in conditions.supports.tracks:
+            point, axis, local = name
+            table = conditions.supports.table(name)
+            if local:
+                self._local_support(conditions, name, table)
+            else:
+                alike.setdefault((axis, table), []).append(point)
+        for (axis, table), points in alike.items():
+            letter = "xyz"[axis]
+            group = self._point_group("support", points)
+            if any(value for _, value in table):
+                self.model.prescribe(group, ramp=table, **{letter: 1.0})
+            else:
+                self.model.fix(group, letter)
+        if mesh.dim == 2 and self.found.rotations:
+            self.model.fix(self._point_group("rotation", self.found.rotations.values()), "y")
+
+    def _local_support(self, conditions: Conditions, name: Component, table: Table) -> None:
+        point, axis, _ = name
+        dim = self.found.dim
+        direction = conditions.directions[point][axis][:dim]
+        columns = point * dim + np.arange(dim)
+        rows = csr_array((direction, (np.zeros(dim, int), columns)), shape=(1, self.model.n_dofs))
+        made = Relation(f"the support of {conditions.named(name)} on local axes", rows, 1.0, table)
+        self.local_supports.append(made)
+        self.model.relations.append(made)
+
+    def _forces(self, conditions: Conditions) -> None:
+        alike: dict[tuple[int, Table], list[int]] = {}
+        for name in conditions.forces.tracks:
+            point, axis, local = name
+            table = conditions.forces.table(name)
+            direction = conditions.directions[point][axis] if local else np.eye(3)[axis]
+            for k in range(self.found.dim):
+                if abs(direction[k]) > 1e-12:
+                    scaled = tuple((t, v * float(direction[k]) / self.thickness) for t, v in table)
+                    alike.setdefault((k, scaled), []).append(point)
+        for (axis, table), points in alike.items():
+            if any(value for _, value in table):
+                group = self._point_group("force", points)
+                self.model.add_force(group, distribute=False, ramp=table, **{"xyz"[axis]: 1.0})
+
+    def _pressures(self, groups: list[tuple[str, Table]]) -> None:
+        for group, table in groups:
+            if any(value for _, value in table):
+                self.model.add_pressure(group, 1.0, ramp=table)
+
+    def _body_forces(self, conditions: Conditions) -> None:
+        for number, name in enumerate(conditions.loads.tracks, start=1):
+            if name.face is not None:
+                continue
+            track = conditions.loads.tracks[name]
+            by_density: dict[float, list[Any]] = {}
+            for key in name.elements:
+                if key in self.made.solids:
+                    by_density.setdefault(self._density(key, name, track.place), []).append(key)
+            for density, keys in by_density.items():
+                group = self.found.add_solids(f"load {number} of density {density:g}", keys)
+                self._name_solids(group)
+                values = _body_force(name, density, self.found.dim)
+                self.model.add_body_force(group, ramp=conditions.loads.table(name), **values)
+
+    def _density(self, key: Any, name: Distributed, place: Place) -> float:
+        if name.kind[0] == "B":
+            return 1.0
+        material = self.densities[key]
+        if material.density is None:
+            raise place.refuse(f"material '{material.name}' has no *DENSITY, so {name.kind} is no force")
+        return material.density
+
+    def _name_solids(self, group: str) -> None:
+        """Add a group of solids to the mesh that is made already; elements begin the numbers of cells."""
+        offsets = self.model.mesh.offsets
+        numbers = [offsets[name] + row for name, row in self.found.groups[group]]
+        self.model.mesh = self.model.mesh.with_groups(cells={group: numbers})
+
+    def _springs(self) -> None:
+        for name, (place, stiffness) in self.content.springs.items():
+            for key in self.made.keys("element", name, place):
+                cell, points = self.made.discrete.get(key, (None, ()))
+                if cell is None or cell.type != "SPRINGA":
+                    raise place.refuse(f"element {key[1]} is no spring of type SPRINGA")
+                self.model.add_spring(points[0], points[1], axial=stiffness / self.thickness)
+        self._check_discrete("SPRINGA", self.content.springs, "*SPRING")
+
+    def _check_discrete(self, kind: str, given: Mapping[str, Any], needed: str) -> None:
+        """Refuse springs and gap elements without properties."""
+        with_one = {key for name, entry in given.items() for key in self.made.keys("element", name, entry[0])}
+        for key, (cell, _) in self.made.discrete.items():
+            if cell.type == kind and key not in with_one:
+                raise cell.place.refuse(f"element {key[1]} of type {kind} has no {needed}")
+
+    def _contact(self) -> None:
+        for pair in self.content.pairs:
+            secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
+            options = {"kind": "tied"} if pair.tied else self._options(pair)
+            self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
+
+    def _options(self, pair: Pair) -> dict[str, Any]:
+        law = self.content.interactions[folded(pair.interaction)]
+        options: dict[str, Any] = {}
+        if law.kind != "unilateral":
+            if law.friction:
+                raise law.place.refuse(f"friction with {law.kind} contact is not supported")
+            options["kind"] = law.kind
+        if law.penalty is not None and law.kind != "tied":
+            options["penalty"] = law.penalty
+        if law.friction:
+            options["friction"] = law.friction
+            if law.stick is not None:
+                options["tangential_penalty"] = law.stick
+        if pair.adjust or pair.clearance is not None:
+            options.update(self._fitted(pair))
+        return options
+
+    def _fitted(self, pair: Pair) -> dict[str, Any]:
+        """Return the clearance that brings the sides to where ADJUST or *CLEARANCE say; refused where no number does."""
+        secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
+        gaps = nodal_gaps(self.model, secondary, primary)
+        size = TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max())
+        if pair.clearance is not None:
+            if np.ptp(gaps) > size:
+                raise pair.place.refuse(
+                    f"*CLEARANCE is supported between sides of one distance, these are {gaps.min():.6g} to "
+                    f"{gaps.max():.6g} apart"
+                )
+            return {"clearance": pair.clearance - float(gaps.mean())}
+        try:
+            within = float(pair.adjust)
+        except ValueError:
+            raise pair.place.refuse(f"ADJUST={pair.adjust[:40]}: only a distance is supported") from None
+        moved = gaps[(gaps <= within) & (np.abs(gaps) > size)]
+        if not len(moved):
+            return {}
+        if np.ptp(gaps) > size:
+            raise pair.place.refuse(
+                f"ADJUST={within:g} would move {len(moved)} nodes of '{pair.secondary}', by {moved.min():.6g} to "
+                f"{moved.max():.6g}: supported only where all nodes move by the same; move them in the mesh"
+            )
+        self.content.note(pair.place, f"ADJUST: the distance {gaps.mean():.6g} of the sides counts as none")
+        return {"clearance": -float(gaps.mean())}
+
+    def _gap_groups(self) -> dict[str, tuple[str, list[tuple[int, int]]]]:
+        """Make groups of the facets behind gap elements; return their names, with the points of each element."""
+        found = {}
+        self._check_discrete("GAPUNI", self.content.gaps, "*GAP")
+        for name, (place, _, _) in self.content.gaps.items():
+            ends = [self.made.discrete.get(key, (None, ()))[1] for key in self.made.keys("element", name, place)]
+            if any(len(pair) != 2 for pair in ends):
+                raise place.refuse("acts on elements of type GAPUNI only")
+            chosen = {pair[0] for pair in ends}
+            faces = [sides[0] for corners, sides in self.made.owners.items() if len(sides) == 1 and corners <= chosen]
+            shown = self.content.root.set_names.get(name, name)
+            group = self.found.add_facets(f"{shown} facets", faces)
+            covered = {p for element, row in self.found.groups[group] for p in self.found.facets[element][row]}
+            if covered != chosen:
+                raise place.refuse(
+                    "gap elements are supported on all nodes of whole faces only, from the body to nodes that are held"
+                )
+            found[name] = (group, [(pair[0], pair[1]) for pair in ends])
+        return found
+
+    def _gaps(self, groups: Mapping[str, Any], conditions: Conditions) -> dict[str, dict[int, int]]:
+        """Make contact with a rigid plane from gap elements to nodes that are held at rest."""
+        ends = {}
+        dim = self.found.dim
+        for name, (group, pairs) in groups.items():
+            place, clearance, vector = self.content.gaps[name]
+            direction = np.array(vector)[:dim] / np.linalg.norm(vector)
+            for _, end in pairs:
+                tracks = [
+                    conditions.supports.tracks.get((end, axis, False)) for axis in np.flatnonzero(direction).tolist()
+                ]
+                if any(track is None or any(v for _, v in track.points) for track in tracks):
+                    raise place.refuse("gap elements are supported to nodes that are held at rest only")
+            places = self.model.mesh.points[[first for first, _ in pairs]] @ direction
+            if np.ptp(places) > TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max()):
+                raise place.refuse("gap elements are supported where their nodes lie in a plane across their direction")
+            point = tuple((places.mean() + clearance) * direction)
+            shown = self.content.root.set_names.get(name, name)
+            wall = HalfSpace(point=point, normal=tuple(-direction))
+            self.model.add_obstacle(shown, secondary=group, obstacle=wall, formulation="node_to_segment")
+            ends[shown] = dict(pairs)
+        return ends
+
+    def _ramp(self, conditions: Conditions) -> Ramp:
+        """Return the ends of all steps, of the increments of steps with friction, and the corners of all histories."""
+        steps = self.content.steps
+        if not steps:
+            raise Place(self.content.title or "the deck", 0, "STEP").refuse(
+                "the deck has no step, so nothing is loaded"
+            )
+        instants = {float(number) for number in range(1, len(steps) + 1)}
+        if any(pair.options.get("friction") for pair in self.model.contact):
+            for number, step in enumerate(steps):
+                instants.update(number + part for part in _parts(step))
+        for histories in (conditions.supports, conditions.forces, conditions.loads):
+            for track in histories.tracks.values():
+                instants.update(round(time, 12) for time, _ in track.points if abs(time - round(time)) > 1e-6)
+        if len(instants) > LONGEST_RAMP:
+            raise steps[0].place.refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
+        return Ramp(tuple(sorted(instants)), ((0.0, 0.0), (float(len(steps)), 1.0)))
+
+
+def _parts(step: Step) -> list[float]:
+    """Return the ends of equal increments inside of a step, of its length."""
+    count = min(MOST_PARTS, max(1, round(step.period / min(step.increment, step.period))))
+    return [k / count for k in range(1, count)]
+
+
+def _body_force(name: Distributed, density: float, dim: int) -> dict[str, Any]:
+    """Return the components of a body force at the value 1 of its history."""
+    if name.kind[0] == "B":
+        return {name.kind[1].lower(): density}
+    if name.kind == "GRAV":
+        direction = np.array(name.vector) / np.linalg.norm(name.vector)
+        return {"xyz"[k]: density * float(direction[k]) for k in range(dim) if direction[k]}
+    origin, axis = np.array(name.vector[:3]), np.array(name.vector[3:])
+    axis = axis / np.linalg.norm(axis)
+
+    def component(k: int) -> Any:
+        def outward(points: Array) -> Array:
+            relative = np.pad(points, ((0, 0), (0, 3 - points.shape[1]))) - origin
+            return np.asarray(density * (relative - np.outer(relative @ axis, axis))[:, k])
+
+        return outward
+
+    return {"xyz"[k]: component(k) for k in range(dim) if abs(axis[k]) < 1.0}
+
+
+def nodal_gaps(model: Model, secondary: str, primary: str) -> Array:
+    """Return the distances (n,) of the nodes of one side from the other, where they face it [length]."""
+    from fastcontact.contact.configuration import Configuration
+    from fastcontact.model.contact_pair import ContactPair
+
+    pair = ContactPair("gaps", secondary, primary, "continuous", {})
+    found = model.bind(pair).constraints(Configuration.undeformed(model.mesh.points))
+    faced = np.diff(found.B.indptr) > 0
+    return found.gap0[faced] if faced.any() else np.zeros(1)

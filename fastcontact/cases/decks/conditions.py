@@ -1,0 +1,202 @@
+"""Supports and loads of all steps: histories of displacement components, nodal forces, pressures and body forces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.cases.decks.assembled import Key
+from fastcontact.cases.decks.blocks import Place, Row
+from fastcontact.cases.decks.content import Axes, Given
+from fastcontact.cases.decks.histories import Histories
+from fastcontact.cases.decks.meshing import DeckMesh
+
+Array = NDArray[np.float64]
+NAMED = {"XSYMM": (1,), "YSYMM": (2,), "ZSYMM": (3,), "ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3)}
+ROUND_OFF = 1e-9
+# Point and component from 0; of supports on local axes component from 0 and True.
+Component = tuple[int, int, bool]
+
+
+@dataclass(frozen=True)
+class Distributed:
+    """What a distributed load acts on: its kind, facets or elements, and its direction or axis."""
+
+    keyword: str
+    kind: str
+    face: tuple[Key, int] | None = None
+    elements: tuple[Key, ...] = ()
+    vector: tuple[float, ...] = ()
+
+
+class Conditions:
+    """Supports and loads of a deck with their histories."""
+
+    def __init__(self, mesh: DeckMesh) -> None:
+        self.mesh = mesh
+        self.made = mesh.made
+        content = self.made.content
+        self.supports: Histories[Component] = Histories(content)
+        self.forces: Histories[Component] = Histories(content)
+        self.loads: Histories[Distributed] = Histories(content)
+        self.directions: dict[int, Array] = {}
+        for axes in content.axes:
+            for point in self.made.nodes(axes.nodes, axes.place):
+                self.directions[point] = local_axes(axes, np.array(self.made.points[point]))
+
+    def run(self) -> None:
+        """Go through all steps."""
+        content = self.made.content
+        for given in content.supports:
+            self._supports(given, before=True)
+        self.supports.begin()
+        for number, step in enumerate(content.steps, start=1):
+            for given in step.given:
+                {"BOUNDARY": self._supports, "CLOAD": self._forces}.get(given.block.keyword, self._loads)(given)
+            held = {name for name, track in self.supports.tracks.items() if track.alive}
+            lost = [name for name in self.supports.tracks if name not in held and name not in self.supports.changing]
+            if lost:
+                raise self._new_list(step.given).refuse(
+                    f"step {number} leaves out {len(lost)} supports that were there before (first: {self.named(lost[0])}): "
+                    "supports must stay through all steps"
+                )
+            new = self.supports.advance(number, step)
+            if new and number > 1:
+                place = self.supports.tracks[new[0]].place
+                raise place.refuse(
+                    f"step {number} has {len(new)} supports that were not there before (first: {self.named(new[0])}): "
+                    "supports must stay through all steps"
+                )
+            self.forces.advance(number, step)
+            self.loads.advance(number, step)
+
+    @staticmethod
+    def _new_list(given: list[Given]) -> Place:
+        return next(g.block.place for g in given if g.block.keyword == "BOUNDARY" and g.new)
+
+    def named(self, component: Component) -> str:
+        """Return a component of a point as the deck names it."""
+        point, axis, _ = component
+        for key, index in self.made.index.items():
+            if index == point:
+                where = f"{self.made.content.instances[key[0]].name}." if key[0] else ""
+                return f"component {axis + 1} of node {where}{key[1]}"
+        return f"rotation {axis + 1} of a reference node"
+
+    def _supports(self, given: Given, before: bool = False) -> None:
+        block = given.block
+        kind = block.get("TYPE", "DISPLACEMENT").upper()
+        if kind != "DISPLACEMENT":
+            raise block.place.refuse(f"TYPE={kind} is not supported, only DISPLACEMENT")
+        if given.new:
+            self.supports.forget()
+        for row in block.rows:
+            points = self.made.nodes(row.text(0), row.place)
+            named = NAMED.get(row.text(1).upper())
+            if row.text(1).upper() in ("XASYMM", "YASYMM", "ZASYMM"):
+                raise row.place.refuse(f"{row.text(1)} is not supported: give the components")
+            first = 0 if named else row.whole(1)
+            components = named or tuple(range(first, row.whole(2, first) + 1))
+            value = 0.0 if named else row.number(3, 0.0)
+            if not components or not 1 <= components[0] <= components[-1] <= 6:
+                raise row.place.refuse(f"components {row.text(1)} to {row.text(2)} are none of 1 to 6")
+            if before and value:
+                raise row.place.refuse("a displacement other than zero belongs into a step")
+            for point in points:
+                for component in components:
+                    self._support(given, row, point, component, value)
+
+    def _support(self, given: Given, row: Row, point: int, component: int, value: float) -> None:
+        name = self._component(point, component)
+        if name is None:
+            if value:
+                raise row.place.refuse(f"component {component} does not exist at nodes of this model")
+            return
+        sign = 1.0
+        if point in self.directions and component <= 3:
+            name, sign = self._local(point, component)
+        if "FIXED" in given.block.parameters:
+            self.supports.hold(name, row.place)
+            if name in self.supports.tracks:
+                return
+        self.supports.give(name, sign * value, given.amplitude, row.place)
+
+    def _component(self, point: int, component: int) -> Component | None:
+        """Return the displacement component of a point, or of the point of its rotation; None where there is none."""
+        dim = self.mesh.dim
+        if component <= dim:
+            return point, component - 1, False
+        if point in self.mesh.rotations and component > 3:
+            axis = component - 4 if dim == 3 else {6: 0}.get(component, -1)
+            return (self.mesh.rotations[point], axis, False) if axis >= 0 else None
+        return None
+
+    def _local(self, point: int, component: int) -> tuple[Component, float]:
+        """Return the component along a local axis: a global one with its sign where the axis is parallel to it."""
+        direction = self.directions[point][component - 1]
+        axis = int(np.argmax(np.abs(direction)))
+        if abs(abs(direction[axis]) - 1.0) < ROUND_OFF and axis < self.mesh.dim:
+            return (point, axis, False), float(np.sign(direction[axis]))
+        return (point, component - 1, True), 1.0
+
+    def _forces(self, given: Given) -> None:
+        if given.new:
+            self.forces.forget()
+        for row in given.block.rows:
+            component, value = row.whole(1), row.number(2)
+            for point in self.made.nodes(row.text(0), row.place):
+                name = self._component(point, component) if 1 <= component <= 6 else None
+                if name is None:
+                    raise row.place.refuse(f"a force cannot act on component {component} of this node")
+                self.forces.give(
+                    (*name[:2], point in self.directions and component <= 3), value, given.amplitude, row.place
+                )
+
+    def _loads(self, given: Given) -> None:
+        keyword = given.block.keyword
+        if given.new:
+            kept = self.loads.changing
+            for name, track in self.loads.tracks.items():
+                track.alive = track.alive and (name.keyword != keyword or name in kept)
+        for row in given.block.rows:
+            for name, value in self._distributed(keyword, row):
+                self.loads.give(name, value, given.amplitude, row.place)
+
+    def _distributed(self, keyword: str, row: Row) -> list[tuple[Distributed, float]]:
+        label = row.text(1).upper()
+        if keyword == "DSLOAD":
+            if label != "P":
+                raise row.place.refuse(f"load {label[:40]} on a surface is not supported, only P")
+            faces, value = self.made.faces(row.text(0), row.place), row.number(2)
+            return [(Distributed(keyword, "P", face), value) for face in faces]
+        keys = self.made.keys("element", row.text(0), row.place) if row.text(0) else list(self.made.solids)
+        if label[:1] == "P" and label[1:].isdigit():
+            facets = [(key, self.made.facet(key, int(label[1:]), row.place)) for key in keys]
+            return [(Distributed(keyword, "P", face), row.number(2)) for face in facets]
+        size = {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}.get(label)
+        if size is None:
+            raise row.place.refuse(
+                f"load {label[:40]} is not supported; known are P1, P2, ..., GRAV, CENTRIF, BX, BY, BZ"
+            )
+        vector = tuple(row.number(3 + i, 0.0) for i in range(size))
+        if size and not any(vector[-3:]):
+            raise row.place.refuse(f"the direction of {label} is missing")
+        return [(Distributed(keyword, label, None, tuple(keys), vector), row.number(2))]
+
+
+def local_axes(axes: Axes, point: Array) -> Array:
+    """Return the local axes (3, 3) at a point as rows [-]; CaseError if they are not defined there."""
+    a, b = np.array(axes.points[:3]), np.array(axes.points[3:])
+    if axes.cylindrical:
+        third, first = b - a, point - a
+        third = third / max(np.linalg.norm(third), 1e-300)
+        first = first - (first @ third) * third
+    else:
+        first, third = a, np.cross(a, b)
+    lengths = np.linalg.norm(first), np.linalg.norm(third)
+    if min(lengths) <= ROUND_OFF * max(1.0, float(np.abs(axes.points).max()) if not axes.cylindrical else 0.0):
+        raise axes.place.refuse(f"the local axes are not defined at the point {point.tolist()}")
+    first, third = first / lengths[0], third / lengths[1]
+    return np.array([first, np.cross(third, first), third])

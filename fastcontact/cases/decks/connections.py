@@ -1,0 +1,107 @@
+"""Keywords of contact pairs, ties, equations, rigid bodies, couplings and local axes of nodes."""
+
+from __future__ import annotations
+
+from fastcontact.cases.decks.blocks import Block, Row, as_number, unquoted
+from fastcontact.cases.decks.content import Axes, Content, Equation, Link, Pair
+
+# Terms of an equation: more tie everything to everything.
+MOST_TERMS = 100_000
+
+
+def contact_pair(content: Content, block: Block) -> None:
+    """*CONTACT PAIR: the first surface of a line is the secondary side."""
+    kinds = ("NODE TO SURFACE", "SURFACE TO SURFACE", "MORTAR", "LINMORTAR", "PGLINMORTAR")
+    if block.choice("TYPE", kinds) == "NODE TO SURFACE":
+        content.note(
+            block.place, "NODE TO SURFACE: mortar contact is solved, which passes uniform pressures on any meshes"
+        )
+    if "SMALL SLIDING" in block.parameters:
+        content.note(block.place, "SMALL SLIDING: sides are paired on the deformed shape all the same")
+    adjust = block.get("ADJUST") if "ADJUST" in block.parameters else ""
+    for row in block.rows:
+        if len([entry for entry in row.entries if entry]) != 2:
+            raise row.place.refuse("a contact pair needs two surfaces, the secondary and the primary one")
+        secondary, primary = unquoted(row.text(0)), unquoted(row.text(1))
+        content.pairs.append(Pair(row.place, secondary, primary, block.required("INTERACTION"), adjust=adjust))
+
+
+def clearance(content: Content, block: Block) -> None:
+    """*CLEARANCE: the initial distance of the sides of a pair, whatever the coordinates say."""
+    secondary = block.get("SLAVE") or block.get("SECONDARY")
+    primary = block.get("MASTER") or block.get("MAIN")
+    value = as_number(block.place, block.required("VALUE"))
+    for pair in content.pairs:
+        if (pair.secondary.upper(), pair.primary.upper()) == (secondary.upper(), primary.upper()):
+            pair.clearance = value
+            return
+    raise block.place.refuse(f"there is no contact pair of '{secondary}' and '{primary}' above this line")
+
+
+def tie(content: Content, block: Block) -> None:
+    """*TIE: sides that neither open nor slide."""
+    tolerance = block.get("POSITION TOLERANCE")
+    value = as_number(block.place, tolerance) if tolerance else None
+    adjust = block.get("ADJUST", "YES").upper()
+    for row in block.rows:
+        if len([entry for entry in row.entries if entry]) != 2:
+            raise row.place.refuse("a tie needs two surfaces, the secondary and the primary one")
+        secondary, primary = unquoted(row.text(0)), unquoted(row.text(1))
+        content.pairs.append(Pair(row.place, secondary, primary, tied=True, adjust=adjust, tolerance=value))
+
+
+def equation(content: Content, block: Block) -> None:
+    """*EQUATION: the number of terms, then node, component and coefficient of each."""
+    rows = iter(block.rows)
+    for head in rows:
+        count = head.whole(0)
+        terms: list[tuple[str, int, float]] = []
+        if not 1 <= count <= MOST_TERMS:
+            raise head.place.refuse(f"an equation cannot have {count} terms")
+        while len(terms) < count:
+            row = next(rows, None)
+            if row is None:
+                raise head.place.refuse(f"the equation has {len(terms)} terms, {count} are announced")
+            terms += [_term(row, start) for start in range(0, len(row.entries), 3) if row.text(start)]
+        if len(terms) > count:
+            raise head.place.refuse(f"the equation has {len(terms)} terms, {count} are announced")
+        content.equations.append(Equation(head.place, tuple(terms)))
+
+
+def _term(row: Row, start: int) -> tuple[str, int, float]:
+    return row.text(start), row.whole(start + 1), row.number(start + 2)
+
+
+def rigid_body(content: Content, block: Block) -> None:
+    """*RIGID BODY: nodes that move with a reference node as a whole."""
+    kind = "elements" if block.get("ELSET") else "nodes"
+    group = block.get("ELSET") or block.required("NSET")
+    content.links.append(Link(block.place, block.required("REF NODE"), group, kind, rotation=block.get("ROT NODE")))
+
+
+def coupling(content: Content, block: Block, inner: Block) -> None:
+    """*COUPLING with *KINEMATIC or *DISTRIBUTING below it."""
+    components: set[int] = set()
+    for row in inner.rows:
+        first, last = row.whole(0), row.whole(1, row.whole(0))
+        if not 1 <= first <= last <= 6:
+            raise row.place.refuse(f"the components {first} to {last} are none of 1 to 6")
+        components.update(range(first, last + 1))
+    chosen = tuple(sorted(components)) or (1, 2, 3, 4, 5, 6)
+    distributing = inner.keyword == "DISTRIBUTING"
+    if distributing and not {1, 2, 3} <= set(chosen):
+        raise inner.place.refuse("*DISTRIBUTING is supported with the components 1 to 3, or 1 to 6")
+    content.links.append(
+        Link(
+            block.place, block.required("REF NODE"), block.required("SURFACE"), "surface", chosen, distributing
+        )
+    )  # fmt: skip
+
+
+def transform(content: Content, block: Block) -> None:
+    """*TRANSFORM: local axes of nodes."""
+    cylindrical = block.choice("TYPE", ("R", "C")) == "C"
+    if len(block.rows) != 1:
+        raise block.place.refuse("one data line with six coordinates is needed")
+    points = tuple(block.rows[0].number(i) for i in range(6))
+    content.axes.append(Axes(block.place, block.required("NSET"), cylindrical, points))

@@ -1,0 +1,224 @@
+"""What a deck says, before it becomes a model: parts with nodes, elements, sets and surfaces; properties; steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from fastcontact.cases.decks.blocks import Block, Place, folded
+
+
+@dataclass(frozen=True)
+class Cell:
+    """An element: its type, the numbers of its nodes, and its line."""
+
+    type: str
+    nodes: tuple[int, ...]
+    place: Place
+    set: str = ""
+
+
+@dataclass(frozen=True)
+class Members:
+    """One entry of a set: a number, a range or the name of another set, in an instance (empty: where it is defined)."""
+
+    place: Place
+    first: int = 0
+    last: int = 0
+    increment: int = 1
+    name: str = ""
+    instance: str = ""
+    generated: bool = False
+
+
+@dataclass(frozen=True)
+class Face:
+    """One entry of a surface: an element set or number, or for nodes a node set or number, and the label of the face."""
+
+    place: Place
+    of: str
+    label: str = ""
+
+
+@dataclass
+class SurfaceDefinition:
+    """A surface as the deck has it."""
+
+    name: str
+    place: Place
+    of_nodes: bool
+    faces: list[Face] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Section:
+    """Which material the elements of a set have, and how thick they are (None: not given)."""
+
+    place: Place
+    elements: str
+    material: str
+    thickness: float | None = None
+    orientation: str = ""
+
+
+@dataclass
+class Part:
+    """Nodes, elements, sets and surfaces of a part, of the assembly, or of a deck without parts."""
+
+    name: str = ""
+    nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
+    flat: bool = False
+    cells: dict[int, Cell] = field(default_factory=dict)
+    node_sets: dict[str, list[Members]] = field(default_factory=dict)
+    element_sets: dict[str, list[Members]] = field(default_factory=dict)
+    set_names: dict[str, str] = field(default_factory=dict)
+    surfaces: dict[str, SurfaceDefinition] = field(default_factory=dict)
+    sections: list[Section] = field(default_factory=list)
+
+    def add(self, kind: str, name: str, members: list[Members]) -> None:
+        """Add entries to a set, which may be there already."""
+        sets = self.node_sets if kind == "node" else self.element_sets
+        sets.setdefault(folded(name), []).extend(members)
+        self.set_names.setdefault(folded(name), name)
+
+
+@dataclass
+class Instance:
+    """Where a part stands in the assembly: moved, then turned about the line through two points by an angle [degree]."""
+
+    name: str
+    part: Part
+    translation: tuple[float, ...] = (0.0, 0.0, 0.0)
+    rotation: tuple[float, ...] = ()
+
+
+@dataclass
+class Material:
+    """A material of the deck; `law` makes one of the model from axes, None for those of the mesh."""
+
+    name: str
+    place: Place
+    law: Callable[[Any], Any] | None = None
+    density: float | None = None
+
+
+@dataclass
+class Interaction:
+    """How surfaces touch."""
+
+    name: str
+    place: Place
+    penalty: float | None = None
+    friction: float = 0.0
+    stick: float | None = None
+    kind: str = "unilateral"
+
+
+@dataclass
+class Pair:
+    """A contact pair or a tie."""
+
+    place: Place
+    secondary: str
+    primary: str
+    interaction: str = ""
+    tied: bool = False
+    adjust: str = ""
+    clearance: float | None = None
+    tolerance: float | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the pair in the results."""
+        return f"{self.secondary}/{self.primary}"
+
+
+@dataclass(frozen=True)
+class Equation:
+    """A linear equation: node, component and coefficient of each term."""
+
+    place: Place
+    terms: tuple[tuple[str, int, float], ...]
+
+
+@dataclass(frozen=True)
+class Link:
+    """A reference node with nodes that follow it (rigid, kinematic) or whose mean motion it follows (distributing)."""
+
+    place: Place
+    reference: str
+    group: str
+    kind: str  # nodes, elements or surface
+    components: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
+    distributing: bool = False
+    rotation: str = ""
+
+
+@dataclass(frozen=True)
+class Axes:
+    """Local axes of nodes or materials: rectangular by points of the first axis and plane, or cylindrical about a line."""
+
+    place: Place
+    nodes: str
+    cylindrical: bool
+    points: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Amplitude:
+    """Points (time, multiplier), in the time of the step or of the analysis."""
+
+    place: Place
+    times: tuple[float, ...]
+    values: tuple[float, ...]
+    total: bool
+
+
+@dataclass(frozen=True)
+class Given:
+    """Values of a *BOUNDARY, *CLOAD, *DLOAD or *DSLOAD: its block, what remains of earlier steps, its amplitude."""
+
+    block: Block
+    new: bool
+    amplitude: str = ""
+
+
+@dataclass
+class Step:
+    """A load step of the deck."""
+
+    place: Place
+    nonlinear: bool = False
+    period: float = 1.0
+    increment: float = 1.0
+    static: bool = False
+    given: list[Given] = field(default_factory=list)
+
+
+@dataclass
+class Content:
+    """All that a deck says."""
+
+    title: str = ""
+    root: Part = field(default_factory=lambda: Part(flat=True))
+    parts: dict[str, Part] = field(default_factory=dict)
+    instances: dict[str, Instance] = field(default_factory=dict)
+    materials: dict[str, Material] = field(default_factory=dict)
+    interactions: dict[str, Interaction] = field(default_factory=dict)
+    pairs: list[Pair] = field(default_factory=list)
+    equations: list[Equation] = field(default_factory=list)
+    links: list[Link] = field(default_factory=list)
+    axes: list[Axes] = field(default_factory=list)
+    orientations: dict[str, Axes] = field(default_factory=dict)
+    amplitudes: dict[str, Amplitude] = field(default_factory=dict)
+    gaps: dict[str, tuple[Place, float, tuple[float, ...]]] = field(default_factory=dict)
+    springs: dict[str, tuple[Place, float]] = field(default_factory=dict)
+    supports: list[Given] = field(default_factory=list)
+    steps: list[Step] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    outputs: list[Place] = field(default_factory=list)
+
+    def note(self, place: Place, text: str) -> None:
+        """Remember what a line means here, where that is not plain."""
+        self.notes.append(f"{place}: {text}")

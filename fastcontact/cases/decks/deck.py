@@ -1,0 +1,233 @@
+"""`read_deck`: a deck of Abaqus or CalculiX as a model with its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, vstack
+from scipy.sparse.linalg import lsqr
+
+from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.result_warnings import largest_rotation
+from fastcontact.analysis.run import solve_steps
+from fastcontact.cases.decks.blocks import Place, read_blocks
+from fastcontact.cases.decks.building import Building
+from fastcontact.cases.decks.content import Content
+from fastcontact.cases.decks.reading import read_content
+from fastcontact.elasticity import recovery
+from fastcontact.errors import MeshError, warn
+from fastcontact.mesh.files.paths import PathLike, existing_file
+from fastcontact.model.model import Model
+from fastcontact.model.ramp import Ramp
+from fastcontact.results.step import StepResult
+
+
+@dataclass(frozen=True, eq=False)
+class Deck:
+    """An input deck of Abaqus or CalculiX, ready to solve.
+
+    Attributes
+    ----------
+    path : pathlib.Path
+    title : str
+        First line of *HEADING.
+    model : Model
+        Contact pairs are named ``SECONDARY/PRIMARY``, groups after the sets and surfaces of the deck. Plane models
+        have a unit of thickness.
+    ramp : Ramp
+        Step k of the deck ends at the load factor k.
+    criteria : Criteria
+    notes : tuple of str
+        What lines mean here where that is not plain: what has no effect, what is solved in another way.
+    thickness : float
+        Of a plane model [length]; forces that `solve` returns are those of all of it.
+    """
+
+    path: Path
+    title: str
+    model: Model
+    ramp: Ramp
+    criteria: Criteria
+    notes: tuple[str, ...]
+    thickness: float = 1.0
+    building: Building = field(default=None, repr=False)  # type: ignore[assignment]
+
+    def solve(self, **options: Any) -> list[StepResult]:
+        """Solve all steps; `options` are those of `fastcontact.solve_steps` without `resume`.
+
+        Returns
+        -------
+        list of StepResult
+            With the load factor k at the end of step k. Displacements are along the global axes; reactions are the forces of
+            supports alone, without those of equations and couplings; forces of plane models are those of the whole thickness.
+
+        Errors and warnings are those of `fastcontact.solve`; where the deck asks for NLGEOM, a FastcontactWarning tells the
+        largest strain and rotation, which linear kinematics leave out the squares of.
+        """
+        given = {"criteria": self.criteria, **options}
+        steps: list[StepResult] = []
+        for step in solve_steps(self.model, self.ramp, **given):
+            if steps:
+                steps[-1] = replace(steps[-1], restart=None)
+            steps.append(self.finished(step))
+        return steps
+
+    def solve_steps(self, **options: Any) -> Iterator[StepResult]:
+        """Solve step by step, as `fastcontact.solve_steps` does; results are those of `solve`."""
+        for step in solve_steps(self.model, self.ramp, **{"criteria": self.criteria, **options}):
+            yield self.finished(step)
+
+    def points_of(self, name: str) -> NDArray[np.int32]:
+        """Return the sorted point numbers (n,) of a node set, in any case; of sets of parts ``Instance.set``.
+
+        MeshError if there is none of that name.
+        """
+        wanted = name.replace('"', "").strip().upper()
+        for group in self.model.mesh.point_groups:
+            if group.upper() == wanted:
+                return self.model.mesh.points_of(group)
+        return self.model.mesh.points_of(name)
+
+    def point(self, number: int | str) -> int:
+        """Return the point number of a node: its number in the deck, or ``"Instance".number``.
+
+        MeshError if there is no such node.
+        """
+        made = self.building.made
+        scope, rest = made.place_of(str(number))
+        if not rest.isdigit() or (scope, int(rest[:19])) not in made.index:
+            raise MeshError(f"node '{number}' is not defined in '{self.path.name}'")
+        return made.index[scope, int(rest[:19])]
+
+    def finished(self, step: StepResult) -> StepResult:
+        """Return a step of the model with the reactions of supports alone and forces of the whole thickness."""
+        reaction = self._supports_alone(step.reaction)
+        for name, ends in self.building.gap_ends.items():
+            contact = step.contact[name]
+            for point, force in zip(contact.points.tolist(), contact.force_vectors, strict=True):
+                reaction[ends[point]] += force
+        if self.building.content.steps and step.load_factor == self.ramp.instants[-1]:
+            self._tell_nonlinear(step)
+        t = self.thickness
+        if t == 1.0:
+            return replace(step, reaction=reaction)
+        whole = {
+            name: replace(
+                c, force=t * c.force, force_vectors=t * c.force_vectors, dissipation=t * c.dissipation,
+                primary_force_vectors=t * c.primary_force_vectors,
+            )
+            for name, c in step.contact.items()
+        }  # fmt: skip
+        return replace(step, reaction=t * reaction, contact=whole)
+
+    def _supports_alone(self, reaction: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return nodal forces (n_points, dim) without those of relations, found where no support acts [force]."""
+        links = self.building.links
+        if not links:
+            return reaction.copy()
+        held = self.model.prescribed()[0].ravel()
+        for support in self.building.local_supports:
+            held[support.rows.indices] = True
+        R = csr_array(vstack([link.rows for link in links], format="csr"))
+        free = csr_array(R[:, np.flatnonzero(~held)])
+        multipliers = lsqr(free.T, reaction.ravel()[~held], atol=1e-14, btol=1e-14, iter_lim=20 * sum(R.shape))[0]
+        return (reaction.ravel() - R.T @ multipliers).reshape(reaction.shape)
+
+    def _largest_strain(self, step: StepResult) -> float:
+        """Return the largest equivalent strain of the solid cells, from their nodal stresses [-]."""
+        field, found = self.model.material_field(), 0.0
+        for name, block in self.model.mesh.solids.items():
+            strains = np.einsum("cij,cnj->cni", field.compliance[field.rows[name]], step.stress[block])
+            found = max(
+                found, float(recovery.equivalent_strain(strains.reshape(-1, strains.shape[2])).max(initial=0.0))
+            )
+        return found
+
+    def _tell_nonlinear(self, step: StepResult) -> None:
+        """Warn with the largest strain and rotation where the deck asks for large ones."""
+        for asked in (s for s in self.building.content.steps if s.nonlinear):
+            strain = self._largest_strain(step)
+            angle, _ = largest_rotation(self.model.mesh, step.displacement)
+            warn(
+                f"{asked.place}: NLGEOM, but small strains and rotations were solved; found an equivalent strain up to "
+                f"{strain:.3g} and a rotation up to {angle:.3g} radian, of which linear kinematics leave out the squares"
+            )
+            return
+
+
+def read_deck(path: PathLike) -> Deck:
+    """Read an input deck of Abaqus or CalculiX: static steps of linear elastic bodies in contact.
+
+    Every keyword and parameter is translated, noted as without effect, or refused. Nothing but the deck and what it includes
+    below its own folder is read.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    Deck
+
+    Raises
+    ------
+    CaseError
+        If the deck is wrong or asks for what is outside of fastcontact; the message names file, line and keyword.
+    FileError
+        If a file cannot be read.
+    FastcontactError
+        If the model is wrong.
+
+    Warns
+    -----
+    FastcontactWarning
+        If a step has NLGEOM: small strains and rotations are solved.
+
+    Examples
+    --------
+    >>> deck = read_deck("flange.inp")                         # doctest: +SKIP
+    >>> steps = deck.solve()                                   # doctest: +SKIP
+    >>> steps[-1].reaction[deck.points_of("FLOOR")].sum(axis=0)  # doctest: +SKIP
+    """
+    found = existing_file(path)
+    content = read_content(read_blocks(found))
+    for step in content.steps:
+        if step.nonlinear:
+            warn(
+                f"{step.place}: NLGEOM: fastcontact solves small strains and rotations; the result is valid only while they "
+                "stay small, and a warning after the solution tells how large they are"
+            )
+            break
+    if not content.steps:
+        raise Place(found.name, 1, "STEP").refuse("the deck has no step, so nothing is loaded")
+    building = Building(content, _text(found))
+    return Deck(
+        path=found,
+        title=content.title or found.stem,
+        model=building.model,
+        ramp=building.ramp,
+        criteria=Criteria(),
+        notes=_notes(content, building.thickness),
+        thickness=building.thickness,
+        building=building,
+    )
+
+
+def _text(path: Path) -> str:
+    """Return the text that result files keep: the title as a case file has it."""
+    return f"# from the deck {path.name}\n"
+
+
+def _notes(content: Content, thickness: float) -> tuple[str, ...]:
+    notes = list(dict.fromkeys(content.notes))
+    if content.outputs:
+        kinds = ", ".join(sorted({f"*{place.keyword}" for place in content.outputs}))
+        notes.append(f"{kinds}: no effect, results hold all output and convergence has criteria of its own")
+    if thickness != 1.0:
+        notes.append(f"thickness {thickness:g}: the model has a unit of it, results of the deck are those of the whole")
+    return tuple(notes)

@@ -1,0 +1,70 @@
+"""Element types of decks: the element here, the kinematics, and which nodes make the faces that labels name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+TETRAHEDRON = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
+HEXAHEDRON = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
+WEDGE = ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0))
+TRIANGLE = ((0, 1), (1, 2), (2, 0))
+QUADRANGLE = ((0, 1), (1, 2), (2, 3), (3, 0))
+SHAPES = {"tet": TETRAHEDRON, "hex": HEXAHEDRON, "wed": WEDGE, "tri": TRIANGLE, "qua": QUADRANGLE}
+SOLIDS = {"4": "tet4", "6": "wedge6", "8": "hex8", "10": "tet10", "15": "wedge15", "20": "hex20"}
+PLANES = {"3": "tri3", "4": "quad4", "6": "tri6", "8": "quad8"}
+FAMILIES = {"CPE": "plane_strain", "CPS": "plane_stress", "CAX": "axisymmetric"}
+# Type names of elements that are no solids, by their beginning.
+OTHERS = {
+    "S": "shell", "STRI": "shell", "B": "beam", "T": "truss", "M": "membrane", "CPEG": "generalised plane strain",
+    "DC": "heat transfer", "R": "rigid", "SC": "continuum shell", "C3D8P": "pore pressure", "CONN": "connector",
+    "DASHPOT": "dashpot", "MASS": "mass", "F3D": "network", "D": "network", "U": "user", "COH": "cohesive",
+    "GK": "gasket", "ITS": "slide line",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ElementType:
+    """What a type of the deck becomes.
+
+    Attributes
+    ----------
+    name, element, kinematics : str
+        Of the deck; of the mesh; of the model.
+    faces : tuple of tuple of int
+        Corners of the faces 1, 2, ..., as places in the connectivity.
+    note : str
+        How the element here differs, empty where it does not.
+    """
+
+    name: str
+    element: str
+    kinematics: str
+    note: str = ""
+
+    @property
+    def faces(self) -> tuple[tuple[int, ...], ...]:
+        """Corners of the faces 1, 2, ..., as places in the connectivity."""
+        return SHAPES[self.element[:3]]
+
+
+def element_type(name: str) -> ElementType | None:
+    """Return what an element type of decks (in upper case) becomes, None for what is no solid known here."""
+    base, note = name, ""
+    for ending, meaning in (
+        ("RH", "integrated fully, without hybrid pressure"), ("IH", "without incompatible modes"),
+        ("R", "integrated fully here"), ("I", "without incompatible modes: stiffer where thin parts of linear elements bend"),
+        ("H", "without hybrid pressure: nearly incompressible materials have a mean dilatation"),
+        ("M", "an ordinary quadratic one here"), ("T", ""),
+    ):  # fmt: skip
+        if meaning and base.endswith(ending):
+            base, note = base[: -len(ending)], meaning
+            break
+    table, kinematics = (SOLIDS, "3d") if base[:3] == "C3D" else (PLANES, FAMILIES.get(base[:3], ""))
+    element = table.get(base[3:])
+    return ElementType(name, element, kinematics, note) if element and kinematics else None
+
+
+def described(name: str) -> str:
+    """Return what kind of element an unsupported type is, in brackets; empty where that is not known."""
+    fitting = [key for key in OTHERS if name.startswith(key)]
+    return f" ({OTHERS[max(fitting, key=len)]})" if fitting else ""

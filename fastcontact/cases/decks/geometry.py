@@ -1,0 +1,145 @@
+"""Keywords of the geometry: nodes, elements, sets, surfaces, parts, instances."""
+
+from __future__ import annotations
+
+from fastcontact.cases.decks.blocks import Block, Row, folded, unquoted
+from fastcontact.cases.decks.content import Cell, Content, Face, Instance, Members, Part, SurfaceDefinition
+from fastcontact.cases.decks.element_types import described, element_type
+from fastcontact.mesh import elements
+
+# Elements that are no solids and yet mean something here: numbers of their nodes.
+DISCRETE = {"GAPUNI": 2, "SPRINGA": 2}
+# From this number of nodes on an element may go on in the next line without a comma at the end.
+LONG = 15
+
+
+def nodes(content: Content, part: Part, block: Block) -> None:
+    """*NODE: numbers and coordinates."""
+    if block.get("SYSTEM", "R").upper() != "R":
+        raise block.place.refuse(f"SYSTEM={block.get('SYSTEM')} is not supported: give rectangular coordinates")
+    numbers = []
+    for row in block.rows:
+        number = row.whole(0)
+        if len(row.entries) > 4 and any(row.entries[4:]):
+            raise row.place.refuse(f"node {number} has more than three coordinates")
+        where = (row.number(1, 0.0), row.number(2, 0.0), row.number(3, 0.0))
+        if part.nodes.setdefault(number, where) != where:
+            raise row.place.refuse(f"node {number} is defined twice, at different places")
+        numbers.append(Members(row.place, number, number))
+    if block.get("NSET"):
+        part.add("node", block.get("NSET"), numbers)
+
+
+def cells(content: Content, part: Part, block: Block) -> None:
+    """*ELEMENT: numbers and nodes of elements of one type."""
+    name, own = block.required("TYPE").upper(), block.get("ELSET")
+    kind = element_type(name)
+    if kind is None and name not in DISCRETE:
+        where = f" in set '{own}'" if own else ""
+        count = len(_joined(block, 0))
+        raise block.place.refuse(
+            f"element type {name[:40]}{described(name)} is not supported; {count} element{'s' * (count != 1)}{where}"
+        )
+    needed = DISCRETE[name] if kind is None else elements.get(kind.element).n_nodes
+    if kind is not None and kind.note and f"{name}: " not in "".join(content.notes):
+        content.note(block.place, f"{name}: {kind.note}")
+    members = []
+    for row, entries in _joined(block, needed):
+        number = row.whole(0)
+        found = [Row(row.place, entries).whole(i) for i in range(1, len(entries)) if entries[i]]
+        if len(found) != needed:
+            raise row.place.refuse(f"element {number} of type {name} has {len(found)} nodes, {needed} are needed")
+        if number in part.cells:
+            raise row.place.refuse(f"element {number} is defined twice, first in line {part.cells[number].place.line}")
+        part.cells[number] = Cell(name, tuple(found), row.place, own)
+        members.append(Members(row.place, number, number))
+    if own:
+        part.add("element", own, members)
+
+
+def _joined(block: Block, needed: int) -> list[tuple[Row, tuple[str, ...]]]:
+    """Return the entries of each element, which may go on over lines that end with a comma."""
+    found: list[tuple[Row, tuple[str, ...]]] = []
+    goes_on = False
+    for row in block.rows:
+        if goes_on:
+            found[-1] = (found[-1][0], found[-1][1] + row.entries)
+        else:
+            found.append((row, row.entries))
+        short = len(found[-1][1]) < needed + 1
+        goes_on = short and (row.goes_on or (needed >= LONG and len(row.entries) >= 8))
+    return found
+
+
+def node_set(content: Content, part: Part, block: Block) -> None:
+    """*NSET."""
+    part.add("node", block.required("NSET"), _members(block))
+
+
+def element_set(content: Content, part: Part, block: Block) -> None:
+    """*ELSET."""
+    part.add("element", block.required("ELSET"), _members(block))
+
+
+def _members(block: Block) -> list[Members]:
+    """Return the entries of a set."""
+    instance = folded(block.get("INSTANCE"))
+    found = []
+    for row in block.rows:
+        if "GENERATE" in block.parameters:
+            first, last, increment = row.whole(0), row.whole(1), row.whole(2, 1)
+            if increment < 1 or last < first:
+                raise row.place.refuse(f"the range {first} to {last} by {increment} is empty: it must ascend")
+            found.append(Members(row.place, first, last, increment, "", instance, True))
+            continue
+        for entry in row.entries:
+            if entry.isdigit() and len(entry) < 19:
+                found.append(Members(row.place, int(entry), int(entry), instance=instance))
+            elif entry:
+                found.append(Members(row.place, name=entry, instance=instance))
+    return found
+
+
+def surface(content: Content, part: Part, block: Block) -> None:
+    """*SURFACE: faces of elements, or nodes."""
+    name, kind = block.required("NAME"), block.choice("TYPE", ("ELEMENT", "NODE"))
+    if folded(name) in part.surfaces:
+        raise block.place.refuse(f"surface '{name}' is defined twice")
+    made = SurfaceDefinition(name, block.place, kind == "NODE")
+    for row in block.rows:
+        label = row.text(1).upper()
+        if not made.of_nodes and label and not (label[0] == "S" and label[1:].isdigit()):
+            raise row.place.refuse(f"face '{row.text(1)[:40]}' is not supported: faces of solids are S1, S2, ...")
+        made.faces.append(Face(row.place, row.text(0), "" if made.of_nodes else label))
+    if not made.faces:
+        raise block.place.refuse(f"surface '{name}' has no faces")
+    part.surfaces[folded(name)] = made
+
+
+def instance(content: Content, block: Block) -> Instance:
+    """*INSTANCE: a part with its place in the assembly."""
+    name, of = block.required("NAME"), block.required("PART")
+    if folded(of) not in content.parts:
+        known = ", ".join(part.name for part in content.parts.values()) or "none"
+        raise block.place.refuse(f"part '{of}' is not defined; parts: {known}")
+    if folded(name) in content.instances:
+        raise block.place.refuse(f"instance '{name}' is defined twice")
+    made = Instance(name, content.parts[folded(of)])
+    rows = block.rows
+    if rows:
+        made.translation = tuple(rows[0].number(i, 0.0) for i in range(3))
+    if len(rows) > 1:
+        made.rotation = tuple(rows[1].number(i) for i in range(7))
+    if len(rows) > 2:
+        raise rows[2].place.refuse("an instance has at most two data lines: a translation and a rotation")
+    content.instances[folded(name)] = made
+    return made
+
+
+def new_part(content: Content, block: Block) -> Part:
+    """*PART."""
+    name = block.required("NAME")
+    if folded(name) in content.parts:
+        raise block.place.refuse(f"part '{name}' is defined twice")
+    content.parts[folded(name)] = Part(unquoted(name))
+    return content.parts[folded(name)]

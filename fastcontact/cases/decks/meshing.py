@@ -1,0 +1,153 @@
+"""The mesh of a deck: solids, the facets of its surfaces, groups, and a further point for each rotation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fastcontact.cases.decks.assembled import Assembled, Key, facet_points
+from fastcontact.cases.decks.blocks import folded
+from fastcontact.errors import CaseError
+from fastcontact.mesh import topology
+from fastcontact.mesh.mesh import Mesh
+
+FACETS = {2: {2: "line2", 3: "line3"}, 3: {3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8"}}
+# How far points of a plane model may leave the plane, relative to its size.
+FLAT = 1e-9
+
+
+@dataclass
+class DeckMesh:
+    """A mesh in the making.
+
+    Attributes
+    ----------
+    made : Assembled
+    kinematics : str
+    dim : int
+    rotations : dict of int to int
+        By reference point the point whose displacement is its rotation [radian]; in the plane the first component.
+    facets : dict of str to list of tuple of int
+        Facets by element, each once.
+    groups, point_groups : dict of str to list
+        Groups of cells, as pairs (element, row), and of points.
+    """
+
+    made: Assembled
+    kinematics: str
+    dim: int
+    rotations: dict[int, int] = field(default_factory=dict)
+    facets: dict[str, list[tuple[int, ...]]] = field(default_factory=dict)
+    rows: dict[frozenset[int], tuple[str, int]] = field(default_factory=dict)
+    solid_rows: dict[Key, tuple[str, int]] = field(default_factory=dict)
+    groups: dict[str, list[tuple[str, int]]] = field(default_factory=dict)
+    point_groups: dict[str, list[int]] = field(default_factory=dict)
+
+    def add_facets(self, group: str, faces: Iterable[tuple[Key, int]]) -> str:
+        """Make a group of facets, given by element and place among its facets; return its name."""
+        members = []
+        for key, facet in faces:
+            points = facet_points(self.made.solids[key], facet)
+            if frozenset(points) not in self.rows:
+                name = FACETS[self.dim][len(points)]
+                block = self.facets.setdefault(name, [])
+                self.rows[frozenset(points)] = (name, len(block))
+                block.append(points)
+            members.append(self.rows[frozenset(points)])
+        self.groups[group] = members
+        return group
+
+    def add_solids(self, group: str, keys: Iterable[Key]) -> str:
+        """Make a group of solids; return its name."""
+        self.groups[group] = [self.solid_rows[key] for key in keys if key in self.solid_rows]
+        return group
+
+    def add_points(self, group: str, points: Iterable[int]) -> str:
+        """Make a group of points, or find the group that holds the same ones; return its name."""
+        wanted = sorted(set(points))
+        for name, members in self.point_groups.items():
+            if len(members) == len(wanted) and members == wanted:
+                return name
+        self.point_groups[group] = wanted
+        return group
+
+    def rotation(self, point: int) -> int:
+        """Return the point that carries the rotation of a reference point, which is made where there is none."""
+        if point not in self.rotations:
+            self.rotations[point] = len(self.made.points)
+            self.made.points.append(self.made.points[point])
+        return self.rotations[point]
+
+    def mesh(self) -> Mesh:
+        """Return the mesh, with solids turned the right way."""
+        solids: dict[str, list[tuple[int, ...]]] = {}
+        for solid in self.made.solids.values():
+            solids.setdefault(solid.type.element, []).append(solid.points)
+        cells = {**solids, **self.facets}
+        starts, total = {}, 0
+        for name, block in cells.items():
+            starts[name], total = total, total + len(block)
+        groups = {
+            group: np.array([starts[name] + row for name, row in members]) for group, members in self.groups.items()
+        }
+        points = np.array(self.made.points)[:, : self.dim]
+        points_of = {name: np.array(members) for name, members in self.point_groups.items()}
+        mesh = Mesh(points, {name: np.array(block) for name, block in cells.items()}, groups, points_of)
+        mesh, turned = topology.oriented(mesh)
+        if turned:
+            self.made.content.notes.append(f"{turned} elements were inside out and are turned")
+        return mesh
+
+
+def begun(made: Assembled) -> DeckMesh:
+    """Return the mesh of a deck without any facets yet, with groups for its sets.
+
+    CaseError if there are no solids, if elements of several kinematics are mixed, or if a plane model is not flat.
+    """
+    if not made.solids:
+        raise CaseError("the deck has no solid elements")
+    first = next(iter(made.solids.values()))
+    for solid in made.solids.values():
+        if solid.type.kinematics != first.type.kinematics:
+            raise solid.cell.place.refuse(
+                f"elements of type {solid.type.name} and {first.type.name} ({first.type.kinematics}) cannot be in one model"
+            )
+    kinematics = first.type.kinematics
+    dim = 3 if kinematics == "3d" else 2
+    points = np.array(made.points)
+    if dim == 2 and np.ptp(points[:, 2]) > FLAT * np.ptp(points[:, :2]):
+        raise first.cell.place.refuse(f"elements of type {first.type.name} lie in the plane z = const, but z differs")
+    found = DeckMesh(made, kinematics, dim)
+    counts: dict[str, int] = {}
+    for key, solid in made.solids.items():
+        name = solid.type.element
+        found.solid_rows[key] = (name, counts.setdefault(name, 0))
+        counts[name] += 1
+    _name_sets(found)
+    return found
+
+
+def _name_sets(found: DeckMesh) -> None:
+    """Name groups after the sets and surfaces of the deck; those of parts after ``Instance.name``."""
+    made = found.made
+    for scope in made.scopes:
+        part = made.part(scope)
+        prefix = f"{made.content.instances[scope].name}." if scope else ""
+        for name, members in part.node_sets.items():
+            points = [made.index[key] for key in made.members("node", scope, name, members[0].place)] if members else []
+            found.point_groups[prefix + part.set_names[name]] = sorted(set(points))
+        for name, definition in part.surfaces.items():
+            found.add_facets(
+                prefix + definition.name, made.faces(f"{scope}.{name}" if scope else name, definition.place)
+            )
+        for name, members in part.element_sets.items():
+            if name not in part.surfaces and members:
+                found.add_solids(prefix + part.set_names[name], made.members("element", scope, name, members[0].place))
+
+
+def group_of_surface(found: DeckMesh, name: str) -> str:
+    """Return the name of the group of a surface, however a pair writes it."""
+    wanted = folded(name)
+    return next(group for group in found.groups if folded(group) == wanted)

@@ -1,0 +1,226 @@
+"""Keywords of materials, sections, contact properties and amplitudes."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.cases.decks.blocks import Block, Row, folded
+from fastcontact.cases.decks.content import Amplitude, Axes, Content, Interaction, Material, Part, Section
+from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
+from fastcontact.elasticity.materials import LinearElastic
+from fastcontact.errors import ModelError
+
+# Numbers of the constants of elastic materials.
+CONSTANTS = {"ISOTROPIC": 2, "ENGINEERING CONSTANTS": 9, "ORTHOTROPIC": 9, "ANISOTROPIC": 21}
+
+
+def material(content: Content, block: Block) -> Material:
+    """*MATERIAL: begins a material."""
+    name = block.required("NAME")
+    if folded(name) in content.materials:
+        raise block.place.refuse(f"material '{name}' is defined twice")
+    content.materials[folded(name)] = Material(name, block.place)
+    return content.materials[folded(name)]
+
+
+def elastic(content: Content, current: Material, block: Block) -> None:
+    """*ELASTIC: constants of one temperature."""
+    kind = " ".join(block.get("TYPE", "ISOTROPIC").upper().split())
+    found = [known for known in CONSTANTS if len(kind) >= 3 and known.startswith(kind)]
+    if not found:
+        known = ", ".join(CONSTANTS)
+        raise block.place.refuse(f"material '{current.name}': TYPE={kind[:40]} is not supported; known are {known}")
+    if found[0] != "ISOTROPIC":
+        _with_axes(current, block, found[0])
+        return
+    row = _only(block, "temperatures" if len(block.rows) > 1 else "")
+    E, nu = row.number(0), row.number(1, 0.0)
+    if row.text(2):
+        content.note(row.place, "the temperature of the constants has no effect: there is one set of them")
+    try:
+        law = LinearElastic(E=E, nu=nu)
+    except ModelError as error:
+        raise row.place.refuse(f"material '{current.name}': {error}") from None
+
+    current.law = lambda axes: law
+
+
+def _with_axes(current: Material, block: Block, kind: str) -> None:
+    """Take the constants of a material with axes, which may go on over lines; a temperature may follow them."""
+    numbers = [row.number(i) for row in block.rows for i in range(len(row.entries)) if row.entries[i]]
+    count = CONSTANTS[kind]
+    if not count <= len(numbers) <= count + 1:
+        raise block.place.refuse(
+            f"material '{current.name}': {len(numbers)} constants where {kind} has {count}, at one temperature"
+        )
+    values = numbers[:count]
+
+    def law(axes: Any) -> Orthotropic | Anisotropic:
+        if kind == "ENGINEERING CONSTANTS":
+            return Orthotropic(E=values[:3], nu=values[3:6], G=values[6:], axes=axes)
+        return Anisotropic(_moduli(values), axes=axes)
+
+    try:
+        law(None)
+    except ModelError as error:
+        raise block.place.refuse(f"material '{current.name}': {error}") from None
+    current.law = law
+
+
+def _moduli(values: list[float]) -> NDArray[np.float64]:
+    """Return moduli (6, 6) [pressure] from those of a deck, its upper triangle by columns 11, 22, 33, 12, 13, 23."""
+    D = np.zeros((6, 6))
+    places = [(i, j) for j in range(6) for i in range(j + 1)]
+    if len(values) == CONSTANTS["ORTHOTROPIC"]:
+        places = [(i, j) for i, j in places if i == j or j < 3]
+    for (i, j), value in zip(places, values, strict=True):
+        D[i, j] = D[j, i] = value
+    order = [0, 1, 2, 3, 5, 4]
+    return D[np.ix_(order, order)]
+
+
+def orientation(content: Content, block: Block) -> None:
+    """*ORIENTATION: axes of materials."""
+    name, system = block.required("NAME"), block.choice("SYSTEM", ("RECTANGULAR", "CYLINDRICAL"))
+    rows = block.rows
+    if not rows:
+        raise block.place.refuse("a data line with six coordinates is needed")
+    points = tuple(rows[0].number(i) for i in range(6))
+    if any(rows[0].entries[6:]) and any(rows[0].number(6 + i, 0.0) for i in range(3)):
+        raise rows[0].place.refuse("an origin of the axes is not supported: give points seen from 0, 0, 0")
+    if len(rows) > 1 and rows[1].number(1, 0.0):
+        raise rows[1].place.refuse("a further rotation of the axes is not supported: turn the points of the first line")
+    content.orientations[folded(name)] = Axes(block.place, "", system == "CYLINDRICAL", points)
+
+
+def density(content: Content, current: Material, block: Block) -> None:
+    """*DENSITY."""
+    current.density = _only(block).number(0)
+    if not current.density > 0:
+        raise block.place.refuse(f"material '{current.name}': the density {current.density:g} must be positive")
+
+
+def expansion(content: Content, current: Material, block: Block) -> None:
+    """*EXPANSION: means something only with temperatures, which are refused where they stand."""
+    for row in block.rows:
+        row.number(0)
+    content.note(block.place, f"material '{current.name}': without temperatures the expansion has no effect")
+
+
+def section(content: Content, part: Part, block: Block) -> None:
+    """*SOLID SECTION: which material the elements of a set have."""
+    thickness = None
+    for row in block.rows[:1]:
+        thickness = row.number(0, 1.0)
+        if not thickness > 0:
+            raise row.place.refuse(f"the thickness {thickness:g} must be positive")
+    orientation = block.get("ORIENTATION")
+    part.sections.append(
+        Section(block.place, block.required("ELSET"), block.required("MATERIAL"), thickness, orientation)
+    )
+
+
+def interaction(content: Content, block: Block) -> Interaction:
+    """*SURFACE INTERACTION: begins the properties of contact pairs."""
+    name = block.required("NAME")
+    if folded(name) in content.interactions:
+        raise block.place.refuse(f"surface interaction '{name}' is defined twice")
+    content.interactions[folded(name)] = Interaction(name, block.place)
+    if block.rows:
+        block.rows[0].number(0, 1.0)
+        content.note(block.rows[0].place, "the thickness of the interaction has no effect: that of the sections counts")
+    return content.interactions[folded(name)]
+
+
+def behaviour(content: Content, current: Interaction, block: Block) -> None:
+    """*SURFACE BEHAVIOR: hard, or soft with a slope."""
+    law = block.choice("PRESSURE-OVERCLOSURE", ("HARD", "LINEAR", "EXPONENTIAL", "TABULAR", "TIED"))
+    if law == "LINEAR":
+        current.penalty = _positive(_only(block), 0, "slope")
+    elif law == "EXPONENTIAL":
+        row = _only(block)
+        row.number(0), row.number(1)
+        content.note(block.place, "EXPONENTIAL: solved as hard contact, exactly; the softness of this law is left out")
+    elif law == "TABULAR":
+        current.penalty = _slope(block)
+    elif law == "TIED":
+        current.kind = "tied"
+    if "NO SEPARATION" in block.parameters:
+        current.kind = "bilateral_once_closed"
+
+
+def _slope(block: Block) -> float:
+    """Return the slope of a table of pressure and overclosure; only one straight line through no pressure at zero is one."""
+    points = [(row.number(0), row.number(1)) for row in block.rows]
+    if len(points) != 2 or points[0] != (0.0, 0.0) or min(points[1]) <= 0:
+        raise block.place.refuse(
+            "TABULAR is supported with two points only, 0, 0 and a pressure with its overclosure: a penalty has one slope"
+        )
+    return points[1][0] / points[1][1]
+
+
+def friction(content: Content, current: Interaction, block: Block) -> None:
+    """*FRICTION: coefficient, and in CalculiX the stick slope."""
+    row = _only(block)
+    current.friction = row.number(0)
+    if current.friction < 0:
+        raise row.place.refuse(f"the coefficient of friction {current.friction:g} is negative")
+    if row.text(1) and row.number(1):
+        current.stick = _positive(row, 1, "stick slope")
+        content.note(row.place, f"{current.stick:g} is taken for the stick slope, as in CalculiX (shear by slip)")
+    if len(row.entries) > 2 and any(row.entries[2:]):
+        raise row.place.refuse(
+            "friction that depends on pressure or temperature is not supported: give one coefficient"
+        )
+
+
+def amplitude(content: Content, block: Block) -> None:
+    """*AMPLITUDE: pairs of time and multiplier."""
+    name = block.required("NAME")
+    block.choice("DEFINITION", ("TABULAR",))
+    block.choice("VALUE", ("RELATIVE",))
+    total = block.choice("TIME", ("STEP TIME", "TOTAL TIME")) == "TOTAL TIME"
+    numbers = [row.number(i) for row in block.rows for i in range(len(row.entries)) if row.entries[i]]
+    times, values = numbers[::2], numbers[1::2]
+    if not times or len(times) != len(values) or any(b <= a for a, b in pairwise(times)):
+        raise block.place.refuse(f"amplitude '{name}' needs pairs of ascending times and multipliers")
+    content.amplitudes[folded(name)] = Amplitude(block.place, tuple(times), tuple(values), total)
+
+
+def gap(content: Content, block: Block) -> None:
+    """*GAP: clearance and direction of gap elements."""
+    row = _only(block)
+    direction = tuple(row.number(i, 0.0) for i in (1, 2, 3))
+    if not any(direction):
+        raise row.place.refuse("the direction of the gap elements is missing")
+    content.gaps[folded(block.required("ELSET"))] = (block.place, row.number(0), direction)
+
+
+def spring(content: Content, block: Block) -> None:
+    """*SPRING: stiffness of springs along their line."""
+    rows = block.rows
+    if len(rows) != 1:
+        raise block.place.refuse("linear springs along their line need an empty line and then one with the stiffness")
+    if rows[0].text(1):
+        raise rows[0].place.refuse("only linear springs are supported: one stiffness")
+    content.springs[folded(block.required("ELSET"))] = (block.place, _positive(rows[0], 0, "stiffness"))
+
+
+def _positive(row: Row, index: int, what: str) -> float:
+    value = row.number(index)
+    if not value > 0:
+        raise row.place.refuse(f"the {what} {value:g} must be positive")
+    return value
+
+
+def _only(block: Block, why: str = "") -> Row:
+    """Return the only data line of a block."""
+    rows = block.rows
+    if len(rows) != 1:
+        text = f"{len(rows)} data lines where one is needed"
+        raise block.place.refuse(text + (f": constants that depend on {why} are not supported" if why else ""))
+    return rows[0]

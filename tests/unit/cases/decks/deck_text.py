@@ -1,0 +1,70 @@
+"""A small deck to change: two cubes, the upper one pressed down."""
+
+import fastcontact as fc
+
+NODES = """*Heading
+ two cubes
+*Node
+1, 0., 0., 0.
+2, 1., 0., 0.
+3, 1., 1., 0.
+4, 0., 1., 0.
+5, 0., 0., 1.
+6, 1., 0., 1.
+7, 1., 1., 1.
+8, 0., 1., 1.
+11, 0., 0., 1.
+12, 1., 0., 1.
+13, 1., 1., 1.
+14, 0., 1., 1.
+15, 0., 0., 2.
+16, 1., 0., 2.
+17, 1., 1., 2.
+18, 0., 1., 2.
+*Element, type=C3D8, elset=low
+1, 1, 2, 3, 4, 5, 6, 7, 8
+*Element, type=C3D8, elset=up
+2, 11, 12, 13, 14, 15, 16, 17, 18
+*Nset, nset=bottom, generate
+1, 4
+*Nset, nset=top
+15, 16, 17, 18
+*Nset, nset=x0
+1, 4, 5, 8, 11, 14, 15, 18
+*Nset, nset=y0
+1, 2, 5, 6, 11, 12, 15, 16
+*Surface, name=sm, type=ELEMENT
+low, S2
+*Surface, name=ss
+up, S1
+*Surface, name=roof
+up, S2
+"""
+MATERIAL = """*Material, name=steel
+*Elastic
+200000., 0.
+*Solid Section, elset=low, material=steel
+*Solid Section, elset=up, material=steel
+"""
+CONTACT = """*Surface Interaction, name=si
+*Contact Pair, interaction=si, type=SURFACE TO SURFACE
+ss, sm
+"""
+SUPPORTS = """*Boundary
+bottom, 3
+x0, 1
+y0, 2
+"""
+STEP = """*Step
+*Static
+*Dsload
+roof, P, 100.
+*End Step
+"""
+WHOLE = NODES + MATERIAL + CONTACT + SUPPORTS + STEP
+
+
+def deck_of(folder, text, name="deck.inp"):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return fc.read_deck(path)

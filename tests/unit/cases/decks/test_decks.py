@@ -1,0 +1,309 @@
+"""Decks as models: every keyword translated or refused by its line, histories over steps, results as decks mean them."""
+
+import numpy as np
+import pytest
+from deck_text import CONTACT, MATERIAL, NODES, STEP, SUPPORTS, WHOLE, deck_of
+
+import fastcontact as fc
+from fastcontact.cases.case import files_of_case, read_case
+from fastcontact.cli._main import main
+
+
+def height(deck, steps, number=17):
+    return [step.displacement[deck.point(number), 2] for step in steps]
+
+
+def line_of(text, begins):
+    """Return the number of the last line that begins with a text."""
+    return max(number for number, line in enumerate(text.splitlines(), start=1) if line.startswith(begins))
+
+
+def test_two_cubes_are_a_bar(tmp_path):
+    deck = deck_of(tmp_path, WHOLE)
+    (step,) = deck.solve()
+    assert (deck.title, step.load_factor) == ("two cubes", 1.0)
+    assert step.contact["ss/sm"].force[2] == pytest.approx(100.0)
+    assert step.reaction[deck.points_of("Bottom")].sum(axis=0) == pytest.approx([0.0, 0.0, 100.0], abs=1e-9)
+    assert height(deck, [step]) == pytest.approx([-100.0 * 2 / 200_000])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "begins", "said"),
+    [
+        ("*Boundary\n", "*Boundry\n", "*Boundry", r"unknown keyword \*BOUNDRY; is \*BOUNDARY meant"),
+        ("bottom, 3\n", "botom, 3\n", "botom, 3", "set 'botom' is not defined; node sets: bottom, top, x0, y0"),
+        ("ss, sm\n", "ss, s_m\n", "ss, s_m", "surface 's_m' is not defined; surfaces: roof, sm, ss"),
+        ("elset=up, material=steel", "elset=up, material=brass", "*Solid Section, elset=up",
+         "material 'brass' is not defined; materials: steel"),
+        ("*Solid Section, elset=up, material=steel\n", "", "2, 11, 12", r"1 element \(2\) of set 'up' has no section"),
+        ("17, 18\n*Nset, nset=bottom", "17, 99\n*Nset, nset=bottom", "2, 11, 12",
+         "element 2 uses node 99, which is not defined"),
+        ("17, 18\n*Nset, nset=bottom", "17\n*Nset, nset=bottom", "2, 11, 12", "has 7 nodes, 8 are needed"),
+        ("200000., 0.\n", "200000., O.3\n", "200000.", "'O.3' is no number"),
+        ("200000., 0.\n", "200000., 0.5\n", "200000.", "material 'steel': Poisson's ratio"),
+        ("200000., 0.\n", "200000., 0.\n*Plastic\n1., 0.\n", "*Plastic",
+         r"material 'steel': \*PLASTIC is outside of fastcontact"),
+        ("*Static\n", "*Dynamic\n", "*Dynamic", "quasi-static"),
+        ("*Static\n", "", "*Step", r"has no \*STATIC"),
+        ("*End Step\n", "", "*Step", r"has no \*END STEP"),
+        ("type=SURFACE TO SURFACE", "type=MASSLESS", "*Contact Pair", "TYPE=MASSLESS is not supported"),
+        ("type=SURFACE TO SURFACE", "tied", "*Contact Pair", "the parameter TIED of .* is not supported"),
+        ("interaction=si, ", "interaction=so, ", "ss, sm", "surface interaction 'so' is not defined"),
+        ("roof, P, 100.", "roof, HP, 100.", "roof, HP", "load HP on a surface is not supported"),
+        ("up, S2\n", "up, S7\n", "up, S7", "has no face 7"),
+        ("up, S2\n", "up, SPOS\n", "up, SPOS", "face 'SPOS' is not supported"),
+        ("top\n15, 16, 17, 18\n", "top\n15, 16, 17, 18, 77\n", "15, 16, 17, 18, 77", "node 77 is not defined"),
+        ("top\n15, 16, 17, 18\n", "top\ntop\n", "top", "set 'top' contains itself"),
+        ("2, 1., 0., 0.\n", "2, 1., 0., 0.\n1, 5.\n", "1, 5.", "node 1 is defined twice"),
+        ("*Static\n", "*Static\n*Temperature\ntop, 100.\n", "*Temperature", "no temperatures"),
+        ("roof, P, 100.\n", "roof, P, 100.\nroof, P, 50.\n", "roof, P, 50.", "second value here in one step"),
+        ("*Dsload\n", "*Dsload, amplitude=none\n", "*Dsload", "amplitude 'none' is not defined"),
+        ("roof, P, 100.\n", "roof, P, 100.\n*Dload\nup, GRAV, 9.81, 0, 0, -1\n", "up, GRAV", r"no \*DENSITY"),
+        ("bottom, 3\n", "bottom, 3, 3, 0.1\n", "bottom, 3", "belongs into a step"),
+        ("bottom, 3\n", "bottom, 11\n", "bottom, 11", "none of 1 to 6"),
+        ("type=C3D8, elset=up", "type=S4, elset=up", "*Element, type=S4",
+         r"S4 \(shell\) is not supported; 1 element in set 'up'"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_told_by_file_line_and_keyword(tmp_path, old, new, begins, said):
+    assert old in WHOLE
+    line = line_of(WHOLE.replace(old, new), begins)
+    with pytest.raises(fc.CaseError, match=rf"^deck\.inp, line {line}, \*[A-Z ]+: .*{said}"):
+        deck_of(tmp_path, WHOLE.replace(old, new))
+
+
+def test_a_deck_without_steps_says_so(tmp_path):
+    with pytest.raises(fc.CaseError, match="no step"):
+        deck_of(tmp_path, WHOLE.replace(STEP, ""))
+
+
+def test_nlgeom_warns_and_tells_the_strain_found(tmp_path):
+    text = WHOLE.replace("*Step\n", "*Step, nlgeom=YES\n").replace("P, 100.", "P, 2000.")
+    with pytest.warns(fc.FastcontactWarning, match=r"deck\.inp, line 50, \*STEP: NLGEOM"):
+        deck = deck_of(tmp_path, text)
+    with pytest.warns(fc.FastcontactWarning, match=r"equivalent strain up to 0\.00667"):  # 2/3 of 0.01 at nu = 0
+        deck.solve()
+    deck_of(tmp_path, WHOLE.replace("*Step\n", "*Step, nlgeom=NO\n"))
+
+
+def test_loads_ramp_from_step_to_step_and_stay_or_go(tmp_path):
+    steps = """*Step
+*Static
+*Dsload
+roof, P, 100.
+*End Step
+*Step
+*Static
+*Cload
+top, 3, -5.
+*End Step
+*Step
+*Static
+*Dsload, op=NEW
+*End Step
+*Step
+*Static
+*Cload
+15, 3, -25.
+*Dsload
+roof, P, 60.
+*End Step
+"""
+    deck = deck_of(tmp_path, WHOLE.replace(STEP, steps))
+    found = deck.solve()
+    assert [step.load_factor for step in found] == [1.0, 2.0, 3.0, 4.0]
+    forces = [step.contact["ss/sm"].force[2] for step in found]
+    assert forces == pytest.approx([100.0, 120.0, 20.0, 100.0])
+
+
+def test_prescribed_displacements_go_from_value_to_value(tmp_path):
+    steps = """*Amplitude, name=wave
+0., 0., 0.5, 2., 1., 1.
+*Step
+*Static
+*Boundary
+top, 3, 3, -0.002
+*End Step
+*Step
+*Static
+*Boundary, op=NEW, amplitude=wave
+bottom, 3
+x0, 1
+y0, 2
+top, 3, 3, -0.001
+*End Step
+"""
+    deck = deck_of(tmp_path, WHOLE.replace(STEP, steps))
+    found = {step.load_factor: step.displacement[deck.point(17), 2] for step in deck.solve()}
+    assert found == pytest.approx({1.0: -0.002, 1.5: -0.002, 2.0: -0.001}, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ("*Boundary, op=NEW\nbottom, 3\n", r"line 57, \*BOUNDARY: step 2 leaves out 16 supports"),
+        ("*Boundary\ntop, 3\n", r"line 58, \*BOUNDARY: step 2 has 4 supports that were not there before"),
+    ],
+)
+def test_supports_stay_through_all_steps(tmp_path, lines, said):
+    with pytest.raises(fc.CaseError, match=said):
+        deck_of(tmp_path, WHOLE + f"*Step\n*Static\n{lines}*End Step\n")
+
+
+def test_weight_and_centrifugal_force(tmp_path):
+    loads = "*Dload\n, GRAV, 10., 0., 0., -2.\nup, CENTRIF, 4., 0., 0., 0., 0., 0., 1.\n*End Step\n"
+    text = WHOLE.replace("*Elastic\n", "*Density\n3.\n*Elastic\n").replace("*Dsload\nroof, P, 100.\n*End Step\n", loads)
+    deck = deck_of(tmp_path, text)
+    (step,) = deck.solve()
+    assert step.reaction[deck.points_of("bottom")].sum(axis=0)[2] == pytest.approx(60.0)
+    assert step.contact["ss/sm"].force[2] == pytest.approx(30.0)
+    assert step.reaction[deck.points_of("x0")].sum(axis=0)[0] == pytest.approx(-3.0 * 4.0 * 0.5)
+
+
+@pytest.mark.filterwarnings("ignore:contact .* penetrates by")
+def test_a_linear_law_is_a_penalty_of_that_slope(tmp_path):
+    law = "*Surface Interaction, name=si\n*Surface Behavior, pressure-overclosure={}\n{}"
+    text = WHOLE.replace("*Surface Interaction, name=si\n", law)
+    linear = deck_of(tmp_path, text.format("LINEAR", "1.e6\n"))
+    assert height(linear, linear.solve()) == pytest.approx([-0.001 - 1e-4])
+    table = deck_of(tmp_path, text.format("TABULAR", "0., 0.\n1.e3, 1.e-3\n"))
+    assert height(table, table.solve()) == pytest.approx([-0.001 - 1e-4])
+    with pytest.raises(fc.CaseError, match="TABULAR is supported with two points"):
+        deck_of(tmp_path, text.format("TABULAR", "0., 0.\n1., 1.\n3., 2.\n"))
+
+
+def test_a_clearance_opens_and_adjust_closes(tmp_path):
+    apart = WHOLE.replace("11, 0., 0., 1.", "11, 0., 0., 1.0001")
+    for number, where in (("12", "1., 0."), ("13", "1., 1."), ("14", "0., 1.")):
+        apart = apart.replace(f"{number}, {where}, 1.\n", f"{number}, {where}, 1.0001\n")
+    pressed = apart.replace("*Dsload\nroof, P, 100.", "*Boundary\ntop, 3, 3, -0.0005")
+    for options, gap in (("", 1e-4), (", adjust=0.01", 0.0), (", adjust=0.00001", 1e-4)):
+        deck = deck_of(tmp_path, pressed.replace("type=SURFACE TO SURFACE", f"type=SURFACE TO SURFACE{options}"))
+        stiffness = 200_000.0 / (2.0 - 1e-4)
+        assert deck.solve()[0].contact["ss/sm"].force[2] == pytest.approx(stiffness * (0.0005 - gap), rel=1e-6)
+    clear = "ss, sm\n*Clearance, master=sm, slave=ss, value=0.0002\n"
+    deck = deck_of(tmp_path, pressed.replace("ss, sm\n", clear))
+    assert deck.solve()[0].contact["ss/sm"].force[2] == pytest.approx(stiffness * 0.0003, rel=1e-6)
+
+
+def test_reactions_are_those_of_supports_alone(tmp_path):
+    together = "*Equation\n2\n16, 3, 1., 15, 3, -1.\n2\n17, 3, 1., 15, 3, -1.\n2\n18, 3, 1., 15, 3, -1.\n"
+    text = (NODES + MATERIAL + CONTACT + together + SUPPORTS + STEP).replace(
+        "*Dsload\nroof, P, 100.", "*Cload\n15, 3, -100."
+    )
+    deck = deck_of(tmp_path, text)
+    (step,) = deck.solve()
+    assert step.contact["ss/sm"].force[2] == pytest.approx(100.0)
+    assert np.abs(step.reaction[deck.points_of("top"), 2]).max() < 1e-8
+    assert step.reaction[deck.points_of("bottom"), 2].sum() == pytest.approx(100.0)
+
+
+def test_a_rigid_body_turns_by_a_moment_at_its_reference_node(tmp_path):
+    rigid = "*Node, nset=ref\n90, 0.5, 0.5, 2.5\n*Rigid Body, elset=up, ref node=90\n"
+    load = "*Boundary\nref, 1, 2\nref, 4\nref, 6\n*Cload\nref, 3, -1.\nref, 5, 0.1\n"
+    text = (NODES + rigid + MATERIAL + CONTACT + "*Boundary\nbottom, 1, 3\n" + STEP).replace(
+        "*Dsload\nroof, P, 100.\n", load
+    )
+    deck = deck_of(tmp_path, text)
+    (step,) = deck.solve()
+    contact = step.contact["ss/sm"]
+    assert contact.force[2] == pytest.approx(1.0)
+    moment = (contact.force_vectors[:, 2] * (contact.coordinates[:, 0] - 0.5)).sum()
+    assert moment == pytest.approx(0.1, rel=1e-3)
+    assert step.reaction[deck.points_of("bottom")].sum(axis=0)[2] == pytest.approx(1.0)
+    assert abs(step.reaction[deck.point(90), 2]) < 1e-9
+
+
+@pytest.mark.parametrize("kind", ["Kinematic", "Distributing"])
+def test_forces_and_moments_at_a_coupling_reach_the_floor(tmp_path, kind):
+    coupling = f"*Node\n90, 0.7, 0.5, 3.\n*Coupling, constraint name=c, ref node=90, surface=roof\n*{kind}\n1, 3\n"
+    text = (NODES + coupling + MATERIAL + CONTACT + SUPPORTS + STEP).replace(
+        "*Dsload\nroof, P, 100.\n", "*Cload\n90, 3, -100.\n90, 5, 5.\n"
+    )
+    deck = deck_of(tmp_path, text)
+    (step,) = deck.solve()
+    bottom = deck.points_of("bottom")
+    force = step.reaction[bottom, 2]
+    assert force.sum() == pytest.approx(100.0)
+    # The force acts at x = 0.7; the moment 5 about y moves its line by 0.05.
+    x = deck.model.mesh.points[bottom, 0]
+    sides = step.reaction[deck.points_of("x0"), 0] @ deck.model.mesh.points[deck.points_of("x0"), 2]
+    assert (force @ x) == pytest.approx(75.0 + sides, abs=0.05)
+
+
+def test_local_axes_turn_supports(tmp_path):
+    turned = "*Transform, nset=bottom, type=R\n0., 0., 1., 1., 0., 0.\n"
+    text = WHOLE.replace("*Boundary\nbottom, 3\n", f"{turned}*Boundary\nbottom, 1\n").replace("x0, 1\n", "x0, 1\n")
+    text = text.replace("*Nset, nset=x0\n1, 4, 5, 8,", "*Nset, nset=x0\n5, 8,").replace(
+        "nset=y0\n1, 2, 5,", "nset=y0\n5,"
+    )
+    deck = deck_of(tmp_path, text)
+    (step,) = deck.solve()
+    assert step.reaction[deck.points_of("bottom"), 2].sum() == pytest.approx(100.0)
+
+
+def test_the_command_line_takes_decks(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    deck_of(tmp_path, WHOLE)
+    assert main(["info", "deck.inp"]) == 0
+    assert "ss/sm" in capsys.readouterr().out
+    assert main(["run", "deck.inp", "-q"]) == 0
+    with fc.open_results("deck.vtkhdf") as results:
+        assert results[-1].contact["ss/sm"].force[2] == pytest.approx(100.0)
+    assert main(["run", "deck.inp", "--resume"]) == 0
+    assert "complete" in capsys.readouterr().out
+    (tmp_path / "deck.inp").write_text(WHOLE.replace("*Boundary\n", "*Boundry\n"), encoding="utf-8")
+    assert main(["run", "deck.inp"]) == 1
+    assert "deck.inp, line 46, *BOUNDRY" in capsys.readouterr().err
+
+
+def test_a_deck_is_a_case(tmp_path):
+    deck_of(tmp_path, WHOLE)
+    case = read_case(tmp_path / "deck.inp")
+    assert (case.name, case.title) == ("deck", "two cubes")
+    assert files_of_case(tmp_path / "deck.inp") == [tmp_path / "deck.inp"]
+
+
+def test_a_node_or_set_that_is_not_there(tmp_path):
+    deck = deck_of(tmp_path, WHOLE)
+    with pytest.raises(fc.MeshError, match=r"node '99' is not defined in 'deck\.inp'"):
+        deck.point(99)
+    with pytest.raises(fc.MeshError, match="did you mean"):
+        deck.points_of("botom")
+
+
+def test_materials_with_axes(tmp_path):
+    """A bar along z, the second axis of the material once it is turned: E2 counts."""
+    turned = "*Orientation, name=turned\n1., 0., 0., 0., 0., 1.\n"
+    law = "*Elastic, type=engineering constants\n1.e5, 5.e4, 2.e4, 0., 0., 0., 1.e4, 1.e4,\n1.e4\n"
+    text = WHOLE.replace(MATERIAL[:22], turned + MATERIAL[:22]).replace("*Elastic\n200000., 0.\n", law)
+    text = text.replace(", material=steel\n", ", material=steel, orientation=turned\n")
+    deck = deck_of(tmp_path, text)
+    assert height(deck, deck.solve()) == pytest.approx([-100.0 * 2 / 5e4])
+    moduli = "*Elastic, type=orthotropic\n1.e5, 0., 5.e4, 0., 0., 2.e4, 1.e4, 1.e4\n1.e4\n"
+    other = text.replace(law, moduli)
+    deck = deck_of(tmp_path, other)
+    assert height(deck, deck.solve()) == pytest.approx([-100.0 * 2 / 5e4])
+    with pytest.raises(fc.CaseError, match=r"\*ELASTIC: material 'steel': 8 constants where ORTHOTROPIC has 9"):
+        deck_of(tmp_path, other.replace("1.e4, 1.e4\n1.e4\n", "1.e4, 1.e4\n"))
+    with pytest.raises(fc.CaseError, match="orientation 'turned' is not defined; orientations: none"):
+        deck_of(tmp_path, other.replace(turned, ""))
+
+
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
+def test_a_deck_with_a_line_left_out_cut_or_twice_is_read_or_refused_in_one_line(tmp_path):
+    lines, texts = WHOLE.splitlines(), []
+    for number, line in enumerate(lines):
+        for instead in (
+            [],
+            [line[: len(line) // 2]],
+            [line, line],
+            [line.replace("1", "x")],
+            [line.replace(",", ",,")],
+        ):
+            try:
+                deck_of(tmp_path, "\n".join([*lines[:number], *instead, *lines[number + 1 :]]))
+            except fc.FastcontactError as error:
+                texts.append(str(error))
+    assert len(texts) > len(lines)
+    assert not [text for text in texts if "\n" in text]

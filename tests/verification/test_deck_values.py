@@ -1,0 +1,107 @@
+"""Input decks with exact values and CalculiX's: each within its tolerances; wrong ones with the line and what is wrong."""
+
+import json
+import warnings
+
+import pytest
+
+import fastcontact as fc
+
+SOUND = (
+    "two_cubes_good", "stack_c3d8", "stack_mortar", "hertz_cax", "pressfit_cpe8", "friction_slide", "gap_spring_cpe",
+    "cae_assembly", "tets_tie_gravity", "coupling_punch", "ortho_wedge",
+)  # fmt: skip
+NOT_YET = {"thermal_gap_c3d20r": "*INITIAL CONDITIONS", "bolt_pretension": "*PRE-TENSION"}
+WRONG = (
+    "dynamic", "include_absolute", "include_missing", "include_parent", "include_self", "keyword_typo", "missing_material",
+    "no_section", "number", "plastic", "shell_s4", "short_element", "unknown_node", "unknown_set", "unknown_surface",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def decks(root):
+    folder = root.parent / "shared" / "decks"
+    if not folder.is_dir():
+        pytest.skip(f"the decks are not there: {folder}")
+    return folder
+
+
+def read(decks, name):
+    return json.loads((decks / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def found(deck, step, reference):
+    """Return the value that a reference is about, None where it is one of CalculiX's own quantities."""
+    component, quantity = reference["component"], reference["quantity"]
+    axis = "xyz".find(component)
+    if quantity == "reaction":
+        return step.reaction[deck.points_of(reference["set"])].sum(axis=0)[axis]
+    if quantity == "displacement":
+        return step.displacement[deck.point(reference["node"])][axis]
+    if quantity == "stress":
+        return step.stress[deck.point(reference["node"])][("xx", "yy", "zz", "xy").index(component)]
+    if quantity == "position":
+        return None
+    if quantity == "internal_force":
+        return None
+    contact = step.contact[reference["pair"]]
+    if quantity == "contact_force":
+        normal = (contact.force_vectors * contact.normal).sum()
+        return normal if component == "normal" else contact.force[axis]
+    if quantity == "contact_radius":
+        return sum(contact.radius) / 2
+    if quantity == "centre_of_contact_force":
+        weight = contact.force_vectors[:, 2]
+        return (weight @ contact.coordinates)[axis] / weight.sum()
+    if component == "mean":
+        return contact.pressure.mean()
+    if component == "peak":
+        return contact.pressure_max
+    return contact.pressure[abs(contact.place - float(component.split("=")[1])).argmin()]
+
+
+@pytest.mark.parametrize("name", SOUND)
+@pytest.mark.filterwarnings("ignore:contact .* penetrates by")
+def test_a_deck_has_its_values(decks, name):
+    deck = fc.read_deck(decks / f"{name}.inp")
+    steps = {step.load_factor: step for step in deck.solve()}
+    compared = 0
+    for reference in read(decks, name)["references"]:
+        value = found(deck, steps[float(reference["step"])], reference)
+        if value is None:
+            continue
+        tolerance = reference["tolerance"]
+        allowed = tolerance.get("abs", 0.0) + tolerance.get("rel", 0.0) * abs(reference["value"])
+        assert abs(value - reference["value"]) <= allowed, (reference, value)
+        compared += 1
+    assert compared
+
+
+def test_an_instance_lies_where_the_assembly_puts_it(decks):
+    deck = fc.read_deck(decks / "cae_assembly.inp")
+    assert deck.model.mesh.points[deck.point('"Upper Plate-1".17')] == pytest.approx([30.0, 20.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_deck_is_refused_by_file_line_and_keyword(decks, name):
+    told = read(decks, f"bad_{name}")
+    with pytest.raises(fc.CaseError) as caught:
+        fc.read_deck(decks / told["deck"])
+    assert f"{told['deck']}, line {told['line']}, {told['keyword']}: " in str(caught.value)
+
+
+def test_large_rotations_are_told(decks):
+    told = read(decks, "bad_nlgeom")
+    with pytest.warns(fc.FastcontactWarning, match=f"line {told['line']}, .STEP: NLGEOM"):
+        deck = fc.read_deck(decks / told["deck"])
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        deck.solve()
+    assert any("NLGEOM" in str(w.message) and "rotation up to" in str(w.message) for w in caught)
+
+
+@pytest.mark.parametrize("name", NOT_YET)
+def test_what_is_not_translated_is_refused(decks, name):
+    with pytest.raises(fc.CaseError) as caught:
+        fc.read_deck(decks / f"{name}.inp")
+    assert NOT_YET[name] in str(caught.value)
