@@ -179,5 +179,5 @@ def test_functions_that_return_no_axes_are_refused(axes, words):
 
 
 def test_what_is_no_material_is_refused():
-    with pytest.raises(fc.ModelError, match="is no material"):
+    with pytest.raises(fc.ModelError, match="must be a Material, not the float"):
         fc.Model(fc.generate.block(divisions=(2, 2)), "plane_strain").add_material(210.0)

@@ -77,7 +77,7 @@ def test_a_failed_point_is_told_and_the_others_go_on(case, capsys):
         ({}, "at least one parameter"),
         ({"approach": ()}, "at least one value"),
         ({"aproach": (1.0,)}, "'approach'"),
-        ({"material[0].G": (1.0,)}, "material.*'E'|unknown key"),
+        ({"material[0].F": (1.0,)}, "material.*'E'|unknown key"),
     ],
 )
 def test_what_is_wrong_is_told_before_anything_runs(case, parameters, words):
