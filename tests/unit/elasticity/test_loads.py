@@ -259,7 +259,7 @@ def model():
         (
             "add_pressure",
             {"group": "TOP", "value": 1.0, "ramp": [1, 2]},
-            r"argument ramp of .* must be a Ramp or a sequence of sequences",
+            r"argument ramp of .* must be a Ramp",
         ),
         ("add_traction", {"group": "TOP"}, r"traction on 'TOP' has no component"),
         ("add_traction", {"group": "TOP", "z": 1.0}, r"component 'z'"),
