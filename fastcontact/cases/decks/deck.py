@@ -35,7 +35,7 @@ class Deck:
     ----------
     path : pathlib.Path
     title : str
-        First line of *HEADING.
+        First line of ``*HEADING``.
     model : Model
         Contact pairs are named ``SECONDARY/PRIMARY``, groups after the sets and surfaces of the deck. Plane models
         have a unit of thickness.
