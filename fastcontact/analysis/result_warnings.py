@@ -47,7 +47,7 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
         contact = last.contact[name]
         if pair.options.gap_only:
             continue
-        found += _deep(pair, contact, state.u) + _lost(name, contact, name in state.touched, loaded)
+        found += _deep(pair, contact, state.u) + _lost(pair, contact, name in state.touched, loaded)
         found += _unresolved(name, pair, contact)
     return found + _unsettled(state) + _loose(problem, last)
 
@@ -187,12 +187,18 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
     return float(square**0.5), place
 
 
-def _lost(name: str, contact: ContactResult, touched: bool, loaded: bool) -> list[str]:
+def _lost(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool) -> list[str]:
     """Return a warning where a pair never closed, or is open although the loads are still there."""
     if contact.active.any():
         return []
+    name, reach = contact.name, pair.options.search_distance
     facing = contact.gap[np.isfinite(contact.gap)]
     gap = f"the smallest gap is {facing.min():.4g}" if len(facing) else "no node faces the other side"
+    if reach is not None and len(facing) and facing.min() < -reach:
+        return [
+            f"contact '{name}' carries nothing where its sides penetrate by {-facing.min():.4g}, more than its "
+            f"search_distance {reach:.4g}: raise that, or use more load steps"
+        ]
     if len(facing) and facing.min() < 0.0 and not touched:
         return [
             f"contact '{name}' carries nothing although its sides penetrate by {-facing.min():.4g}: supports or relations "
