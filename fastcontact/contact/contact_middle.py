@@ -171,7 +171,8 @@ def _along_line(
         line = UnrolledLine.straight(centre, across, float(np.ptp(points, axis=0).max()))
     lengths = line.lengths(points)
     if len(planes) == 1 and not line.closed:
-        start = float(lengths[planes[0][1]].mean())
+        ends = lengths[planes[0][1]]  # both ends of a half ring lie on the plane
+        start = float(ends[np.argmin(np.abs(ends - weight @ lengths))])
         return ContactMiddle(line.at(start), line, start, start > 0.5 * (lengths.min() + lengths.max()))
     start = float(weight @ lengths)
     return ContactMiddle(line.at(start), line, start)

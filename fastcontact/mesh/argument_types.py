@@ -79,13 +79,13 @@ def check_fields(what: str, values: abc.Mapping[str, Any], kind: type, error: ty
 @functools.cache
 def types_of(call: Callable[..., Any]) -> dict[str, Any]:
     """Return the types of the arguments of a function, or of the fields of a class itself, by name."""
-    found = {}
+    found: dict[str, Any] = {}
     own = inspect.get_annotations(call)
     space = vars(sys.modules[call.__module__])
     for name, text in own.items():
         try:
-            found[name] = eval(text, space) if isinstance(text, str) else text
-        except NameError:  # imported for type checkers alone
+            found |= typing.get_type_hints(types.SimpleNamespace(__annotations__={name: text}), space)
+        except (NameError, TypeError):  # imported for type checkers alone, or of the class and no argument
             continue
     return found
 

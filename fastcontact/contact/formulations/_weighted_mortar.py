@@ -304,9 +304,10 @@ class WeightedPressures(NodalField):
 
     @property
     def covered(self) -> Array:
-        """What part of the whole areas the gaps stand for; none where there is no gap."""
+        """What part of the whole areas the gaps stand for; at mid nodes without a gap, the mean of their corners."""
         usable = np.isfinite(self.weight)
-        return np.divide(self.weight, self.tested, out=np.zeros_like(self.weight), where=usable & (self.tested > 0.0))
+        part = np.divide(self.weight, self.tested, out=np.zeros_like(self.weight), where=usable & (self.tested > 0.0))
+        return self._at_nodes(part, only_without_gap=True)
 
     def over_whole_side(self, force: Array) -> Array:
         """Return forces over the whole areas of the positive functions; see `_at_nodes`.

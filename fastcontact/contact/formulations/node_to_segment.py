@@ -76,7 +76,8 @@ class NodeToSegment(Formulation):
             return found
         assert isinstance(self.primary, Surface)
         assert self.normals is not None
-        return at_nodes(found, candidates, self.primary, self.points + at.displacement, self.normals)
+        snapped = at_nodes(found, candidates, self.primary, self.points + at.displacement, self.normals)
+        return replace(snapped, beyond=None)
 
     def unilateral(self, at: Configuration) -> Constraints:
         """Pair on the displaced configuration and return one gap per secondary node."""
