@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -237,6 +237,62 @@ class Mesh:
             cell_groups={**self.cell_groups, **(cells or {})},
             point_groups={**self.point_groups, **(points or {})},
         )
+
+    @typed(MeshError)
+    def with_facet_group(self, name: str, where: Callable[[Array], ArrayLike]) -> Mesh:
+        """Return the mesh with a cell group of the outer facets that lie somewhere, for contact, supports and loads.
+
+        Facets that are no cells yet become cells, of lines or faces; a group of that name is replaced.
+
+        Parameters
+        ----------
+        name : str
+        where : callable
+            From positions (n, dim) [length] to bool (n,). A facet belongs to the group if that holds at all its nodes.
+
+        Raises
+        ------
+        MeshError
+            If it holds nowhere on the outside, or there is a point group of that name.
+
+        Examples
+        --------
+        >>> mesh = Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2]]})
+        >>> mesh.with_facet_group("BOTTOM", lambda x: x[:, 1] == 0).cells_of("BOTTOM")["line2"].tolist()
+        [[0, 1]]
+        """
+        from fastcontact.mesh.facets import facets_of_solids, joined  # kernels, which reading a mesh needs not
+
+        if name in self.point_groups:
+            raise MeshError(f"'{name}' is a group of points already: give the facets another name")
+        outer = facets_of_solids(self.solids, self.offsets, self.n_points, self.n_cells)[0]
+        inside = self._inside(where)
+        found = {element: facets[inside[facets].all(axis=1)] for element, facets in outer.items()}
+        if not sum(map(len, found.values())):
+            low, high = self.points.min(axis=0), self.points.max(axis=0)
+            raise MeshError(
+                f"no outer facet has all its nodes where '{name}' is wanted: the condition holds at {inside.sum()} of "
+                f"{self.n_points} points, which lie between {low.tolist()} and {high.tolist()}; compare coordinates with "
+                "a tolerance, such as abs(x[:, 1] - 5) < 1e-6"
+            )
+        cells, numbers = dict(self.cells), {}
+        for element, facets in found.items():
+            before = self.cells.get(element, facets[:0])
+            cells[element], numbers[element] = joined(before, facets)
+        starts = dict(zip(cells, np.cumsum([0, *map(len, cells.values())]).tolist(), strict=False))
+        shift = np.repeat([starts[e] - at for e, at in self.offsets.items()], [*map(len, self.cells.values())])
+        groups = {group: members + shift[members] for group, members in self.cell_groups.items()}
+        groups[name] = np.concatenate([starts[element] + rows for element, rows in numbers.items()])
+        return self.replace(cells=cells, cell_groups=groups)
+
+    def _inside(self, where: Callable[[Array], ArrayLike]) -> NDArray[np.bool_]:
+        inside = np.asarray(where(self.points))
+        if inside.shape != (self.n_points,) or inside.dtype != bool:
+            raise MeshError(
+                f"the condition must return truth values for {self.n_points} positions in rows, such as x[:, 1] > 0; it "
+                f"returned {inside.dtype} of shape {inside.shape}"
+            )
+        return inside
 
     @typed(MeshError)
     def merged_groups(self, name: str, members: Iterable[str]) -> Mesh:
