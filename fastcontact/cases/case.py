@@ -12,6 +12,7 @@ from typing import Any
 from fastcontact import analytic
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.cases.checks import CHECK, Check, read_check
+from fastcontact.cases.decks.blocks import files_of_deck
 from fastcontact.cases.decks.deck import Deck, read_deck
 from fastcontact.cases.keys import NUMBER, RAMP, SOLVE, STUDY, TOP, UNITS, called, check_keys, tables
 from fastcontact.cases.model_tables import build_model, points
@@ -20,6 +21,7 @@ from fastcontact.errors import CaseError, unknown
 from fastcontact.linear.choice import check_tolerance
 from fastcontact.mesh import generate
 from fastcontact.mesh.files.mesh_files import read_mesh
+from fastcontact.mesh.files.paths import existing_file
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, linear_ramp
@@ -130,10 +132,13 @@ def _case_of_deck(path: Path) -> Case:
 
 
 def files_of_case(path: str | Path) -> list[Path]:
-    """Return a case file and the files of meshes that it names; raises CaseError if it cannot be read."""
+    """Return a case file and the files of meshes that it names, or a deck and what it includes.
+
+    Raises CaseError or FileError if one cannot be read.
+    """
     path = case_path(path)
     if path.suffix.lower() == DECK:
-        return [path]
+        return files_of_deck(existing_file(path))
     found, waiting = [path], [_parsed(path)[1]]
     while waiting:
         for key, value in waiting.pop().items():

@@ -98,11 +98,12 @@ class Block:
 
 @dataclass
 class Source:
-    """The deck that is read: its folder, what was read so far, and which files are open."""
+    """The deck that is read: its folder, whether data lines are kept, what was read so far, and which files are open."""
 
     folder: Path
+    with_data: bool = True
     size: int = 0
-    files: int = 0
+    files: list[Path] = field(default_factory=list)
     open: list[Path] = field(default_factory=list)
 
 
@@ -141,11 +142,19 @@ def read_blocks(path: Path) -> list[Block]:
     return list(_blocks(path, path.name, source))
 
 
+def files_of_deck(path: Path) -> list[Path]:
+    """Return a deck and the files that it includes, in the order in which they are read; raises like `read_blocks`."""
+    source = Source(path.resolve().parent, with_data=False)
+    for _ in _blocks(path, path.name, source):
+        pass
+    return source.files
+
+
 def _text(path: Path, source: Source) -> str:
-    source.files += 1
+    source.files.append(path)
     try:
         source.size += path.stat().st_size
-        if source.size > LARGEST or source.files > MOST_FILES:
+        if source.size > LARGEST or len(source.files) > MOST_FILES:
             raise FileError(
                 f"'{path}' with what it includes is more than {LARGEST >> 20} MiB or {MOST_FILES} files: too much for a deck"
             )
@@ -165,9 +174,9 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
         if line.startswith("**"):
             continue
         if not line.startswith("*"):
-            if current is not None:
+            if current is not None and source.with_data:
                 rows.append(_row(Place(name, number, current.keyword), line))
-            elif line:
+            elif line and current is None:
                 raise Place(name, number, "").refuse("a data line before any keyword")
             continue
         if current is not None:
