@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from fastcontact.mesh.files.packing import packed, unpacked
 
 # Limits of the child, each a constant and a part for every byte of the file. meshio 5.3.5 takes up to 0.15 s and 9 MB for a
-# megabyte (permas, vtu).
+# megabyte (permas, vtu); the process itself takes 130 MB.
 SECONDS, SECONDS_PER_BYTE = 5.0, 5e-6
-MEMORY, MEMORY_PER_BYTE = 1 << 31, 64
+MEMORY, MEMORY_PER_BYTE = 1 << 30, 32
 # Limit of what the child returns [bytes]: a packed file of a few kilobytes can hold any number of equal points.
 RETURNED, RETURNED_PER_BYTE = 1 << 28, 32
 # Limit of the time that passes, in computing times: a busy machine may need as long.

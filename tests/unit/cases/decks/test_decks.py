@@ -264,6 +264,23 @@ def test_a_deck_is_a_case(tmp_path):
     assert files_of_case(tmp_path / "deck.inp") == [tmp_path / "deck.inp"]
 
 
+@pytest.mark.parametrize("source", ["deck.inp", "parts/nodes.inp", "parts/more.inp"])
+@pytest.mark.parametrize("option", ["-o", "--json"])
+def test_no_run_replaces_a_part_of_its_deck(option, source, tmp_path, monkeypatch, capsys):
+    """Decks include files, which include others."""
+    monkeypatch.chdir(tmp_path)
+    parts = tmp_path / "parts"
+    parts.mkdir()
+    (parts / "nodes.inp").write_text("*Include,\ninput=parts/more.inp\n", encoding="utf-8")
+    (parts / "more.inp").write_text(NODES, encoding="utf-8")
+    deck_of(tmp_path, "*Include, input=parts/nodes.inp\n" + WHOLE.replace(NODES, ""))
+    assert files_of_case(tmp_path / "deck.inp") == [tmp_path / "deck.inp", parts / "nodes.inp", parts / "more.inp"]
+    before = (tmp_path / source).read_bytes()
+    assert main(["run", "deck.inp", option, source]) == 1
+    assert f"'{source}' is what this command reads" in capsys.readouterr().err
+    assert (tmp_path / source).read_bytes() == before
+
+
 def test_a_node_or_set_that_is_not_there(tmp_path):
     deck = deck_of(tmp_path, WHOLE)
     with pytest.raises(fc.MeshError, match=r"node '99' is not defined in 'deck\.inp'"):
