@@ -1,0 +1,123 @@
+"""What must hold for the result of any model: balance, complementarity, Coulomb's cone, moments, pressures that carry the force.
+
+Each function returns numbers that vanish in an exact solution, relative to the sizes that it names; tests and
+``bench/random_models.py`` say how far they may be from zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from unittest.mock import patch
+
+import numpy as np
+
+import fastcontact as fc
+from fastcontact.analysis import load_step as page
+from fastcontact.contact.integration import nodal_areas
+
+
+class Watched:
+    """The settled contact of the last load step, see `watching`."""
+
+    settled = None
+
+
+@contextmanager
+def watching() -> Iterator[Watched]:
+    """Keep the settled contact of the last load step that is solved inside."""
+    found = Watched()
+
+    def watched(*given, settle=page.settle_geometry):
+        found.settled = settle(*given)
+        return found.settled
+
+    with patch.object(page, "settle_geometry", watched):
+        yield found
+
+
+def out_of_balance(model: fc.Model, step: fc.StepResult, factor: float) -> tuple[float, float]:
+    """Return the largest nodal force that nothing balances, and the largest contact force, reaction or load [force].
+
+    `factor` is the multiplier of the loads.
+    """
+    internal = model.internal_forces(step.displacement)
+    external = sum((factor * model.load_vector(load) for load in model.loads), np.zeros_like(internal))
+    contact = contact_forces(model, step)
+    largest = max(np.abs(part).max(initial=0.0) for part in (external, contact, step.reaction))
+    return float(np.abs(internal - contact - external - step.reaction).max()), float(largest)
+
+
+def contact_forces(model: fc.Model, step: fc.StepResult) -> np.ndarray:
+    """Return the contact forces (n_points, dim) on all nodes, those of both sides [force]."""
+    total = np.zeros(model.mesh.points.shape)
+    for found in step.contact.values():
+        np.add.at(total, found.points, found.force_vectors)
+        np.add.at(total, found.primary_points, found.primary_force_vectors)
+    return total
+
+
+def given_back(model: fc.Model, step: fc.StepResult, name: str) -> tuple[float, float]:
+    """Return by how much the forces on both sides of a pair fail to cancel, and their moments in the deformed state.
+
+    The first over the sum of the sizes of the forces, the second over their moment about the side's middle. About an axis,
+    forces along the radius do not cancel and have no moment.
+    """
+    found = step.contact[name]
+    nodes = np.concatenate([found.points, found.primary_points])
+    forces = np.vstack([found.force_vectors, found.primary_force_vectors])
+    size = np.linalg.norm(found.force_vectors, axis=1).sum()
+    if not size:
+        return 0.0, 0.0
+    if model.kinematics == "axisymmetric":
+        return float(abs(forces[:, 1].sum()) / size), 0.0
+    places = model.mesh.points[nodes] + step.displacement[nodes]
+    arm = places - places[: len(found.points)].mean(axis=0)
+    moment = np.cross(arm, forces).sum(axis=0)
+    extent = np.linalg.norm(np.ptp(places[: len(found.points)], axis=0))
+    return float(np.linalg.norm(forces.sum(axis=0)) / size), float(np.linalg.norm(moment) / (size * extent))
+
+
+def complementarity(settled, lengths: float) -> tuple[float, float, float]:
+    """Return the largest penetration, tension and product of gap and force over all inequalities.
+
+    Over `lengths` [length] and the largest force. What a penalty lets penetrate is part of the gap.
+    """
+    state, constraints = settled.solution, settled.constraints
+    usable = np.diff(constraints.B.indptr) > 0
+    if constraints.equality is not None:
+        usable &= ~constraints.equality
+    gap, force = state.gap[usable], state.multiplier[usable]
+    largest = np.abs(state.multiplier).max(initial=0.0) or 1.0
+    return (
+        float(-gap.min(initial=0.0) / lengths),
+        float(-force.min(initial=0.0) / largest),
+        float(np.abs(gap * force).max(initial=0.0) / (lengths * largest)),
+    )
+
+
+def friction(settled) -> tuple[float, float]:
+    """Return by how much tangential forces leave Coulomb's cone, and how much of their work is done along the slip.
+
+    Over the largest force, and over that times the largest slip.
+    """
+    state, constraints = settled.solution, settled.constraints
+    if not constraints.tangents:
+        return 0.0, 0.0
+    largest = np.abs(state.multiplier).max(initial=0.0) or 1.0
+    rubbing = np.linalg.norm(state.tangential, axis=1)
+    outside = (rubbing - constraints.coefficients * state.multiplier).max(initial=0.0)
+    slip = np.linalg.norm(state.slip, axis=1)
+    driving = np.einsum("mk,mk->m", state.tangential, state.slip).max(initial=0.0)
+    return float(outside / largest), float(driving / (largest * (slip.max(initial=0.0) or 1.0)))
+
+
+def carried(model: fc.Model, step: fc.StepResult, settled, name: str) -> float:
+    """Return by how much the integral of the reported pressure misses the normal forces of a pair, over their sum of sizes."""
+    (pair,) = (one for one in model.contact if one.name == name)
+    bound = model.bind(pair)
+    part, rows = settled.constraints.parts[name], settled.constraints.rows()[name]
+    forces = part.normal_forces(settled.solution.multiplier[rows])
+    areas = nodal_areas(bound.secondary, bound.points, bound.axisymmetric)
+    total = np.abs(forces).sum()
+    return float(abs((step.contact[name].pressure * areas).sum() - forces.sum()) / total) if total else 0.0
