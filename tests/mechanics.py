@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from unittest.mock import patch
 
 import numpy as np
+from scipy.sparse import csr_array
 
 import fastcontact as fc
 from fastcontact.analysis import load_step as page
 from fastcontact.contact.integration import nodal_areas
+from fastcontact.elasticity.stiffness import stiffness
 
 
 class Watched:
@@ -36,16 +39,38 @@ def watching() -> Iterator[Watched]:
         yield found
 
 
-def out_of_balance(model: fc.Model, step: fc.StepResult, factor: float) -> tuple[float, float]:
-    """Return the largest nodal force that nothing balances, and the largest contact force, reaction or load [force].
+# Forces below so many units in the last place of what their sums are made of are round-off.
+ROUND_OFF = 3000 * float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """By what figures are divided: the largest displacement [length] and force [force], infinite where all is round-off."""
+
+    length: float
+    force: float
+
+
+def out_of_balance(model: fc.Model, step: fc.StepResult, factor: float) -> tuple[float, Sizes]:
+    """Return the largest nodal force that nothing balances, over the largest force or round-off, and the sizes of both.
 
     `factor` is the multiplier of the loads.
     """
-    internal = model.internal_forces(step.displacement)
+    K = stiffness_of(model)
+    internal = (K @ step.displacement.ravel()).reshape(step.displacement.shape)
     external = sum((factor * model.load_vector(load) for load in model.loads), np.zeros_like(internal))
     contact = contact_forces(model, step)
     largest = max(np.abs(part).max(initial=0.0) for part in (external, contact, step.reaction))
-    return float(np.abs(internal - contact - external - step.reaction).max()), float(largest)
+    noise = ROUND_OFF * (abs(K) @ np.abs(step.displacement).ravel()).max(initial=0.0)
+    residual = float(np.abs(internal - contact - external - step.reaction).max())
+    sizes = Sizes(np.abs(step.displacement).max(initial=0.0) or 1.0, float(largest) if largest > noise else np.inf)
+    return max(residual - noise, 0.0) / (noise or 1.0) if largest <= noise else residual / largest, sizes
+
+
+def stiffness_of(model: fc.Model) -> csr_array:
+    """Return the stiffness (n_dofs, n_dofs) of the solid cells [force / length]."""
+    moduli, material = model.material_numbers()
+    return stiffness(model.mesh, model.kinematics, moduli, material, None, model.averaged_materials())
 
 
 def contact_forces(model: fc.Model, step: fc.StepResult) -> np.ndarray:
@@ -57,7 +82,7 @@ def contact_forces(model: fc.Model, step: fc.StepResult) -> np.ndarray:
     return total
 
 
-def given_back(model: fc.Model, step: fc.StepResult, name: str) -> tuple[float, float]:
+def given_back(model: fc.Model, step: fc.StepResult, sizes: Sizes, name: str) -> tuple[float, float]:
     """Return by how much the forces on both sides of a pair fail to cancel, and their moments in the deformed state.
 
     The first over the sum of the sizes of the forces, the second over their moment about the side's middle. About an axis,
@@ -67,8 +92,7 @@ def given_back(model: fc.Model, step: fc.StepResult, name: str) -> tuple[float, 
     nodes = np.concatenate([found.points, found.primary_points])
     forces = np.vstack([found.force_vectors, found.primary_force_vectors])
     size = np.linalg.norm(found.force_vectors, axis=1).sum()
-    if not size:
-        return 0.0, 0.0
+    size = max(float(size), sizes.force)
     if model.kinematics == "axisymmetric":
         return float(abs(forces[:, 1].sum()) / size), 0.0
     places = model.mesh.points[nodes] + step.displacement[nodes]
@@ -78,46 +102,37 @@ def given_back(model: fc.Model, step: fc.StepResult, name: str) -> tuple[float, 
     return float(np.linalg.norm(forces.sum(axis=0)) / size), float(np.linalg.norm(moment) / (size * extent))
 
 
-def complementarity(settled, lengths: float) -> tuple[float, float, float]:
-    """Return the largest penetration, tension and product of gap and force over all inequalities.
+def complementarity(settled, sizes: Sizes) -> tuple[float, float, float]:
+    """Return the largest penetration, tension and product of gap and force over all inequalities, in units of `sizes`.
 
-    Over `lengths` [length] and the largest force. What a penalty lets penetrate is part of the gap.
+    What a penalty lets penetrate is part of the gap.
     """
     state, constraints = settled.solution, settled.constraints
     usable = np.diff(constraints.B.indptr) > 0
     if constraints.equality is not None:
         usable &= ~constraints.equality
-    gap, force = state.gap[usable], state.multiplier[usable]
-    largest = np.abs(state.multiplier).max(initial=0.0) or 1.0
-    return (
-        float(-gap.min(initial=0.0) / lengths),
-        float(-force.min(initial=0.0) / largest),
-        float(np.abs(gap * force).max(initial=0.0) / (lengths * largest)),
-    )
+    gap, force = state.gap[usable] / sizes.length, state.multiplier[usable] / sizes.force
+    product = float(np.abs(gap * force).max(initial=0.0))
+    return float(-gap.min(initial=0.0)), float(-force.min(initial=0.0)), product
 
 
-def friction(settled) -> tuple[float, float]:
-    """Return by how much tangential forces leave Coulomb's cone, and how much of their work is done along the slip.
-
-    Over the largest force, and over that times the largest slip.
-    """
+def friction(settled, sizes: Sizes) -> tuple[float, float]:
+    """Return how far tangential forces leave Coulomb's cone, and what work they do along the slip, in units of `sizes`."""
     state, constraints = settled.solution, settled.constraints
     if not constraints.tangents:
         return 0.0, 0.0
-    largest = np.abs(state.multiplier).max(initial=0.0) or 1.0
     rubbing = np.linalg.norm(state.tangential, axis=1)
     outside = (rubbing - constraints.coefficients * state.multiplier).max(initial=0.0)
-    slip = np.linalg.norm(state.slip, axis=1)
     driving = np.einsum("mk,mk->m", state.tangential, state.slip).max(initial=0.0)
-    return float(outside / largest), float(driving / (largest * (slip.max(initial=0.0) or 1.0)))
+    return float(outside / sizes.force), float(driving / (sizes.force * sizes.length))
 
 
-def carried(model: fc.Model, step: fc.StepResult, settled, name: str) -> float:
+def carried(model: fc.Model, step: fc.StepResult, settled, sizes: Sizes, name: str) -> float:
     """Return by how much the integral of the reported pressure misses the normal forces of a pair, over their sum of sizes."""
     (pair,) = (one for one in model.contact if one.name == name)
     bound = model.bind(pair)
     part, rows = settled.constraints.parts[name], settled.constraints.rows()[name]
     forces = part.normal_forces(settled.solution.multiplier[rows])
     areas = nodal_areas(bound.secondary, bound.points, bound.axisymmetric)
-    total = np.abs(forces).sum()
-    return float(abs((step.contact[name].pressure * areas).sum() - forces.sum()) / total) if total else 0.0
+    total = max(float(np.abs(forces).sum()), sizes.force)
+    return float(abs((step.contact[name].pressure * areas).sum() - forces.sum()) / total)

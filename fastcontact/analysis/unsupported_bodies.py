@@ -25,7 +25,8 @@ from fastcontact.elasticity.constrained_system import System
 from fastcontact.model.rigid_motions import FreeMotions
 
 Array = NDArray[np.float64]
-# The springs carry less than this fraction of the loads; more where round-off or the linear solver leave more.
+# The springs carry less than this fraction of the loads and of the contact forces, which is all there is where motions drive
+# the bodies; more where round-off or the linear solver leave more.
 SLACK = 1e-12
 # What is left when nothing improves any more counts as slack below this fraction.
 STAGNANT = 1e-8
@@ -152,7 +153,7 @@ class UnsupportedBodies:
             Solves the contact problem with the springs at a position (k,).
         start : ndarray (k,)
         load : float
-            The forces to compare those of the springs with [force].
+            The loads to compare the forces of the springs with, beside those of contact [force].
         noise : float
             Accuracy of displacements, as a fraction of the largest one.
         round_off : float
@@ -165,19 +166,21 @@ class UnsupportedBodies:
         """
         search = _Search(solve_at, self.dofs, start)
         noise *= float(np.abs(search.state.u).max())
-        enough = max(SLACK * load / self.stiffness, noise)
-        tolerable = max(enough, STAGNANT * load / self.stiffness, round_off)
+
+        def elongation(part: float) -> float:
+            return max(part * max(load, search.contact_force) / self.stiffness, noise)
+
         derivative: Array | None = None
-        while search.settled and search.left > enough and search.positions < MAX_POSITIONS:
+        while search.settled and search.left > elongation(SLACK) and search.positions < MAX_POSITIONS:
             before = search.left
             if derivative is None:
                 derivative = search.differences(max(0.1 * search.left, 1e3 * noise, 1e3 * round_off))
             search.move(_step(derivative, search.elongation))
             if search.left > 0.1 * before:
                 derivative = None
-                if search.left >= 0.5 * before and search.left <= tolerable:
+                if search.left >= 0.5 * before and search.left <= max(elongation(STAGNANT), round_off):
                     break
-        slack = search.settled and search.left <= tolerable
+        slack = search.settled and search.left <= max(elongation(STAGNANT), round_off)
         state = dataclasses.replace(search.unsettled or search.state, iterations=search.iterations)
         return RigidPosition(state, search.position, self.stiffness * search.elongation, search.positions, slack)
 
@@ -201,6 +204,11 @@ class _Search:
     def left(self) -> float:
         """Largest elongation [length]."""
         return float(np.abs(self.elongation).max())
+
+    @property
+    def contact_force(self) -> float:
+        """Largest contact force [force]."""
+        return float(np.abs(self.state.multiplier).max(initial=0.0))
 
     def _at(self, position: Array) -> tuple[Solution, Array]:
         state = self._solve_at(position)

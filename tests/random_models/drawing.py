@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,6 +11,7 @@ from layers import Random
 
 import fastcontact as fc
 
+log = logging.getLogger(__name__)
 # Unknowns beyond which a model is drawn again.
 LARGEST = 3000
 
@@ -43,7 +45,11 @@ def drawn(seed: int) -> Drawn:
     for attempt in range(20):
         random = np.random.default_rng([seed, attempt])
         family = str(random.choice(list(FAMILIES), p=[one.share for one in FAMILIES.values()]))
-        draft = FAMILIES[family].build(random)
+        try:
+            draft = FAMILIES[family].build(random)
+        except fc.MeshError as error:  # a crown that turned cells inside out, a size beyond what a generator takes
+            log.info("seed %d: %s", seed, error)
+            continue
         if draft.model.n_dofs <= LARGEST:
             break
     labels = {"family": family, "kinematics": draft.model.kinematics, "dofs": draft.model.n_dofs, **draft.labels}
@@ -82,7 +88,7 @@ def pair_options(random: Random, length: float, obstacle: bool = False, friction
     if random.random() < 0.25:
         options["clearance"] = float(random.uniform(-1.0, 0.5) * length)
         if not obstacle and options.get("formulation") is None and random.random() < 0.2:
-            options["clearance_ramp"] = ((0.0, 0.0), (1.0, 1.0))
+            options["clearance_ramp"] = ((0.0, 0.0), (1.0, 1.0), (2.0, 1.0))
     if random.random() < 0.05:
         options["search_distance"] = 100 * length
     if random.random() < 0.08 and "friction" not in options:

@@ -64,13 +64,12 @@ def solved(given: Drawn) -> dict[str, Any]:
 
 def figures(model: fc.Model, step: fc.StepResult, settled, factor: float) -> dict[str, float]:
     """Return what must vanish; see `mechanics`."""
-    residual, largest = mechanics.out_of_balance(model, step, factor)
-    length = np.abs(step.displacement).max(initial=0.0) or 1.0
-    penetration, tension, product = mechanics.complementarity(settled, length)
-    cone, driving = mechanics.friction(settled)
-    both = [mechanics.given_back(model, step, pair.name) for pair in model.contact if pair.obstacle is None]
+    balance, sizes = mechanics.out_of_balance(model, step, factor)
+    penetration, tension, product = mechanics.complementarity(settled, sizes)
+    cone, driving = mechanics.friction(settled, sizes)
+    both = [mechanics.given_back(model, step, sizes, pair.name) for pair in model.contact if pair.obstacle is None]
     return {
-        "balance": residual / largest if largest else 0.0,
+        "balance": balance,
         "given back": max((force for force, _ in both), default=0.0),
         "moment": max((moment for _, moment in both), default=0.0),
         "penetration": penetration,
@@ -78,7 +77,7 @@ def figures(model: fc.Model, step: fc.StepResult, settled, factor: float) -> dic
         "product": product,
         "cone": cone,
         "driving": driving,
-        "carried": max(mechanics.carried(model, step, settled, name) for name in step.contact),
+        "carried": max(mechanics.carried(model, step, settled, sizes, name) for name in step.contact),
     }
 
 
