@@ -129,7 +129,9 @@ def summary(found: list[dict[str, Any]]) -> str:
     for name in ("balance", "given back", "moment", "penetration", "tension", "product", "cone", "driving", "carried"):
         row = max(found, key=lambda one: one.get(name, 0.0))
         worst.append(f"{name} {row.get(name, 0.0):.2g} (seed {row['seed']})")
-    findings = [f"seed {row['seed']}: {row['outcome']}: {row['text'][:300]}" for row in found if row["outcome"] in FINDINGS]
+    findings = [
+        f"seed {row['seed']}: {row['outcome']}: {row['text'][:300]}" for row in found if row["outcome"] in FINDINGS
+    ]
     return "\n\n".join([*parts, "\n".join(lines), "largest: " + ", ".join(worst), "\n".join(findings)])
 
 
@@ -169,10 +171,12 @@ def main() -> int:
         found.append(row)
         if row["outcome"] in FINDINGS:
             print(f"seed {row['seed']}: {row['outcome']}: {row['text'][:200]}", flush=True)
-        if given.json and len(found) % 20 == 0 or len(found) == len(seeds) and given.json:
+        if given.json and (len(found) % 20 == 0 or len(found) == len(seeds)):
             given.json.write_text(json.dumps(found, indent=0, default=str))
     print(summary(found))
-    print(f"{len(found)} models, {sum(row.get('seconds', 0.0) for row in found):.0f} CPU s, {time.perf_counter() - begin:.0f} s")
+    print(
+        f"{len(found)} models, {sum(row.get('seconds', 0.0) for row in found):.0f} CPU s, {time.perf_counter() - begin:.0f} s"
+    )
     return 1 if any(row["outcome"] in FINDINGS for row in found) else 0
 
 

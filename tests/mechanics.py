@@ -1,4 +1,4 @@
-"""What must hold for the result of any model: balance, complementarity, Coulomb's cone, moments, pressures that carry the force.
+"""What must hold for any result: balance, complementarity, Coulomb's cone, moments, pressures that carry the force.
 
 Each function returns numbers that vanish in an exact solution, relative to the sizes that it names; tests and
 ``bench/random_models.py`` say how far they may be from zero.
@@ -6,38 +6,14 @@ Each function returns numbers that vanish in an exact solution, relative to the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from unittest.mock import patch
 
 import numpy as np
 from scipy.sparse import csr_array
 
 import fastcontact as fc
-from fastcontact.analysis import load_step as page
 from fastcontact.contact.integration import nodal_areas
 from fastcontact.elasticity.stiffness import stiffness
-
-
-class Watched:
-    """The settled contact of the last load step, see `watching`."""
-
-    settled = None
-
-
-@contextmanager
-def watching() -> Iterator[Watched]:
-    """Keep the settled contact of the last load step that is solved inside."""
-    found = Watched()
-
-    def watched(*given, settle=page.settle_geometry):
-        found.settled = settle(*given)
-        return found.settled
-
-    with patch.object(page, "settle_geometry", watched):
-        yield found
-
 
 # Forces below so many units in the last place of what their sums are made of are round-off.
 ROUND_OFF = 3000 * float(np.finfo(float).eps)
@@ -85,10 +61,12 @@ def contact_forces(model: fc.Model, step: fc.StepResult) -> np.ndarray:
 def given_back(model: fc.Model, step: fc.StepResult, sizes: Sizes, name: str) -> tuple[float, float]:
     """Return by how much the forces on both sides of a pair fail to cancel, and their moments in the deformed state.
 
-    The first over the sum of the sizes of the forces, the second over their moment about the side's middle. About an axis,
-    forces along the radius do not cancel and have no moment.
+    The first over the sum of the sizes of the forces, the second over that times the extent of the side, less what forces
+    on sides that stand apart make: by a clearance, or where tied. About an axis, forces along the radius do not cancel and
+    have no moment.
     """
     found = step.contact[name]
+    (options,) = (pair.options for pair in model.contact if pair.name == name)
     nodes = np.concatenate([found.points, found.primary_points])
     forces = np.vstack([found.force_vectors, found.primary_force_vectors])
     size = np.linalg.norm(found.force_vectors, axis=1).sum()
@@ -97,9 +75,18 @@ def given_back(model: fc.Model, step: fc.StepResult, sizes: Sizes, name: str) ->
         return float(abs(forces[:, 1].sum()) / size), 0.0
     places = model.mesh.points[nodes] + step.displacement[nodes]
     arm = places - places[: len(found.points)].mean(axis=0)
-    moment = np.cross(arm, forces).sum(axis=0)
+    moment = np.cross(in_space(arm), in_space(forces)).sum(axis=0)
     extent = np.linalg.norm(np.ptp(places[: len(found.points)], axis=0))
-    return float(np.linalg.norm(forces.sum(axis=0)) / size), float(np.linalg.norm(moment) / (size * extent))
+    apart = abs(options.get("clearance", 0.0))
+    if options.get("kind") == "tied":
+        apart = np.abs(found.gap[np.isfinite(found.gap)]).max(initial=0.0)
+    left = max(float(np.linalg.norm(moment)) - apart * size, 0.0) if size < np.inf else 0.0
+    return float(np.linalg.norm(forces.sum(axis=0)) / size), left / (size * extent)
+
+
+def in_space(vectors: np.ndarray) -> np.ndarray:
+    """Return vectors (n, dim) with three components."""
+    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
 
 
 def complementarity(settled, sizes: Sizes) -> tuple[float, float, float]:
@@ -128,7 +115,7 @@ def friction(settled, sizes: Sizes) -> tuple[float, float]:
 
 
 def carried(model: fc.Model, step: fc.StepResult, settled, sizes: Sizes, name: str) -> float:
-    """Return by how much the integral of the reported pressure misses the normal forces of a pair, over their sum of sizes."""
+    """Return by how much the integral of the reported pressure misses the normal forces of a pair, over their sizes."""
     (pair,) = (one for one in model.contact if one.name == name)
     bound = model.bind(pair)
     part, rows = settled.constraints.parts[name], settled.constraints.rows()[name]

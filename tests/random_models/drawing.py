@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from layers import Random
+from bodies import Random
 
 import fastcontact as fc
 
@@ -78,7 +78,9 @@ def material(random: Random, unit: float, contrast: bool) -> fc.LinearElastic:
     return fc.LinearElastic(float(unit * factor), nu)
 
 
-def pair_options(random: Random, length: float, obstacle: bool = False, friction: float | None = None) -> dict[str, Any]:
+def pair_options(
+    random: Random, length: float, obstacle: bool = False, friction: float | None = None
+) -> dict[str, Any]:
     """Return the options of a pair: mostly none; `length` is that by which it is pressed."""
     options: dict[str, Any] = {}
     if random.random() < 0.3:
@@ -107,8 +109,8 @@ def formulation(random: Random, obstacle: bool) -> dict[str, Any]:
     rule = {"integration": str(random.choice(["gauss", "simpson", "node"]))}
     if obstacle:
         return [nts, {**continuous, **rule}][int(random.integers(2))]
-    choices = [nts, {**nts, "normals": "averaged"}, continuous, {**continuous, **rule}, mortar, mortar,
-               {**mortar, "multipliers": "dual", "normals": str(random.choice(["facet", "averaged", "secondary"]))}]  # fmt: skip
+    dual = {**mortar, "multipliers": "dual", "normals": str(random.choice(["facet", "averaged", "secondary"]))}
+    choices = [nts, {**nts, "normals": "averaged"}, continuous, {**continuous, **rule}, mortar, mortar, dual]
     return choices[int(random.integers(len(choices)))]
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 
+import generated
 import numpy as np
-from drawing import Draft, add_contact, add_obstacle, material
-from layers import FLAT, SOLIDS, Array, Body, Placement, Random, flat, rotation
+from bodies import FLAT, SOLIDS, Array, Body, Placement, Random, flat, rotation
+from drawing import Draft, add_contact
+from holding import hold, load, materials
 
 import fastcontact as fc
-import generated
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ def layers(random: Random) -> Draft:
     kinematics = str(random.choice(["plane_strain", "plane_stress", "axisymmetric", "3d"], p=[0.3, 0.15, 0.25, 0.3]))
     dim, length = 3 if kinematics == "3d" else 2, 10.0 ** random.uniform(-2, 3)
     at = placement(random, dim, kinematics, length)
-    n = int(random.choice([2, 3, 4], p=[0.55, 0.3, 0.15]))
+    n = int(random.choice([2, 3, 4], p=[0.4, 0.4, 0.2]))
     pressed = length * 10.0 ** random.uniform(-4, -1.7)
     shares = [heights(random, length, dim) for _ in range(n + 1)]
     shares[0] = shares[-1] = flat
@@ -73,7 +75,7 @@ def layers(random: Random) -> Draft:
     draft.labels |= {"elements": " ".join(body.element for body in bodies), "bent": at.radius is not None}
     materials(random, draft, [body.name for body in bodies])
     hold(random, draft, bodies, at, pressed)
-    for below, above in zip(bodies[:-1], bodies[1:], strict=True):
+    for below, above in pairwise(bodies):
         add_contact(random, draft, (f"{above.name}_BOTTOM", f"{below.name}_TOP"), pressed)
     return draft
 
@@ -89,17 +91,16 @@ def layer(
     low, high = np.full(dim, start), np.full(dim, start + width)
     low[-1], high[-1] = level, level + height
     element = str(random.choice(FLAT if dim == 2 else SOLIDS, p=None if dim == 2 else _of_solids()))
-    fine = element in ("tri3", "quad4")
-    cells = (int(random.integers(2, 13 if fine else 8)), int(random.integers(1, 5))) if dim == 2 else (
-        *random.integers(1, 5 if element in ("hex8", "tet4", "wedge6", "pyramid5") else 3, 2).tolist(), int(random.integers(1, 3))
-    )  # fmt: skip
+    if dim == 2:
+        cells = (int(random.integers(2, 13 if element in ("tri3", "quad4") else 8)), int(random.integers(1, 5)))
+    else:
+        most = 5 if element in ("hex8", "tet4", "wedge6", "pyramid5") else 3
+        cells = (*random.integers(1, most, 2).tolist(), int(random.integers(1, 3)))
     crown = -random.uniform(0, 0.15) / length if random.random() < 0.35 and name != "B0" else 0.0
     middle = 0.5 * (low[:-1] + high[:-1]) if start < 0 else low[:-1]
     under = partial(crowned, shares[0], middle, -crown)
     grading = (random.uniform(0.6, 1.6), random.uniform(0.7, 1.4)) if random.random() < 0.3 else (1.0, 1.0)
-    return Body(
-        name, element, low, high, cells, under, shares[1], grading, random.uniform(0, 0.2) if dim == 2 else 0.0
-    )
+    return Body(name, element, low, high, cells, under, shares[1], grading, random.uniform(0, 0.2) if dim == 2 else 0.0)
 
 
 def _of_solids() -> Array:
@@ -107,130 +108,49 @@ def _of_solids() -> Array:
     return shares / shares.sum()
 
 
-def materials(random: Random, draft: Draft, groups: list[str]) -> None:
-    """Give every body a material of its own, or all the same."""
-    unit = 10.0 ** random.uniform(0, 11)
-    contrast = random.random() < 0.25
-    own = random.random() < 0.6 or contrast
-    first = material(random, unit, False)
-    found = []
-    for group in groups:
-        found.append(material(random, unit, contrast and bool(found)) if own else first)
-        draft.model.add_material(found[-1], [group])
-    moduli = [one.E for one in found]
-    draft.stiffness = min(moduli)
-    draft.labels |= {"contrast": round(float(np.log10(max(moduli) / min(moduli))), 1), "nu": max(m.nu for m in found)}
-
-
-def slides(draft: Draft, name: str) -> None:
-    """Let a body slide along its planes of symmetry."""
-    model, dim = draft.model, draft.model.mesh.dim
-    for side in ("LEFT", "FRONT")[: dim - 1]:
-        if model.kinematics == "axisymmetric" and np.abs(model.mesh.points[model.mesh.points_of(f"{name}_{side}"), 0]).max() == 0:
-            continue  # the axis
-        model.fix(f"{name}_{side}", "normal")
-
-
-def hold(random: Random, draft: Draft, bodies: list[Body], at: Placement, pressed: float) -> None:
-    """Hold the lowest body, let the others slide along their left sides, and press on the last one."""
-    model, dim = draft.model, draft.model.mesh.dim
-    straight = at.radius is None and not at.upright
-    axisymmetric = model.kinematics == "axisymmetric"
-    below = bodies[0].name
-    tube_without_hole = at.upright and np.abs(model.mesh.points[model.mesh.points_of(f"{below}_BOTTOM"), 0]).max() == 0
-    if straight and random.random() < 0.1:
-        draft.labels["stands on"] = "obstacle"
-        plane = fc.obstacles.HalfSpace(
-            tuple(at.places(np.zeros((1, dim)))[0]), tuple(at.direction(*[0.0] * (dim - 1), 1.0))
-        )
-        add_obstacle(random, draft, f"{below}_BOTTOM", plane, 0.0, {})
-        slides(draft, below)
-    elif tube_without_hole:
-        model.fix(f"{below}_LEFT", "y")
-    else:
-        model.fix(f"{below}_BOTTOM", "xyz"[:dim] if not axisymmetric or random.random() < 0.5 else "y" if not at.upright else "xy")
-    for body in bodies[1:-1]:
-        sliding(draft, body.name, at)
-    load(random, draft, bodies[-1], at, pressed)
-
-
-def sliding(draft: Draft, name: str, at: Placement) -> None:
-    if at.upright:
-        draft.model.fix(f"{name}_LEFT", "y")
-    else:
-        slides(draft, name)
-
-
-def load(random: Random, draft: Draft, body: Body, at: Placement, pressed: float) -> None:
-    """Press on the top of a body: by its displacement, a pressure, or a rigid obstacle."""
-    model, dim, top = draft.model, draft.model.mesh.dim, f"{body.name}_TOP"
-    height = body.high[-1]
-    way = str(random.choice(["displacement", "pressure", "aside", "obstacle"], p=[0.4, 0.25, 0.2, 0.15]))
-    bent = at.radius is not None or at.upright
-    if way in ("aside", "obstacle") and bent or way == "aside" and model.kinematics == "axisymmetric":
-        way = "displacement"
-    draft.labels["loaded by"] = way
-    if way == "aside":
-        vector = at.direction(*(pressed * random.uniform(-1, 1, dim - 1)), -pressed)
-        model.prescribe(top, **{"xyz"[k]: float(vector[k]) for k in range(dim)})
-        return
-    sliding(draft, body.name, at)
-    if way == "displacement":
-        model.prescribe(top, normal=-pressed)
-    elif way == "pressure":
-        model.add_pressure(top, draft.stiffness * pressed / height * random.uniform(0.1, 1.0))
-    else:
-        normal = at.direction(*[0.0] * (dim - 1), -1.0)
-        tip = np.array([*(0.5 * (body.low + body.high))[:-1], height])
-        if model.kinematics == "axisymmetric":
-            tip[0] = 0.0
-        tip = at.places(tip[None])[0]
-        R = draft.length * random.uniform(0.5, 5.0)
-        shape = (
-            fc.obstacles.HalfSpace(tuple(tip), tuple(normal))
-            if random.random() < 0.4
-            else fc.obstacles.Sphere(tuple(tip - R * normal), float(R))
-        )
-        motion = {"xyz"[k]: float(pressed * normal[k]) for k in range(dim)}
-        add_obstacle(random, draft, top, shape, pressed, {"motion": motion})
-
-
 def punches(random: Random) -> Draft:
     """Return one to three blocks beside each other on a wide one."""
     kinematics = str(random.choice(["plane_strain", "plane_stress", "3d"], p=[0.45, 0.2, 0.35]))
     dim, length = 3 if kinematics == "3d" else 2, 10.0 ** random.uniform(-2, 3)
-    at = placement(random, dim, kinematics, length)
-    at = Placement(dim, None, False, at.Q, at.shift)
-    n = int(random.integers(1, 4))
+    at = replace(placement(random, dim, kinematics, length), radius=None)
+    n = int(random.choice([1, 2, 3]))
     pressed = length * 10.0 ** random.uniform(-4, -2)
-    base = layer(random, "B0", dim, length, -0.5 * length, (flat, flat), kinematics, at)
-    base = Body("B0", base.element, np.array([0.0, 0.0, -0.4 * length])[-dim:] if dim == 3 else np.array([0.0, -0.4 * length]),
-                length * np.array([1.0, 0.4, 0.0])[[0, 1, 2] if dim == 3 else [0, 2]],
-                ((int(random.integers(4, 14)), 3) if dim == 2 else (int(random.integers(3, 7)), 2, 1)), flat, flat, base.grading,
-                base.distortion)  # fmt: skip
-    bodies = [base]
-    for i in range(n):
-        one = layer(random, f"B{i + 1}", dim, length, 0.0, (flat, flat), kinematics, at)
-        width = length / n * random.uniform(0.3, 0.8)
-        start = length / n * (i + random.uniform(0.0, 0.2)) - (0.2 * width if random.random() < 0.2 else 0.0)
-        low, high = np.full(dim, start), np.full(dim, start + width)
-        if dim == 3:
-            low[1], high[1] = length * np.array([random.uniform(-0.1, 0.1), random.uniform(0.3, 0.5)])
-        low[-1], high[-1] = 0.0, length * random.uniform(0.1, 0.4)
-        middle = 0.5 * (low[:-1] + high[:-1])
-        crown = random.uniform(0, 0.3) / length if random.random() < 0.4 else 0.0
-        bodies.append(Body(one.name, one.element, low, high, one.cells, partial(crowned, flat, middle, crown), flat))
+    bodies = [foundation(random, dim, length)]
+    bodies += [punch(random, f"B{i + 1}", bodies[0], (i, n), kinematics) for i in range(n)]
     draft = Draft(fc.Model(fc.generate.union(*(body.mesh(at) for body in bodies)), kinematics), "punches", length, 1.0)
     draft.labels |= {"elements": " ".join(body.element for body in bodies), "bent": False}
     materials(random, draft, [body.name for body in bodies])
     draft.model.fix("B0_BOTTOM", "xyz"[:dim])
     for body in bodies[1:]:
         load(random, draft, body, at, pressed)
-        if len(draft.model.contact) < 3:
-            add_contact(random, draft, (f"{body.name}_BOTTOM", "B0_TOP"), pressed)
-        else:
-            draft.model.fix(f"{body.name}_BOTTOM", "xyz"[:dim])
+        add_contact(random, draft, (f"{body.name}_BOTTOM", "B0_TOP"), pressed)
     return draft
+
+
+def foundation(random: Random, dim: int, length: float) -> Body:
+    """Return the block below, its top at the height 0."""
+    size = length * np.array([1.0, 0.4] if dim == 2 else [1.0, 0.4, 0.4])
+    low, high = np.zeros(dim), size.copy()
+    low[-1], high[-1] = -size[-1], 0.0
+    element = str(random.choice(FLAT if dim == 2 else SOLIDS, p=None if dim == 2 else _of_solids()))
+    cells = (int(random.integers(4, 14)), 3) if dim == 2 else (int(random.integers(3, 7)), 2, 1)
+    return Body("B0", element, low, high, cells, flat, flat, distortion=random.uniform(0, 0.2) if dim == 2 else 0.0)
+
+
+def punch(random: Random, name: str, base: Body, place: tuple[int, int], kinematics: str) -> Body:
+    """Return one of several blocks on the block below, the first sometimes standing out beyond its end."""
+    dim, length = len(base.low), float(base.high[0])
+    one = layer(random, name, dim, length, 0.0, (flat, flat), kinematics, Placement(dim))
+    share = length / place[1]
+    width = share * random.uniform(0.3, 0.8)
+    start = share * (place[0] + random.uniform(0.0, 0.2)) - (0.2 * width if random.random() < 0.2 else 0.0)
+    low, high = np.full(dim, start), np.full(dim, start + width)
+    if dim == 3:
+        low[1], high[1] = length * np.array([random.uniform(-0.1, 0.1), random.uniform(0.3, 0.5)])
+    low[-1], high[-1] = 0.0, length * random.uniform(0.1, 0.4)
+    crown = random.uniform(0, 0.3) / length if random.random() < 0.4 else 0.0
+    under = partial(crowned, flat, 0.5 * (low[:-1] + high[:-1]), crown)
+    return replace(one, low=low, high=high, under=under, over=flat)
 
 
 FAMILIES = {"layers": Family(0.5, layers), "punches": Family(0.2, punches), "generated": Family(0.3, generated.build)}

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from bodies import FLAT, Random
 from drawing import Draft, add_contact, add_obstacle, material
-from layers import FLAT, Random
 
 import fastcontact as fc
 from fastcontact.mesh import generate
@@ -138,9 +138,7 @@ def rings(random: Random) -> Draft:
         if options.get("kind") != "tied":
             options["clearance"] = -2 * pressed
         pair = model.contact.pop()
-        model.add_contact(
-            name, secondary=pair.secondary, primary=pair.primary, formulation=pair.formulation, **options
-        )
+        model.add_contact(name, secondary=pair.secondary, primary=pair.primary, formulation=pair.formulation, **options)
     else:
         model.add_pressure("BORE", draft.stiffness * 2 * pressed / R)
         add_contact(random, draft, ("CONT_INNER", "CONT_OUTER"), 0.2 * pressed)
@@ -186,7 +184,9 @@ def on_obstacle(random: Random) -> Draft:
         add_obstacle(random, draft, "CONT1", shape, part * R, driven)
         return draft
     element = str(random.choice(["hex8", "tet4"]))
-    mesh = generate.sphere_octant(element, R=R, size=R / 3, contact_size=R / random.uniform(6, 12), contact_radius=R / 5)
+    mesh = generate.sphere_octant(
+        element, R=R, size=R / 3, contact_size=R / random.uniform(6, 12), contact_radius=R / 5
+    )
     draft = begun(random, mesh, "3d", ["SPHERE"], R, element)
     draft.model.fix("SYMMETRY_X", "x")
     draft.model.fix("SYMMETRY_Z", "z")
@@ -229,7 +229,9 @@ def indented(random: Random) -> Draft:
     if random.random() < 0.7:
         driven = {"motion": {up: -part * width / 2}}
     else:
-        driven = {"force": {up: -draft.stiffness * width ** (2 if kinematics in ("3d", "axisymmetric") else 1) * part / 5}}
+        driven = {
+            "force": {up: -draft.stiffness * width ** (2 if kinematics in ("3d", "axisymmetric") else 1) * part / 5}
+        }
     add_obstacle(random, draft, "TOP", shape, part * width / 2, driven)
     return draft
 

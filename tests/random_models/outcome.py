@@ -10,6 +10,7 @@ from typing import Any
 import mechanics
 import numpy as np
 from drawing import Drawn, drawn
+from stepping import watching
 
 import fastcontact as fc
 
@@ -22,9 +23,11 @@ BOUNDS = {
     "product": 1e-8,
     "cone": 1e-8,
     "driving": 1e-8,
-    "carried": 5e-5,
-    "moment": 1e-2,
+    "carried": 5e-4,  # rules of the points on coarse curved facets differ so much
+    "moment": 1e-2,  # of normals that are means, over the size of the force times the extent of the side
 }
+# With iterative solvers gaps are as accurate as displacements are.
+ITERATIVE = {"penetration": 1e-6, "product": 1e-6}
 
 
 def outcome(seed: int) -> dict[str, Any]:
@@ -48,11 +51,12 @@ def outcome(seed: int) -> dict[str, Any]:
 
 def solved(given: Drawn) -> dict[str, Any]:
     """Solve a model and check its last step."""
-    with mechanics.watching() as watched:
+    with watching() as watched:
         steps = fc.solve(given.model, given.ramp, **given.options)
     last, factor = steps[-1], float(np.interp(given.ramp.instants[-1], *zip(*given.ramp.table, strict=True)))
     found = figures(given.model, last, watched.settled, factor)
-    wrong = [name for name, bound in BOUNDS.items() if not found[name] <= bound]
+    bounds = BOUNDS | (ITERATIVE if given.options.get("linear_solver") == "amg" else {})
+    wrong = [name for name, bound in bounds.items() if not found[name] <= bound]
     wrong += unfit(last)
     closed = sum(int(contact.active.sum()) for contact in last.contact.values())
     found |= {"closed": closed, "updates": last.iterations["geometry_updates"], "warnings": len(last.warnings)}
