@@ -27,17 +27,17 @@ class Sizes:
     force: float
 
 
-def out_of_balance(model: fc.Model, step: fc.StepResult, factor: float) -> tuple[float, Sizes]:
+def out_of_balance(model: fc.Model, step: fc.StepResult, factor: float, tolerance: float = 0.0) -> tuple[float, Sizes]:
     """Return the largest nodal force that nothing balances, over the largest force or round-off, and the sizes of both.
 
-    `factor` is the multiplier of the loads.
+    `factor` is the multiplier of the loads, `tolerance` that of an iterative linear solver.
     """
     K = stiffness_of(model)
     internal = (K @ step.displacement.ravel()).reshape(step.displacement.shape)
     external = sum((factor * model.load_vector(load) for load in model.loads), np.zeros_like(internal))
     contact = contact_forces(model, step)
     largest = max(np.abs(part).max(initial=0.0) for part in (external, contact, step.reaction))
-    noise = ROUND_OFF * (abs(K) @ np.abs(step.displacement).ravel()).max(initial=0.0)
+    noise = max(ROUND_OFF, 10 * tolerance) * (abs(K) @ np.abs(step.displacement).ravel()).max(initial=0.0)
     residual = float(np.abs(internal - contact - external - step.reaction).max())
     sizes = Sizes(np.abs(step.displacement).max(initial=0.0) or 1.0, float(largest) if largest > noise else np.inf)
     return max(residual - noise, 0.0) / (noise or 1.0) if largest <= noise else residual / largest, sizes

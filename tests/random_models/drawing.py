@@ -71,11 +71,26 @@ def solving(random: Random) -> dict[str, Any]:
     return {"linear_solver": str(random.choice(["amg", "direct"]))} if random.random() < 0.15 else {}
 
 
-def material(random: Random, unit: float, contrast: bool) -> fc.LinearElastic:
-    """Return a material; moduli lie within a factor of ten around `unit`, with contrast from 1e-3 to 1e6 times it."""
-    factor = 10.0 ** (random.uniform(-3, 6) if contrast else random.uniform(-0.5, 0.5))
+def material(random: Random, unit: float, decades: tuple[float, float] = (-0.5, 0.5)) -> fc.LinearElastic:
+    """Return a material; its modulus is `unit` times a power of ten between two `decades`."""
     nu = float(random.choice([0.3, 0.3, 0.3, 0.0, random.uniform(0, 0.45), 0.49, 0.499, 0.4999]))
-    return fc.LinearElastic(float(unit * factor), nu)
+    return fc.LinearElastic(float(unit * 10.0 ** random.uniform(*decades)), nu)
+
+
+def materials(random: Random, draft: Draft, groups: list[str]) -> None:
+    """Give every body a material of its own, or all the same; a quarter of the models mix moduli up to 1 to 1e6."""
+    unit = 10.0 ** random.uniform(0, 11)
+    contrast = random.random() < 0.25
+    lowest = random.uniform(-3, 0)
+    decades = (lowest, lowest + 6) if contrast else (-0.5, 0.5)
+    same = random.random() < 0.4 and not contrast
+    found = [material(random, unit, decades) for _ in groups]
+    for k, group in enumerate(groups):
+        draft.model.add_material(found[0 if same else k], [group])
+    given = [own for own, _ in draft.model.materials]
+    moduli = [own.E for own in given]
+    draft.stiffness = min(moduli)
+    draft.labels |= {"contrast": round(float(np.log10(max(moduli) / min(moduli))), 1), "nu": max(m.nu for m in given)}
 
 
 def pair_options(

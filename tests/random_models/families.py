@@ -10,8 +10,8 @@ from itertools import pairwise
 import generated
 import numpy as np
 from bodies import FLAT, SOLIDS, Array, Body, Placement, Random, flat, rotation
-from drawing import Draft, add_contact
-from holding import hold, load, materials
+from drawing import Draft, add_contact, materials
+from holding import hold, load
 
 import fastcontact as fc
 
@@ -92,10 +92,10 @@ def layer(
     low[-1], high[-1] = level, level + height
     element = str(random.choice(FLAT if dim == 2 else SOLIDS, p=None if dim == 2 else _of_solids()))
     if dim == 2:
-        cells = (int(random.integers(2, 13 if element in ("tri3", "quad4") else 8)), int(random.integers(1, 5)))
+        cells = (int(random.integers(2, 25 if element in ("tri3", "quad4") else 14)), int(random.integers(1, 7)))
     else:
-        most = 5 if element in ("hex8", "tet4", "wedge6", "pyramid5") else 3
-        cells = (*random.integers(1, most, 2).tolist(), int(random.integers(1, 3)))
+        most = 7 if element in ("hex8", "tet4", "wedge6", "pyramid5") else 4
+        cells = (*random.integers(1, most, 2).tolist(), int(random.integers(1, 4)))
     crown = -random.uniform(0, 0.15) / length if random.random() < 0.35 and name != "B0" else 0.0
     middle = 0.5 * (low[:-1] + high[:-1]) if start < 0 else low[:-1]
     under = partial(crowned, shares[0], middle, -crown)
@@ -133,7 +133,9 @@ def foundation(random: Random, dim: int, length: float) -> Body:
     low, high = np.zeros(dim), size.copy()
     low[-1], high[-1] = -size[-1], 0.0
     element = str(random.choice(FLAT if dim == 2 else SOLIDS, p=None if dim == 2 else _of_solids()))
-    cells = (int(random.integers(4, 14)), 3) if dim == 2 else (int(random.integers(3, 7)), 2, 1)
+    cells = (
+        (int(random.integers(4, 28)), 3) if dim == 2 else (int(random.integers(3, 9)), int(random.integers(2, 5)), 2)
+    )
     return Body("B0", element, low, high, cells, flat, flat, distortion=random.uniform(0, 0.2) if dim == 2 else 0.0)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from bodies import FLAT, Random
-from drawing import Draft, add_contact, add_obstacle, material
+from drawing import Draft, add_contact, add_obstacle, materials
 
 import fastcontact as fc
 from fastcontact.mesh import generate
@@ -22,21 +22,10 @@ def build(random: Random) -> Draft:
 
 
 def begun(random: Random, mesh: fc.Mesh, kinematics: str, bodies: list[str], length: float, element: str) -> Draft:
-    """Return a model with materials, its mesh sometimes shifted along y."""
+    """Return a model with materials."""
     draft = Draft(fc.Model(mesh, kinematics), "", length, 1.0)
-    unit, contrast = 10.0 ** random.uniform(0, 11), random.random() < 0.25
-    one = material(random, unit, False)
-    same = random.random() < 0.5 and not contrast
-    found = [one if same or k == 0 else material(random, unit, contrast) for k in range(len(bodies))]
-    for own, body in zip(found, bodies, strict=True):
-        draft.model.add_material(own, [body])
-    moduli = [own.E for own in found]
-    draft.labels |= {
-        "elements": element,
-        "contrast": round(float(np.log10(max(moduli) / min(moduli))), 1),
-        "nu": max(own.nu for own in found),
-    }
-    draft.stiffness = min(moduli)
+    materials(random, draft, bodies)
+    draft.labels["elements"] = element
     return draft
 
 

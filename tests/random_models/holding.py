@@ -1,27 +1,12 @@
-"""Materials of random models, what holds their bodies, and what presses on them."""
+"""What holds the bodies of random models, and what presses on them."""
 
 from __future__ import annotations
 
 import numpy as np
 from bodies import Body, Placement, Random
-from drawing import Draft, add_obstacle, material
+from drawing import Draft, add_obstacle
 
 import fastcontact as fc
-
-
-def materials(random: Random, draft: Draft, groups: list[str]) -> None:
-    """Give every body a material of its own, or all the same."""
-    unit = 10.0 ** random.uniform(0, 11)
-    contrast = random.random() < 0.25
-    own = random.random() < 0.6 or contrast
-    first = material(random, unit, False)
-    found = []
-    for group in groups:
-        found.append(material(random, unit, contrast and bool(found)) if own else first)
-        draft.model.add_material(found[-1], [group])
-    moduli = [one.E for one in found]
-    draft.stiffness = min(moduli)
-    draft.labels |= {"contrast": round(float(np.log10(max(moduli) / min(moduli))), 1), "nu": max(m.nu for m in found)}
 
 
 def slides(draft: Draft, name: str) -> None:
