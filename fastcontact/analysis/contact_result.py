@@ -175,9 +175,11 @@ def _closed_nodes(
     pair: Formulation, part: Constraints, active: Mask, gap: Array, pressure: Array, at: Configuration
 ) -> Mask:
     """Return which secondary nodes are in contact: by their pressure, or because they never open again."""
-    if pair.options.always_closed:
-        return np.isfinite(gap)
     assert part.nodal is not None
+    if pair.options.always_closed:
+        covered = part.nodal.covered
+        # Nodes that stand out beyond the other side face nothing themselves, but parts of their facets may.
+        return np.isfinite(gap) if isinstance(covered, float) else np.isfinite(gap) | (covered > 0.0)
     closed = part.nodal.closed_nodes(active, gap, pressure)
     for_good = pair.never_opening(pair.points[pair.secondary.points], at)
     return closed if for_good is None else closed | (for_good & np.isfinite(gap))
