@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,11 @@ from fastcontact.cases.decks.content import Content, Material, Pair, Section, St
 from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
+from fastcontact.cases.decks.temperatures import add_temperatures
 from fastcontact.contact.obstacles.shapes import HalfSpace
+from fastcontact.elasticity.anisotropic_materials import Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes
+from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.relations import Relation
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
@@ -64,6 +68,7 @@ class Building:
         self._forces(conditions)
         self._pressures(groups)
         self._body_forces(conditions)
+        add_temperatures(self.model, conditions.temperatures)
         self._springs()
         self._contact()
         self.gap_ends = self._gaps(gaps, conditions)
@@ -101,8 +106,7 @@ class Building:
             material = self.content.materials[name]
             axes = self._axes(owner[keys[0]][0])
             group = f"material {material.name}" + (f" along {turned.lower()}" if turned else "")
-            assert material.law is not None
-            found.append((material.law(axes), self.found.add_solids(group, keys)))
+            found.append((_law(self.content, material, axes), self.found.add_solids(group, keys)))
         return found, thickness or 1.0
 
     def _axes(self, section: Section) -> Any:
@@ -367,12 +371,28 @@ class Building:
         if any(pair.options.get("friction") for pair in self.model.contact):
             for number, step in enumerate(steps):
                 instants.update(number + part for part in _parts(step))
-        for histories in (conditions.supports, conditions.forces, conditions.loads):
+        for histories in (conditions.supports, conditions.forces, conditions.loads, conditions.temperatures):
             for track in histories.tracks.values():
                 instants.update(round(time, 12) for time, _ in track.points if abs(time - round(time)) > 1e-6)
         if len(instants) > LONGEST_RAMP:
             raise steps[0].place.refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
         return Ramp(tuple(sorted(instants)), ((0.0, 0.0), (float(len(steps)), 1.0)))
+
+
+def _law(content: Content, material: Material, axes: Any) -> Any:
+    """Return the material of the model along axes, with its expansion."""
+    assert material.law is not None
+    law, expansion = material.law(axes), material.expansion
+    heated = any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
+    if expansion is None:
+        if heated:
+            content.note(material.place, f"material '{material.name}' has no *EXPANSION: temperatures do not strain it")
+        return replace(law, expansion=0.0) if heated else law
+    if not heated:
+        content.note(material.place, f"material '{material.name}': without temperatures the expansion has no effect")
+    if isinstance(law, LinearElastic) and isinstance(expansion, tuple):
+        law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (law.E / (2.0 * (1.0 + law.nu)),) * 3, axes)
+    return replace(law, expansion=expansion)
 
 
 def _parts(step: Step) -> list[float]:

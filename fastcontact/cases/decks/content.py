@@ -101,6 +101,7 @@ class Material:
     place: Place
     law: Callable[[Any], Any] | None = None
     density: float | None = None
+    expansion: float | tuple[float, ...] | None = None
 
 
 @dataclass
@@ -177,7 +178,7 @@ class Amplitude:
 
 @dataclass(frozen=True)
 class Given:
-    """Values of a *BOUNDARY, *CLOAD, *DLOAD or *DSLOAD: its block, what remains of earlier steps, its amplitude."""
+    """Values of supports, loads or temperatures: their block, what remains of earlier steps, their amplitude."""
 
     block: Block
     new: bool
@@ -215,6 +216,7 @@ class Content:
     gaps: dict[str, tuple[Place, float, tuple[float, ...]]] = field(default_factory=dict)
     springs: dict[str, tuple[Place, float]] = field(default_factory=dict)
     supports: list[Given] = field(default_factory=list)
+    initial: list[Block] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     outputs: list[Place] = field(default_factory=list)
