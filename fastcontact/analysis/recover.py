@@ -22,6 +22,8 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import normals
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import recovery
+from fastcontact.model.pretension import section_results
+from fastcontact.model.ramp import multiplier
 from fastcontact.results.material_stress import by_largest_von_mises
 from fastcontact.results.step import ContactResult, StepResult, half_width
 
@@ -52,6 +54,11 @@ def recover(
     factors = problem.temperature_factors(place[1])
     if factors:
         iterations = {**iterations, "temperature_factors": factors}
+    sections = problem.model.pretensions
+    if sections:
+        pulls = [multiplier(own.ramp, problem.ramp, place[1]) for own in sections]
+        found = section_results(sections, u, reaction.reshape(-1, mesh.dim), pulls)
+        iterations = {**iterations, "pretension": found}
     at_places = recovery.nodal_stress(
         mesh,
         problem.model.kinematics,

@@ -40,6 +40,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         **({"the temperatures": _unordered(model.temperatures, mesh)} if model.temperatures else {}),
         "the relations": _unordered(model.relations, mesh),
         "the springs": _unordered(model.springs, mesh),
+        **({"the pretension sections": _unordered(model.pretensions, mesh)} if model.pretensions else {}),
         "the list of contact pairs": [pair.name for pair in model.contact],
         **{f"contact '{pair.name}'": pair for pair in model.contact},
         **{f"the option {name}": value for name, value in (options or {}).items()},

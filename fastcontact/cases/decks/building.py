@@ -18,6 +18,7 @@ from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
 from fastcontact.cases.decks.temperatures import add_temperatures
+from fastcontact.cases.decks.tightening import add_sections, cut_sections
 from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.elasticity.anisotropic_materials import Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes
@@ -58,13 +59,15 @@ class Building:
         conditions.run()
         groups = self._groups(conditions)
         gaps = self._gap_groups()
-        self.model = Model(self.found.mesh(), self.found.kinematics, case_text)
+        mesh = cut_sections(self.found, self.found.mesh())
+        self.model = Model(mesh, self.found.kinematics, case_text)
         for material, group in materials:
             self.model.add_material(material, group)
         self.local_supports: list[Relation] = []
         self._supports(conditions)
         self.links = relations_of(self.found, self.model.mesh)
         self.model.relations.extend(self.links)
+        self.links += add_sections(self.model, self.found, conditions.locks)
         self._forces(conditions)
         self._pressures(groups)
         self._body_forces(conditions)

@@ -157,6 +157,16 @@ class Link:
 
 
 @dataclass(frozen=True)
+class PretensionSection:
+    """A section through a bolt: its surface, the node that has its shortening and its force, and its normal."""
+
+    place: Place
+    surface: str
+    node: str
+    normal: tuple[float, ...] | None
+
+
+@dataclass(frozen=True)
 class Axes:
     """Local axes of nodes or materials: rectangular by points of the first axis and plane, or cylindrical about a line."""
 
@@ -211,6 +221,7 @@ class Content:
     equations: list[Equation] = field(default_factory=list)
     links: list[Link] = field(default_factory=list)
     axes: list[Axes] = field(default_factory=list)
+    pretensions: list[PretensionSection] = field(default_factory=list)
     orientations: dict[str, Axes] = field(default_factory=dict)
     amplitudes: dict[str, Amplitude] = field(default_factory=dict)
     gaps: dict[str, tuple[Place, float, tuple[float, ...]]] = field(default_factory=dict)

@@ -112,4 +112,6 @@ def _add(model: Model, members: list[tuple[int, float]], ramp: Table) -> None:
         values = np.zeros(model.mesh.n_points)
         points, rises = zip(*members, strict=True)
         values[list(points)] = rises
+        for section in model.pretensions:  # whose opposite nodes the deck does not know
+            values[section.opposite] = values[section.nodes]
         model.add_temperature(values, ramp=ramp)
