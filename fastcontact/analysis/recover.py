@@ -65,7 +65,7 @@ def recover(
         problem.field.moduli,
         problem.field.rows,
         u,
-        problem.field.averaged,
+        problem.field.treatment,
         problem.sides,
         problem.field.thermal(problem.model.temperature_rise(factors)),
     )

@@ -27,6 +27,7 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
             **dict.fromkeys(("E", "nu"), (int, float, list)),
             "groups": (list, str),
             "volumetric": str,
+            "incompatible_modes": bool,
             **dict.fromkeys(("G", "D"), list),
             "axes": (list, dict),
             "density": NUMBER,

@@ -28,7 +28,11 @@ def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
         constants["axes"] = called("material.axes", CylindricalAxes, constants["axes"])
     if kind is LinearElastic:
         for key in constants:
-            if key != "volumetric" and not isinstance(constants[key], (list, tuple)) and key != "axes":
+            if (
+                key not in ("volumetric", "incompatible_modes")
+                and not isinstance(constants[key], (list, tuple))
+                and key != "axes"
+            ):
                 constants[key] = float(constants[key])
     for key in constants:
         if key not in inspect.signature(kind).parameters:

@@ -368,7 +368,7 @@ class Model:
                     "it expansion=..., 0.0 if it does not expand"
                 )
             held = stress_at_points(
-                self.mesh, self.kinematics, field.moduli, field.rows, np.zeros(self.mesh.points.shape), field.averaged,
+                self.mesh, self.kinematics, field.moduli, field.rows, np.zeros(self.mesh.points.shape), field.treatment,
                 field.thermal(rise),
             )  # fmt: skip
             by_ramp[own.ramp] = by_ramp.get(own.ramp, 0.0) - internal_force(self.mesh, self.kinematics, held)
@@ -872,12 +872,12 @@ class Model:
         displacement : ndarray (n_points, dim)
             Of a step result [length].
         """
-        moduli, material = self.material_numbers()
+        field = self.material_field()
         if np.size(displacement) != self.n_dofs:
             raise ModelError(
                 f"the displacement has the shape {np.shape(displacement)}, but the mesh {self.mesh.points.shape}"
             )
-        K = stiffness(self.mesh, self.kinematics, moduli, material, None, self.averaged_materials())
+        K = stiffness(self.mesh, self.kinematics, field.moduli, field.rows, None, field.treatment)
         return np.asarray(K @ np.ravel(displacement)).reshape(-1, self.mesh.dim)
 
     def prescribed(self) -> tuple[NDArray[np.bool_], Array]:

@@ -99,17 +99,24 @@ class Building:
                         )
                     owner[key] = (section, material)
         self._check_sections(owner)
-        by_material: dict[tuple[str, str], list[Any]] = {}
+        by_material: dict[tuple[str, str, bool], list[Any]] = {}
         for key in self.made.solids:
             section, material = owner[key]
-            by_material.setdefault((folded(material.name), folded(section.orientation)), []).append(key)
+            modes = self.made.solids[key].type.modes
+            by_material.setdefault((folded(material.name), folded(section.orientation), modes), []).append(key)
         self.densities = {key: owner[key][1] for key in self.made.solids}
         found = []
-        for (name, turned), keys in by_material.items():
+        for (name, turned, modes), keys in by_material.items():
             material = self.content.materials[name]
             axes = self._axes(owner[keys[0]][0])
             group = f"material {material.name}" + (f" along {turned.lower()}" if turned else "")
-            found.append((_law(self.content, material, axes), self.found.add_solids(group, keys)))
+            group += " with incompatible modes" if modes else ""
+            found.append(
+                (
+                    replace(_law(self.content, material, axes), incompatible_modes=modes),
+                    self.found.add_solids(group, keys),
+                )
+            )
         return found, thickness or 1.0
 
     def _axes(self, section: Section) -> Any:
