@@ -14,6 +14,8 @@ from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
 from fastcontact.elasticity import recovery
+from fastcontact.model.pretension import section_results
+from fastcontact.model.ramp import multiplier
 from fastcontact.results.material_stress import by_largest_von_mises
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -43,13 +45,18 @@ def recover(
     factors = problem.temperature_factors(place[1])
     if factors:
         iterations = {**iterations, "temperature_factors": factors}
+    sections = problem.model.pretensions
+    if sections:
+        pulls = [multiplier(own.ramp, problem.ramp, place[1]) for own in sections]
+        found = section_results(sections, u, reaction.reshape(-1, mesh.dim), pulls)
+        iterations = {**iterations, "pretension": found}
     at_places = recovery.nodal_stress(
         mesh,
         problem.model.kinematics,
         problem.field.moduli,
         problem.field.rows,
         u,
-        problem.field.averaged,
+        problem.field.treatment,
         problem.sides,
         problem.field.thermal(problem.model.temperature_rise(factors)),
     )

@@ -9,6 +9,7 @@ from typing import Any
 
 from fastcontact.analysis import restart, step_halving
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.locked_sections import go_on, locked_before
 from fastcontact.analysis.problem import Problem, prepare
 from fastcontact.analysis.progress import Progress
 from fastcontact.analysis.result_warnings import result_warnings
@@ -154,12 +155,13 @@ def _marched(
     doubtful = model_warnings(model, ramp)
     for text in doubtful if last is None else ():
         warn(text)
-    problem = prepared(model)
+    problem = prepared(locked_before(model, last))
     state = problem.initial_state() if last is None else restart.put_back(problem, last, touched)
     begin, before = problem.ramp.table[0][0], 0
     if last is not None:
         begin, before, last = last.load_factor, last.index, None  # kept no longer
     for index, instant in enumerate(instants, start=before + 1):
+        problem, state = go_on(prepared, model, problem, state, begin)
         state, step = step_halving.advance(problem, state, index, begin, instant)
         found = result_warnings(problem, state, step) if instant == instants[-1] else []
         for text in found:

@@ -198,7 +198,7 @@ def build_case(
         name=name,
         title=data.get("title", name),
         text=text,
-        mesh=mesh,
+        mesh=model.mesh,
         model=model,
         ramp=ramp,
         criteria=criteria,

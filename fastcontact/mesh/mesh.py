@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastcontact.errors import MeshError, unknown
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.facet_search import added, facets_with_nodes
 from fastcontact.mesh.html_table import html_table
 
 Array = NDArray[np.float64]
@@ -239,60 +240,51 @@ class Mesh:
         )
 
     @typed(MeshError)
-    def with_facet_group(self, name: str, where: Callable[[Array], ArrayLike]) -> Mesh:
-        """Return the mesh with a cell group of the outer facets that lie somewhere, for contact, supports and loads.
-
-        Facets that are no cells yet become cells, of lines or faces; a group of that name is replaced.
+    def with_facet_group(self, name: str, where: Callable[[Array], ArrayLike], *, between: bool = False) -> Mesh:
+        """Return the mesh with a new group of facets of its solids, chosen by place; facets that it lacks are added.
 
         Parameters
         ----------
         name : str
+            Of the group; one of that name is replaced.
         where : callable
-            From positions (n, dim) [length] to bool (n,). A facet belongs to the group if that holds at all its nodes.
+            From positions (n_points, dim) [length] to bool (n_points,). A facet belongs to the group if all its nodes do.
+        between : bool
+            Facets between two cells, such as a section through a body; by default those on the outside.
 
-        Raises
-        ------
-        MeshError
-            If it holds nowhere on the outside, or there is a point group of that name.
+        MeshError if there is no such facet, there is a group of points of that name, or `where` returns anything else.
 
         Examples
         --------
-        >>> mesh = Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2]]})
-        >>> mesh.with_facet_group("BOTTOM", lambda x: x[:, 1] == 0).cells_of("BOTTOM")["line2"].tolist()
-        [[0, 1]]
+        >>> mesh = Mesh([[0, 0], [1, 0], [1, 1], [0, 1]], {"quad4": [[0, 1, 2, 3]]})
+        >>> mesh.with_facet_group("TOP", lambda x: x[:, 1] > 0.99).cells_of("TOP")["line2"].tolist()
+        [[2, 3]]
         """
-        from fastcontact.mesh.facets import facets_of_solids, joined  # kernels, which reading a mesh needs not
-
         if name in self.point_groups:
             raise MeshError(f"'{name}' is a group of points already: give the facets another name")
-        outer = facets_of_solids(self.solids, self.offsets, self.n_points, self.n_cells)[0]
-        inside = self._inside(where)
-        found = {element: facets[inside[facets].all(axis=1)] for element, facets in outer.items()}
-        if not sum(map(len, found.values())):
-            low, high = self.points.min(axis=0), self.points.max(axis=0)
+        chosen = np.asarray(where(np.array(self.points)))
+        if chosen.shape != (self.n_points,) or chosen.dtype != bool:
             raise MeshError(
-                f"no outer facet has all its nodes where '{name}' is wanted: the condition holds at {inside.sum()} of "
-                f"{self.n_points} points, which lie between {low.tolist()} and {high.tolist()}; compare coordinates with "
-                "a tolerance, such as abs(x[:, 1] - 5) < 1e-6"
+                f"the function of facet group '{name}' returned {chosen.dtype} of shape {chosen.shape}: it must return True "
+                f"or False for each point, shape ({self.n_points},)"
             )
-        cells, numbers = dict(self.cells), {}
-        for element, facets in found.items():
-            before = self.cells.get(element, facets[:0])
-            cells[element], numbers[element] = joined(before, facets)
+        facets = facets_with_nodes(self.solids, chosen, between)
+        if not facets:
+            raise MeshError(
+                f"facet group '{name}' would be empty: its function chooses {int(chosen.sum())} points, but no facet "
+                f"{'between two cells' if between else 'on the outside'} has all its nodes among them; compare coordinates "
+                "with a tolerance"
+            )
+        cells, rows = dict(self.cells), {}
+        for kind, block in facets.items():
+            cells[kind], rows[kind] = added(cells.get(kind, block[:0]), block)
         starts = dict(zip(cells, np.cumsum([0, *map(len, cells.values())]).tolist(), strict=False))
-        shift = np.repeat([starts[e] - at for e, at in self.offsets.items()], [*map(len, self.cells.values())])
-        groups = {group: members + shift[members] for group, members in self.cell_groups.items()}
-        groups[name] = np.concatenate([starts[element] + rows for element, rows in numbers.items()])
+        groups = {
+            own: np.concatenate([starts[kind] + place for kind, place in self.split(members).items()] or [members])
+            for own, members in self.cell_groups.items()
+        }
+        groups[name] = np.concatenate([starts[kind] + place for kind, place in rows.items()])
         return self.replace(cells=cells, cell_groups=groups)
-
-    def _inside(self, where: Callable[[Array], ArrayLike]) -> NDArray[np.bool_]:
-        inside = np.asarray(where(self.points))
-        if inside.shape != (self.n_points,) or inside.dtype != bool:
-            raise MeshError(
-                f"the condition must return truth values for {self.n_points} positions in rows, such as x[:, 1] > 0; it "
-                f"returned {inside.dtype} of shape {inside.shape}"
-            )
-        return inside
 
     @typed(MeshError)
     def merged_groups(self, name: str, members: Iterable[str]) -> Mesh:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import wraps
+from types import MappingProxyType
 from typing import TypeVar
 from weakref import WeakKeyDictionary
 
@@ -14,9 +15,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact.errors import MeshError
-from fastcontact.mesh import elements
+from fastcontact.mesh import elements, topology_kernels
 from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.facets import facets_of_solids
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -156,7 +156,23 @@ def cells_joined_by_facets(mesh: Mesh) -> NDArray[np.int32]:
 @remembered
 def _facets(mesh: Mesh) -> tuple[Mapping[str, Indices], NDArray[np.int32]]:
     """Return `outer_facets` and `cells_joined_by_facets`."""
-    return facets_of_solids(mesh.solids, mesh.offsets, mesh.n_points, mesh.n_cells)
+    found: dict[str, list[Indices]] = {}
+    owners: dict[str, list[Indices]] = {}
+    for name, block in mesh.solids.items():
+        element, numbers = elements.get(name), mesh.offsets[name] + np.arange(len(block), dtype=np.int32)
+        for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
+            found.setdefault(facet_element, []).append(block[:, list(facet)])
+            owners.setdefault(facet_element, []).append(numbers)
+    parent, kept = np.arange(sum(map(len, mesh.cells.values())), dtype=np.int32), {}
+    for name, blocks in found.items():
+        facets = np.ascontiguousarray(np.concatenate(blocks))
+        alone = np.empty(len(facets), bool)
+        topology_kernels.alone(facets, np.concatenate(owners[name]), mesh.n_points, alone, parent)
+        kept[name] = np.ascontiguousarray(facets[alone])
+        kept[name].setflags(write=False)
+    while not (parent[parent] == parent).all():
+        parent = parent[parent]
+    return MappingProxyType({name: facets for name, facets in kept.items() if len(facets)}), parent
 
 
 @dataclass(frozen=True, eq=False)

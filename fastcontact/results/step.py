@@ -204,7 +204,8 @@ class StepResult:
         ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``, ``history`` (list of dict). If contact
         alone holds bodies, ``regularised``: their springs and the forces in them. If round-off kept the contact geometry
         from settling to the criterion, ``scatter``: by how much ``displacement`` and contact ``force`` still vary [-].
-        With temperatures, ``temperature_factors``: what each of them is multiplied with [-].
+        With temperatures, ``temperature_factors``: what each of them is multiplied with [-]. With pretension sections,
+        ``pretension``, see the property of that name.
     warnings : tuple of str
         Warnings of the step.
     cell_fields : dict of str to ndarray (n_solids,)
@@ -253,6 +254,11 @@ class StepResult:
         warnings = [("warning", text) for text in self.warnings]
         own = html_table([*self.shown.items(), *warnings], caption=f"Step {self.index}")
         return own + "".join(contact._repr_html_() for contact in self.contact.values())
+
+    @property
+    def pretension(self) -> dict[str, dict[str, float]]:
+        """By pretension section its ``force``, positive in tension [force], and its ``shortening`` [length]."""
+        return dict(self.iterations.get("pretension", {}))
 
     def stress_of_material(self, number: int) -> Array:
         """Return the nodal stress (n_points, 4) or (n_points, 6) with the side of one material where several meet [pressure].

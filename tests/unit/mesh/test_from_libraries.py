@@ -208,23 +208,6 @@ def test_other_groups_keep_their_cells():
     np.testing.assert_array_equal(more.cells_of("LINES")["line2"], bare.cells["line2"][[0, 2]])
 
 
-@pytest.mark.parametrize(
-    ("where", "text"),
-    [
-        (
-            lambda x: x[:, 1] > 7,
-            r"the condition holds at 0 of 9 points, which lie between \[0.0, 0.0\] and \[2.0, 1.0\]",
-        ),
-        (lambda x: x[1] > 0, r"returned bool of shape \(2,\)"),
-        (lambda x: x[:, 1], "returned float64 of shape"),
-    ],
-)
-def test_conditions_that_hold_nowhere_or_say_nothing(where, text):
-    mesh = fc.generate.block((2.0, 1.0), (2, 2), "quad4")
-    with pytest.raises(fc.MeshError, match=text):
-        mesh.with_facet_group("SOMEWHERE", where)
-
-
 def test_a_group_of_points_is_not_shadowed():
     mesh = a_body("quad4")
     with pytest.raises(fc.MeshError, match="'CORNER' is a group of points already"):
