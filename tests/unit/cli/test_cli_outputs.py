@@ -41,7 +41,7 @@ def files(folder: Path, tmp_path: Path) -> Path:
 # Of each command that writes: its arguments with one source, and its options for files.
 WRITERS = {
     "profile": (["profile", "case.vtkhdf"], ["--csv", "--agr", "--png"], ["case.vtkhdf"]),
-    "plot": (["plot", "case.vtkhdf"], ["--png"], ["case.vtkhdf"]),
+    "plot": (["plot", "case.vtkhdf"], ["--png", "--animate"], ["case.vtkhdf"]),
     "export": (["export", "case.vtkhdf"], ["--med", "--xdmf"], ["case.vtkhdf"]),
     "run": (["run", "case.toml"], ["-o", "--json", "--plot"], ["case.toml", "coarse.med"]),
     "converge": (["converge", "case.toml"], ["--json", "--csv", "--png", "--html", "-o"], ["case.toml", "coarse.med"]),
