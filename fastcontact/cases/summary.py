@@ -13,6 +13,7 @@ from fastcontact._version import __version__
 from fastcontact.cases.case import Case
 from fastcontact.cases.checks import at_point, evaluated
 from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.units import units_of_results
 
 # Numbers that a theory must have to be compared as a whole.
 COMPARED = ("force", "pressure_max", "radius")
@@ -39,7 +40,7 @@ def summarise(
     return {
         "case": case.name,
         "title": case.title,
-        "units": dict(case.units),
+        "units": units_of_results(case.units, case.model.kinematics),
         "mesh": {"n_points": mesh.n_points, "n_cells": mesh.n_cells},
         "n_dofs": case.model.n_dofs,
         "steps": list(steps),
