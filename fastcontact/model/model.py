@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.default_formulation import default_formulation
+from fastcontact.contact.default_formulation import against_obstacle, default_formulation
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
 from fastcontact.contact.obstacles import MeshedSurface, Obstacle
 from fastcontact.contact.obstacles.rigid_side import RigidSide
@@ -46,6 +46,7 @@ from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
 from fastcontact.elasticity.temperature import Temperature, checked_value
 from fastcontact.errors import ContactError, ModelError, unknown
+from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import check_fields, typed
 from fastcontact.mesh.html_table import html_table
 from fastcontact.mesh.mesh import Mesh
@@ -698,7 +699,7 @@ class Model:
         motion: Mapping[str, float] | None = None,
         force: Mapping[str, float] | None = None,
         ramp: History = None,
-        formulation: str = "continuous",
+        formulation: str | None = None,
         **options: Any,
     ) -> None:
         """Let the facets of group `secondary` come into contact with a rigid obstacle.
@@ -717,8 +718,9 @@ class Model:
             follows `motion`. Results tell where it is.
         ramp : Ramp or iterable of (float, float), optional
             History of motion and force.
-        formulation : str
-            ``"node_to_segment"`` (then: node against obstacle) or ``"continuous"``.
+        formulation : str, optional
+            ``"node_to_segment"`` (then: node against obstacle), by default on linear triangles and tetrahedra, or
+            ``"continuous"``, on all other elements.
         **options
             Fields of the formulation.
         """
@@ -730,8 +732,21 @@ class Model:
             obstacle.check_apart(self.mesh)
         obstacle.distance(self.mesh.points[:1])  # what does not fit this dimension shows at once
         history = table_of(ramp, f"the ramp of the motion of obstacle '{name}'")
+        if formulation is None:
+            formulation, reason = against_obstacle(self._is_of_simplices(secondary), options)
+            log.info("contact '%s': %s, since %s", name, method(formulation, options), reason)
         driving = self._driving(name, moves, force)
         self._add_pair(ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving))
+
+    def _is_of_simplices(self, group: str) -> bool:
+        """Return whether linear triangles or tetrahedra alone have the facets of a group; no, if there is no such group."""
+        if group not in self.mesh.cell_groups:
+            return False
+        solids, facets = self.mesh.solids, self.mesh.cells_of(group, self.mesh.dim - 1)
+        theirs = [
+            np.isin(self.mesh.points_of(group), solids[name]).all() for name in ("tri3", "tet4") if name in solids
+        ]
+        return bool(facets) and any(theirs) and all(elements.get(name).linear == name for name in facets)
 
     def _driving(self, name: str, moves: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
         """Return the force on obstacle `name` by component, None for prescribed ones; empty without any."""
