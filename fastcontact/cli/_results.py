@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
 from fastcontact.errors import CaseError, unknown
+from fastcontact.mesh.files import toml_text
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -53,8 +53,8 @@ def case_data(results: Any) -> dict[str, Any]:
     from fastcontact.cases.case import described
 
     try:
-        data = tomllib.loads(results.case_text or "")
-    except tomllib.TOMLDecodeError:
+        data = toml_text.parsed(results.case_text or "")
+    except ValueError:
         data = {}
     return described(data)
 
@@ -79,9 +79,11 @@ def pressure_curves(
     load : float
         Multiplier of the loads at this step [-].
 
-    There is nothing without a theory whose pressure can be drawn; that of a flat punch is infinite.
+    There is nothing without a theory whose pressure can be drawn; that of a flat punch is infinite. Of finite half spheres it
+    is Hertz's.
     """
     theory: Any = theories.get("theory")
+    theory = theory if pressure_curve(theory) is not None else getattr(theory, "hertz", None)
     own = pressure_curve(theory)
     if own is None:
         return {}
@@ -112,4 +114,4 @@ def law(theories: Mapping[str, Any]) -> Any:
     """Return what gives force and radius of a contact by its approach, from none on; None where nothing does."""
     theory = theories.get("theory")
     theory = getattr(theory, "hertz", theory)
-    return theory if hasattr(theory, "at_approach") and theories["share"] == 1.0 else None
+    return theory if hasattr(theory, "at_approach") else None
