@@ -45,8 +45,8 @@ def out_of_balance(model: fc.Model, step: fc.StepResult, factor: float, toleranc
 
 def stiffness_of(model: fc.Model) -> csr_array:
     """Return the stiffness (n_dofs, n_dofs) of the solid cells [force / length]."""
-    moduli, material = model.material_numbers()
-    return stiffness(model.mesh, model.kinematics, moduli, material, None, model.averaged_materials())
+    field = model.material_field()
+    return stiffness(model.mesh, model.kinematics, field.moduli, field.rows, None, field.treatment)
 
 
 def contact_forces(model: fc.Model, step: fc.StepResult) -> np.ndarray:
