@@ -155,8 +155,8 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
     """Return the depth of wear at the secondary nodes of a contact pair after Archard, added up over the load steps.
 
     ``depth = sum of coefficient * pressure * slip``, with the mean of the pressures at both ends of a step. Slip is the
-    relative tangential displacement of a node and of what it faces at the end of the step; where friction holds nodes it is zero. The
-    geometry is not changed by it; given back as `clearance` it is, in another analysis.
+    relative tangential displacement of a node and of what it faces at the end of the step; where friction holds nodes it is
+    zero. The geometry is not changed by it; given back as `clearance` it is, in another analysis.
 
     Parameters
     ----------
