@@ -39,8 +39,13 @@ def test_a_pure_moment_bends_a_beam_to_a_circle(kind):
     moved, angle = at_reference(model, step)
     assert angle == pytest.approx(MOMENT * LENGTH / (E * INERTIA), rel=1e-9)
     assert moved[1] == pytest.approx(MOMENT * LENGTH**2 / (2 * E * INERTIA) + 2.0 * angle, rel=1e-9)
-    assert step.stress[:, 0] == pytest.approx(-MOMENT / INERTIA * (model.mesh.points[:, 1] - 0.5) * (
-        np.arange(model.mesh.n_points) < model.mesh.n_points - 2), abs=1e-9)
+    assert step.stress[:, 0] == pytest.approx(
+        -MOMENT
+        / INERTIA
+        * (model.mesh.points[:, 1] - 0.5)
+        * (np.arange(model.mesh.n_points) < model.mesh.n_points - 2),
+        abs=1e-9,
+    )
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -144,16 +149,25 @@ def test_a_case_file_has_couplings_moments_and_liquids():
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda m: m.add_coupling("RIGHT", "LEFT"), "'RIGHT' is no reference point: make the model of fc.generate.with_ref"),
+        (
+            lambda m: m.add_coupling("RIGHT", "LEFT"),
+            "'RIGHT' is no reference point: make the model of fc.generate.with_ref",
+        ),
         (lambda m: m.add_coupling("REF", "LEFT", kind="stiff"), "unknown kind of coupling 'stiff'"),
         (lambda m: m.add_coupling("REF", "REF"), "the group needs points, without the reference point itself"),
         (lambda m: m.add_coupling("REF", "LEFT", components="z"), "unknown component 'z'"),
         (lambda m: m.add_coupling("REF", "LEFT", kind="distributing", components="x"), "has all components"),
-        (lambda m: m.add_coupling("REF", "HELD", kind="distributing"), "the coupling of 'REF' with 'HELD': the points lie in"),
+        (
+            lambda m: m.add_coupling("REF", "HELD", kind="distributing"),
+            "the coupling of 'REF' with 'HELD': the points lie in",
+        ),
         (lambda m: m.add_moment("REF", x=1.0), "in the plane moments are about z"),
         (lambda m: m.add_moment("HELD", z=1.0), "the moment on 'HELD': the points lie in one line or place"),
         (lambda m: m.add_moment("REF", z=np.nan), "the moment on 'REF' is nan"),
-        (lambda m: m.add_hydrostatic_pressure("LEFT", weight=np.inf, level=1.0), "the weight of the hydrostatic pressure"),
+        (
+            lambda m: m.add_hydrostatic_pressure("LEFT", weight=np.inf, level=1.0),
+            "the weight of the hydrostatic pressure",
+        ),
         (lambda m: m.add_hydrostatic_pressure("LEFT", weight=1.0, level=1.0, axis="z"), "unknown component 'z'"),
         (lambda m: fc.generate.with_reference_points(m.mesh, {"REF": (0.0, 0.0)}), "already a group 'REF'"),
         (lambda m: fc.generate.with_reference_points(m.mesh, {"NEW": (0.0, 0.0, 1.0)}), "must be 2 numbers"),
