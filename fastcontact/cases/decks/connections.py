@@ -48,8 +48,8 @@ def tie(content: Content, block: Block) -> None:
             raise block.place.refuse(f"POSITION TOLERANCE={value:g} is negative")
         content.note(
             block.place,
-            f"POSITION TOLERANCE={value:g}: no effect, the surfaces are tied where they face each other, at any distance, not "
-            "node by node",
+            f"POSITION TOLERANCE={value:g}: no effect, the surfaces are tied where they face each other, at any distance, "
+            "not node by node",
         )
     if adjust == "YES" and "ADJUST" in block.parameters:
         content.note(block.place, "ADJUST=YES: nodes are not moved, distances of the sides are kept")
