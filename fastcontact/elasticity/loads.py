@@ -116,7 +116,7 @@ class Hydrostatic:
     axis: int
 
     def __call__(self, points: Array) -> Array:
-        """Return the pressure (n,) [pressure] at positions (n, dim) [length]."""
+        """Return the pressure (n,) [pressure] at `points` (n, dim) [length]."""
         return np.asarray(self.weight * np.maximum(self.level - points[:, self.axis], 0.0))
 
 
