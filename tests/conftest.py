@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -94,3 +97,37 @@ def forma04():
         return model
 
     return make
+
+
+@pytest.fixture(scope="session")
+def solved_case(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the training case of two steps, `case.toml`, its mesh `coarse.med`, and its results `old.vtkhdf`.
+
+    It is for all tests of a process: work on copies.
+    """
+    from fastcontact.cli import main
+
+    folder = tmp_path_factory.mktemp("solved")
+    case = folder / "case.toml"
+    mesh = ["mesh", "half-spheres", "--element", "tri3", "--size", "6", "-o", str(folder / "coarse.med"), "-q"]
+    assert main(mesh) == 0
+    assert main(["cases", "--copy", "forma04a", "-o", str(case), "-q"]) == 0
+    (folder / "forma04a.med").unlink()
+    text = case.read_text(encoding="utf-8").replace("forma04a.med", "coarse.med")
+    case.write_text(text.replace("steps = 20", "steps = 2"), encoding="utf-8")
+    assert main(["run", str(case), "-o", str(folder / "old.vtkhdf"), "-q"]) == 0
+    return folder
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path):
+    """A folder with room for a megabyte."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    if os.name != "posix" or os.geteuid() != 0 or shutil.which("mount") is None:
+        pytest.skip("only root may mount a small file system")
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(folder)], capture_output=True)
+    if mounted.returncode:
+        pytest.skip(f"no small file system here: {mounted.stderr.decode().strip()}")
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)

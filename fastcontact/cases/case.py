@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,6 +10,7 @@ from typing import Any
 from fastcontact import analytic
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.cases.checks import CHECK, Check, read_check
+from fastcontact.cases.decks.blocks import files_of_deck
 from fastcontact.cases.decks.deck import Deck, read_deck
 from fastcontact.cases.keys import NUMBER, RAMP, SOLVE, STUDY, TOP, UNITS, called, check_keys, tables
 from fastcontact.cases.model_tables import build_model, points
@@ -19,7 +18,9 @@ from fastcontact.cases.shipped import case_path
 from fastcontact.errors import CaseError, unknown
 from fastcontact.linear.choice import check_tolerance
 from fastcontact.mesh import generate
+from fastcontact.mesh.files import toml_text
 from fastcontact.mesh.files.mesh_files import read_mesh
+from fastcontact.mesh.files.paths import existing_file
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, linear_ramp
@@ -28,10 +29,6 @@ from fastcontact.results.units import units_of_results
 
 # Suffix of input decks of Abaqus and CalculiX.
 DECK = ".inp"
-LARGEST = 1 << 23  # of a case file [bytes]
-# The parser takes a time that grows with the square of the parts of a dotted key.
-PARTS = 50
-LONG_KEY = re.compile(rf"""(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{PARTS},}}""")
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,10 +128,13 @@ def _case_of_deck(path: Path) -> Case:
 
 
 def files_of_case(path: str | Path) -> list[Path]:
-    """Return a case file and the files of meshes that it names; raises CaseError if it cannot be read."""
+    """Return a case file and the files of meshes that it names, or a deck and what it includes.
+
+    Raises CaseError or FileError if one cannot be read.
+    """
     path = case_path(path)
     if path.suffix.lower() == DECK:
-        return [path]
+        return files_of_deck(existing_file(path))
     found, waiting = [path], [_parsed(path)[1]]
     while waiting:
         for key, value in waiting.pop().items():
@@ -148,21 +148,16 @@ def files_of_case(path: str | Path) -> list[Path]:
 def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
     """Return the text of a case file, and its data."""
     try:
-        if path.stat().st_size > LARGEST:
+        if path.stat().st_size > toml_text.LARGEST:
             raise CaseError(
-                f"the case file '{path}' is larger than {LARGEST >> 20} MB: put its mesh into a file of its own"
+                f"the case file '{path}' is larger than {toml_text.LARGEST >> 20} MB: put its mesh into a file of its own"
             )
         text = path.read_text(encoding="utf-8-sig")  # editors of Windows begin texts with a byte order mark
     except (OSError, UnicodeDecodeError) as error:
         raise CaseError(f"cannot read the case file '{path}': {_unreadable(path, error)}") from error
-    if found := LONG_KEY.search(text):
-        line = text.count("\n", 0, found.start()) + 1
-        raise CaseError(
-            f"the case file '{path}' has a key of more than {PARTS} parts in line {line}: no key is that long"
-        )
     try:
-        return text, tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # tomllib's own error, and those of numbers too long, tables too deep
+        return text, toml_text.parsed(text)
+    except ValueError as error:
         raise CaseError(f"the case file '{path}' is not valid TOML: {error}") from error
 
 
@@ -204,7 +199,7 @@ def build_case(
         name=name,
         title=data.get("title", name),
         text=text,
-        mesh=mesh,
+        mesh=model.mesh,
         model=model,
         ramp=ramp,
         criteria=criteria,

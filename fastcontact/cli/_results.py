@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
 from fastcontact.errors import CaseError, unknown
+from fastcontact.mesh.files import toml_text
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -53,8 +53,8 @@ def case_data(results: Any) -> dict[str, Any]:
     from fastcontact.cases.case import described
 
     try:
-        data = tomllib.loads(results.case_text or "")
-    except tomllib.TOMLDecodeError:
+        data = toml_text.parsed(results.case_text or "")
+    except ValueError:
         data = {}
     return described(data)
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
+from fastcontact.cli._executor import executor
 from fastcontact.cli._outputs import check_outputs, save, write_json, write_text
 from fastcontact.cli._progress import Runs
 from fastcontact.cli._terminal import say
-from fastcontact.errors import CaseError, FastcontactError
+from fastcontact.errors import FastcontactError
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -53,37 +53,6 @@ def finished(options: argparse.Namespace, study: Callable[..., Any]) -> Any:
         raise FastcontactError(stopped(options)) from None
     finally:
         progress.close()
-
-
-@contextlib.contextmanager
-def executor(where: str) -> Iterator[Any]:
-    """Give an executor to run on, None for processes of this machine, and shut it down at the end.
-
-    Raises CaseError if the library for it is not installed, nothing answers at the address, or the word is unknown.
-    """
-    if where == "processes":
-        yield None
-        return
-    if where == "mpi":
-        try:
-            from mpi4py.futures import MPIPoolExecutor
-        except ImportError as error:
-            raise CaseError(f"--executor mpi needs mpi4py ({error}): pip install mpi4py") from error
-        with MPIPoolExecutor() as pool:
-            yield pool
-        return
-    if "://" not in where:
-        raise CaseError(f"--executor '{where}' must be processes, mpi, or the address of a Dask scheduler")
-    try:
-        from dask.distributed import Client
-    except ImportError as error:
-        raise CaseError(f"--executor {where} needs Dask ({error}): pip install distributed") from error
-    try:
-        client = Client(where)
-    except (OSError, ValueError) as error:
-        raise CaseError(f"no Dask scheduler answers at --executor {where}: {error}") from error
-    with client:
-        yield client.get_executor()
 
 
 def stopped(options: argparse.Namespace) -> str:

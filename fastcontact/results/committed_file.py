@@ -77,7 +77,7 @@ class CommittedFile(DriverFile):
 
     def _get(self, start: int, data: bytearray) -> None:
         super()._get(start, data)
-        journal.overlay(list(self._pending.items()), start, data)
+        journal.overlay(self._pending.items(), start, data)
 
     def write(self, data: bytes) -> int:
         """Keep data for the position; later data replace earlier ones."""

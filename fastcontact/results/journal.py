@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import io
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import IO, Any
 
 Write = tuple[int, bytes]
@@ -95,7 +95,7 @@ class Repeated(io.RawIOBase):
         super().close()
 
 
-def overlay(writes: Sequence[Write], start: int, view: memoryview | bytearray) -> None:
+def overlay(writes: Iterable[Write], start: int, view: memoryview | bytearray) -> None:
     """Put into `view`, which holds a file from `start` on, what writes change there."""
     end = start + len(view)
     for place, data in writes:

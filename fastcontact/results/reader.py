@@ -6,7 +6,6 @@ import contextlib
 import io
 import json
 import os
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import FileError
 from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.files import toml_text
 from fastcontact.mesh.files.hdf5 import check_contents
 from fastcontact.mesh.files.packing import unpacked
 from fastcontact.mesh.files.paths import PathLike, existing_file
@@ -235,8 +235,8 @@ class Results(Sequence[StepResult]):
     def _units(self) -> dict[str, str]:
         """Return the names of the units of length, force and pressure that the case text gives."""
         try:
-            named = tomllib.loads(self.case_text or "").get("units", {})
-        except tomllib.TOMLDecodeError:
+            named = toml_text.parsed(self.case_text or "").get("units", {})
+        except ValueError:
             return {}
         return {key: str(value) for key, value in named.items()} if isinstance(named, dict) else {}
 
@@ -397,6 +397,7 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
         dissipation=float(step["dissipation"]) if "dissipation" in known else 0.0,
         obstacle_displacement=moved if np.isfinite(moved).all() else None,
         middle=step["middle"].copy() if "middle" in known else None,  # type: ignore[arg-type]
+        tangent=step["tangent"].copy() if "tangent" in known and np.isfinite(step["tangent"]).all() else None,
         **faced,
         **columns,
     )

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import disk_faults
 import pytest
-
-from fastcontact.cli import main
 
 COMMANDS = [
     ["run", "case.toml", "-o", "case.vtkhdf", "-q", "--json", "case.json"],
@@ -31,18 +30,11 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def source(solved_case: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A case with its mesh, results of a run, and files that commands replace."""
-    folder = tmp_path_factory.mktemp("source")
-    case = folder / "case.toml"
-    mesh = ["mesh", "half-spheres", "--element", "tri3", "--size", "6", "-o", str(folder / "coarse.med"), "-q"]
-    assert main(mesh) == 0
-    assert main(["cases", "--copy", "forma04a", "-o", str(case), "-q"]) == 0
-    (folder / "forma04a.med").unlink()
-    text = case.read_text(encoding="utf-8").replace("forma04a.med", "coarse.med")
-    case.write_text(text.replace("steps = 20", "steps = 2"), encoding="utf-8")
-    assert main(["run", str(case), "-o", str(folder / "old.vtkhdf"), "-q"]) == 0
-    (folder / "old.med").write_bytes((folder / "coarse.med").read_bytes())
+    folder = tmp_path_factory.mktemp("faults") / "source"
+    shutil.copytree(solved_case, folder)
+    shutil.copy(folder / "coarse.med", folder / "old.med")
     for name in ("old.csv", "old.agr", "old.xdmf", "old.png"):
         (folder / name).write_text("old\n")
     return folder

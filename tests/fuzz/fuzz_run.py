@@ -71,12 +71,14 @@ def run(numbers: list[int], seed: int, folder: Path, failures: Path | None = Non
 
     def work(place: Path) -> None:
         place.mkdir(exist_ok=True)
-        process = _start(seed, folder, place)
+        process = None
         while True:
             with lock:
                 if not waiting:
                     break
                 number = waiting.pop()
+            if process is None or process.poll() is not None:
+                process = _start(seed, folder, place)
             entry = _one(process, number)
             if entry["kind"] in FROM_OUTSIDE:
                 if process.poll() is None:
@@ -93,12 +95,11 @@ def run(numbers: list[int], seed: int, folder: Path, failures: Path | None = Non
                 if failures and entry["kind"] not in GOOD and path.is_file():
                     failures.mkdir(parents=True, exist_ok=True)
                     shutil.copy(path, failures / f"{entry['kind'].replace(' ', '-')}-{path.name}")
-            if process.poll() is not None:
-                process = _start(seed, folder, place)
             for left in place.glob(f"{number}.*"):
                 left.unlink()
-        process.stdin.close()
-        process.wait(timeout=30)
+        if process is not None:
+            process.stdin.close()
+            process.wait(timeout=30)
 
     threads = [threading.Thread(target=work, args=(folder / f"work{i}",)) for i in range(workers)]
     for thread in threads:

@@ -11,10 +11,13 @@ from fastcontact.errors import CaseError, FileError
 # Bytes of a deck and all files it includes, and how many these are: more is an error of whoever wrote it.
 LARGEST = 1 << 28
 MOST_FILES = 200
+# Characters of a line, a keyword with the lines on which it goes on: both programs end theirs far below.
+LONGEST_LINE = 1 << 16
+_TOO_LONG = f"the line has more than {LONGEST_LINE} characters: end it where its entries end"
 LONGEST_QUOTED = 80
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Place:
     """A line of a file, and the keyword to which it belongs."""
 
@@ -30,7 +33,7 @@ class Place:
         return f"{self.file}, line {self.line}, *{self.keyword}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Row:
     """A data line: its entries without blanks around them, and its place."""
 
@@ -98,11 +101,12 @@ class Block:
 
 @dataclass
 class Source:
-    """The deck that is read: its folder, what was read so far, and which files are open."""
+    """The deck that is read: its folder, whether data lines are kept, what was read so far, and which files are open."""
 
     folder: Path
+    with_data: bool = True
     size: int = 0
-    files: int = 0
+    files: list[Path] = field(default_factory=list)
     open: list[Path] = field(default_factory=list)
 
 
@@ -141,11 +145,19 @@ def read_blocks(path: Path) -> list[Block]:
     return list(_blocks(path, path.name, source))
 
 
+def files_of_deck(path: Path) -> list[Path]:
+    """Return a deck and the files that it includes, in the order in which they are read; raises like `read_blocks`."""
+    source = Source(path.resolve().parent, with_data=False)
+    for _ in _blocks(path, path.name, source):
+        pass
+    return source.files
+
+
 def _text(path: Path, source: Source) -> str:
-    source.files += 1
+    source.files.append(path)
     try:
         source.size += path.stat().st_size
-        if source.size > LARGEST or source.files > MOST_FILES:
+        if source.size > LARGEST or len(source.files) > MOST_FILES:
             raise FileError(
                 f"'{path}' with what it includes is more than {LARGEST >> 20} MiB or {MOST_FILES} files: too much for a deck"
             )
@@ -164,15 +176,19 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
         line = raw.strip()
         if line.startswith("**"):
             continue
+        if len(line) > LONGEST_LINE:
+            keyword = _keyword(line) if line.startswith("*") else current.keyword if current else ""
+            raise Place(name, number, keyword).refuse(_TOO_LONG)
         if not line.startswith("*"):
-            if current is not None:
+            if current is not None and source.with_data:
                 rows.append(_row(Place(name, number, current.keyword), line))
-            elif line:
+            elif line and current is None:
                 raise Place(name, number, "").refuse("a data line before any keyword")
             continue
         if current is not None:
             yield Block(current.place, current.parameters, tuple(rows))
-        place, line = Place(name, number, _keyword(line)), _continued(line, lines)
+        place = Place(name, number, _keyword(line))
+        line = _continued(place, line, lines)
         current, rows = Block(place, _parameters(place, line)), []
         if place.keyword == "INCLUDE":
             yield from _included(current, name, source)
@@ -182,12 +198,14 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
     source.open.pop()
 
 
-def _continued(line: str, lines: Iterator[tuple[int, str]]) -> str:
+def _continued(place: Place, line: str, lines: Iterator[tuple[int, str]]) -> str:
     """Return a keyword line with the lines on which it goes on, after a comma."""
     while line.endswith(","):
         _, more = next(lines, (0, ""))
         if not more.strip().startswith("**"):
             line = f"{line} {more.strip()}"
+        if len(line) > LONGEST_LINE:
+            raise place.refuse(_TOO_LONG)
         if not more:
             break
     return line

@@ -20,6 +20,9 @@ from fastcontact.mesh.files.paths import PathLike, existing_file
 # Zeros compress a thousandfold, but no whole file does that holds a mesh or results.
 PLAUSIBLE_BYTES = 1 << 28
 PLAUSIBLE_EXPANSION = 20
+# The same for all data sets together, each counted as often as a link leads to it.
+PLAUSIBLE_IN_ALL = 1 << 30
+PLAUSIBLE_EXPANSION_IN_ALL = 100
 FEW_OBJECTS = 1000
 # Groups in groups; HDF5 itself follows them by recursion, and deep ones overrun its stack.
 DEEPEST = 64
@@ -48,13 +51,15 @@ def opened(path: PathLike) -> Iterator[Any]:
 def check_contents(file: Any, path: PathLike) -> None:
     """Look through an open HDF5 file before anything in it is read.
 
-    Raises FileError if a link or the values of a data set lead to another file, a data set needs a foreign filter or more
-    memory than a file of this size can mean, or groups stand too deep or in a circle.
+    Raises FileError if a link or the values of a data set lead to another file, a data set needs a foreign filter, one or
+    all of them need more memory than a file of this size can mean, or groups stand too deep or in a circle.
     """
     from h5py import h5d, h5g, h5o
     from h5py.h5l import TYPE_HARD, TYPE_SOFT
 
-    limit = max(PLAUSIBLE_BYTES, PLAUSIBLE_EXPANSION * file.id.get_filesize())
+    file_size, total = file.id.get_filesize(), 0
+    limit = max(PLAUSIBLE_BYTES, PLAUSIBLE_EXPANSION * file_size)
+    limit_in_all = max(PLAUSIBLE_IN_ALL, PLAUSIBLE_EXPANSION_IN_ALL * file_size)
     seen: set[Any] = {h5o.get_info(file["/"].id).addr}
     waiting: list[tuple[Any, str, int]] = [(file["/"].id, "", 0)]
     while waiting:
@@ -69,7 +74,12 @@ def check_contents(file: Any, path: PathLike) -> None:
                 raise FileError(f"'{path}' refers to another file at '{name}': copy the data into one file")
             item = h5o.open(group, raw)
             if isinstance(item, h5d.DatasetID):
-                _check_dataset(item, f"'{name}' of '{path}'", limit, file.id.get_filesize())
+                total += _check_dataset(item, f"'{name}' of '{path}'", limit, file_size)
+                if total > limit_in_all:
+                    raise FileError(
+                        f"'{path}' declares more than {limit_in_all:.3g} bytes in all, which a file of its size cannot hold: "
+                        "write it anew"
+                    )
             elif isinstance(item, h5g.GroupID):
                 address = h5o.get_info(item).addr
                 if address in seen or depth >= DEEPEST:
@@ -78,8 +88,8 @@ def check_contents(file: Any, path: PathLike) -> None:
                 waiting.append((item, name, depth + 1))
 
 
-def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> None:
-    """Refuse a data set whose values stand elsewhere, or that is too large for its file."""
+def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
+    """Refuse a data set whose values stand elsewhere, or that is too large for its file; return its size [bytes]."""
     from h5py import h5d, h5z
 
     settings = dataset.get_create_plist()
@@ -104,6 +114,14 @@ def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> None
         size = max(size, chunk)
     if size > limit:
         raise FileError(f"{where} declares {size:.3g} bytes, which a file of its size cannot hold: write it anew")
+    return int(size)
+
+
+def check_size(where: str, shape: tuple[int, ...], file: Any) -> None:
+    """Raise FileError if an array of doubles that is put together from a file is larger than its size can mean."""
+    size = 8 * int(np.prod(shape, dtype=object))
+    if size > max(PLAUSIBLE_IN_ALL, PLAUSIBLE_EXPANSION_IN_ALL * file.id.get_filesize()):
+        raise FileError(f"{where} is an array of {size:.3g} bytes, which a file of its size cannot hold: write it anew")
 
 
 def values(group: Any, name: str) -> NDArray[Any]:

@@ -18,7 +18,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files import med_families
 from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_known
-from fastcontact.mesh.files.hdf5 import attribute, opened, values
+from fastcontact.mesh.files.hdf5 import attribute, check_size, opened, values
 from fastcontact.mesh.files.hdf5_driver import new_hdf5
 from fastcontact.mesh.files.med_families import Families, checked_name, decoded
 from fastcontact.mesh.files.paths import PathLike, replacing
@@ -321,6 +321,7 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
         times = np.array([attribute(entry, "PDT") for entry in instants], np.float64)
         n_components = int(attribute(group, "NCO"))
         n_points = _field_size(file, group, instants, n_components)
+        check_size(f"field '{field}' of '{path}'", (len(instants), n_points, n_components), file)
         return times, np.stack([_read_instant(file, entry["NOE"], n_points, n_components) for entry in instants])
 
 

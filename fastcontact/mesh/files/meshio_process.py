@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from fastcontact.mesh.files.packing import packed, unpacked
 
 # Limits of the child, each a constant and a part for every byte of the file. meshio 5.3.5 takes up to 0.15 s and 9 MB for a
-# megabyte (permas, vtu).
+# megabyte (permas, vtu); the process itself takes 130 MB.
 SECONDS, SECONDS_PER_BYTE = 5.0, 5e-6
-MEMORY, MEMORY_PER_BYTE = 1 << 31, 64
+MEMORY, MEMORY_PER_BYTE = 1 << 30, 32
 # Limit of what the child returns [bytes]: a packed file of a few kilobytes can hold any number of equal points.
 RETURNED, RETURNED_PER_BYTE = 1 << 28, 32
 # Limit of the time that passes, in computing times: a busy machine may need as long.
@@ -95,14 +95,15 @@ def plain_content(path: Path, file_format: str) -> dict[str, Any]:
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             found = library().read(path, file_format=file_format)
-            return {**_plain(found), "said": said.getvalue()}
+            return {**plain_parts(found), "said": said.getvalue()}
     except MemoryError:
         return {"error": "it announces more than memory can hold"}
     except (Exception, SystemExit) as error:
         return {"error": (said.getvalue() if isinstance(error, SystemExit) else str(error)) or type(error).__name__}
 
 
-def _plain(found: Any) -> dict[str, Any]:
+def plain_parts(found: Any) -> dict[str, Any]:
+    """Return a ``meshio.Mesh`` as the plain data that `plain_content` tells of."""
     cell_data = {key: data for key, data in found.cell_data.items() if key in TAGS or key.startswith(CELL_PREFIX)}
     point_data = {key: data for key, data in found.point_data.items() if key in TAGS or key.startswith(POINT_PREFIX)}
     return {

@@ -12,7 +12,7 @@ from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.results.plot._axes import UNKNOWN, Units, labelled, new_axes, valued
-from fastcontact.results.step import ContactResult
+from fastcontact.results.step import ContactResult, half_width
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -107,7 +107,7 @@ def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) ->
 
 def _mark_edges(ax: Axes, contact: ContactResult, place: Array, units: Units) -> None:
     """Shade where the edge of the contact lies: between the outermost closed place and the first open one."""
-    inside, outside = contact.radius
+    inside, outside = half_width(contact.place, contact.active)
     if not (np.isfinite(inside) and np.isfinite(outside)):
         return
     centre = 0.0

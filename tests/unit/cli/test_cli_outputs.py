@@ -17,32 +17,17 @@ from fastcontact.cli._terminal import printable
 mpl.use("Agg")
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A result file, a case file and the mesh that it reads."""
-    folder = tmp_path_factory.mktemp("outputs")
-    case = folder / "case.toml"
-    mesh = ["mesh", "half-spheres", "--element", "tri3", "--size", "5", "-o", str(folder / "coarse.med"), "-q"]
-    assert main(mesh) == 0
-    assert main(["cases", "--copy", "forma04a", "-o", str(case), "-q"]) == 0
-    (folder / "forma04a.med").unlink()
-    text = case.read_text(encoding="utf-8").replace("forma04a.med", "coarse.med")
-    case.write_text(text.replace("steps = 20", "steps = 1"), encoding="utf-8")
-    assert main(["run", str(case), "-o", str(folder / "case.vtkhdf"), "-q"]) == 0
-    return folder
-
-
 @pytest.fixture
-def files(folder: Path, tmp_path: Path) -> Path:
-    shutil.copytree(folder, tmp_path / "files")
+def files(solved_case: Path, tmp_path: Path) -> Path:
+    shutil.copytree(solved_case, tmp_path / "files")
     return tmp_path / "files"
 
 
 # Of each command that writes: its arguments with one source, and its options for files.
 WRITERS = {
-    "profile": (["profile", "case.vtkhdf"], ["--csv", "--agr", "--png"], ["case.vtkhdf"]),
-    "plot": (["plot", "case.vtkhdf"], ["--png", "--animate"], ["case.vtkhdf"]),
-    "export": (["export", "case.vtkhdf"], ["--med", "--xdmf"], ["case.vtkhdf"]),
+    "profile": (["profile", "old.vtkhdf"], ["--csv", "--agr", "--png"], ["old.vtkhdf"]),
+    "plot": (["plot", "old.vtkhdf"], ["--png", "--animate"], ["old.vtkhdf"]),
+    "export": (["export", "old.vtkhdf"], ["--med", "--xdmf"], ["old.vtkhdf"]),
     "run": (["run", "case.toml"], ["-o", "--json", "--plot"], ["case.toml", "coarse.med"]),
     "converge": (["converge", "case.toml"], ["--json", "--csv", "--png", "--html", "-o"], ["case.toml", "coarse.med"]),
     "sweep": (
@@ -117,7 +102,7 @@ def test_an_output_that_fails_leaves_nothing(files, monkeypatch, capsys):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", fail)
-    assert main(["profile", "case.vtkhdf", "--png", "old.png"]) == 1
+    assert main(["profile", "old.vtkhdf", "--png", "old.png"]) == 1
     assert "No space left on device" in capsys.readouterr().err
     assert Path("old.png").read_bytes() == b"old"
     assert sorted(os.listdir()) == names

@@ -246,20 +246,6 @@ def test_a_disk_that_is_full_stops_the_run(extra, whole, path, monkeypatch):
     assert_same(path, steps)
 
 
-@pytest.fixture
-def small_disk(tmp_path):
-    """A folder with room for a megabyte."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    if os.name != "posix" or os.geteuid() != 0 or shutil.which("mount") is None:
-        pytest.skip("only root may mount a small file system")
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(folder)], capture_output=True)
-    if mounted.returncode:
-        pytest.skip(f"no small file system here: {mounted.stderr.decode().strip()}")
-    yield folder
-    subprocess.run(["umount", str(folder)], check=True)
-
-
 def test_a_full_disk_stops_the_run_before_anything_is_replaced(whole, small_disk, capsys):
     case, steps = whole
     path = small_disk / "run.vtkhdf"

@@ -333,20 +333,6 @@ FULL = """
 """
 
 
-@pytest.fixture
-def small_disk(tmp_path: Path):
-    """A folder with room for a megabyte."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    if os.name != "posix" or os.geteuid() != 0 or shutil.which("mount") is None:
-        pytest.skip("only root may mount a small file system")
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(folder)], capture_output=True)
-    if mounted.returncode:
-        pytest.skip(f"no small file system here: {mounted.stderr.decode().strip()}")
-    yield folder
-    subprocess.run(["umount", str(folder)], check=True)
-
-
 def test_a_full_disk_costs_no_step_and_the_run_goes_on_when_there_is_room(small_disk: Path, path: Path) -> None:
     full = small_disk / "run.vtkhdf"
     command = [sys.executable, "-c", textwrap.dedent(FULL), str(Path(__file__).parent), str(full)]

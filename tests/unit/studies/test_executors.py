@@ -5,6 +5,9 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
+from concurrent.futures import Future, ThreadPoolExecutor
+from types import SimpleNamespace
 
 import pytest
 
@@ -57,21 +60,98 @@ def test_a_dask_scheduler_by_its_address(case, here, tmp_path):
     assert [point["force"] for point in points] == [point.values["force"] for point in here.points]
 
 
-def test_three_mpi_processes(case, here, tmp_path):
+# More processes than processors, and perhaps as the administrator: Open MPI wants to be told.
+ALLOWED = {
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
+}
+
+
+@pytest.fixture
+def mpiexec():
     pytest.importorskip("mpi4py", reason="needs mpi4py: pip install 'fastcontact[mpi]'")
     places = os.pathsep.join([os.path.dirname(sys.executable), os.environ.get("PATH", "")])
-    mpiexec = shutil.which("mpiexec", path=places)
-    if mpiexec is None:
+    found = shutil.which("mpiexec", path=places)
+    if found is None:
         pytest.skip("needs mpiexec: pip install 'fastcontact[mpi]'")
+    return found
+
+
+def test_three_mpi_processes(case, here, tmp_path, mpiexec):
     target = tmp_path / "sweep.json"
     values = "approach=" + ",".join(map(str, APPROACHES))
     command = [mpiexec, "-n", "3", sys.executable, "-m", "mpi4py.futures", "-m", "fastcontact", "sweep", str(case)]
     command += ["--set", values, "--level", "0", "--executor", "mpi", "--json", str(target), "-q"]
-    # More processes than processors, and perhaps as the administrator: Open MPI wants to be told.
-    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    allowed |= {"PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe"}
-    done = subprocess.run(command, env={**os.environ, **allowed}, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(command, env={**os.environ, **ALLOWED}, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     points = json.loads(target.read_text())["points"]
     assert [point["force"] for point in points] == [point.values["force"] for point in here.points]
     assert [point["n_dofs"] for point in points] == [point.n_dofs for point in here.points]
+
+
+DYING = """
+import os, signal, sys
+from fastcontact.studies import execute
+
+def dies(job, threads=None):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+if __name__ == "__main__":
+    execute.run = dies
+    from fastcontact.cli import main
+    sys.exit(main(sys.argv[1:]))
+"""
+
+
+def test_an_mpi_process_that_dies_ends_the_study(case, tmp_path, mpiexec):
+    script = tmp_path / "dying.py"
+    script.write_text(DYING)
+    command = [mpiexec, "-n", "3", sys.executable, "-m", "mpi4py.futures", str(script), "sweep", str(case)]
+    command += ["--set", "approach=1:2:10", "--level", "0", "--executor", "mpi", "--json", str(tmp_path / "x.json")]
+    done = subprocess.run(command, env={**os.environ, **ALLOWED}, capture_output=True, text=True, timeout=120)
+    assert done.returncode != 0
+    assert "signal 9" in done.stderr
+    assert not (tmp_path / "x.json").exists()
+
+
+def test_without_mpiexec_a_study_ends(case, tmp_path, mpiexec):
+    """Some libraries of MPI can start processes by themselves; where they cannot, the study does not wait for ever."""
+    command = [sys.executable, "-m", "fastcontact", "sweep", str(case), "--set", "approach=1,2", "--level", "0"]
+    command += ["--executor", "mpi", "-q"]
+    done = subprocess.run(command, env={**os.environ, **ALLOWED}, capture_output=True, text=True, timeout=240)
+    assert done.returncode in (0, 1), done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.returncode == 0 or "error: --executor mpi has no processes, or lost one (" in done.stderr
+
+
+class LosingPool(ThreadPoolExecutor):
+    """Like the pool of mpi4py when a process is lost: answers so often, then the thread that waits for answers fails."""
+
+    answers = 2
+
+    def submit(self, *task):
+        LosingPool.answers -= 1
+        if LosingPool.answers >= 0:
+            return super().submit(*task)
+        threading.Thread(target=self._fail).start()
+        return Future()
+
+    def _fail(self):
+        raise RuntimeError("MPI_ERR_PROC_FAILED: process\nfailure")
+
+
+@pytest.mark.parametrize("answers", [0, 1, 3])
+def test_a_process_that_is_lost_while_the_launcher_goes_on(case, monkeypatch, capsys, answers):
+    monkeypatch.setattr(LosingPool, "answers", answers)
+    futures = SimpleNamespace(MPIPoolExecutor=LosingPool)
+    monkeypatch.setitem(sys.modules, "mpi4py", SimpleNamespace(futures=futures))
+    monkeypatch.setitem(sys.modules, "mpi4py.futures", futures)
+    hook = threading.excepthook
+    command = ["sweep", str(case), "--set", "approach=1,2,3,4", "--level", "0", "--executor", "mpi"]
+    assert main(command) == 1
+    assert capsys.readouterr().err == (
+        "error: --executor mpi has no processes, or lost one (MPI_ERR_PROC_FAILED: process failure): start with 'mpiexec "
+        "-n N python -m mpi4py.futures -m fastcontact ...'\n"
+    )
+    assert threading.excepthook is hook

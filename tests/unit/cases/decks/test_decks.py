@@ -55,7 +55,7 @@ def test_two_cubes_are_a_bar(tmp_path):
         ("top\n15, 16, 17, 18\n", "top\n15, 16, 17, 18, 77\n", "15, 16, 17, 18, 77", "node 77 is not defined"),
         ("top\n15, 16, 17, 18\n", "top\ntop\n", "top", "set 'top' contains itself"),
         ("2, 1., 0., 0.\n", "2, 1., 0., 0.\n1, 5.\n", "1, 5.", "node 1 is defined twice"),
-        ("*Static\n", "*Static\n*Temperature\ntop, 100.\n", "*Temperature", "no temperatures"),
+        ("*Static\n", "*Static\n*Cflux\n17, 11, 3.\n", "*Cflux", "temperatures are given"),
         ("roof, P, 100.\n", "roof, P, 100.\nroof, P, 50.\n", "roof, P, 50.", "second value here in one step"),
         ("*Dsload\n", "*Dsload, amplitude=none\n", "*Dsload", "amplitude 'none' is not defined"),
         ("roof, P, 100.\n", "roof, P, 100.\n*Dload\nup, GRAV, 9.81, 0, 0, -1\n", "up, GRAV", r"no \*DENSITY"),
@@ -262,6 +262,23 @@ def test_a_deck_is_a_case(tmp_path):
     case = read_case(tmp_path / "deck.inp")
     assert (case.name, case.title) == ("deck", "two cubes")
     assert files_of_case(tmp_path / "deck.inp") == [tmp_path / "deck.inp"]
+
+
+@pytest.mark.parametrize("source", ["deck.inp", "parts/nodes.inp", "parts/more.inp"])
+@pytest.mark.parametrize("option", ["-o", "--json"])
+def test_no_run_replaces_a_part_of_its_deck(option, source, tmp_path, monkeypatch, capsys):
+    """Decks include files, which include others."""
+    monkeypatch.chdir(tmp_path)
+    parts = tmp_path / "parts"
+    parts.mkdir()
+    (parts / "nodes.inp").write_text("*Include,\ninput=parts/more.inp\n", encoding="utf-8")
+    (parts / "more.inp").write_text(NODES, encoding="utf-8")
+    deck_of(tmp_path, "*Include, input=parts/nodes.inp\n" + WHOLE.replace(NODES, ""))
+    assert files_of_case(tmp_path / "deck.inp") == [tmp_path / "deck.inp", parts / "nodes.inp", parts / "more.inp"]
+    before = (tmp_path / source).read_bytes()
+    assert main(["run", "deck.inp", option, source]) == 1
+    assert f"'{source}' is what this command reads" in capsys.readouterr().err
+    assert (tmp_path / source).read_bytes() == before
 
 
 def test_a_node_or_set_that_is_not_there(tmp_path):

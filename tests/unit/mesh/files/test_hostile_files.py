@@ -1,11 +1,14 @@
 """Files that declare what they cannot hold are refused within limits of memory and time."""
 
+import base64
 import errno
+import lzma
 import os
 import struct
 import subprocess
 import sys
 import time
+import zlib
 from types import SimpleNamespace
 
 import h5py
@@ -15,9 +18,11 @@ from test_result_files import MESH, step_result, write
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
+from fastcontact.cli._results import case_data
 from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh.files import meshio_process
-from fastcontact.mesh.files.med import write_med_mesh
+from fastcontact.mesh.files.med import add_field, write_med_mesh
+from fastcontact.results.med import write_med_results
 
 HEAP = b"GCOL\x01\0\0\0"
 
@@ -293,3 +298,142 @@ def test_an_abaqus_file_that_includes_another(tmp_path):
     (tmp_path / "mesh.inp").write_text("*HEADING\n*include, input=other.inp\n")
     with pytest.raises(FileError, match="includes another file, which is not read: copy its lines"):
         fc.read_mesh(tmp_path / "mesh.inp")
+
+
+def packed_vtu(path, compressor, pack, megabytes, blocks):
+    """Write a mesh whose points are zeros, packed in blocks of 32 kB or in one."""
+    size = (1 << 20) * megabytes // blocks
+    block = pack(bytes(size))
+    head = struct.pack("<III", blocks, size, 0) + struct.pack("<I", len(block)) * blocks
+    points = base64.b64encode(head).decode() + base64.b64encode(block * blocks).decode()
+    path.write_text(
+        '<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian" header_type="UInt32" '
+        f'compressor="vtk{compressor}DataCompressor"><UnstructuredGrid><Piece NumberOfPoints="{(megabytes << 20) // 24}" '
+        'NumberOfCells="1"><Points><DataArray type="Float64" Name="Points" NumberOfComponents="3" format="binary">'
+        f"{points}</DataArray></Points></Piece></UnstructuredGrid></VTKFile>"
+    )
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows limits neither memory nor computing time")
+@pytest.mark.parametrize(
+    ("compressor", "pack", "blocks"),
+    [("ZLib", zlib.compress, 12_800), ("ZLib", zlib.compress, 1), ("LZMA", lzma.compress, 400)],
+)
+def test_a_packed_file_takes_no_more_memory_than_it_may(tmp_path, monkeypatch, compressor, pack, blocks):
+    path = tmp_path / "packed.vtu"
+    packed_vtu(path, compressor, pack, 400, blocks)
+    assert path.stat().st_size < 2_000_000
+    monkeypatch.setattr(meshio_process, "MEMORY", 1 << 28)
+    with pytest.raises(FileError, match=r"it announces more than memory can hold"):
+        fc.read_mesh(path)
+
+
+LINES = {
+    "msh": "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n3\n",
+    "vtu": '<VTKFile type="UnstructuredGrid" version="0.1"><UnstructuredGrid><Piece NumberOfPoints="1" NumberOfCells="1">'
+    '<Points><DataArray type="Float64" Name="Points" NumberOfComponents="3" format="ascii">',
+    "off": "OFF\n", "su2": "NDIME= 3\nNPOIN= 7\n", "inp": "*NODE\n1, ", "bdf": "BEGIN BULK\nGRID,", "obj": "v ",
+    "mesh": "MeshVersionFormatted 2\nDimension 3\nVertices\n1000\n",
+}  # fmt: skip
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows limits neither memory nor computing time")
+@pytest.mark.parametrize("suffix", LINES)
+def test_a_line_of_megabytes_is_refused_within_the_limits(tmp_path, monkeypatch, suffix):
+    path = tmp_path / f"line.{suffix}"
+    path.write_text(LINES[suffix] + ("12," if suffix in ("inp", "bdf") else "12 ") * 1_000_000)
+    monkeypatch.setattr(meshio_process, "MEMORY", 1 << 28)
+    with pytest.raises((FileError, MeshError)) as caught:
+        fc.read_mesh(path)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 1000
+
+
+def test_data_sets_that_are_too_large_together(tmp_path, results):
+    """A few kilobytes can hold any number of names of one data set of zeros."""
+    mesh = tmp_path / "mesh.med"
+    write_med_mesh(mesh, MESH)
+    write_med_results(tmp_path / "fields.rmed", MESH, [step_result(1)])
+    for path in (mesh, tmp_path / "fields.rmed", results):
+        with h5py.File(path, "r+") as file:
+            file.create_dataset("zeros", (1 << 24,), "f8", chunks=(1 << 20,), compression="gzip")
+            for number in range(20):
+                file[f"names/{number}"] = file["zeros"]
+        with pytest.raises(FileError, match=r"declares more than 1.07e\+09 bytes in all, which a file of its size"):
+            fc.open_results(path) if path is results else fc.read_mesh(path)
+
+
+def test_a_field_of_too_many_instants(tmp_path):
+    """Symbolic links inside a file may name one instant as often as one likes."""
+    path = tmp_path / "fields.rmed"
+    mesh = fc.generate.GENERATORS["box"](divisions=(20, 20, 20))
+    points = np.zeros(mesh.points.shape)
+    write_med_mesh(path, mesh)
+    with h5py.File(path, "r+") as file:
+        add_field(file, "DEPL", ("DX", "DY", "DZ"), points, (1, 1.0), "mesh")
+        field = file["CHA/DEPL"]
+        first = next(iter(field))
+        for number in range(6000):
+            field[f"{number:040d}"] = h5py.SoftLink(f"/CHA/DEPL/{first}")
+    with pytest.raises(
+        FileError, match=r"field 'DEPL' of '.*' is an array of 1.33e\+09 bytes, which a file of its size"
+    ):
+        fc.read_med_field(path, "DEPL")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("*NODE\n1, " + "12," * 30_000, r"line 2, \*NODE: the line has more than 65536 characters"),
+        ("*NODE" + ",a=12" * 30_000, r"line 1, \*NODE: the line has more than 65536 characters"),
+        ("*NODE,\n" + ",\n" * 300_000, r"line 1, \*NODE: the line has more than 65536 characters"),
+        ("12," * 30_000, r"line 1, \*: the line has more than 65536 characters"),
+    ],
+)
+def test_lines_of_decks_end_somewhere(tmp_path, text, said):
+    path = tmp_path / "deck.inp"
+    path.write_text(text)
+    started = time.process_time()
+    with pytest.raises(fc.CaseError, match=said):
+        fc.read_deck(path)
+    assert time.process_time() - started < 2
+
+
+def test_comments_of_decks_may_have_any_length(tmp_path):
+    path = tmp_path / "deck.inp"
+    path.write_text("** " + "x" * 100_000 + "\n*HEADING\n")
+    with pytest.raises(fc.CaseError, match="the deck has no step"):
+        fc.read_deck(path)
+
+
+# Texts for which a careless search, or the parser, takes a time that grows with the square of their length.
+SLOW = {
+    "word": "a" * 300_000,
+    "blanks": "a" + " " * 300_000 + ".",
+    "parts": "a." * 40_000 + "a = 1",
+    "quoted parts": "'a'." * 40_000 + "a = 1",
+    "quotes": "\"'" * 150_000,
+    "table": "[" + "a." * 40_000 + "a]",
+    "almost": ("a." * 49 + "a b ") * 3000,
+    "deep": "a = " + "[" * 100_000,
+}
+
+
+@pytest.mark.parametrize("kind", SLOW)
+def test_texts_of_cases_are_parsed_in_bounded_time(tmp_path, results, kind):
+    path = tmp_path / "case.toml"
+    path.write_text(SLOW[kind])
+    started = time.process_time()
+    with pytest.raises(fc.CaseError, match=r"is not valid TOML: "):
+        read_case(path)
+    with fc.open_results(results) as found:
+        found.case_text = SLOW[kind]
+        assert case_data(found)["title"] == ""
+        assert found._units() == {}
+    assert time.process_time() - started < 5
+
+
+def test_a_case_text_in_results_that_is_too_large_is_not_parsed(results):
+    with fc.open_results(results) as found:
+        found.case_text = "a = 1\n" + "#" * (1 << 23)
+        assert found._units() == {}

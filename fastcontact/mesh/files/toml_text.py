@@ -1,0 +1,32 @@
+"""TOML from elsewhere, parsed in bounded time: its parser takes a time that grows with the square of the parts of a key."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from typing import Any
+
+LARGEST = 1 << 23  # of a text [bytes]
+PARTS = 50  # of a dotted key
+# Parts are taken whole, never given back, and none begins inside another: that keeps the search linear in the text.
+LONG_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{PARTS},}}""")
+
+
+def parsed(text: str) -> dict[str, Any]:
+    """Return the tables of a text.
+
+    Raises
+    ------
+    ValueError
+        If the text is no TOML, tables stand too deep in it, it is larger than `LARGEST`, or a key has more than `PARTS`
+        parts.
+    """
+    if len(text) > LARGEST:
+        raise ValueError(f"it is larger than {LARGEST >> 20} MB")
+    if found := LONG_KEY.search(text):
+        line = text.count("\n", 0, found.start()) + 1
+        raise ValueError(f"a key of more than {PARTS} parts in line {line}: no key is that long")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("tables or lists stand too deep in each other") from None
