@@ -27,7 +27,7 @@ class PrintCompletion(argparse.Action):
         parser.exit()
 
 
-def _mark_files(parser: argparse.ArgumentParser, kind: dict[str, str]) -> None:
+def _mark_files(parser: argparse.ArgumentParser, kind: Any) -> None:
     """Tell shtab which arguments of a parser and its sub-commands are names of files."""
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
