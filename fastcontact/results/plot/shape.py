@@ -92,7 +92,7 @@ def _framed(axes: Any, drawn: Any, shown: Field, heading: str, units: Units, bel
     caption, dim = labelled(shown.caption, units, shown.quantity), shown.mesh.dim
     axes.figure.colorbar(drawn, ax=axes, label=caption, shrink=0.6 if dim == 3 else 0.8)
     axes.set_aspect("equal")
-    axes.set_title(heading, fontsize="medium")
+    axes.set_title(heading, fontsize="medium", pad=18 if dim == 3 else None)
     axes.set(**{f"{axis}label": labelled(axis, units, "length") for axis in "xyz"[:dim]})
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, below))
     return axes
