@@ -22,6 +22,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
+LARGEST = 1e30  # of coordinates that can be drawn: the libraries multiply them
+
+
+def scaled(points: Array, scale: float, displacement: Array) -> Array:
+    """Return displaced points (n, dim) [length]; FastcontactError if `scale` moves them out of what can be drawn."""
+    with np.errstate(all="ignore"):
+        place = points + scale * displacement
+        drawn = np.isfinite(scale) and (np.abs(place) < LARGEST).all()
+    if not drawn:
+        raise FastcontactError(f"scale = {scale:g} must be a finite number, and not so large that nothing can be drawn")
+    return place
 
 
 @typed(FastcontactError)
@@ -60,7 +71,7 @@ def deformed_shape(
     """
     solid, (whole, (mesh, node, stress)) = mesh.dim == 3, (mesh, separated(mesh, step))
     values = step.von_mises if mesh is whole else von_mises(stress)  # each material's own, where they meet
-    place = mesh.points + scale * step.displacement[node]
+    place = scaled(mesh.points, scale, step.displacement[node])
     both = np.concatenate([place, place * [-1.0, 1.0]]) if mirrored and not solid else place
     axes = new_axes(ax, (7.0, 7.0) if solid else _size(both), "3d" if solid else None)
     field = (
