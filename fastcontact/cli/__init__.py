@@ -2,6 +2,27 @@
 
 from __future__ import annotations
 
-from fastcontact.cli._main import entry_point, main
+import os
+import signal
+import sys
+from collections.abc import Sequence
 
-__all__ = ["entry_point", "main"]
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code."""
+    try:
+        from fastcontact.cli._main import main as run  # may be interrupted, too
+
+        return run(argv)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
+
+
+def entry_point() -> None:
+    """Run the command line and exit with its code."""
+    # Threads of BLAS spin between the small products here; loops of our own have those of Numba.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    code = main()
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is left to say: a second Ctrl-C ends at once
+    sys.exit(code)

@@ -20,6 +20,7 @@ from typing import Any
 from fastcontact._jit import compiling
 from fastcontact._version import __version__
 from fastcontact.cli._completion import SHELLS, PrintCompletion
+from fastcontact.cli._interrupts import interruptible
 from fastcontact.cli._terminal import add_loudness, encodable, printable, say
 from fastcontact.errors import ConvergenceError, FastcontactError, unknown
 
@@ -81,14 +82,8 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     try:
-        given = sys.argv[1:] if argv is None else list(argv)
-        arguments = parser(given[0] if given else None).parse_args(given)
-        handler = _Printable()
-        log.handlers[:] = [handler]
-        log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
-        if sys.stderr.isatty() and not (arguments.quiet or arguments.verbose):  # the log tells it with -v
-            compiling.listeners[:] = [partial(say, f"{compiling.TEXT} ...", error=True)]
-        return int(arguments.run(arguments) or 0)
+        with interruptible():
+            return _run(sys.argv[1:] if argv is None else list(argv))
     except ConvergenceError as error:
         say("\n".join([f"no convergence: {error}", *history_lines(error.history), *_notes(error)]), error=True)
         return 2
@@ -100,6 +95,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt as error:
         say("\n".join(["interrupted", *_notes(error)]), error=True)
         return 130  # as shells have it
+
+
+def _run(given: list[str]) -> int:
+    arguments = parser(given[0] if given else None).parse_args(given)
+    handler = _Printable()
+    log.handlers[:] = [handler]
+    log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
+    if sys.stderr.isatty() and not (arguments.quiet or arguments.verbose):  # the log tells it with -v
+        compiling.listeners[:] = [partial(say, f"{compiling.TEXT} ...", error=True)]
+    return int(arguments.run(arguments) or 0)
 
 
 def _notes(error: BaseException) -> list[str]:
@@ -117,10 +122,3 @@ def history_lines(history: Sequence[Mapping[str, Any]], shown: int = 10) -> list
         residual = f"{entry['residual']:.3e}" if "residual" in entry else "-"
         lines.append(f"  {number:4d}  {entry['displacement_change']:.3e}  {entry['active']:6d}  {residual}")
     return lines
-
-
-def entry_point() -> None:
-    """Run the command line and exit with its code."""
-    # Threads of BLAS spin between the small products here; loops of our own have those of Numba.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    sys.exit(main())

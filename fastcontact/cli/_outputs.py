@@ -5,11 +5,13 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from fastcontact.cli._results import load_multiplier, pressure_curves
+from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError, FileError
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -77,10 +79,16 @@ def write_json(path: str, numbers: Any, indent: int = 2) -> None:
 
 
 def save(axes: Any, path: str) -> None:
-    """Write the figure of `axes` to `path`; raises FileError if it cannot be written or its format is unknown."""
+    """Write the figure of `axes` to `path`; raises FileError if it cannot be written or its format is unknown.
+
+    What Matplotlib warns of, such as characters that its font lacks, is told in one line each.
+    """
     try:
-        with _target(path) as target:
+        with warnings.catch_warnings(record=True) as caught, _target(path) as target:
+            warnings.simplefilter("always", UserWarning)
             axes.figure.savefig(target)
+        for text in dict.fromkeys(str(warning.message) for warning in caught):
+            say(f"warning: {path}: {' '.join(text.split())}", error=True)
     except ValueError as error:
         raise FileError(f"cannot write the picture '{path}': {error}") from error
 

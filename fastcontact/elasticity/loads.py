@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 Table = tuple[tuple[float, float], ...]
 Value = float | Callable[[Array], Array]
+# Size of any number of a model: squares of products of two of them are still finite.
+LARGEST = 1e60
 Components = Mapping[int, Value]
 
 # Points of the product rule along each direction, and along those of squares, cubes and prisms: exact to degree 7 at least,
@@ -287,13 +289,18 @@ def evaluated(value: Value, points: Array, name: str) -> Array:
     bad = np.flatnonzero(~np.isfinite(found))
     if len(bad):
         raise ModelError(f"{name} is {found[bad[0]]} at {flat[bad[0]]}: it must be finite everywhere")
+    if np.abs(found).max(initial=0.0) > LARGEST:
+        raise ModelError(f"{name} is out of range: its size must be at most {LARGEST:g} everywhere, in any unit")
     return found.astype(np.float64).reshape(points.shape[:-1])
 
 
 def check_number(name: str, value: Any) -> None:
-    """Raise ModelError if `value` is not a finite number; `name` names it."""
-    if not isinstance(value, Real) or isinstance(value, bool) or not math.isfinite(value):
+    """Raise ModelError if `value` is not a finite number, or one that arithmetic cannot hold; `name` names it."""
+    number: Any = value if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    if not abs(number) < math.inf:
         raise ModelError(f"{name} is {value!r}, which is not a finite number")
+    if abs(number) > LARGEST:
+        raise ModelError(f"{name} is out of range: its size must be at most {LARGEST:g}, in any unit")
 
 
 def check_value(name: str, value: Any) -> None:

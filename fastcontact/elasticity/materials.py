@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.elasticity.loads import LARGEST
 from fastcontact.elasticity.material_axes import PAIRS, Axes, frames, rotations
 from fastcontact.errors import ModelError, unknown
 from fastcontact.mesh.argument_types import typed
@@ -147,8 +148,11 @@ class Material:
 
 def check_positive(name: str, value: Any, what: str = "a positive number") -> None:
     """Raise ModelError if a constant of a material, `name` in the message, is not a positive number."""
-    if not isinstance(value, Real) or isinstance(value, bool) or not 0.0 < float(value) < math.inf:
+    number: Any = value if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    if not 0.0 < number < math.inf:
         raise ModelError(f"{name} = {value} must be {what}")
+    if not 1.0 / LARGEST <= number <= LARGEST:
+        raise ModelError(f"{name} is out of range: it must lie between {1.0 / LARGEST:g} and {LARGEST:g}, in any unit")
 
 
 def check_density(value: Any) -> None:
@@ -203,8 +207,7 @@ class LinearElastic(Material):
     incompatible_modes: bool = False
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.E) and self.E > 0):
-            raise ModelError(f"Young's modulus E = {self.E} must be a positive number")
+        check_positive("Young's modulus E", self.E)
         if not -1.0 < self.nu < 0.5:
             raise ModelError(
                 f"Poisson's ratio nu = {self.nu} must lie between -1 and 0.5, both excluded "

@@ -162,7 +162,10 @@ def _is_real(value: Any, kind: type) -> bool:
     truth = isinstance(value, bool | np.bool_)
     if kind is bool:
         return truth or (isinstance(value, Real) and value in (0, 1))
-    return isinstance(value, Real) and not truth and (kind is float or math.isfinite(value))
+    try:
+        return isinstance(value, Real) and not truth and (math.isfinite(value) or kind is float)
+    except OverflowError:  # a whole number of hundreds of digits
+        return False
 
 
 def _is_array_like(annotation: Any) -> bool:

@@ -9,6 +9,7 @@ from numbers import Real
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.elasticity.loads import LARGEST
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
 
@@ -26,13 +27,15 @@ def checked_table(rows: Iterable[Iterable[float]], what: str = "the ramp") -> Ta
     """
     try:
         table = tuple((float(time), float(value)) for time, value in rows)
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         raise ModelError(f"the table of {what} must hold pairs (instant, multiplier of the loads)") from None
     times = np.asarray([time for time, _ in table])
     if len(table) < 2 or not (np.diff(times) > 0).all():
         raise ModelError(f"the table of {what} needs at least two points with ascending instants")
     if not np.isfinite(table).all():
         raise ModelError(f"the table of {what} holds a number that is not finite: {table}")
+    if np.abs(table).max() > LARGEST:
+        raise ModelError(f"the table of {what} is out of range: the size of its numbers must be at most {LARGEST:g}")
     return table
 
 

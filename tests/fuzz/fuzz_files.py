@@ -9,12 +9,13 @@ from pathlib import Path
 
 import fuzz_bytes
 import fuzz_hdf5
+import fuzz_texts
 import fuzz_toml
 import numpy as np
 
 HDF5 = (".med", ".rmed", ".vtkhdf", ".h5m", ".hmf", ".cgns")
 # Our own formats come more often than those of others.
-WEIGHTS = {".med": 16, ".rmed": 16, ".vtkhdf": 32, ".toml": 4}
+WEIGHTS = {".med": 16, ".rmed": 16, ".vtkhdf": 32, ".toml": 4, ".deck": 24, ".msh": 6, ".vtu": 6}
 
 
 def kinds(seeds: dict[str, Path]) -> list[str]:
@@ -49,11 +50,18 @@ def make_file(number: int, seed: int, seeds: dict[str, Path], folder: Path, outs
             fuzz_hdf5.damage(target, outside, random)
     elif structured and source.suffix == ".toml":
         target.write_text(fuzz_toml.damaged(source.read_text(encoding="utf-8"), random), encoding="utf-8")
+    elif structured and source.suffix in fuzz_texts.CHANGED and _is_text(source):
+        changed = fuzz_texts.CHANGED[source.suffix](source.read_text(encoding="utf-8"), random)
+        target.write_text(changed, encoding="utf-8")
     else:
         others = [seeds[other].read_bytes() for other in _near(name, seeds)]
         data = fuzz_bytes.damaged(source.read_bytes(), random, others)
         target.write_bytes(data[: 1 << 22])
     return name, target
+
+
+def _is_text(path: Path) -> bool:
+    return b"\0" not in path.read_bytes()
 
 
 def _near(name: str, seeds: dict[str, Path]) -> list[str]:

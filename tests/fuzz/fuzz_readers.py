@@ -22,6 +22,8 @@ def read(path: Path) -> None:
     """Read everything in a file, and check that it hangs together."""
     if path.suffix == ".toml":
         check_mesh(read_case(path).mesh)
+    elif path.suffix == ".deck":
+        check_deck(fc.read_deck(path))
     elif path.suffix == ".vtkhdf":
         read_results(path)
     else:
@@ -31,6 +33,15 @@ def read(path: Path) -> None:
                 times, values = fc.read_med_field(path, name)
                 assert values.ndim == 3
                 assert len(times) == len(values)
+
+
+def check_deck(deck: fc.Deck) -> None:
+    """Check that a deck is a model with steps."""
+    check_mesh(deck.model.mesh)
+    assert len(deck.ramp)
+    assert isinstance(deck.title, str)
+    assert all(isinstance(note, str) for note in deck.notes)
+    deck.model.describe()
 
 
 def read_results(path: Path) -> None:

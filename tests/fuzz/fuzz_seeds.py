@@ -62,6 +62,83 @@ MESHIO = {
 }
 
 
+# Two cubes, one pressed and dragged over the other, with most of what decks may hold.
+DECK = """*Heading
+ two cubes
+*Node
+1, 0., 0., 0.
+2, 1., 0., 0.
+3, 1., 1., 0.
+4, 0., 1., 0.
+5, 0., 0., 1.
+6, 1., 0., 1.
+7, 1., 1., 1.
+8, 0., 1., 1.
+11, 0., 0., 1.
+12, 1., 0., 1.
+13, 1., 1., 1.
+14, 0., 1., 1.
+15, 0., 0., 2.
+16, 1., 0., 2.
+17, 1., 1., 2.
+18, 0., 1., 2.
+*Element, type=C3D8, elset=low
+1, 1, 2, 3, 4, 5, 6, 7, 8
+*Element, type=C3D8, elset=up
+2, 11, 12, 13, 14,
+ 15, 16, 17, 18
+*Nset, nset=bottom, generate
+1, 4, 1
+*Nset, nset=top
+15, 16, 17, 18
+*Elset, elset=both
+low, up
+*Surface, name=sm, type=ELEMENT
+low, S2
+*Surface, name=ss
+up, S1
+*Surface, name=roof
+up, S2
+*Material, name=steel
+*Elastic
+200000., 0.3
+*Density
+7.8E-9
+*Expansion
+1.2D-5
+*Solid Section, elset=both, material=steel
+*Surface Interaction, name=si
+*Friction
+0.2
+*Contact Pair, interaction=si, type=SURFACE TO SURFACE
+ss, sm
+*Amplitude, name=up
+0., 0., 1., 1., 2., 0.5
+*Equation
+2
+15, 1, 1., 16, 1, -1.
+*Boundary
+bottom, 1, 3
+top, 1, 2
+*Step, nlgeom=NO
+ press
+*Static
+0.5, 1.
+*Dsload
+roof, P, 100.
+*Node Print, nset=top
+U
+*End Step
+*Step
+*Static
+*Boundary, amplitude=up
+top, 1, 1, 0.001
+*Cload
+17, 3, -2.
+*End Step
+"""
+
+
 def small_mesh() -> fc.Mesh:
     """Two blocks of unlike elements, with groups of solids, facets and points."""
     points = [(x, y) for y in (0.0, 1.0, 2.0) for x in (0.0, 1.0, 2.0)]
@@ -111,6 +188,8 @@ def make_seeds(folder: Path) -> dict[str, Path]:
         for step in steps:
             out.write(step)
     seeds |= {f"{path.stem}.toml": _case(path, folder) for path in sorted((DATA / "cases").glob("*.toml"))}
+    seeds["cubes.deck"] = folder / "cubes.deck"
+    seeds["cubes.deck"].write_text(DECK, encoding="utf-8")
     return seeds | _foreign(folder)
 
 

@@ -22,7 +22,7 @@ import fastcontact
 MEMORY = 1 << 30  # bytes more than before a file is read
 SECONDS = int(os.environ.get("FUZZ_SECONDS", 10))  # of CPU time, a file
 # Files that are read in this process; those of other formats are read in one of their own.
-OF_THIS_PROCESS = (".med", ".rmed", ".vtkhdf", ".toml", ".inp")
+OF_THIS_PROCESS = (".med", ".rmed", ".vtkhdf", ".toml", ".deck")
 _OPENED = 0x20 | 0x2 | 0x100 | 0x200  # IN_OPEN, IN_MODIFY, IN_CREATE, IN_DELETE
 
 

@@ -15,6 +15,7 @@ MOST_FILES = 200
 LONGEST_LINE = 1 << 16
 _TOO_LONG = f"the line has more than {LONGEST_LINE} characters: end it where its entries end"
 LONGEST_QUOTED = 80
+LARGEST_WHOLE = 1 << 53  # beyond, floating-point numbers leave some out
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +58,7 @@ class Row:
     def whole(self, index: int, default: int | None = None) -> int:
         """Return an entry as a whole number; errors as for `number`."""
         value = self.number(index, default)
-        if value != int(value):
+        if value != int(value) or abs(value) > LARGEST_WHOLE:
             raise self.place.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is no whole number")
         return int(value)
 

@@ -407,7 +407,7 @@ def _law(content: Content, material: Material, axes: Any) -> Any:
 
 def _parts(step: Step) -> list[float]:
     """Return the ends of equal increments inside of a step, of its length."""
-    count = min(MOST_PARTS, max(1, round(step.period / min(step.increment, step.period))))
+    count = max(1, round(min(MOST_PARTS, step.period / min(step.increment, step.period))))
     return [k / count for k in range(1, count)]
 
 

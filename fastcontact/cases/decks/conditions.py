@@ -112,13 +112,14 @@ class Conditions:
             named = NAMED.get(row.text(1).upper())
             if row.text(1).upper() in ("XASYMM", "YASYMM", "ZASYMM"):
                 raise row.place.refuse(f"{row.text(1)} is not supported: give the components")
-            first = 0 if named else row.whole(1)
-            components = named or tuple(range(first, row.whole(2, first) + 1))
+            first = 1 if named else row.whole(1)
+            last = first if named else row.whole(2, first)
             value = 0.0 if named else row.number(3, 0.0)
-            if not components or not 1 <= components[0] <= components[-1] <= 6:
+            if not 1 <= first <= last <= 6:
                 raise row.place.refuse(f"components {row.text(1)} to {row.text(2)} are none of 1 to 6")
             if before and value:
                 raise row.place.refuse("a displacement other than zero belongs into a step")
+            components = named or tuple(range(first, last + 1))
             for point in points:
                 for component in components:
                     self._support(given, row, point, component, value)

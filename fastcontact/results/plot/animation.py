@@ -16,7 +16,7 @@ from fastcontact.mesh.files.paths import checked_target, replacing
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes
 from fastcontact.results.plot.fields import field_of
-from fastcontact.results.plot.shape import deformed_shape
+from fastcontact.results.plot.shape import deformed_shape, scaled
 from fastcontact.results.step import StepResult
 
 Array = NDArray[np.float64]
@@ -120,7 +120,7 @@ def _over_all(
     for step in steps:
         smallest, largest = field_of(mesh, step, field).range
         colours = min(colours[0], smallest), max(colours[1], largest)
-        place = mesh.points + scale * step.displacement
+        place = scaled(mesh.points, scale, step.displacement)
         low, high = np.minimum(low, place.min(axis=0)), np.maximum(high, place.max(axis=0))
     if mirrored and mesh.dim == 2:
         low[0], high[0] = min(low[0], -high[0]), max(high[0], -low[0])

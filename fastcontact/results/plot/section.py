@@ -16,6 +16,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import UNKNOWN, Units, labelled, new_axes, part_shown, placed, valued
 from fastcontact.results.plot.fields import Field, field_of
 from fastcontact.results.plot.hiding import across
+from fastcontact.results.plot.shape import scaled
 from fastcontact.results.plot.solid import MOST_EDGES
 from fastcontact.results.step import StepResult
 
@@ -71,7 +72,7 @@ def section(
     shown = field_of(mesh, step, field)
     triangles, lines = _touching(shown, step, at, direction)
     basis, labels = _plane_axes(direction)
-    place = triangles[..., :3] + scale * triangles[..., 3:6]
+    place = scaled(triangles[..., :3], scale, triangles[..., 3:6])
     flat, values = place @ basis.T - (0.0 if labels else at @ basis.T), triangles[..., 6]
     axes = new_axes(ax, (6.4, 5.6))
     drawn = _fill(axes, flat, values, shown)

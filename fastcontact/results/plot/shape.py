@@ -20,6 +20,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
+LARGEST = 1e30  # of coordinates that can be drawn: the libraries multiply them
+
+
+def scaled(points: Array, scale: float, displacement: Array) -> Array:
+    """Return displaced points (n, dim) [length]; FastcontactError if `scale` moves them out of what can be drawn."""
+    with np.errstate(all="ignore"):
+        place = points + scale * displacement
+        drawn = np.isfinite(scale) and (np.abs(place) < LARGEST).all()
+    if not drawn:
+        raise FastcontactError(f"scale = {scale:g} must be a finite number, and not so large that nothing can be drawn")
+    return place
 
 
 @typed(FastcontactError)
@@ -54,7 +65,7 @@ def deformed_shape(
     mirrored : bool
         In 2D, draw the other half beyond x = 0, too: the full section of an axisymmetric body.
     zoom : float, optional
-        In 2D, half the width of the part to draw, around the marked place [length].
+        In 2D, half the width of the part to draw, around the marked place [length]; FastcontactError in 3D.
     limits : (float, float), optional
         Values of the first and the last colour, in the unit of the field.
     title, units
@@ -63,13 +74,11 @@ def deformed_shape(
         In 3D, height of the eye over the x-y plane and its direction around z [degrees].
     ax : matplotlib Axes, optional
         In 3D with ``projection="3d"``.
-
-    Raises FastcontactError if there is no such field, or `zoom` is not positive or asked for in 3D.
     """
     if zoom is not None and (mesh.dim == 3 or zoom <= 0.0):
         raise FastcontactError(f"zoom = {zoom:g}: in the plane half a width > 0 can be drawn; in 3D draw a section")
     shown = field_of(mesh, step, field)
-    place = shown.mesh.points + scale * step.displacement[shown.node]
+    place = scaled(shown.mesh.points, scale, step.displacement[shown.node])
     heading = title or f"Deformed shape (displacements x {scale:g}), load factor {step.load_factor:g}"
     if mesh.dim == 3:
         axes = new_axes(ax, (6.4, 6.2), "3d")

@@ -7,6 +7,7 @@ import sys
 from typing import Any
 
 from fastcontact.errors import FastcontactError
+from fastcontact.results.plot.shape import scaled
 from fastcontact.results.step import StepResult
 
 
@@ -36,7 +37,7 @@ def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "",
     if screenshot is None and not _has_display():
         raise FastcontactError("there is no display to open a window on: write a picture instead, with --png FILE")
     grid = results.to_pyvista(step)
-    grid.points = grid.points + scale * grid.point_data["displacement"]
+    grid.points = scaled(grid.points, scale, grid.point_data["displacement"])
     plotter: Any = pyvista.Plotter(off_screen=screenshot is not None)
     plotter.add_mesh(
         grid, scalars="von_mises", show_edges=grid.n_cells <= 5000, line_width=0.3, cmap="viridis",

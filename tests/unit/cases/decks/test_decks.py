@@ -324,3 +324,32 @@ def test_a_deck_with_a_line_left_out_cut_or_twice_is_read_or_refused_in_one_line
                 texts.append(str(error))
     assert len(texts) > len(lines)
     assert not [text for text in texts if "\n" in text]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("bottom, 3\n", "bottom, 3, 2000000000\n", r"\*BOUNDARY: components 3 to 2000000000 are none of 1 to 6"),
+        ("bottom, 3\n", "bottom, 3, 9223372036854775808\n", "'9223372036854775808' is no whole number"),
+        ("bottom, 3\n", "bottom, 1e308\n", "'1e308' is no whole number"),
+        ("generate\n1, 4\n", "generate\n1, 9223372036854775808\n", "'9223372036854775808' is no whole number"),
+    ],
+)
+def test_numbers_without_measure_take_neither_time_nor_memory(tmp_path, old, new, said):
+    assert old in WHOLE
+    with pytest.raises(fc.CaseError, match=said):
+        deck_of(tmp_path, WHOLE.replace(old, new))
+
+
+def test_a_range_to_a_large_number_takes_what_is_there(tmp_path):
+    deck = deck_of(
+        tmp_path, WHOLE.replace("generate\n1, 4\n", "generate\n1, 4\n*Nset, nset=all, generate\n1, 900000000000000\n")
+    )
+    assert len(deck.points_of("all")) == 16
+
+
+@pytest.mark.parametrize("increment", ["1e-320, 1.", "1e-9, 1.", "1., 1e-320", "1e-300, 1e308"])
+def test_increments_of_any_size(tmp_path, increment):
+    """With friction every increment is a load step, up to a number that ends."""
+    text = WHOLE.replace("name=si\n", "name=si\n*Friction\n0.2\n").replace("*Static\n", f"*Static\n{increment}\n")
+    assert 1 <= len(deck_of(tmp_path, text).ramp) < 2000

@@ -1,0 +1,169 @@
+"""Ctrl-C at any time ends a command with one line; it is neither lost nor told with the program's inside."""
+
+import contextlib
+import ctypes
+import importlib
+import os
+import signal
+import subprocess
+import sys
+import time
+import weakref
+
+import pytest
+
+from fastcontact.cli import main
+from fastcontact.cli._interrupts import interruptible
+from fastcontact.errors import FastcontactError, FileError
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals as POSIX knows them")
+
+
+def interrupted_within(seconds):
+    with pytest.raises(KeyboardInterrupt):
+        time.sleep(seconds)
+
+
+IMPORTED = """
+import sys
+def act(inner):
+    class Importing:
+        def find_spec(self, name, *rest):
+            if name == "no_such_module":
+                inner()
+    sys.meta_path.insert(0, Importing())
+    try:
+        import no_such_module
+    except ImportError:
+        pass
+    finally:
+        del sys.meta_path[0]
+"""
+
+
+def in_an_import(act):
+    exec(IMPORTED, space := {})
+    space["act"](act)
+
+
+def in_a_finaliser(act):
+    class Gone:
+        def __del__(self):
+            act()
+
+    Gone()
+
+
+def in_a_call_back(act):
+    ctypes.CFUNCTYPE(None)(act)()
+
+
+def in_a_weak_reference(act):
+    class Gone:
+        pass
+
+    gone = Gone()
+    reference = weakref.ref(gone, lambda _: act())
+    del gone
+    assert reference() is None
+
+
+@pytest.mark.parametrize("where", [in_an_import, in_a_finaliser, in_a_call_back, in_a_weak_reference])
+def test_an_interruption_that_would_be_lost_comes_later(where, capsys):
+    with interruptible():
+        where(lambda: signal.raise_signal(signal.SIGINT))
+        interrupted_within(2)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert capsys.readouterr().err == ""
+
+
+def act_and_fail():
+    with interruptible():
+        with contextlib.suppress(BaseException):
+            signal.raise_signal(signal.SIGINT)
+        raise FileError("it is damaged")
+
+
+def act_and_tell():
+    with interruptible():
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            raise FastcontactError("stopped") from None
+
+
+def test_another_error_that_is_made_of_it_is_an_interruption():
+    with pytest.raises(KeyboardInterrupt):
+        act_and_fail()
+    with pytest.raises(FastcontactError, match="stopped"):
+        act_and_tell()
+    with pytest.raises(FileError), interruptible():
+        raise FileError("without any")
+
+
+def test_other_errors_that_are_lost_are_told_as_before(monkeypatch):
+    told = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda found: told.append(found.exc_type))
+    with interruptible():
+        in_a_finaliser(lambda: 1 / 0)
+    assert told == [ZeroDivisionError]
+
+
+def test_elsewhere_it_comes_at_once():
+    with interruptible(), pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_the_handler_of_another_program_stays():
+    heard = []
+    before = signal.signal(signal.SIGINT, lambda *_: heard.append(1))
+    try:
+        with interruptible():
+            signal.raise_signal(signal.SIGINT)
+        assert heard == [1]
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_while_the_command_line_is_imported(monkeypatch, capsys):
+    class Interrupted:
+        def find_spec(self, name, *_):
+            if name == "fastcontact.cli._main":
+                raise KeyboardInterrupt
+
+    import fastcontact.cli
+
+    importlib.import_module("fastcontact.cli._main")
+    monkeypatch.delitem(sys.modules, "fastcontact.cli._main")
+    monkeypatch.delattr(fastcontact.cli, "_main")
+    monkeypatch.setattr(sys, "meta_path", [Interrupted(), *sys.meta_path])
+    assert main(["env"]) == 130
+    assert capsys.readouterr().err == "interrupted\n"
+
+
+COMMANDS = {
+    "run": ["run", "forma04c", "-q", "-o", "out.vtkhdf"],
+    "sweep": ["sweep", "forma04c", "--set", "approach=1:4:200", "--workers", "2", "-q"],
+    "converge": ["converge", "forma04c", "--levels", "4", "--workers", "2", "-q"],
+}
+
+
+@pytest.mark.parametrize("seconds", [0.4, 1.0, 2.0, pytest.param(4.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("command", COMMANDS)
+def test_no_traceback_is_printed(command, seconds, tmp_path):
+    """A terminal sends the signal to all processes of a command."""
+    # Kernels are compiled anew, so that compiling is interrupted, too.
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "fastcontact", *COMMANDS[command]], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True, cwd=tmp_path, env=environment,
+    )  # fmt: skip
+    time.sleep(seconds)
+    os.killpg(process.pid, signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode in (130, 1, -signal.SIGINT), said
+    assert "Traceback" not in said
+    assert "Exception ignored" not in said
+    assert said.startswith(
+        ("interrupted\n", "error: stopped; with --store DIR the same command would go on where it stopped")
+    )
