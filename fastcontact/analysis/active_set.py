@@ -10,9 +10,9 @@ therefore goes on changing only the wrong constraint with the lowest number, whi
 (Murty, 1974).
 
 Solvers that iterate need not finish for a set that changes anyway: they are watched, and left as soon as signs beyond
-the error that their residual leaves ask for another set. This ends too: a set that is left early is never left early
-again, and after EARLY sets altogether nothing is left early any more; there are finitely many sets, and what follows
-is the method above from some start. A state counts as settled only from a finished solution.
+the error that their residual leaves ask for another set. This ends too: no set is left early to change back what an earlier
+one was left for, since signs that contradict each other so are those of errors; every constraint changes early at most
+once, and what follows is the method above from some start. A state counts as settled only from a finished solution.
 """
 
 from __future__ import annotations
@@ -26,8 +26,6 @@ from fastcontact.linear.protocol import Loaded
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-# Unfinished solutions that may be left in all.
-EARLY = 40
 
 
 def solve(
@@ -54,12 +52,11 @@ def solve(
     signs = _Signs(constraints, accuracy)
     active = (active & signs.usable) | signs.equations
     seen: set[bytes] = set()
-    left: set[bytes] = set()
+    changed = np.zeros(len(active), bool)  # early
     one_by_one = False
     iteration = 1
     while True:
-        may_leave = constraints.normal_compliance is None and len(left) < EARLY and active.tobytes() not in left
-        watch = _Watch(signs, active) if may_leave else None
+        watch = _Watch(signs, active, changed) if constraints.normal_compliance is None else None
         rows, compliance = np.flatnonzero(active), constraints.normal_compliance
         C = None if compliance is None else compliance.block(rows)
         nodes = None if constraints.nodes is None else constraints.nodes[rows]
@@ -68,7 +65,7 @@ def solve(
         )
         guess = u
         if watch is not None and watch.wanted is not None:
-            left.add(active.tobytes())
+            changed |= active != watch.wanted
             active = watch.wanted
             continue
         found = signs.of(u, forces, active, iteration)
@@ -123,12 +120,16 @@ class _Watch:
         The set that the last solution looked at asks for; None where that is the present one.
     """
 
-    def __init__(self, signs: _Signs, active: Mask) -> None:
-        self._signs, self._active = signs, active
+    def __init__(self, signs: _Signs, active: Mask, changed: Mask) -> None:
+        self._signs, self._active, self._changed = signs, active, changed
         self.wanted: Mask | None = None
 
     def __call__(self, u: Array, forces: Array, error: float) -> bool:
-        """Return whether the signs ask for another set; errors of relative size `error` do not count."""
+        """Return whether the signs ask for another set; errors of relative size `error` do not count.
+
+        A set that changes back constraints that were `changed` before does not count either.
+        """
         found = self._signs.of(u, forces, self._active, 0, error)
-        self.wanted = None if found.settled else found.wanted
+        again = (found.wanted != self._active) & self._changed
+        self.wanted = None if found.settled or again.any() else found.wanted
         return self.wanted is not None

@@ -149,7 +149,7 @@ def _settle(step: Step, iterate: Iterate, extrapolation: Extrapolation, expected
             return replace(settled, scatter=scatter)
         mixed = mixing.next(moved.before, part, solution, tolerances.inexact)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
-        tolerances.tighten(moved.relative)
+        tolerances.tighten(moved.relative, getattr(solution, "residual", 0.0))
         if plan.extrapolate and update == PATIENT_UPDATES:
             # Nodes that flip between facets may do so for ever from one start and not from another.
             iterate.begin_again(step.state)

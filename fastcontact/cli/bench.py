@@ -52,22 +52,39 @@ def run(options: argparse.Namespace) -> int:
     subjects, timing, table = map(suite, ("subjects", "timing", "table"))
     before = _stored(options.compare) if options.compare else None
     results: dict[str, Any] = {}
+    tables: dict[str, Any] = {}
     show = sys.stderr.isatty() and not options.quiet
     for name in options.names or subjects.names():
         subject = subjects.load(name)
+        if hasattr(subject, "entries"):  # a table of its own
+            tables[name] = _table(subject, name, options, show)
+            continue
         sizes = subject.SIZES[:1] if options.smallest else options.sizes or subject.SIZES
         for size in sizes:
             if show:
                 say(f"{name} {size} ...", error=True)
             found = timing.measured(subject, size, 1 if options.smallest else 3)
             results.setdefault(name, []).append(found)
-    if not options.quiet:
+    if results and not options.quiet:
         say("\n".join(table.lines(results, before)))
     if options.json:
-        write_json(options.json, {"environment": table.environment(), "results": results}, indent=1)
+        write_json(options.json, {"environment": table.environment(), "results": results, "tables": tables}, indent=1)
     if options.png:
         draw(options.png, results)
     return 0
+
+
+def _table(subject: Any, name: str, options: argparse.Namespace, show: bool) -> list[dict[str, Any]]:
+    """Return the rows of a subject that has a table of its own, and print them."""
+
+    def tell(text: str) -> None:
+        if show:
+            say(f"{name} {text} ...", error=True)
+
+    found: list[dict[str, Any]] = subject.entries(options.smallest, tell)
+    if not options.quiet:
+        say("\n".join(subject.lines(found)))
+    return found
 
 
 def _contact(options: argparse.Namespace) -> int:

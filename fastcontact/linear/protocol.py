@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
+from fastcontact.linear.springs import Springs
+
 Array = NDArray[np.float64]
 # Called with an unfinished solution (u, multiplier, relative residual); where it returns True, the solver stops there.
 Monitor = Callable[[Array, Array, float], bool]
@@ -88,14 +90,14 @@ class FrictionTerms:
     ----------
     rows : csr_array (m, n)
         Rows that multipliers act through in place of those of the equations [-].
-    springs : csr_array (n, n), optional
-        S, symmetric and positive semidefinite [force / length].
+    springs : Springs, optional
+        S is their matrix [force / length].
     forces : ndarray (n,), optional
         Further forces [force].
     """
 
     rows: csr_array
-    springs: csr_array | None = None
+    springs: Springs | None = None
     forces: Array | None = None
 
 

@@ -7,6 +7,7 @@ from stepping import Stepping
 
 import fastcontact as fc
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.cli.bench import suite
 from fastcontact.contact.configuration import Configuration
 
 
@@ -119,3 +120,35 @@ def test_left_solutions_and_extrapolated_starts_end_where_the_direct_solver_does
         < 1e-6 * np.abs(direct.contact["c"].pressure).max()
     )
     assert np.array_equal(amg.contact["c"].active, direct.contact["c"].active)
+
+
+@pytest.mark.filterwarnings("ignore:Young's moduli")
+@pytest.mark.parametrize(
+    ("given", "most"),
+    [
+        ({}, 3.5),
+        ({"multipliers": "standard"}, 5.5),
+        ({"ratio": 1e4}, 3.5),
+        ({"ratio": 1e8}, 3.5),
+        ({"nu": 0.45}, 3.5),
+        ({"nu": 0.49}, 3.5),
+        ({"element": "tet4"}, 3.5),
+        ({"element": "tet10", "divisions": 6}, 4.5),
+        ({"curvature": 0.02}, 5.5),
+        ({"stretch": 20.0}, 3.5),
+    ],
+)
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_iterations_under_whole_interfaces_are_a_few_times_those_without_contact(given, most, friction):
+    robustness = suite("subjects").load("robustness")
+    found = robustness.figures(robustness.blocks(**{"divisions": 12, **given, "friction": friction}))
+    assert not found["gave_up"]
+    assert found["sliding"] > 0 or not friction
+    assert found["step"]["iterations"] <= most * found["linear"]["iterations"]
+    assert found["residual"] < 1e-6
+
+
+def test_signs_of_loose_solutions_do_not_change_the_active_set_to_and_fro():
+    robustness = suite("subjects").load("robustness")
+    found = robustness.figures(robustness.blocks(12, nu=0.499))
+    assert found["step"]["iterations"] <= 4 * found["linear"]["iterations"]

@@ -20,12 +20,16 @@ from fastcontact.analysis.solution import Accuracy
 from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import FrictionTerms, LoadedNonsymmetric
+from fastcontact.linear.springs import Springs
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 # The stiffest spring across a slip, in units of what holds the constraint itself: a slip that hardly moves would ask for
 # any. The solution does not depend on it, for there nothing slips across.
-STIFFEST = 2.0
+STIFFEST = 100.0
+# Constraints are taken for so much softer than the unknowns that they act on are by themselves, for neighbours give way, too.
+# Where materials are nearly incompressible, stiffer ones kept Newton's method from settling.
+SOFTER = 0.2
 # The residual of the friction law that is small enough, in units of that of the linear solutions; and that which will do
 # after PATIENCE steps: contact forces that are a small part of all forces are no more accurate.
 ENOUGH, ACCEPTABLE, PATIENCE = 10.0, 300.0, 12
@@ -112,7 +116,7 @@ class Eliminated:
         self._rows = (rows[0], *slipping)
         self._free = np.vstack([free[0], np.where(still, 0.0, free[1:])])
         self._slips = ~still
-        self._unit = 1.0 / np.sqrt(np.where(own[0, 0] > 0.0, own[0, 0], 1.0))
+        self._unit = np.sqrt(SOFTER / np.where(own[0, 0] > 0.0, own[0, 0], 1.0))
         equality = constraints.equality
         self.law = Law(np.where(usable, mu, 0.0), None if equality is None else equality & usable)
         self.u = u
@@ -173,7 +177,9 @@ class Eliminated:
         across = np.stack([-d[1], d[0]])
         rows = sum(diags_array(part) @ T[at] for part, T in zip(across, self._rows[1:], strict=True))
         spring = np.minimum(turning / np.maximum(1.0 - turning, 1e-300), STIFFEST) * self._unit[at] ** 2
-        return _Sliding(at, pull, _Springs(across, csr_array(rows), spring, (across * self._free[1:, at]).sum(axis=0)))
+        return _Sliding(
+            at, pull, _Across(across, Springs(csr_array(rows), spring), (across * self._free[1:, at]).sum(axis=0))
+        )
 
     def _drag(self, B: csr_array, shut: NDArray[np.intp], sliding: _Sliding) -> FrictionTerms:
         """Return what sliding adds to equations B whose first rows are the gaps of `shut`."""
@@ -185,18 +191,17 @@ class Eliminated:
         through = csr_array(vstack([through, B[len(shut) :]], format="csr"))
         if sliding.springs is None:
             return FrictionTerms(through)
-        springs = sliding.springs
-        weighted = springs.rows.T @ diags_array(springs.stiffness)
-        return FrictionTerms(through, csr_array(weighted @ springs.rows), -(weighted @ springs.free))
+        across = sliding.springs
+        pushed = across.springs.rows.T @ (across.springs.stiffness * across.free)
+        return FrictionTerms(through, across.springs, -pushed)
 
 
 @dataclass(frozen=True, eq=False)
-class _Springs:
-    """Springs across slips: along (k, q), with rows (q, n), stiffness (q,), and slips (q,) across at u = 0."""
+class _Across:
+    """Springs across slips: along (k, q), and slips (q,) across at u = 0."""
 
     along: Array
-    rows: csr_array
-    stiffness: Array
+    springs: Springs
     free: Array
 
 
@@ -206,15 +211,15 @@ class _Sliding:
 
     at: NDArray[np.intp]
     pull: Array
-    springs: _Springs | None = None
+    springs: _Across | None = None
 
     def force(self, normal: Array, u: Array) -> Array:
         """Return the tangential forces (k, q)."""
         dragged = self.pull * normal
         if self.springs is None:
             return dragged
-        springs = self.springs
-        return np.asarray(dragged - springs.along * springs.stiffness * (springs.rows @ u + springs.free))
+        across, springs = self.springs, self.springs.springs
+        return np.asarray(dragged - across.along * springs.stiffness * (springs.rows @ u + across.free))
 
 
 def _own(rows: tuple[csr_array, ...], yielding: Array) -> Array:

@@ -3,6 +3,8 @@
 The prolongators stay those without equations, except for the rows of the eliminated unknowns, the pivots. Only Galerkin
 products near the pivots change. The changes are stored beside the matrices of the levels, which stay as they are. On the
 finest level only diagonal blocks are formed: products with the matrix move displacements and forces at the pivots instead.
+Springs between unknowns, such as those across sliding contacts, are added on all levels: beside smooth displacements, which
+coarser levels correct, they are far stiffer than the bodies.
 """
 
 from __future__ import annotations
@@ -12,18 +14,18 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, csc_array, csr_array
+from scipy.sparse import csc_array, csr_array, diags_array
 
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import constrained_kernels, cycle_kernels
 from fastcontact.linear.multigrid.hierarchy import Hierarchy, Level
-from fastcontact.linear.multigrid.matrix import BlockMatrix, diagonal_blocks
+from fastcontact.linear.multigrid.local_change import LocalChange, block_rows, merged, places, renumbered
+from fastcontact.linear.multigrid.matrix import BlockMatrix
+from fastcontact.linear.springs import Springs
 
 Array = NDArray[np.float64]
 Values = NDArray[Any]
 Nodes = NDArray[np.intp]
-# Sum of the weights with which a pivot may follow others before the spectrum of the finest level is estimated again.
-WEIGHT = 4.0
 
 
 class ConstrainedHierarchy:
@@ -34,58 +36,69 @@ class ConstrainedHierarchy:
     hierarchy : Hierarchy
     A : BlockMatrix
         Its finest matrix, all digits.
+
+    Attributes
+    ----------
+    stiffening : float
+        By how much equations stiffen the node that they stiffen most, beside its own stiffness: large where pivots belong to
+        a much stiffer body than the unknowns that they follow, which the prolongators of K do not suit.
     """
 
     def __init__(self, hierarchy: Hierarchy, A: BlockMatrix) -> None:
         self.hierarchy, self.A = hierarchy, A
+        self.stiffening = 0.0
         self._kept: list[tuple[Level, Nodes, Values]] = []
 
-    def constrain(self, elimination: Elimination | None) -> None:
-        """Make the hierarchy that of the matrix under the equations eliminated; None: without equations."""
+    def constrain(self, elimination: Elimination | None, springs: Springs | None = None) -> None:
+        """Make the hierarchy that of the matrix under the equations eliminated; None: without equations.
+
+        `springs` are added to the matrix of the hierarchy; only with equations.
+        """
         self._undo()
         if elimination is None or not len(elimination.pivots):
             self.hierarchy.coarse.set(None)
             self.hierarchy.set_bounds()
             return
-        self._change_levels(elimination)
-        # On coarser levels equations often raise the spectrum, on the finest only where pivots follow several times over.
-        anew = list(range(1, len(self.hierarchy.levels) - 1))
-        W = elimination.weights
-        sums = np.bincount(np.repeat(np.arange(len(elimination.pivots)), np.diff(W.indptr)), np.abs(W.data))
-        if sums.max(initial=0.0) > WEIGHT and len(self.hierarchy.levels) > 1:
-            anew.insert(0, 0)
-        self.hierarchy.set_bounds(anew)
+        added = None
+        if springs is not None:
+            added = SpringChange(springs.under(elimination.pivots, elimination.weights), len(self.A.rows))
+        self._change_levels(elimination, added)
+        # Equations raise the spectrum of coarser levels, and that of the finest where pivots follow soft bodies or several
+        # times over.
+        self.hierarchy.set_bounds(range(len(self.hierarchy.levels) - 1))
 
-    def _change_levels(self, elimination: Elimination) -> None:
+    def _change_levels(self, elimination: Elimination, added: SpringChange | None) -> None:
         top = self.hierarchy.levels[0]
         kind = top.b.dtype
         rounded = elimination.weights.astype(kind)
         top.eliminated = replace(elimination, weights=rounded, force_weights=rounded)
         first = CoarseChange(self.A, elimination)
         if top.P is None:
-            self.hierarchy.coarse.set(first.on_finest())
+            self.hierarchy.coarse.set(first.on_finest() + (added.on_finest() if added else 0.0))
             return
-        self._change_top_diagonal(elimination)
-        nodes, change = first.on_coarse(top.P)
+        diagonal, change = self._top_diagonal(elimination), first.on_coarse(top.P)
+        self.stiffening = self._stiffening(diagonal)
+        if added:
+            top.springs = added.springs.scaled(1.0, kind)
+            diagonal, change = merged(diagonal, added.diagonal()), merged(change, added.on_coarse(top.P))
+        self._change_diagonal(top, diagonal)
         for level in self.hierarchy.levels[1:]:
             if level.P is None:
-                self.hierarchy.coarse.set(_scattered(nodes, change, level.n))
+                self.hierarchy.coarse.set(change.scattered(level.n))
                 return
-            size = len(level.A.rows)
-            self._change_diagonal(level, nodes, diagonal_blocks(change.indptr, change.indices, change.data, size))
-            columns = nodes[change.indices].astype(np.int32)
-            level.change = nodes, change.indptr, columns, change.data.astype(kind).ravel()
-            nodes, change = _coarser(nodes, change, level.P)
+            self._change_diagonal(level, change)
+            level.change = change.rows(kind)
+            change = change.coarser(level.P)
 
     def _undo(self) -> None:
         for level, nodes, old in self._kept:
             level.inverse.reshape(-1, old.shape[1])[nodes] = old
         self._kept.clear()
         for level in self.hierarchy.levels:
-            level.eliminated = level.change = None
+            level.eliminated = level.change = level.springs = None
 
-    def _change_top_diagonal(self, elimination: Elimination) -> None:
-        """Change the diagonal blocks of the finest level to those under the equations."""
+    def _top_diagonal(self, elimination: Elimination) -> LocalChange:
+        """Return by how much the diagonal blocks of the finest level change under the equations."""
         A, W, pivots = self.A, elimination.weights, elimination.pivots
         size, n_nodes = len(A.rows), len(A.indptr) - 1
         nodes = np.unique(np.concatenate([pivots, W.indices]) // size)
@@ -95,17 +108,67 @@ class ConstrainedHierarchy:
         constrained_kernels.diagonal_change(
             pivots, number, W.indptr, W.indices, W.data, A.indptr, A.indices, A.exact, place, size, change
         )
-        self._change_diagonal(self.hierarchy.levels[0], nodes, change)
+        return LocalChange.of_diagonal(nodes, change.reshape(-1, size, size))
 
-    def _change_diagonal(self, level: Level, nodes: Nodes, change: Array) -> None:
-        """Add `change` (k * size * size,) to the diagonal blocks of k `nodes`, and remember what the inverses were."""
-        size = len(level.A.rows)
-        blocks = level.diagonal.reshape(-1, size**2)[nodes].astype(float).ravel() + change
+    def _stiffening(self, change: LocalChange) -> float:
+        size = change.size
+        of_all = self.hierarchy.levels[0].diagonal.reshape(-1, size * size)[change.nodes]
+        own, more = (np.einsum("kii->k", part.reshape(-1, size, size)) for part in (of_all, change.diagonal()))
+        return float(np.divide(more, own, out=np.zeros(len(more)), where=own > 0.0).max(initial=0.0))
+
+    def _change_diagonal(self, level: Level, change: LocalChange) -> None:
+        """Add the diagonal blocks of a change to those of a level, and remember what the inverses were."""
+        size, nodes = len(level.A.rows), change.nodes
+        blocks = level.diagonal.reshape(-1, size**2)[nodes].astype(float).ravel() + change.diagonal()
         inverse = np.empty(blocks.size, level.inverse.dtype)
         cycle_kernels.invert_blocks(blocks, size, inverse)
         every = level.inverse.reshape(-1, size**2)
         self._kept.append((level, nodes, every[nodes].copy()))
         every[nodes] = inverse.reshape(-1, size**2)
+
+
+class SpringChange:
+    """What springs add to the finest level and to the next coarser one.
+
+    Parameters
+    ----------
+    springs : Springs
+        Under the equations.
+    size : int
+        Unknowns of a node.
+    """
+
+    def __init__(self, springs: Springs, size: int) -> None:
+        self.springs, self._size = springs, size
+        self._nodes = np.unique(springs.rows.indices // size)
+        self._rows = renumbered(springs.rows, self._nodes, size)
+
+    def on_finest(self) -> csc_array:
+        """Return their matrix on all unknowns."""
+        return self._matrix(self._nodes, self._rows).scattered(self.springs.rows.shape[1])
+
+    def on_coarse(self, P: BlockMatrix) -> LocalChange:
+        """Return their Galerkin product on the next coarser level."""
+        size = len(P.cols)
+        rows = csr_array(self._rows @ block_rows(P, self._nodes, (int(P.indices.max()) + 1) * size).tocsr())
+        nodes = np.unique(rows.indices // size)
+        return self._matrix(nodes, renumbered(rows, nodes, size), size)
+
+    def _matrix(self, nodes: Nodes, rows: csr_array, size: int | None = None) -> LocalChange:
+        weighted = csr_array(diags_array(self.springs.stiffness) @ rows)
+        return LocalChange.of(nodes, csr_array(rows.T @ weighted), size or self._size)
+
+    def diagonal(self) -> LocalChange:
+        """Return their diagonal blocks."""
+        R, size = self._rows, self._size
+        spring = np.repeat(np.arange(R.shape[0]), np.diff(R.indptr))
+        pairs, which = np.unique(spring * len(self._nodes) + R.indices // size, return_inverse=True)
+        parts = np.zeros((len(pairs), size))
+        parts[which, R.indices % size] = R.data
+        spring, node = np.divmod(pairs, len(self._nodes))
+        blocks = np.zeros((len(self._nodes), size, size))
+        np.add.at(blocks, node, self.springs.stiffness[spring, None, None] * parts[:, :, None] * parts[:, None, :])
+        return LocalChange.of_diagonal(self._nodes, blocks)
 
 
 class CoarseChange:
@@ -128,60 +191,20 @@ class CoarseChange:
         K = csr_array(block_rows(A, own, shape[1]).tocsr()[place * size + pivots % size])
         K.eliminate_zeros()
         self._nodes = np.unique(np.concatenate([D.indices, K.indices]) // size)
-        self._D, self._K = (_renumbered(M, self._nodes, size) for M in (D, K))
-        self._among = self._K[:, _places(pivots, self._nodes, size)]
+        self._D, self._K = (renumbered(M, self._nodes, size) for M in (D, K))
+        self._among = self._K[:, places(pivots, self._nodes, size)]
         self._n = shape[1]
 
     def on_finest(self) -> csc_array:
         """Return ``T.T A T - A``, on all unknowns."""
         half = self._D.T @ (self._K + 0.5 * (self._among @ self._D))
-        return _scattered(self._nodes, bsr_array((half + half.T).tobsr(2 * (self._size,))), self._n)
+        return LocalChange.of(self._nodes, half + half.T, self._size).scattered(self._n)
 
-    def on_coarse(self, P: BlockMatrix) -> tuple[Nodes, bsr_array]:
-        """Return the nodes of the next coarser level whose rows change, and the change on them."""
+    def on_coarse(self, P: BlockMatrix) -> LocalChange:
+        """Return the change on the next coarser level."""
         size, rows = len(P.cols), block_rows(P, self._nodes, (int(P.indices.max()) + 1) * len(P.cols)).tocsr()
         E = csr_array(self._D @ rows)
         H = csr_array(self._K @ rows + 0.5 * (self._among @ E))
         nodes = np.unique(np.concatenate([E.indices, H.indices]) // size)
-        half = _renumbered(E, nodes, size).T @ _renumbered(H, nodes, size)
-        change = bsr_array((half + half.T).tobsr((size, size)))
-        change.sort_indices()
-        return nodes, change
-
-
-def _places(columns: Any, nodes: Nodes, size: int) -> Any:
-    """Return the numbers of `columns` where only those of `nodes`, ascending, are counted."""
-    return np.searchsorted(nodes, columns // size) * size + columns % size
-
-
-def _renumbered(M: csr_array, nodes: Nodes, size: int) -> csr_array:
-    """Return a matrix with columns of `nodes` alone."""
-    return csr_array((M.data, _places(M.indices, nodes, size), M.indptr), shape=(M.shape[0], len(nodes) * size))
-
-
-def block_rows(A: BlockMatrix, nodes: Nodes, n: int) -> bsr_array:
-    """Return the block rows `nodes` of a matrix with n columns, in double precision."""
-    rows, cols = len(A.rows), len(A.cols)
-    count = np.diff(A.indptr)[nodes]
-    indptr = np.concatenate([[0], np.cumsum(count)])
-    blocks = np.repeat(A.indptr[nodes] - indptr[:-1], count) + np.arange(indptr[-1])
-    data = sum(part.reshape(-1, rows, cols)[blocks].astype(float) for part in A.exact)
-    return bsr_array((data, A.indices[blocks], indptr), shape=(len(nodes) * rows, n))
-
-
-def _coarser(nodes: Nodes, change: bsr_array, P: BlockMatrix) -> tuple[Nodes, bsr_array]:
-    """Return the Galerkin product of a change of rows `nodes`, in the same form."""
-    own = block_rows(P, nodes, (int(P.indices.max()) + 1) * len(P.cols))
-    below, columns = np.unique(own.indices, return_inverse=True)
-    own = bsr_array((own.data, columns, own.indptr), shape=(own.shape[0], len(below) * len(P.cols)))
-    product = bsr_array(own.T @ change @ own)
-    product.sort_indices()
-    return below, product
-
-
-def _scattered(nodes: Nodes, change: bsr_array, n: int) -> csc_array:
-    """Return the change on all n unknowns."""
-    size = change.blocksize[0]
-    count = np.zeros(n // size, np.intp)
-    count[nodes] = np.diff(change.indptr)
-    return bsr_array((change.data, nodes[change.indices], np.r_[0, np.cumsum(count)]), shape=(n, n)).tocsc()
+        half = renumbered(E, nodes, size).T @ renumbered(H, nodes, size)
+        return LocalChange.of(nodes, half + half.T, size)

@@ -150,19 +150,26 @@ def solve_dense(L, reciprocal, b, work, x):
 
 
 @kernel
-def subtract_rows(numbers, indptr, indices, data, x, y, size):
-    """Subtract from `y` the product with `x` of a block matrix whose rows are rows `numbers` of y.
+def _subtract_rows(low, high, numbers, indptr, indices, data, x, y, rows):
+    m = len(rows)
+    for i in range(low, high):
+        sums = row_times(indices, data, x, indptr[i], indptr[i + 1], rows, rows)
+        for r in range(m):
+            y[m * numbers[i] + r] -= sums[r]
 
-    Blocks are `size` x `size`; `indices` number the blocks of x.
+
+@parallel_kernel
+def subtract_rows(numbers, indptr, indices, data, x, y, rows):
+    """Subtract from `y` the product with `x` of a matrix of square blocks whose rows are rows `numbers` of y, all different.
+
+    `indices` number the blocks of x; `data` come as a tuple, as in `multiply`.
     """
-    for i in range(numbers.shape[0]):
-        for a in range(size):
-            s = x[0] * 0
-            for k in range(indptr[i], indptr[i + 1]):
-                at, j = (k * size + a) * size, indices[k] * size
-                for b in range(size):
-                    s += data[at + b] * x[j + b]
-            y[numbers[i] * size + a] -= s
+    n = numbers.shape[0]
+    if n <= ALONE:
+        _subtract_rows(0, n, numbers, indptr, indices, data, x, y, rows)
+        return
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        _subtract_rows(c * CHUNK, min(n, (c + 1) * CHUNK), numbers, indptr, indices, data, x, y, rows)
 
 
 @kernel

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.matrix import BlockMatrix
+from fastcontact.linear.springs import Springs
 
 Values = NDArray[Any]
 
@@ -31,8 +32,10 @@ class Level:
     eliminated : Elimination or None
         Equations, on the finest level: weights in the precision of the cycle, the same for forces.
     change : tuple of ndarray, or None
-        What eliminated equations add to the matrix, on coarser levels: the block rows that change (k,), and the change on
-        them as `indptr`, `indices` and `data` of a `BlockMatrix`.
+        What eliminated equations and springs add to the matrix, on coarser levels: the block rows that change (k,), and
+        the change on them as `indptr`, `indices` and `data` of a `BlockMatrix`.
+    springs : Springs or None
+        Springs on the finest level, under the equations.
     b, x, r, d : ndarray (n,)
         Right-hand side, iterate, residual and step of the cycle.
     """
@@ -45,6 +48,7 @@ class Level:
     R: BlockMatrix | None = None
     eliminated: Elimination | None = None
     change: tuple[Values, ...] | None = None
+    springs: Springs | None = None
     b: Values = field(init=False)
     x: Values = field(init=False)
     r: Values = field(init=False)
@@ -75,8 +79,11 @@ class Level:
         self.A.combine(-1.0, x, 1.0, b, r)
         if self.eliminated is not None:
             self.eliminated.move_forces(r)
-        elif self.change is not None:
-            cycle_kernels.subtract_rows(*self.change, x, r, len(self.A.rows))
+        if self.springs is not None:
+            self.springs.subtract_forces(x, r)
+        if self.change is not None:
+            numbers, indptr, indices, data = self.change
+            cycle_kernels.subtract_rows(numbers, indptr, indices, (data,), x, r, self.A.rows)
 
     def correct(self, coarse: Values) -> None:
         """Add the correction of the next coarser level."""

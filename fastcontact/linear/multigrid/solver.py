@@ -11,18 +11,19 @@ import logging
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, csr_array
+from scipy.sparse import bsr_array
 
 from fastcontact._jit.decorators import check_threads
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.flexibility import FlexibilityColumns
 from fastcontact.linear.krylov import krylov_kernels
-from fastcontact.linear.krylov.iterations import ConjugateGradients, ConjugateResiduals
+from fastcontact.linear.krylov.iterations import ConjugateGradients, ConjugateResiduals, Multiply
 from fastcontact.linear.multigrid.constrained_hierarchy import ConstrainedHierarchy
 from fastcontact.linear.multigrid.hierarchy import Hierarchy
 from fastcontact.linear.multigrid.matrix import ScaledMatrix
 from fastcontact.linear.protocol import Counters, Monitor
+from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
@@ -33,6 +34,11 @@ MOST_COLUMNS = 300
 WATCH_EVERY = 2
 # Equations with the same pivots whose weights differ by less than this share a hierarchy.
 ALIKE = 0.02
+# Residuals that fall by less are taken to fall by this.
+SLOWEST = 0.999
+# A warm start of a nonsymmetric solution is improved by this factor, but not to less than this part of its tolerance, and by
+# so many iterations at most where that is met.
+WARM, WARM_LEAST, MOST_WARM = 0.1, 1e-3, 10
 # Where the smoother amplifies something, its bound of the spectrum is raised by this factor, so many times.
 RAISE, RAISES = 1.3, 4
 
@@ -87,6 +93,7 @@ class Multigrid:
         # The equations that hold, and those that the hierarchy was changed for.
         self._equations: Elimination | None = None
         self._hierarchy_equations: Elimination | None = None
+        self._hierarchy_springs: Springs | None = None
         self.counters.setups += 1
 
     def build_in(self, precision: str) -> None:
@@ -99,18 +106,20 @@ class Multigrid:
     def _solve_many(self, F: Array) -> Array:
         return np.column_stack([self.solution(np.ascontiguousarray(f), None, None) for f in F.T])
 
-    def constrain(self, elimination: Elimination | None) -> None:
-        """Change the hierarchy to that of the eliminated matrix.
+    def constrain(self, elimination: Elimination | None, springs: Springs | None = None) -> None:
+        """Change the hierarchy to that of the eliminated matrix, `springs` included.
 
         A hierarchy for the same pivots that follow others with nearly the same weights is kept: it preconditions as
         well, since only the unknowns beside the pivots count. Pivots that are coupled have sparse weights there.
         """
         check_threads()  # every solution begins here, also that of a child forked after the hierarchy was built
-        if elimination is not self._equations:
+        if elimination is not self._equations or springs is not self._hierarchy_springs:
             sparse = elimination and elimination.with_sparse_weights()
-            if not _alike(sparse, self._hierarchy_equations):
-                self._constrained.constrain(sparse)
-                self._hierarchy_equations = sparse
+            known = self._hierarchy_springs
+            alike = known is None if springs is None else springs.alike(known)
+            if not (alike and _alike(sparse, self._hierarchy_equations)):
+                self._constrained.constrain(sparse, None if springs is None else springs.scaled(self.K.unit))
+                self._hierarchy_equations, self._hierarchy_springs = sparse, springs
             self._equations = elimination
 
     def solution(
@@ -138,7 +147,7 @@ class Multigrid:
             self._begin(f, elimination)
         self._solved = f
         enough = max(self.tolerance, tolerance or 0.0) * scale
-        made = raised = 0
+        made, raised, first = 0, 0, cg.norm
         while cg.norm > enough:
             if made >= MAX_ITERATIONS or raised > RAISES:
                 raise StallError(
@@ -146,7 +155,8 @@ class Multigrid:
                     f"above {self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
                 )
             watch = monitor if made and made % WATCH_EVERY == 0 else None
-            if watch is not None and watch(cg.x, self.multiplier(elimination, cg.x, f), cg.norm / scale):
+            error = cg.norm / scale * _amplification(cg.norm / first, made) if watch is not None else 0.0
+            if watch is not None and watch(cg.x, self.multiplier(elimination, cg.x, f), error):
                 break
             if cg.step(self._multiply, self.precondition):
                 made += 1
@@ -158,21 +168,21 @@ class Multigrid:
         return cg.x.copy()
 
     def nonsymmetric_solution(
-        self, f: Array, elimination: Elimination, springs: csr_array | None, guess: Array, tolerance: float
+        self, f: Array, elimination: Elimination, springs: Springs | None, guess: Array, tolerance: float
     ) -> Array:
         """Solve ``K u + S u = f + F.T multiplier`` and ``B u = c``, F the rows that multipliers act through.
 
         A sliding contact keeps its gap closed, but the force that does so also acts sideways. Unknowns are eliminated
         as they are without friction, forces move along the rows F; the reduced matrix is not symmetric. The hierarchy
-        of the equations alone preconditions it.
+        of the equations and springs alone preconditions it.
 
         Parameters
         ----------
         f : ndarray (n,)
             [force]
         elimination : Elimination
-        springs : csr_array (n, n) or None
-            S, symmetric and positive semidefinite [force / length].
+        springs : Springs or None
+            S is their matrix.
         guess : ndarray (n,)
             [length]
         tolerance : float
@@ -180,7 +190,7 @@ class Multigrid:
 
         Raises
         ------
-        ConvergenceError
+        StallError
             If the residual does not fall below the tolerance.
         """
         if self._residuals is None:
@@ -188,29 +198,41 @@ class Multigrid:
         self._solved = None
         iteration = self._residuals
         enough = max(self.tolerance, tolerance) * self._scale(f, elimination)
-        self.constrain(elimination)
+        self.constrain(elimination, springs)
 
         def multiply(p: Array, q: Array) -> None:
             self.K.combine(1.0, p, 0.0, q, q)
             if springs is not None:
-                q += springs @ p
+                springs.subtract_forces(p, q, -1.0)
             elimination.move_forces(q)
 
         iteration.x[:] = guess
         elimination.complete(iteration.x, elimination.offset)
         self.K.combine(-1.0, iteration.x, 1.0, f, iteration.r)
         if springs is not None:
-            iteration.r -= springs @ iteration.x
+            springs.subtract_forces(iteration.x, iteration.r)
         elimination.move_forces(iteration.r)
         iteration.start()
-        made = 0
-        while iteration.norm > enough:
+        self._reduce(iteration, multiply, enough)
+        return iteration.x.copy()
+
+    def _reduce(self, iteration: ConjugateResiduals, multiply: Multiply, enough: float) -> None:
+        """Iterate until the residual is `enough` [force]; a warm start is improved beyond that.
+
+        It may meet the tolerance while the forces of a small contact are not right yet.
+        """
+        made, wanted = 0, max(min(enough, WARM * iteration.norm), WARM_LEAST * enough)
+        while iteration.norm > wanted:
+            done = iteration.norm <= enough
+            if done and made >= MOST_WARM:
+                return
             if made >= MAX_NONSYMMETRIC or not iteration.step(multiply, self.precondition):
+                if done:
+                    return
                 left = iteration.norm / enough
-                raise ConvergenceError(f"conjugate residuals stand at {left:.1e} times the tolerance")
+                raise StallError(f"conjugate residuals stand at {left:.1e} times the tolerance after {made} iterations")
             made += 1
             self.counters.iterations += 1
-        return iteration.x.copy()
 
     def diagonal(self) -> Array:
         """Return the diagonal (n,) of K."""
@@ -224,9 +246,9 @@ class Multigrid:
             self.hierarchy.raise_bounds(RAISE)
             return
         log.info("multigrid: single precision is not enough for this matrix, the cycle goes on in double precision")
-        equations = self._equations
+        equations, springs = self._equations, self._hierarchy_springs
         self.build_in("double")
-        self.constrain(equations)
+        self.constrain(equations, springs)
 
     def _begin(self, f: Array, elimination: Elimination | None) -> None:
         """Make the iterate obey the equations and compute its residual."""
@@ -279,6 +301,16 @@ class Multigrid:
         if elimination is None:
             return np.empty(0)
         return elimination.multiplier(self.K.forces_at(elimination.pivots, u, f))
+
+
+def _amplification(left: float, made: int) -> float:
+    """Return by how much the error of a solution may exceed its residual, of which `made` iterations `left` a part.
+
+    Conjugate gradients reduce errors by ``(sqrt(k) - 1) / (sqrt(k) + 1)`` in an iteration, k the condition number, which is
+    what separates errors from residuals.
+    """
+    rate = min(left, SLOWEST) ** (1.0 / made)
+    return ((1.0 + rate) / (1.0 - rate)) ** 2
 
 
 def _alike(new: Elimination | None, old: Elimination | None) -> bool:

@@ -23,12 +23,15 @@ from fastcontact.linear.flexibility import TooManyColumnsError
 from fastcontact.linear.multigrid.solver import Multigrid, StallError
 from fastcontact.linear.protocol import FrictionTerms, LinearSolver, Loaded, Product
 from fastcontact.linear.solvers.direct import Direct
+from fastcontact.linear.springs import Springs
 from fastcontact.linear.tightening import tighten
 
 log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
 # Unknowns up to which a factorisation replaces multigrid, by the number of components of a displacement.
 FACTORS_UP_TO = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
+# Equations that stiffen a node by more than this take multigrid hundreds of iterations.
+STIFFENED = 300.0
 # Where forces stay out of balance, the tolerance is lowered down to this; round-off leaves little below it.
 TIGHT = 1e-12
 
@@ -101,7 +104,8 @@ class Amg(Multigrid, LinearSolver):
             "asked": list(self.columns.asked),
         }
         instead = None if self.instead is None else {"why": self.gave_up, **self.instead.memory()}
-        return {**kept, "tied": tied, "instead": instead}
+        springs = self._hierarchy_springs
+        return {**kept, "tied": tied, "springs": springs and springs.to_dict(), "instead": instead}
 
     def remember(self, memory: dict[str, Any]) -> None:
         """See `LinearSolver.remember`."""
@@ -112,8 +116,25 @@ class Amg(Multigrid, LinearSolver):
         if memory["precision"] != self.precision:
             self.build_in(memory["precision"])
         self.columns.ask_again(memory["asked"])
-        self.constrain(memory["tied"] and _elimination(memory["tied"], self.hierarchy.n))
+        tied, springs = memory["tied"], memory.get("springs")
+        n = self.hierarchy.n
+        self.constrain(tied and _elimination(tied, n), springs and Springs.from_dict(springs, n))
         self.hierarchy.bounds = memory["bounds"]
+
+    def constrain(self, elimination: Elimination | None, springs: Springs | None = None) -> None:
+        """See `Multigrid.constrain`.
+
+        Raises
+        ------
+        StallError
+            If multigrid would need hundreds of iterations and factors can take over.
+        """
+        super().constrain(elimination, springs)
+        if self._constrained.stiffening > STIFFENED and self._may_factorise:
+            raise StallError(
+                f"contact makes nodes {self._constrained.stiffening:.1e} times as stiff as they are, where the secondary "
+                "side is much stiffer than the primary one: let the softer body be the secondary side"
+            )
 
     def give_up(self, stalled: StallError | TooManyColumnsError) -> None:
         """Factorise the matrix, since the iteration stalls or columns of its inverse cost more.
@@ -184,14 +205,21 @@ class _Loaded(LoadedIteration):
         if solver.instead is not None:
             raise ConvergenceError("factors give the compliance of friction")
         size = solver.K.blocksize[0]
-        if friction is None:
-            elimination = eliminate(B, c, None, nodes, size) if B.shape[0] else None
-            u = solver.solution(f, elimination, guess, tolerance=tolerance)
-            return u, solver.multiplier(elimination, u, f)
-        elimination, springs = eliminate(B, c, friction.rows, nodes, size), friction.springs
-        f = f if friction.forces is None else f + friction.forces
-        u = solver.nonsymmetric_solution(f, elimination, springs, guess, tolerance)
-        return u, solver.multiplier(elimination, u, f - (springs @ u if springs is not None else 0.0))
+        try:
+            if friction is None:
+                elimination = eliminate(B, c, None, nodes, size) if B.shape[0] else None
+                u = solver.solution(f, elimination, guess, tolerance=tolerance)
+                return u, solver.multiplier(elimination, u, f)
+            elimination, springs = eliminate(B, c, friction.rows, nodes, size), friction.springs
+            f = f if friction.forces is None else f + friction.forces
+            u = solver.nonsymmetric_solution(f, elimination, springs, guess, tolerance)
+        except StallError as stalled:
+            solver.give_up(stalled)
+            raise
+        if springs is not None:
+            f = f.copy()
+            springs.subtract_forces(u, f)
+        return u, solver.multiplier(elimination, u, f)
 
 
 SOLVER = Amg

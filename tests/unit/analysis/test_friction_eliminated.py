@@ -14,6 +14,7 @@ from fastcontact.linear.krylov.iterations import KEPT, ConjugateResiduals
 from fastcontact.linear.multigrid import solver
 from fastcontact.linear.protocol import FrictionTerms
 from fastcontact.linear.solvers import amg
+from fastcontact.linear.springs import Springs
 
 BOTH = {"secondary": "CONT_SPHERE", "primary": "CONT_BLOCK"}
 
@@ -130,12 +131,12 @@ def test_nonsymmetric_equations_with_springs_against_a_dense_solution():
         analysis.system.rows(rows[near], np.zeros(4), np.zeros(n))[0] for rows in (constraints.B, *constraints.tangents)
     )
     through, c = csr_array(normal + 0.3 * first), 1e-3 * rng.normal(size=4)
-    springs = csr_array(50.0 * second.T @ second)
+    springs = Springs(second, np.full(4, 50.0))
     push = -0.2 * np.asarray(second.T @ np.ones(4))
     u, multiplier = solver.load(f).solve_nonsymmetric(
         normal, c, np.arange(4), np.zeros(n), 1e-12, FrictionTerms(through, springs, push)
     )
-    out = analysis.system.matrix @ u + springs @ u - f - push - through.T @ multiplier
+    out = analysis.system.matrix @ u + 50.0 * second.T @ (second @ u) - f - push - through.T @ multiplier
     assert np.abs(normal @ u - c).max() < 1e-12
     assert np.abs(out).max() < 1e-8 * np.abs(f).max()
 

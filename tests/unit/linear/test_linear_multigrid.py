@@ -23,6 +23,7 @@ from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.multigrid.smoother import chebyshev, largest_eigenvalue
 from fastcontact.linear.solvers.amg import Amg
 from fastcontact.linear.solvers.pyamg import Pyamg
+from fastcontact.linear.springs import Springs
 
 
 def problem(divisions=(7, 6, 5)):
@@ -210,15 +211,34 @@ def contact_rows(fixed, count=6):
     return csr_array(B)
 
 
-def test_equations_change_the_levels_to_those_of_the_eliminated_matrix_and_back():
+def springs_on(elimination, fixed):
+    """Return springs on pivots, on what they follow and on others."""
+    rng = np.random.default_rng(8)
+    others = rng.permutation(np.flatnonzero(~fixed))[:3]
+    R = np.zeros((3, len(fixed)))
+    for row, (pivot, other) in enumerate(zip(elimination.pivots[:3], others, strict=True)):
+        R[row, [pivot, other, *elimination.weights[[row]].indices[:2]]] = rng.normal(size=4)
+    return Springs(csr_array(R), 100.0 * rng.random(3))
+
+
+@pytest.mark.parametrize("sprung", [False, True])
+def test_equations_and_springs_change_the_levels_to_those_of_the_eliminated_matrix_and_back(sprung):
     K, modes, _, fixed = problem((9, 8, 8))
     hierarchy = Hierarchy(matrix_of(K), modes)
     constrained = ConstrainedHierarchy(hierarchy, matrix_of(K))
     elimination, T = eliminated(contact_rows(fixed), len(fixed))
     before = [level.inverse.copy() for level in hierarchy.levels]
     bounds = [level.bound for level in hierarchy.levels]
-    constrained.constrain(elimination)
-    A, top = (T.T @ K @ T).tocsr(), hierarchy.levels[0]
+    springs = springs_on(elimination, fixed) if sprung else None
+    constrained.constrain(elimination, springs)
+    A, top = T.T @ K @ T, hierarchy.levels[0]
+    if springs is not None:
+        A = A + T.T @ springs.rows.T @ diags_array(springs.stiffness) @ springs.rows @ T
+    A = A.tocsr()
+    x = T @ np.random.default_rng(6).normal(size=len(fixed))
+    r = np.empty(len(fixed))
+    top.subtract_product(x, np.zeros(len(fixed)), r)
+    assert np.abs(r + A @ x).max() < 1e-11 * np.abs(A @ x).max()
     blocks = np.stack([A[3 * i : 3 * i + 3, 3 * i : 3 * i + 3].toarray() for i in range(len(fixed) // 3)])
     expected = np.linalg.pinv(blocks, rcond=1e-10, hermitian=True)
     assert np.abs(top.inverse.reshape(-1, 3, 3) - expected).max() < 1e-9 * np.abs(expected).max()
@@ -240,6 +260,44 @@ def test_equations_change_the_levels_to_those_of_the_eliminated_matrix_and_back(
     constrained.constrain(None)
     assert all(np.array_equal(level.inverse, old) for level, old in zip(hierarchy.levels, before, strict=True))
     assert [level.bound for level in hierarchy.levels] == bounds
+    assert all(level.springs is None for level in hierarchy.levels)
+
+
+def test_springs_on_one_level_are_part_of_its_factors():
+    K, modes, _, fixed = problem((2, 2, 2))
+    hierarchy = Hierarchy(matrix_of(K), modes)
+    assert len(hierarchy.levels) == 1
+    elimination, T = eliminated(contact_rows(fixed, 3), len(fixed))
+    springs = springs_on(elimination, fixed)
+    ConstrainedHierarchy(hierarchy, matrix_of(K)).constrain(elimination, springs)
+    A = T.T @ (K + springs.rows.T @ diags_array(springs.stiffness) @ springs.rows) @ T
+    b, found = A @ np.random.default_rng(3).normal(size=len(fixed)), np.empty(len(fixed))
+    hierarchy.coarse.solve(b, found)
+    assert np.abs(A @ found - b).max() < 1e-9 * np.abs(b).max()
+
+
+def test_springs_are_kept_and_told_apart():
+    rng = np.random.default_rng(2)
+    springs = Springs(csr_array(rng.normal(size=(4, 9)) * (rng.random((4, 9)) < 0.6)), 1.0 + rng.random(4))
+    again = Springs.from_dict(springs.to_dict(), 9)
+    u, r, expected = rng.normal(size=9), np.zeros(9), springs.rows.toarray()
+    again.subtract_forces(u, r, 2.0)
+    assert r == pytest.approx(-2.0 * expected.T @ (springs.stiffness * (expected @ u)))
+    assert springs.alike(again)
+    assert not springs.alike(None)
+    assert not springs.alike(Springs(springs.rows[:3], springs.stiffness[:3]))
+    assert springs.alike(springs.scaled(1.2))
+    assert not springs.alike(springs.scaled(3.0))
+
+
+@pytest.mark.parametrize("rows", [5, 2000])  # one thread, and many
+def test_rows_subtracted_from_others(rows):
+    A, rng = random_blocks(3, 3, rows, 40)
+    numbers, x, y = rng.permutation(rows).astype(np.int32), rng.normal(size=120), rng.normal(size=3 * rows)
+    expected = y.reshape(-1, 3).copy()
+    expected[numbers] -= (A @ x).reshape(-1, 3)
+    cycle_kernels.subtract_rows(numbers, A.indptr, A.indices, (A.data.ravel(),), x, y, (0, 0, 0))
+    assert y == pytest.approx(expected.ravel())
 
 
 @pytest.mark.parametrize("coupled", [False, True])

@@ -10,8 +10,30 @@ from fastcontact.cli.bench import suite
 SUBJECTS = {"assembly", "contact", "io", "linear", "recovery", "search", "startup", "study"}
 
 
+TABLES = {"robustness"}
+
+
 def test_all_subjects_are_there():
-    assert set(suite("subjects").names()) == SUBJECTS
+    assert set(suite("subjects").names()) == SUBJECTS | TABLES
+
+
+def test_the_table_of_robustness(tmp_path, capsys):
+    path = tmp_path / "run.json"
+    assert main(["bench", "robustness", "--smallest", "--json", str(path)]) == 0
+    head, *lines = capsys.readouterr().out.splitlines()
+    rows = json.loads(path.read_text())["tables"]["robustness"]
+    assert len(lines) == len(rows) == 2
+    assert head.split()[-3:] == ["L", "residual", "solver"]
+    assert [row["friction"] for row in rows] == [0.0, 0.3]
+    for row in rows:
+        assert row["closed"] == row["nodes"] > 9
+        assert 0.0 < row["residual"] < 1e-6
+        assert row["step"]["iterations"] < 3 * row["linear"]["iterations"]
+
+
+def test_the_table_tells_what_failed():
+    failed = {"varied": "nu 0.5", "friction": 0.0, "n_dofs": 12, "failed": "no way"}
+    assert suite("subjects").load("robustness").lines([failed])[1].endswith("failed: no way")
 
 
 @pytest.mark.parametrize("name", sorted(SUBJECTS))

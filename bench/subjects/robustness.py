@@ -1,0 +1,147 @@
+"""Multigrid under contact: iterations, price and residual against mesh, contact, friction, materials and cells.
+
+Two blocks that do not match are pressed together, and with friction pushed along each other. One thing at a time is varied,
+each without friction and with it. A row tells the iterations of a linear solution of the same mesh without contact, those of
+a whole cold contact step, what the step costs in units of that linear solution (L, preparation included on both sides,
+assembly on neither), and the largest force out of balance over the largest nodal contact force, with a stiffness assembled
+anew.
+"""
+
+import time
+
+import numpy as np
+from suite.timing import peak_bytes
+
+import fastcontact as fc
+from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.load_step import load_step
+from fastcontact.analysis.problem import near_nullspace, prepare
+from fastcontact.elasticity.stiffness import stiffness
+from fastcontact.errors import FastcontactError
+from fastcontact.linear import choice
+
+# Divisions of the lower block; the upper one has four fifths.
+SIZES = (20,)
+MESHES = (12, 20, 28, 40)
+FRICTION = 0.3
+HEAD = (
+    f"{'varied':<26} {'friction':>8} {'unknowns':>8} {'closed':>9} {'slide':>5} {'linear':>6} {'step':>5} {'L':>6} "
+    f"{'residual':>8}  solver"
+)
+
+
+def blocks(
+    divisions=20, friction=0.0, multipliers="dual", curvature=0.0, ratio=1.0, nu=0.3, stretch=1.0, element="hex8", push=0.01
+):  # fmt: skip
+    """Return the model.
+
+    `ratio` is Young's modulus of the lower block, the primary side, over that of the upper one; `stretch` the length of cells
+    over their width; the surface of the upper block rises with `curvature` times the square of the distance from a corner.
+    """
+
+    def block(count, z, name):
+        mesh = fc.generate.box((stretch, 1.0, 0.5), (count, count, count // 2), element, (0.0, 0.0, z))
+        return fc.generate.renamed(mesh, {group: name + group for group in mesh.group_names})
+
+    upper = block(divisions * 4 // 5, 0.0, "UPPER_")
+    points = np.array(upper.points)
+    points[:, 2] += curvature * (points[:, 0] ** 2 + points[:, 1] ** 2)
+    mesh = fc.generate.union(block(divisions, -0.5, "LOWER_"), upper.replace(points=points))
+    model = fc.Model(mesh, kinematics="3d")
+    model.add_material(fc.LinearElastic(E=ratio, nu=nu), groups=["LOWER_BOX"])
+    model.add_material(fc.LinearElastic(E=1.0, nu=nu), groups=["UPPER_BOX"])
+    model.fix("LOWER_ZMIN", "xyz")
+    model.prescribe("UPPER_ZMAX", x=push if friction else 0.0, y=0.0, z=-0.01)
+    options = {"formulation": "mortar", "multipliers": multipliers, "friction": friction}
+    model.add_contact("c", secondary="UPPER_ZMIN", primary="LOWER_ZMAX", **options)
+    return model
+
+
+def variations(divisions):
+    """Return what is varied, as text and arguments of `blocks`."""
+    rows = [(f"mesh {n}", {"divisions": n}) for n in (*MESHES, divisions) if n in MESHES]
+    rows = [(text, given) for text, given in rows if text != f"mesh {divisions}"]
+    rows = [(f"mesh {divisions}", {}), *rows]
+    rows += [(f"surface curved by {value:g}", {"curvature": value}) for value in (0.002, 0.02, 0.2, 2.0)]
+    rows += [(f"modulus ratio {value:g}", {"ratio": value}) for value in (1e2, 1e4, 1e8, 1e-2, 1e-4)]
+    rows += [(f"nu {value:g}", {"nu": value}) for value in (0.45, 0.49, 0.499, 0.4999)]
+    rows += [(f"aspect ratio {value:g}", {"stretch": value}) for value in (5.0, 20.0, 50.0)]
+    of_cells = {"tet4": divisions, "tet10": divisions // 2, "hex20": divisions * 3 // 5}
+    rows += [(element, {"element": element, "divisions": n}) for element, n in of_cells.items()]
+    rows += [("standard multipliers", {"multipliers": "standard"})]
+    rows = [(text, {"divisions": divisions, **given, "friction": mu}) for text, given in rows for mu in (0.0, FRICTION)]
+    rows[2:2] = [("friction", {"divisions": divisions, "friction": mu}) for mu in (0.1, 0.2, 0.5, 1.0)]
+    return rows
+
+
+def entries(smallest, tell):
+    """Return the figures of all rows; the `smallest` run takes the first two on a coarse mesh. `tell` hears of each row."""
+    divisions = 6 if smallest else SIZES[0]
+    figures(blocks(6, FRICTION))  # compiles
+    found = []
+    for text, given in variations(divisions)[: 2 if smallest else None]:
+        tell(text)
+        found.append({"varied": text, "friction": given["friction"], **figures(blocks(**given))})
+    return found
+
+
+def figures(model, solver="amg"):
+    """Return iterations, price and residual of a linear solution and a cold contact step by one solver."""
+    problem = prepare(model, fc.linear_ramp(1), Criteria(), linear_solver=solver)
+    linear = _linear(problem, solver)
+    counters, before = problem.solver.counters, problem.solver.counters.iterations
+    begin = time.process_time()
+    try:
+        state, result = load_step(problem, problem.initial_state(), 1, 1.0)
+    except FastcontactError as error:
+        return {"n_dofs": model.n_dofs, "linear": linear, "failed": str(error)}
+    cpu = linear["setup_cpu_s"] + time.process_time() - begin
+    contact = result.contact["c"]
+    return {
+        "n_dofs": model.n_dofs, "peak_bytes": peak_bytes(), "linear": linear,
+        "step": {"iterations": counters.iterations - before, "cpu_s": cpu, "ratio": cpu / linear["cpu_s"]},
+        "closed": int(contact.active.sum()), "nodes": len(contact.points),
+        "sliding": int((contact.active & ~contact.sticking).sum()), "residual": out_of_balance(problem, state.u, contact),
+        "gave_up": problem.solver.gave_up,
+    }  # fmt: skip
+
+
+def _linear(problem, name):
+    matrix = problem.system.matrix
+    matrix = matrix.restored() if hasattr(matrix, "restored") else matrix
+    solver = choice.make(name, dim=3, n_dofs=problem.model.n_dofs, tolerance=problem.solver.tolerance)
+    begin = time.process_time()
+    modes = problem.system.unknowns_of(near_nullspace(problem.model))
+    solver.prepare(matrix, modes, problem.system.involved(problem.contact_dofs), True)
+    setup = time.process_time() - begin
+    lift = problem.load_at(1.0).lift
+    solver.load(problem.system.right(np.zeros_like(lift), lift)).full_solution(np.zeros_like(lift))
+    return {"iterations": solver.counters.iterations, "cpu_s": time.process_time() - begin, "setup_cpu_s": setup}
+
+
+def out_of_balance(problem, u, contact):
+    """Return the largest force that nothing balances over the largest nodal contact force."""
+    model, field = problem.model, problem.field
+    out = stiffness(model.mesh, model.kinematics, field.moduli, field.rows, None, field.averaged) @ u
+    forces = out.reshape(-1, model.mesh.dim)
+    np.subtract.at(forces, contact.points, contact.force_vectors)
+    np.subtract.at(forces, contact.primary_points, contact.primary_force_vectors)
+    free = ~np.isin(np.arange(len(out)), np.flatnonzero(problem.system.fixed))
+    return float(np.abs(out[free]).max() / np.linalg.norm(contact.force_vectors, axis=1).max())
+
+
+def lines(found):
+    """Return the table."""
+    table = [HEAD]
+    for row in found:
+        begin = f"{row['varied']:<26} {row['friction']:>8g} {row['n_dofs']:>8}"
+        if "failed" in row:
+            table.append(f"{begin} failed: {row['failed']}")
+            continue
+        step = row["step"]
+        table.append(
+            f"{begin} {row['closed']:>4}/{row['nodes']:<4} {row['sliding']:>5} {row['linear']['iterations']:>6} "
+            f"{step['iterations']:>5} {step['ratio']:>6.1f} {row['residual']:>8.1e}  "
+            f"{'factors took over' if row['gave_up'] else 'multigrid'}"
+        )
+    return table

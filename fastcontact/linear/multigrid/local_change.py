@@ -1,0 +1,113 @@
+"""A change of a few block rows of a symmetric block matrix, and its Galerkin product on the next coarser level."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+from scipy.sparse import bsr_array, csc_array, csr_array
+
+from fastcontact.linear.multigrid.matrix import BlockMatrix, diagonal_blocks
+
+Array = NDArray[np.float64]
+Values = NDArray[Any]
+Nodes = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class LocalChange:
+    """What is added to the blocks of some nodes; nothing beyond them.
+
+    Attributes
+    ----------
+    nodes : ndarray of int (k,)
+        Ascending.
+    blocks : bsr_array (k * size, k * size)
+        Symmetric, in canonical format; `size` unknowns a node.
+    """
+
+    nodes: Nodes
+    blocks: bsr_array
+
+    @classmethod
+    def of(cls, nodes: Nodes, matrix: Any, size: int) -> LocalChange:
+        """Return the change by a sparse `matrix` on the unknowns of `nodes`."""
+        blocks = bsr_array(matrix.tobsr((size, size)))
+        blocks.sort_indices()
+        return cls(nodes, blocks)
+
+    @classmethod
+    def of_diagonal(cls, nodes: Nodes, blocks: Array) -> LocalChange:
+        """Return the change of diagonal `blocks` (k, size, size) alone."""
+        n = blocks.shape[0] * blocks.shape[1]
+        return cls(nodes, bsr_array((blocks, np.arange(len(nodes)), np.arange(len(nodes) + 1)), shape=(n, n)))
+
+    @property
+    def size(self) -> int:
+        """Unknowns of a node."""
+        return int(self.blocks.blocksize[0])
+
+    def diagonal(self) -> Values:
+        """Return the diagonal blocks (k * size * size,)."""
+        return diagonal_blocks(self.blocks.indptr, self.blocks.indices, self.blocks.data, self.size)
+
+    def rows(self, kind: DTypeLike) -> tuple[Values, ...]:
+        """Return nodes, and `indptr`, `indices` (of all nodes) and `data` of their block rows, in a precision."""
+        columns = self.nodes[self.blocks.indices].astype(np.int32)
+        return self.nodes, self.blocks.indptr, columns, self.blocks.data.astype(kind).ravel()
+
+    def coarser(self, P: BlockMatrix) -> LocalChange:
+        """Return the Galerkin product ``P.T change P``."""
+        own = block_rows(P, self.nodes, (int(P.indices.max()) + 1) * len(P.cols))
+        below, columns = np.unique(own.indices, return_inverse=True)
+        own = bsr_array((own.data, columns, own.indptr), shape=(own.shape[0], len(below) * len(P.cols)))
+        product = bsr_array(own.T @ self.blocks @ own)
+        product.sort_indices()
+        return LocalChange(below, product)
+
+    def scattered(self, n: int) -> csc_array:
+        """Return the change on all n unknowns."""
+        change, count = self.blocks, np.zeros(n // self.size, np.intp)
+        count[self.nodes] = np.diff(change.indptr)
+        indptr = np.r_[0, np.cumsum(count)]
+        return bsr_array((change.data, self.nodes[change.indices], indptr), shape=(n, n)).tocsc()
+
+    def spread(self, nodes: Nodes) -> bsr_array:
+        """Return the blocks on more `nodes` (l,), ascending."""
+        place = np.searchsorted(nodes, self.nodes)
+        count = np.zeros(len(nodes), np.intp)
+        count[place] = np.diff(self.blocks.indptr)
+        n = len(nodes) * self.size
+        return bsr_array((self.blocks.data, place[self.blocks.indices], np.r_[0, np.cumsum(count)]), shape=(n, n))
+
+
+def merged(one: LocalChange, other: LocalChange | None) -> LocalChange:
+    """Return the sum of two changes."""
+    if other is None:
+        return one
+    nodes = np.union1d(one.nodes, other.nodes)
+    total = bsr_array(one.spread(nodes) + other.spread(nodes))
+    total.sort_indices()
+    return LocalChange(nodes, total)
+
+
+def places(columns: Any, nodes: Nodes, size: int) -> Any:
+    """Return the numbers of `columns` where only those of `nodes`, ascending, are counted."""
+    return np.searchsorted(nodes, columns // size) * size + columns % size
+
+
+def renumbered(M: csr_array, nodes: Nodes, size: int) -> csr_array:
+    """Return a matrix with columns of `nodes` alone."""
+    return csr_array((M.data, places(M.indices, nodes, size), M.indptr), shape=(M.shape[0], len(nodes) * size))
+
+
+def block_rows(A: BlockMatrix, nodes: Nodes, n: int) -> bsr_array:
+    """Return the block rows `nodes` of a matrix with n columns, in double precision."""
+    rows, cols = len(A.rows), len(A.cols)
+    count = np.diff(A.indptr)[nodes]
+    indptr = np.concatenate([[0], np.cumsum(count)])
+    blocks = np.repeat(A.indptr[nodes] - indptr[:-1], count) + np.arange(indptr[-1])
+    data = sum(part.reshape(-1, rows, cols)[blocks].astype(float) for part in A.exact)
+    return bsr_array((data, A.indices[blocks], indptr), shape=(len(nodes) * rows, n))

@@ -1,0 +1,72 @@
+"""Springs along rows of displacements, such as those across sliding contacts: kept as rows, not as a matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+from scipy.sparse import csr_array, diags_array
+
+from fastcontact.linear import springs_kernels
+
+Array = NDArray[np.float64]
+# Springs that differ by less than this part of their size are alike.
+ALIKE = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Springs:
+    """Springs with the forces ``-rows.T (stiffness * (rows u))``.
+
+    Attributes
+    ----------
+    rows : csr_array (q, n)
+        What each spring is stretched by [-].
+    stiffness : ndarray (q,)
+        Not negative [force / length].
+    """
+
+    rows: csr_array
+    stiffness: NDArray[Any]
+
+    def subtract_forces(self, u: NDArray[Any], r: NDArray[Any], factor: float = 1.0) -> None:
+        """Subtract from `r` (n,) `factor` times the product of their matrix with `u` (n,)."""
+        R = self.rows
+        springs_kernels.subtract(R.indptr, R.indices, R.data, self.stiffness, r.dtype.type(factor), u, r)
+
+    def under(self, pivots: NDArray[np.intp], weights: csr_array) -> Springs:
+        """Return them where ``u[pivots] = weights u``, weights (m, n); rows are then zero at the pivots."""
+        R, W, n = self.rows, weights, self.rows.shape[1]
+        number = np.full(n, -1, np.int32)
+        number[pivots] = np.arange(len(pivots))
+        place = number[R.indices]
+        follows = place >= 0
+        starts = np.concatenate([[0], np.cumsum(follows)])[R.indptr]
+        followed = csr_array((R.data[follows], place[follows], starts), shape=(R.shape[0], W.shape[0]))
+        own = csr_array((R.data[~follows], R.indices[~follows], R.indptr - starts), shape=R.shape)
+        return Springs(csr_array(own + followed @ W), self.stiffness)
+
+    def scaled(self, factor: float, kind: DTypeLike = float) -> Springs:
+        """Return them `factor` times as stiff, in a precision."""
+        return Springs(self.rows.astype(kind), (factor * self.stiffness).astype(kind))
+
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """Return them as plain arrays."""
+        R = self.rows
+        return {"indptr": R.indptr, "indices": R.indices, "data": R.data, "stiffness": self.stiffness}
+
+    @classmethod
+    def from_dict(cls, kept: Mapping[str, NDArray[Any]], n: int) -> Springs:
+        """Return what `to_dict` has kept, for n unknowns."""
+        shape = (len(kept["stiffness"]), n)
+        return cls(csr_array((kept["data"], kept["indices"], kept["indptr"]), shape=shape), kept["stiffness"])
+
+    def alike(self, other: Springs | None) -> bool:
+        """Return whether others act on the same unknowns with nearly the same stiffness."""
+        if other is None or self.rows.shape != other.rows.shape:
+            return False
+        mine, theirs = (csr_array(diags_array(np.sqrt(one.stiffness)) @ one.rows) for one in (self, other))
+        return bool(abs(mine - theirs).sum() <= ALIKE * abs(theirs).sum())
