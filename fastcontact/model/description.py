@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
+
 from fastcontact.model.contact_pair import ContactPair
 
 KINDS = {
@@ -24,12 +26,17 @@ def sentences(model: Any) -> Iterator[str]:
     for material, groups in model.materials:
         where = "all solid cells" if groups is None else _listed(groups)
         locking = ", with a mean dilatation against locking" if material.averaged else ""
-        yield f"Material: E = {material.E:g}, nu = {material.nu:g} in {where}{locking}."
+        locking += ", with incompatible modes" if material.incompatible_modes else ""
+        yield f"Material: {material.described} in {where}{locking}."
     if not model.materials:
         yield "Material: none yet."
     yield from _supports(model)
     for load in model.loads:
         yield f"Load: {load.name}: {_load(load)}{_history(load.ramp)}."
+    for own in model.temperatures:
+        value = "a number for each point" if isinstance(own.value, np.ndarray) else _value(own.value)
+        where = own.name.removeprefix("the temperature of ")
+        yield f"Temperature: {value} over {own.reference:g} in {where}{_history(own.ramp)}."
     for relation in model.relations:
         yield f"Relation: {relation.name}{_history(relation.ramp)}."
     for spring in model.springs:
@@ -63,7 +70,7 @@ def _supports(model: Any) -> Iterator[str]:
 def _load(load: Any) -> str:
     components: Mapping[int, Any] | None = getattr(load, "components", None)
     if components is None:
-        return _value(load.value)
+        return ", ".join(map(_value, load.values))
     return ", ".join(f"{'xyz'[axis]} = {_value(value)}" for axis, value in components.items())
 
 

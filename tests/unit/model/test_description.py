@@ -1,5 +1,6 @@
 """What will be solved, in words."""
 
+import numpy as np
 import pytest
 
 import fastcontact as fc
@@ -83,3 +84,38 @@ def test_a_group_of_points_is_no_surface(call):
     more = {"add_contact": {"secondary": "C1", "primary": "CONT2"}, "add_traction": {"y": 1.0}}.get(call, {})
     with pytest.raises(fc.FastcontactError, match=r"'C1' (is a group of|holds) points"):
         getattr(model, call)(*arguments, **more)
+
+
+def test_every_material_load_and_connection_is_told():
+    mesh = fc.generate.with_reference_points(fc.generate.block(), {"REF": (0.0, 2.0)})
+    model = fc.Model(mesh, "plane_strain")
+    told = {
+        "Material: E = (1, 2, 3), nu = (0.1, 0.1, 0.1)": fc.Orthotropic(
+            (1.0, 2.0, 3.0), (0.1,) * 3, (1.0,) * 3, density=1.0
+        ),
+        "Material: D with the diagonal": fc.Anisotropic(np.eye(6), density=1.0),
+        "nu = 0.3 in all solid cells, with incompatible modes.": fc.LinearElastic(1.0, 0.3, incompatible_modes=True),
+    }
+    for text, material in told.items():
+        model.materials.clear()
+        model.add_material(material)
+        assert text in model.describe()
+    model.add_temperature(5.0, reference=1.0)
+    model.add_temperature(np.zeros(mesh.n_points), "BLOCK", ramp=[(0.0, 0.0), (1.0, 1.0)])
+    model.add_gravity(y=-1.0)
+    model.add_centrifugal(3.0)
+    model.add_moment("REF", z=1.5)
+    model.add_coupling("REF", "TOP")
+    model.add_hydrostatic_pressure("LEFT", weight=1.0, level=2.0)
+    lines = model.describe()
+    for text in (
+        "Temperature: 5 over 1 in all solid cells.",
+        "Temperature: a number for each point over 0 in 'BLOCK', with a history of its own.",
+        "gravity",
+        "Load: the centrifugal force",
+        "Load: the moment on 'REF': z = 1.5.",
+        "Load: the pressure on 'LEFT': a function of position.",
+        "Relation: the coupling of 'REF' with 'TOP'.",
+    ):
+        assert text in lines, text
+    assert "coupling" in model._repr_html_()
