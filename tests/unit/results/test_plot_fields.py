@@ -1,5 +1,6 @@
 """Pictures of fields, sections and contact surfaces: the numbers that they show, and where."""
 
+import dataclasses
 import io
 
 import numpy as np
@@ -221,6 +222,8 @@ def test_a_section_has_the_area_and_the_field_of_the_body(element, point, normal
     stress[:, 0] = mesh.points @ [2.0, 3.0, 5.0]
     ax = fc.plot.section(mesh, step_of(mesh, stress=stress), point, normal, field="stress.xx")
     assert areas(ax).sum() == pytest.approx(area, rel=1e-5)
+    bare = fc.plot.section(mesh, step_of(mesh, stress=stress), point, normal, edges=False)
+    assert len(ax.collections) == len(bare.collections) + 1
     values = ax.collections[0].get_array()
     if normal[2]:
         drawn = ax.collections[0]._triangulation
@@ -464,3 +467,83 @@ def test_an_animation_is_not_a_picture_too(result, tmp_path, capsys):
     assert "leave out --png" in capsys.readouterr().err
     assert main(["plot", str(result), "--animate", str(tmp_path / "a.jpg")]) == 1
     assert "suffix" in capsys.readouterr().err
+
+
+def test_an_animation_hands_every_picture_to_ffmpeg(tmp_path, monkeypatch):
+    """A program of that name that keeps what it is given: as many raw pictures as there are steps."""
+    import os
+    import re
+
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    (folder / "ffmpeg").write_text('#!/bin/sh\nfor last; do :; done\necho "$@" > "$0.asked"\ncat > "$last"\n')
+    (folder / "ffmpeg").chmod(0o755)
+    monkeypatch.setenv("PATH", f"{folder}{os.pathsep}{os.environ['PATH']}")
+    mesh = block((1.0, 1.0), (2, 2), "quad4")
+    steps = [step_of(mesh, values=k * mesh.points[:, 0], displacement=0.1 * k * mesh.points) for k in (1, 2, 3)]
+    fc.plot.animate(mesh, steps, tmp_path / "a.mp4", mirrored=True)
+    width, height = re.search(r"-s (\d+)x(\d+)", (folder / "ffmpeg.asked").read_text()).groups()
+    assert (tmp_path / "a.mp4").stat().st_size == 3 * 4 * int(width) * int(height)
+
+
+def made_contact(mesh, group, pressure):
+    """A contact result on the nodes of a group, with a given pressure (m,)."""
+    points = mesh.points_of(group)
+    n, at = len(points), mesh.points[points]
+    values, zero = pressure(at), np.zeros((n, 3))
+    return fc.ContactResult(
+        "made",
+        "mortar",
+        points,
+        at,
+        np.zeros(n),
+        np.zeros(n),
+        values,
+        values,
+        zero,
+        zero,
+        values > 0,
+        np.zeros(3),
+        (1.0, 2.0),
+    )
+
+
+def test_a_contact_map_is_seen_along_what_carries():
+    """An oblique surface is drawn across its own normal, and true to scale; one that carries all around is refused."""
+    mesh = box((1.0, 1.0, 1.0), (3, 3, 3), "hex8")
+    turn, _ = np.linalg.qr(np.array([[1.0, 2.0, 0.5], [0.3, 1.0, 2.0], [2.0, -1.0, 1.0]]))
+    turned = mesh.replace(points=mesh.points @ (turn * np.sign(np.linalg.det(turn))))
+    (ax,) = fc.plot.contact_map(turned, made_contact(turned, "ZMAX", lambda x: np.ones(len(x))))
+    assert areas(ax).sum() == pytest.approx(1.0)
+    assert ax.get_xlabel() == "across the contact"
+    around = mesh.with_groups(points={"ALL": np.flatnonzero((np.abs(mesh.points - 0.5) > 0.49).any(axis=1))})
+    with pytest.raises(FastcontactError, match="goes around its body"):
+        fc.plot.contact_map(around, made_contact(around, "ALL", lambda x: np.ones(len(x))))
+
+
+def test_a_history_of_a_contact_that_is_closed_everywhere():
+    mesh = block((1.0, 1.0), (2, 2), "quad4")
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    model.fix("BOTTOM", "xy")
+    floor = fc.obstacles.HalfSpace((0.0, 1.0), (0.0, -1.0))
+    model.add_obstacle("floor", secondary="TOP", obstacle=floor, motion={"y": -0.01})
+    steps = fc.solve(model, 2)
+    assert not np.isfinite(steps[0].contact["floor"].radius[1])
+    _, lower = fc.plot.history(steps, "floor")
+    (line,) = (line for line in lower.lines if line.get_label() == "computed: all nodes closed")
+    assert list(line.get_ydata()) == [step.contact["floor"].radius[0] for step in steps]
+
+
+def test_a_contact_that_stays_open_is_drawn_without_closed_nodes():
+    mesh = box((1.0, 1.0, 1.0), (2, 2, 2), "hex8")
+    contact = made_contact(mesh, "ZMAX", lambda x: np.zeros(len(x)))
+    (ax,) = fc.plot.contact_map(mesh, contact)
+    assert not ax.lines
+    assert ax.get_legend() is None
+    assert ax.get_xlim()[1] >= 1.0
+    contact = dataclasses.replace(contact, radius=(np.nan, np.nan))
+    step = dataclasses.replace(step_of(mesh), contact={"made": contact})
+    upper, lower = fc.plot.history([step], "made")
+    assert lower.get_legend() is None
+    assert list(upper.lines[0].get_ydata()) == [0.0]

@@ -8,6 +8,7 @@ import pytest
 from fastcontact.cli import main
 from fastcontact.errors import CaseError
 from fastcontact.studies.sweep import parameter_sweep
+from fastcontact.studies.sweep_figures import parameter_label
 
 
 @pytest.fixture(scope="module")
@@ -110,6 +111,36 @@ def test_a_theory_that_the_parameter_does_not_change_is_told(case):
     labels = curves(drawn(turned)["contact force"])
     assert {"material[0].E = 10000.0", "material[0].E = 20000.0", "theory at equal approach"} <= set(labels)
     assert len(turned.theories) == 2
+
+
+def test_where_a_theory_is_not_defined_there_is_no_curve(case):
+    pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+    found = parameter_sweep(case, {"theory.hertz.nu1": (0.3, 0.6)}, level=0, workers=1)
+    assert len(found.points) == len(found.failed) == 1
+    assert [curve.values for curve in found.theories] == [{}]
+    line = curves(drawn(found)["contact force"])["theory at equal approach"]
+    assert line[1] == pytest.approx([found.points[0].theory["force"]])
+
+
+def test_a_quantity_without_theory_has_no_ratio(root):
+    pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+    found = parameter_sweep(
+        root / "data/cases/cattaneo-mindlin.toml", {"material[0].E": (1e3, 2e3)}, level=0, workers=1
+    )
+    assert found.units["force"] == "N/mm"
+    texts = [text.get_text() for ax in found.figure().axes for text in ax.texts]
+    assert "no theory of the contact force" in texts
+    force = drawn(found)["contact force"]
+    low, high = force.get_ylim()
+    assert high - low > 0.1 * high  # round-off is no trend
+    assert "theory" not in curves(force)
+
+
+def test_parameters_in_words():
+    units = {"length": "mm", "pressure": "MPa"}
+    assert parameter_label("mesh.size", units) == "element size of the mesh [mm]"
+    assert parameter_label("material[2].nu", units) == "Poisson's ratio of material 3 [-]"
+    assert parameter_label("ramp.steps", units) == "ramp.steps"
 
 
 def test_values_that_are_no_numbers_have_no_curve(case):

@@ -15,6 +15,7 @@ from fastcontact import topology
 from fastcontact.errors import FastcontactWarning, FileError, MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.files.mesh_files import read_mesh, read_mesh_report, write_mesh
+from fastcontact.mesh.generate import half_spheres
 from fastcontact.mesh.mesh import Mesh
 
 FLAT = [name for name, element in elements.ELEMENTS.items() if element.dim <= 2]
@@ -430,3 +431,20 @@ def test_threads_get_their_streams_back(tmp_path):
     for thread in threads:
         thread.join()
     assert (sys.stdout, sys.stderr) == streams
+
+
+def test_groups_survive_a_round_trip_through_pyvista(tmp_path):
+    """Also where another program reads the file and writes it again."""
+    pyvista = pytest.importorskip("pyvista", reason="needs PyVista: pip install 'fastcontact[view]'")
+    mesh = half_spheres(size=10.0)
+    write_mesh(tmp_path / "ours.vtu", mesh)
+    pyvista.read(tmp_path / "ours.vtu").save(tmp_path / "theirs.vtu")
+    found = read_mesh(tmp_path / "theirs.vtu")
+    assert set(found.group_names) == set(mesh.group_names)
+    for name in mesh.cell_groups:
+        expected, cells = mesh.cells_of(name), found.cells_of(name)
+        assert {kind: len(block) for kind, block in cells.items()} == {
+            kind: len(block) for kind, block in expected.items()
+        }
+    for name in mesh.group_names:
+        np.testing.assert_allclose(found.points[found.points_of(name)], mesh.points[mesh.points_of(name)])
