@@ -48,6 +48,7 @@ _NAMES = {
     ),
     "mesh.files.med": ("read_med_field",),
     "mesh.files.mesh_files": ("read_mesh", "write_mesh"),
+    "mesh.from_libraries": ("from_gmsh", "from_meshio", "from_pyvista"),
     "mesh.mesh": ("Mesh",),
     "mesh.quality": ("quality",),
     "mesh.topology": ("ordered_line",),

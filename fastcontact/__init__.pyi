@@ -26,6 +26,9 @@ from fastcontact.mesh import topology as topology
 from fastcontact.mesh.files.med import read_med_field as read_med_field
 from fastcontact.mesh.files.mesh_files import read_mesh as read_mesh
 from fastcontact.mesh.files.mesh_files import write_mesh as write_mesh
+from fastcontact.mesh.from_libraries import from_gmsh as from_gmsh
+from fastcontact.mesh.from_libraries import from_meshio as from_meshio
+from fastcontact.mesh.from_libraries import from_pyvista as from_pyvista
 from fastcontact.mesh.mesh import Mesh as Mesh
 from fastcontact.mesh.quality import quality as quality
 from fastcontact.mesh.topology import ordered_line as ordered_line

@@ -2,12 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from unittest.mock import patch
 
 import fastcontact as fc
 from fastcontact.analysis import load_step as page
 from fastcontact.analysis import step_halving
 from fastcontact.analysis.problem import prepare
+
+
+class Watched:
+    """The settled contact of the last load step, see `watching`."""
+
+    settled = None
+
+
+@contextmanager
+def watching() -> Iterator[Watched]:
+    """Keep the settled contact of the last load step that is solved inside."""
+    found = Watched()
+
+    def watched(*given, settle=page.settle_geometry):
+        found.settled = settle(*given)
+        return found.settled
+
+    with patch.object(page, "settle_geometry", watched):
+        yield found
 
 
 class Stepping:
@@ -38,12 +59,9 @@ class Stepping:
     def step(self, index, instant):
         """Go on to the end of a load step; `settled` is then its contact."""
 
-        def watched(*given, settle=page.settle_geometry):
-            self.settled = settle(*given)
-            return self.settled
-
-        with patch.object(page, "settle_geometry", watched):
+        with watching() as found:
             self.state, result = page.load_step(self.problem, self.state, index, instant)
+        self.settled = found.settled
         return result
 
     def advance(self, index, begin, end):

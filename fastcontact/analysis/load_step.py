@@ -50,7 +50,8 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     """
     load = problem.load_at(instant)
     solved_before = problem.solver.counters.iterations
-    loaded = with_loads(problem, state, load)
+    problem.solver.put_back(state.solver)
+    loaded = right_side(problem, load)
     start, expected = prepare_start(problem, state, load, loaded)
     settled, u, balanced = equilibrium(problem, start, load, loaded, expected)
     while balanced.excess > 1.0 and problem.solver.improve(balanced.excess):
@@ -63,12 +64,6 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
         iterations["regularised"] = problem.bodies.report(end.rigid, end.largest_work)
     end = replace(end, solver=problem.solver.snapshot())
     return end, recover(problem, end, contact, balanced.reaction, iterations, (index, instant))
-
-
-def with_loads(problem: Problem, state: State, load: StepLoad) -> Loaded:
-    """Return the prepared matrix with the right-hand side of the step; the solver continues from the state."""
-    problem.solver.put_back(state.solver)
-    return right_side(problem, load)
 
 
 def right_side(problem: Problem, load: StepLoad) -> Loaded:
@@ -101,37 +96,22 @@ def prepare_start(problem: Problem, state: State, load: StepLoad, loaded: Loaded
 
 
 def equilibrium(
-    problem: Problem,
-    start: State,
-    load: StepLoad,
-    loaded: Loaded,
-    expected: float,
-    before: SettledContact | None = None,
-) -> tuple[SettledContact | None, Array, Balance]:
+    problem: Problem, start: State, load: StepLoad, loaded: Loaded, expected: float, before: SettledContact | None = None
+) -> tuple[SettledContact | None, Array, Balance]:  # fmt: skip
     """Return the settled contact, all displacements (n_dofs,) [length] and the balance of forces.
 
     It begins where the contact `before` ended, which less accurate solutions have settled.
     """
-    settled = settle(problem, start, load, loaded, expected, before) if problem.pairs else None
+    settled = None
+    if problem.pairs:
+        dofs = problem.dofs.for_step(start.u, load.lift)
+        step = Step(problem, start, load, dofs.loaded(loaded), dofs)
+        settled = settle_geometry(step, start.extrapolation, expected, before.iterate if before else None)
     u, contact_force = solve_displacements(problem, start, load, loaded, settled)
     balanced = balance(problem, u, contact_force, load.force, start.largest_force)
     if settled is not None:
         settled.iterate.history[-1]["residual"] = balanced.relative
     return settled, u, balanced
-
-
-def settle(
-    problem: Problem,
-    start: State,
-    load: StepLoad,
-    loaded: Loaded,
-    expected: float,
-    before: SettledContact | None = None,
-) -> SettledContact:
-    """Settle the contact geometry on the displacement components that contact depends on."""
-    dofs = problem.dofs.for_step(start.u, load.lift)
-    step = Step(problem, start, load, dofs.loaded(loaded), dofs)
-    return settle_geometry(step, start.extrapolation, expected, None if before is None else before.iterate)
 
 
 def solve_displacements(

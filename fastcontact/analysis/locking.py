@@ -52,9 +52,10 @@ class Comparison:
     def __init__(self, model: Model) -> None:
         self._model, (self._moduli, self._material) = model, model.material_numbers()
         self._averaged = model.averaged_materials()
-        nu = np.full(len(self._moduli), -1.0)  # only isotropic materials have a mean dilatation
+        nu = np.full(len(self._moduli), -1.0)  # only isotropic materials have a mean dilatation; modes do not lock
         for number, (material, _) in enumerate(model.materials):
-            nu[number] = material.nu if isinstance(material, LinearElastic) else -1.0
+            if isinstance(material, LinearElastic) and not material.incompatible_modes:
+                nu[number] = material.nu
         self._suspicious = (nu >= SUSPICIOUS) & (model.kinematics != "plane_stress")
         self._cells = {name: rows for name in model.mesh.solids if (rows := self._may_lock(name)).any()}
         self.elements = list(self._cells)

@@ -109,6 +109,7 @@ def _interpenetration(problem: Problem, state: State) -> list[str]:
         for p in problem.pairs.values()
         if isinstance(p.primary, Surface)
     }
+    joined |= {frozenset((int(body[s.nodes[0]]), int(body[s.opposite[0]]))) for s in problem.model.pretensions}
     texts: list[str] = []
     seen: set[frozenset[int]] = set()
     coordinates = mesh.points + problem.displacement(state.u)

@@ -9,6 +9,7 @@ from typing import Any
 
 from fastcontact.analysis import restart, step_halving
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.locked_sections import go_on, locked_before
 from fastcontact.analysis.problem import Problem, prepare
 from fastcontact.analysis.progress import Progress
 from fastcontact.analysis.result_warnings import result_warnings
@@ -53,8 +54,8 @@ def solve(
     on_step : callable, optional
         Called with every new `StepResult`, e.g. ``ResultWriter.write``. To keep only some steps, see `solve_steps`.
     resume : sequence of StepResult
-        Steps of the same case to continue: what `solve` returned, ``open_results(path)`` or ``ResultWriter.done``. The
-        analysis ends as if it had never stopped. Linear solver, tolerances, limits and the rest of the ramp may be others.
+        Steps to continue as if they had not stopped: what `solve` returned, ``open_results(path)``, ``ResultWriter.done``.
+        Linear solver, tolerances, limits and the rest of the ramp may be others.
     progress : bool
         Write a line on standard error that is drawn anew after every step, also in notebooks.
 
@@ -65,27 +66,36 @@ def solve(
 
     Raises
     ------
-    MeshError, ModelError, ContactError
-        If the model is wrong, or another one than that of `resume`.
-    ConvergenceError
-        If a step does not converge, nor in parts (`Criteria.max_halvings`); `on_step` has had the steps before it.
+    MeshError, ModelError, ContactError, ConvergenceError
+        If the model is wrong, or another one than that of `resume`; if a step does not converge, nor in parts
+        (`Criteria.max_halvings`): `on_step` has had the steps before it.
 
     Warns
     -----
     FastcontactWarning
-        At the beginning about the model (`model.model_warnings`), at the end about the result (`analysis.result_warnings`):
-        what is doubtful, with the value that shows it. The results of the first and of the last step keep the texts.
+        What is doubtful about the model and, at the end, the result, with figures; these steps keep the texts.
     """
     steps, ramp = Steps(resume), ramp_of(ramp)
     total = len(steps) + len(restart.remaining(ramp, steps[-1] if steps else None))
-    with Progress(total, show=progress, done=len(steps)) as line:
-        for step in solve_steps(
-            model, ramp, linear_solver=linear_solver, linear_tolerance=linear_tolerance,
-            linear_precision=linear_precision, criteria=criteria, resume=steps,
-        ):  # fmt: skip
+    new = partial(
+        solve_steps, model, ramp, linear_solver=linear_solver, linear_tolerance=linear_tolerance,
+        linear_precision=linear_precision, criteria=criteria, resume=steps,
+    )  # fmt: skip
+    return _gathered(new, steps, Progress(total, show=progress, done=len(steps)), on_step)
+
+
+def _gathered(
+    new: Callable[[], Iterator[StepResult]],
+    steps: Steps,
+    progress: Progress,
+    on_step: Callable[[StepResult], None] | None,
+) -> Steps:
+    """Return `steps` with the new ones behind them, each handed to `on_step` when it is done."""
+    with progress:
+        for step in new():
             if on_step is not None:
                 on_step(step)
-            line.step(step)
+            progress.step(step)
             if steps and steps[-1].restart is not None:
                 steps[-1] = replace(steps[-1], restart=None)
             steps.append(step)
@@ -145,12 +155,13 @@ def _marched(
     doubtful = model_warnings(model, ramp)
     for text in doubtful if last is None else ():
         warn(text)
-    problem = prepared(model)
+    problem = prepared(locked_before(model, last))
     state = problem.initial_state() if last is None else restart.put_back(problem, last, touched)
     begin, before = problem.ramp.table[0][0], 0
     if last is not None:
         begin, before, last = last.load_factor, last.index, None  # kept no longer
     for index, instant in enumerate(instants, start=before + 1):
+        problem, state = go_on(prepared, model, problem, state, begin)
         state, step = step_halving.advance(problem, state, index, begin, instant)
         found = result_warnings(problem, state, step) if instant == instants[-1] else []
         for text in found:

@@ -25,13 +25,17 @@ from fastcontact.elasticity.constrained_system import System
 from fastcontact.model.rigid_motions import FreeMotions
 
 Array = NDArray[np.float64]
-# The springs carry less than this fraction of the loads; more where round-off or the linear solver leave more.
+# The springs carry less than this fraction of the loads and of the contact forces, which is all there is where motions drive
+# the bodies; more where round-off or the linear solver leave more.
 SLACK = 1e-12
 # What is left when nothing improves any more counts as slack below this fraction.
 STAGNANT = 1e-8
 MAX_POSITIONS = 100
 # Lengths tried along one step.
-TRIALS = 10
+TRIALS = 20
+# A step that leaves more than this part of the elongations meets nothing yet; the next length is so many times as long.
+UNCHANGED = 0.9
+FARTHER = 10.0
 # A motion that resists less than this fraction of its spring does not resist.
 UNRESISTED = 1e-9
 
@@ -152,7 +156,7 @@ class UnsupportedBodies:
             Solves the contact problem with the springs at a position (k,).
         start : ndarray (k,)
         load : float
-            The forces to compare those of the springs with [force].
+            The loads to compare the forces of the springs with, beside those of contact [force].
         noise : float
             Accuracy of displacements, as a fraction of the largest one.
         round_off : float
@@ -165,19 +169,24 @@ class UnsupportedBodies:
         """
         search = _Search(solve_at, self.dofs, start)
         noise *= float(np.abs(search.state.u).max())
-        enough = max(SLACK * load / self.stiffness, noise)
-        tolerable = max(enough, STAGNANT * load / self.stiffness, round_off)
+
+        def elongation(part: float) -> float:
+            return max(part * max(load, search.contact_force) / self.stiffness, noise)
+
+        def tolerable() -> float:
+            return max(elongation(STAGNANT), round_off)
+
         derivative: Array | None = None
-        while search.settled and search.left > enough and search.positions < MAX_POSITIONS:
+        while search.settled and search.left > elongation(SLACK) and search.positions < MAX_POSITIONS:
             before = search.left
             if derivative is None:
                 derivative = search.differences(max(0.1 * search.left, 1e3 * noise, 1e3 * round_off))
-            search.move(_step(derivative, search.elongation))
+            search.move(_step(derivative, search.elongation), farther=search.left > tolerable())
             if search.left > 0.1 * before:
                 derivative = None
-                if search.left >= 0.5 * before and search.left <= tolerable:
+                if search.left >= 0.5 * before and search.left <= tolerable():
                     break
-        slack = search.settled and search.left <= tolerable
+        slack = search.settled and search.left <= tolerable()
         state = dataclasses.replace(search.unsettled or search.state, iterations=search.iterations)
         return RigidPosition(state, search.position, self.stiffness * search.elongation, search.positions, slack)
 
@@ -202,6 +211,11 @@ class _Search:
         """Largest elongation [length]."""
         return float(np.abs(self.elongation).max())
 
+    @property
+    def contact_force(self) -> float:
+        """Largest contact force [force]."""
+        return float(np.abs(self.state.multiplier).max(initial=0.0))
+
     def _at(self, position: Array) -> tuple[Solution, Array]:
         state = self._solve_at(position)
         self.positions += 1
@@ -219,16 +233,26 @@ class _Search:
             columns.append((self._at(self.position + shift)[1] - self.elongation) / shift[k])
         return np.column_stack(columns)
 
-    def move(self, step: Array) -> None:
-        """Go along `step`, less far where the elongations turn round."""
-        slope, length = float(self.elongation @ step), 1.0
+    def move(self, step: Array, *, farther: bool = True) -> None:
+        """Go along `step`: less far where the elongations turn round, `farther` where nothing changes them.
+
+        Where the bodies meet something much stiffer on their way, a step is far too long and its secant far too short. Once a
+        length is too long, one is therefore looked for between two lengths, with at most half of the elongations left.
+        """
+        slope = float(self.elongation @ step)
+        low, high, length = (0.0, slope), None, 1.0
         for _ in range(TRIALS):
             position = self.position + length * step
             state, elongation = self._at(position)
             there = float(elongation @ step)
-            if there >= -0.5 * abs(slope):
+            if there < -0.5 * abs(slope):
+                high = length, there
+                part = min(max(low[1] / (low[1] - there), 0.1), 0.9) if low[1] > there else 0.5
+            elif there <= (UNCHANGED if high is None else 0.5) * slope or not (farther or high):
                 break
-            length *= min(max(slope / (slope - there), 0.1), 0.9)
+            else:
+                low, part = (length, there), 0.5
+            length = FARTHER * length if high is None else low[0] + part * (high[0] - low[0])
         self.position, self.state, self.elongation = position, state, elongation
 
 

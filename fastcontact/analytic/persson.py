@@ -33,8 +33,8 @@ class PerssonPin:
 
     @property
     def radius(self) -> float:
-        """Half the length of the contact along the arc [length]."""
-        return self.R * math.radians(self.contact_angle)
+        """Half the width of the contact, the chord of its arc [length]."""
+        return self.R * math.sin(math.radians(self.contact_angle))
 
     @property
     def pressure_max(self) -> float:

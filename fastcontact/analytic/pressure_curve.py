@@ -45,7 +45,7 @@ class PressureCurve:
     pressure_max : float
         [pressure]
     radius : float
-        Where the pressure ends [length]; infinite where it is the same everywhere.
+        Where the pressure ends along the surface [length]; infinite where it is the same everywhere.
     """
 
     name: str
@@ -62,7 +62,7 @@ def pressure_curve(theory: Any) -> PressureCurve | None:
     >>> from fastcontact.analytic import persson_pin
     >>> pin = persson_pin(E=1000.0, nu=0.3, R=10.0, clearance=0.1, contact_angle=60.0)
     >>> curve = pressure_curve(pin)
-    >>> round(float(curve.pressure(0.0) / pin.pressure_max), 12), float(curve.pressure(pin.radius)) < 1e-6
+    >>> round(float(curve.pressure(0.0) / pin.pressure_max), 12), float(curve.pressure(curve.radius)) < 1e-6
     (1.0, True)
     """
     if theory is None:
@@ -77,7 +77,7 @@ def pressure_curve(theory: Any) -> PressureCurve | None:
             name,
             lambda s: pin.pressure(np.minimum(np.degrees(np.abs(np.asarray(s, float)) / pin.R), 180.0)),
             pin.pressure_max,
-            pin.radius,
+            pin.R * math.radians(pin.contact_angle),
         )
     theory = theory.normal if isinstance(theory, (CattaneoMindlinLine, CattaneoMindlinSphere)) else theory
     if not all(hasattr(theory, key) for key in ("pressure", "pressure_max", "radius")):

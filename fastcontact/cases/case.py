@@ -25,6 +25,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, linear_ramp
 from fastcontact.results.step import StepResult
+from fastcontact.results.units import units_of_results
 
 # Suffix of input decks of Abaqus and CalculiX.
 DECK = ".inp"
@@ -198,7 +199,7 @@ def build_case(
         name=name,
         title=data.get("title", name),
         text=text,
-        mesh=mesh,
+        mesh=model.mesh,
         model=model,
         ramp=ramp,
         criteria=criteria,
@@ -297,14 +298,14 @@ def _theory(where: str, data: dict[str, Any]) -> Any:
 
 
 def described(data: dict[str, Any]) -> dict[str, Any]:
-    """Return title, units, theories, approach and the table of the ramp of a case, as `Case` holds them.
+    """Return title, units of results, theories, approach and the table of the ramp of a case, as `Case` holds them.
 
     `data` is the parsed text kept in a result file; it may be empty.
     """
     theories, approach = _theories(data)
     return {
         "title": data.get("title", ""),
-        "units": _units(data),
+        "units": units_of_results(_units(data), str(data.get("kinematics", ""))),
         "theories": theories,
         "approach": approach,
         "ramp": _ramp(data.get("ramp", {})).table,

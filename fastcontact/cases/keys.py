@@ -27,6 +27,7 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
             **dict.fromkeys(("E", "nu"), (int, float, list)),
             "groups": (list, str),
             "volumetric": str,
+            "incompatible_modes": bool,
             **dict.fromkeys(("G", "D"), list),
             "axes": (list, dict),
             "density": NUMBER,
@@ -58,6 +59,14 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         ("first", "second", "component"),
     ),
     "relation": ({"terms": list, "value": NUMBER, "ramp": list}, ("terms",)),
+    "pretension": (
+        {
+            **dict.fromkeys(("name", "section", "opposite"), str),
+            **dict.fromkeys(("force", "shortening", "locked_from"), NUMBER),
+            **dict.fromkeys(("normal", "ramp"), list),
+        },
+        ("name", "section"),
+    ),
     "spring": (
         {"group": (str, int), "to": (str, int), **AXES, "axial": NUMBER, "transverse": NUMBER, "direction": list},
         ("group",),

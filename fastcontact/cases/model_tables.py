@@ -15,6 +15,7 @@ from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.errors import CaseError, unknown
 from fastcontact.mesh.files.mesh_files import read_mesh
+from fastcontact.mesh.generate.cut import OPPOSITE, cut
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
@@ -27,7 +28,11 @@ def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
         constants["axes"] = called("material.axes", CylindricalAxes, constants["axes"])
     if kind is LinearElastic:
         for key in constants:
-            if key != "volumetric" and not isinstance(constants[key], (list, tuple)) and key != "axes":
+            if (
+                key not in ("volumetric", "incompatible_modes")
+                and not isinstance(constants[key], (list, tuple))
+                and key != "axes"
+            ):
                 constants[key] = float(constants[key])
     for key in constants:
         if key not in inspect.signature(kind).parameters:
@@ -71,12 +76,13 @@ _ADD: dict[str, Callable[..., None]] = {
     "relation": Model.relate,
     "group_relation": Model.relate_groups,
     "spring": Model.add_spring,
+    "pretension": Model.add_pretension,
 }
 
 
 def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
     """Return the model that the parsed `data` of a case file describe; meshes of obstacles lie relative to `folder`."""
-    model = Model(mesh, data["kinematics"], case_text=text)
+    model = Model(_cut(mesh, data.get("pretension", [])), data["kinematics"], case_text=text)
     model.units = dict(data.get("units", {}))
     for kind, add in _ADD.items():
         known, needed = LISTS[kind]
@@ -99,6 +105,16 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
     for name, entry in data.get("obstacle", {}).items():
         _add_obstacle(model, name, entry, folder)
     return model
+
+
+def _cut(mesh: Mesh, sections: Any) -> Mesh:
+    """Return the mesh cut along the sections that have no opposite side yet."""
+    for i, entry in enumerate(tables("pretension", sections)):
+        name = entry.get("section")
+        if isinstance(name, str) and "opposite" not in entry and name + OPPOSITE not in mesh.group_names:
+            with at(f"pretension[{i}]"):
+                mesh = cut(mesh, name, entry.get("normal"))
+    return mesh
 
 
 def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:

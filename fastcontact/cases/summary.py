@@ -13,6 +13,7 @@ from fastcontact._version import __version__
 from fastcontact.cases.case import Case
 from fastcontact.cases.checks import at_point, evaluated
 from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.units import units_of_results
 
 # Numbers that a theory must have to be compared as a whole.
 COMPARED = ("force", "pressure_max", "radius")
@@ -39,7 +40,7 @@ def summarise(
     return {
         "case": case.name,
         "title": case.title,
-        "units": dict(case.units),
+        "units": units_of_results(case.units, case.model.kinematics),
         "mesh": {"n_points": mesh.n_points, "n_cells": mesh.n_cells},
         "n_dofs": case.model.n_dofs,
         "steps": list(steps),
@@ -65,6 +66,8 @@ def of_step(step: StepResult) -> dict[str, Any]:
     found = {"load_factor": step.load_factor, **{name: step.iterations[name] for name in counts}}
     if "substeps" in step.iterations:
         found["substeps"] = step.iterations["substeps"]
+    if step.pretension:
+        found["pretension"] = step.pretension
     return found
 
 
@@ -140,6 +143,11 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
         found.append(f"  {many} did not converge as a whole and went in {sum(parts)} parts")
     for name, contact in summary["contact"].items():
         found += _contact_lines(name, contact, unit)
+    for name, section in steps[-1].get("pretension", {}).items():
+        found.append(
+            f"  pretension '{name}': force {section['force']:.6g} {unit['force']}, shortened by {section['shortening']:.6g} "
+            f"{unit['length']}"
+        )
     top = summary["von_mises_max"]
     where = ", ".join(f"{x:.4g}" for x in top["at"])
     found.append(f"  largest von Mises stress {top['value']:.6g} {unit['pressure']} at ({where}) {unit['length']}")

@@ -79,9 +79,11 @@ def pressure_curves(
     load : float
         Multiplier of the loads at this step [-].
 
-    There is nothing without a theory whose pressure can be drawn; that of a flat punch is infinite.
+    There is nothing without a theory whose pressure can be drawn; that of a flat punch is infinite. Of finite half spheres it
+    is Hertz's.
     """
     theory: Any = theories.get("theory")
+    theory = theory if pressure_curve(theory) is not None else getattr(theory, "hertz", None)
     own = pressure_curve(theory)
     if own is None:
         return {}
@@ -112,4 +114,4 @@ def law(theories: Mapping[str, Any]) -> Any:
     """Return what gives force and radius of a contact by its approach, from none on; None where nothing does."""
     theory = theories.get("theory")
     theory = getattr(theory, "hertz", theory)
-    return theory if hasattr(theory, "at_approach") and theories["share"] == 1.0 else None
+    return theory if hasattr(theory, "at_approach") else None

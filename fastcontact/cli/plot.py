@@ -1,4 +1,4 @@
-"""``fastcontact plot``: the deformed mesh coloured by von Mises, and the history over the load."""
+"""``fastcontact plot``: the deformed mesh coloured by a field, sections, the contact, what happens over the load."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from fastcontact.cli._outputs import check_outputs, save
 from fastcontact.cli._terminal import say
 from fastcontact.errors import CaseError
 
-HELP = "plot the deformed mesh with its von Mises stress, or force and radius over the load"
+HELP = "plot the deformed mesh with a field, a section, the contact, or what happens over the load"
+# Pictures of one contact pair.
+OF_CONTACT = ("history", "axis", "zones", "map")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,7 +25,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     what.add_argument(
         "--zones", action="store_true", help="where the contact is open, closed and slides, over the load"
     )
+    what.add_argument("--map", action="store_true", help="pressure and shear over the contact surface (3D)")
+    what.add_argument("--section", metavar="PLANE", help="a section, such as y=0 or x=12.5 (3D)")
+    what.add_argument("--animate", metavar="FILE", help="a moving picture over the load: .gif, with ffmpeg .mp4")
     what.add_argument("--view", action="store_true", help="an interactive window (PyVista) instead of a picture")
+    parser.add_argument(
+        "--field", metavar="NAME", default="von_mises",
+        help="what colours the mesh: von_mises (default), stress.xx, stress.principal_min, displacement, displacement.y ...",
+    )  # fmt: skip
+    parser.add_argument("--zoom", metavar="LENGTH", type=float, help="half the width to draw around the largest value")
     parser.add_argument("--mirrored", action="store_true", help="draw the full section beyond the axis, too")
     parser.add_argument("--scale", type=float, default=1.0, help="factor on the displacements (default 1)")
 
@@ -33,50 +43,99 @@ def run(options: argparse.Namespace) -> int:
     from fastcontact.results import plot
     from fastcontact.results.reader import open_results
 
-    if not (options.png or options.view):
+    if not (options.png or options.view or options.animate):
         raise CaseError("name the picture to write with --png FILE, or ask for a window with --view")
-    check_outputs([options.file], (), [options.png])
+    check_outputs([options.file], [options.animate], [options.png])
+    if options.png and options.animate:
+        raise CaseError("--animate FILE names the file to write: leave out --png")
+    plane = _plane(options.section) if options.section else None
     with open_results(options.file) as results:
         step = _results.chosen_step(results, options.step)
         case = _results.case_data(results)
         if options.view:
             plot.view(results, step, scale=options.scale, title=case["title"], screenshot=options.png)
             return 0
-        save(_drawn(options, results, step, case), options.png)
+        if options.animate:
+            _animate(options, results, case)
+        elif any(getattr(options, name) for name in OF_CONTACT):
+            save(_of_contact(options, results, step, case), options.png)
+        else:
+            save(_of_bodies(options, results, step, case, plane), options.png)
     if not options.quiet:
-        say(f"wrote {options.png}")
+        say(f"wrote {options.animate or options.png}")
     return 0
 
 
-def _drawn(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> Any:
-    """Draw the deformed mesh, or of one contact pair its zones or history over the load, or the stresses under it."""
+def _plane(text: str) -> tuple[int, float]:
+    """Return the axis and the coordinate [length] of a plane such as ``y=0``; raises CaseError for another text."""
+    name, _, value = text.partition("=")
+    try:
+        return "xyz".index(name.strip()), float(value)
+    except ValueError:
+        raise CaseError(f"'{text}' is no plane: write for example y=0") from None
+
+
+def _animate(options: argparse.Namespace, results: Any, case: dict[str, Any]) -> None:
+    from fastcontact.results import plot
+
+    plot.animate(
+        results.mesh, list(results), options.animate, field=options.field, scale=options.scale,
+        mirrored=options.mirrored, title=case["title"], units=case["units"],
+    )  # fmt: skip
+
+
+def _of_bodies(
+    options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any], plane: tuple[int, float] | None
+) -> Any:
+    """Draw the deformed mesh, or a section through it."""
+    from fastcontact.results import plot
+
+    at = f"section {options.section}, " if plane else ""
+    title = f"{case['title']}\n{at}load factor {step.load_factor:g}, displacements x {options.scale:g}".strip()
+    labels = {
+        "field": options.field,
+        "scale": options.scale,
+        "zoom": options.zoom,
+        "title": title,
+        "units": case["units"],
+    }
+    if plane is None:
+        return plot.deformed_shape(results.mesh, step, mirrored=options.mirrored, **labels)
+    point, normal = [0.0] * 3, [0.0] * 3
+    point[plane[0]], normal[plane[0]] = plane[1], 1.0
+    return plot.section(results.mesh, step, point, normal, **labels)
+
+
+def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> Any:
+    """Draw of one contact pair its map, its zones or history over the load, or the stresses under it."""
     from fastcontact.results import plot
 
     labels = {"title": case["title"], "units": case["units"]}
-    loaded = f"load factor {step.load_factor:g}"
-    if not (options.history or options.axis or options.zones):
-        labels["title"] = f"{case['title']}\n{loaded}, displacements x {options.scale:g}".strip()
-        return plot.deformed_shape(results.mesh, step, scale=options.scale, mirrored=options.mirrored, **labels)
     name = _results.chosen_contact(step, options.contact)
     hint = _results.other_contacts(step, name, options.contact)
     if hint and not options.quiet:
         say(hint, error=True)
     theories = case["theories"].get(name, {})
+    if options.map:
+        labels["title"] = f"{case['title']}\ncontact '{name}', load factor {step.load_factor:g}".strip()
+        return plot.contact_map(results.mesh, step.contact[name], **labels)[0]
     if options.zones:
         return plot.contact_zones(list(results), name, **labels)
     if options.history:
-        approach = case["approach"].get(name)
-        return plot.history(list(results), name, law=_results.law(theories), approach=approach, **labels)[0]
+        given = {"approach": case["approach"].get(name), "share": theories.get("share", 1.0)}
+        return plot.history(list(results), name, law=_results.law(theories), **given, **labels)[0]
+    labels["title"] = f"{case['title']}\nstresses on the axis, load factor {step.load_factor:g}".strip()
+    return plot.axis_stress(results.mesh, step, name, _axis_curves(theories, step, name, case), **labels)
+
+
+def _axis_curves(theories: dict[str, Any], step: Any, name: str, case: dict[str, Any]) -> dict[str, Any]:
+    """Return theories of the stresses on the axis by label, at equal approach and at equal force."""
     theory = theories.get("theory")
     theory = getattr(theory, "hertz", theory)
-    curves: dict[str, Any] = {}
-    if hasattr(theory, "stress_on_axis"):
-        same = _results.at_equal_force("theory, equal force", theory, step.contact[name], theories["share"])
-        approach, load = case["approach"].get(name), _results.load_multiplier(case["ramp"], step)
-        if approach is not None and load > 0 and hasattr(theory, "at_approach"):
-            curves["theory, equal approach"] = theory.at_approach(approach * load) if load != 1.0 else theory
-        elif not same:
-            curves["theory"] = theory
-        curves |= same
-    labels["title"] = f"{case['title']}\nstresses on the axis, {loaded}".strip()
-    return plot.axis_stress(results.mesh, step, name, curves, **labels)
+    if theory is None or not hasattr(theory, "stress_on_axis"):
+        return {}
+    same = _results.at_equal_force("theory, equal force", theory, step.contact[name], theories["share"])
+    approach, load = case["approach"].get(name), _results.load_multiplier(case["ramp"], step)
+    if approach is not None and load > 0 and hasattr(theory, "at_approach"):
+        return {"theory, equal approach": theory.at_approach(approach * load) if load != 1.0 else theory, **same}
+    return same or {"theory": theory}

@@ -7,6 +7,9 @@ symmetry is one on which supports hold the nodes at an end of the surface across
 In the plane, places are lengths along the surface: a ring unrolls. The same holds in axisymmetry where the surface runs along
 the axis rather than across, as in a press fit of cylinders. In space places are distances from the line through the middle
 along the mean normal.
+
+The half-width of a contact in the plane is that of its shadow along the mean normal: half the chord of a pin in its hole, not
+the arc.
 """
 
 from __future__ import annotations
@@ -43,6 +46,9 @@ class ContactMiddle:
         Of the line from which distances are measured [-].
     ignored : tuple of int
         Coordinates along which the model stands for an endless one.
+    tangent : ndarray (dim,), optional
+        Along which half-widths are measured, either way [-]; without one, as in axisymmetry, in space, and on a ring that is
+        pressed all round, places count.
     """
 
     position: Array
@@ -51,6 +57,11 @@ class ContactMiddle:
     reversed: bool = False
     direction: Array | None = None
     ignored: tuple[int, ...] = ()
+    tangent: Array | None = None
+
+    def across(self, positions: Array) -> Array:
+        """Return how far reference positions (n, dim) lie from the middle (n,), seen along the normal there [length]."""
+        return self.places(positions) if self.tangent is None else (positions - self.position) @ self.tangent
 
     def places(self, positions: Array) -> Array:
         """Return how far reference positions (n, dim) lie from the middle (n,), along a line with a sign [length]."""
@@ -163,16 +174,17 @@ def _along_line(
     surface: Surface, coordinates: Array, weight: Array, planes: list[tuple[int, NDArray[np.intp]]], mean: Array
 ) -> ContactMiddle:
     """Return the middle on a surface in the plane; one in several pieces is seen along its mean normal."""
-    points = coordinates[surface.points]
-    centre = weight @ points
-    line = unrolled(surface, coordinates, centre if np.linalg.norm(mean) > DIRECTED else None)
+    points, length = coordinates[surface.points], float(np.linalg.norm(mean))
+    centre, tangent = weight @ points, np.array([-mean[1], mean[0]]) / (length or 1.0)
+    line = unrolled(surface, coordinates, centre if length > DIRECTED else None)
     if line is None:
-        across = np.array([-mean[1], mean[0]]) / (np.linalg.norm(mean) or 1.0)
-        line = UnrolledLine.straight(centre, across, float(np.ptp(points, axis=0).max()))
+        line = UnrolledLine.straight(centre, tangent, float(np.ptp(points, axis=0).max()))
     lengths = line.lengths(points)
     if len(planes) == 1 and not line.closed:
-        ends = lengths[planes[0][1]]  # both ends of a half ring lie on the plane
+        axis, on_plane = planes[0]
+        ends = lengths[on_plane]  # both ends of a half ring lie on the plane
         start = float(ends[np.argmin(np.abs(ends - weight @ lengths))])
-        return ContactMiddle(line.at(start), line, start, start > 0.5 * (lengths.min() + lengths.max()))
+        other_way = start > 0.5 * (lengths.min() + lengths.max())
+        return ContactMiddle(line.at(start), line, start, other_way, tangent=np.eye(2)[axis])
     start = float(weight @ lengths)
-    return ContactMiddle(line.at(start), line, start)
+    return ContactMiddle(line.at(start), line, start, tangent=tangent if length > DIRECTED else None)

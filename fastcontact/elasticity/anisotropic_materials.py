@@ -44,6 +44,8 @@ class Orthotropic(Material):
         Mass per volume [mass / length^3].
     expansion : float or (float, float, float), optional
         Coefficients of thermal expansion, one for all or one along each axis [1 / temperature].
+    incompatible_modes : bool
+        As of `LinearElastic`.
 
     Notes
     -----
@@ -63,6 +65,7 @@ class Orthotropic(Material):
     axes: Axes = None
     density: float | None = None
     expansion: float | Sequence[float] | None = None
+    incompatible_modes: bool = False
 
     def __post_init__(self) -> None:
         for name in ("E", "nu", "G"):
@@ -150,12 +153,15 @@ class Anisotropic(Material):
         Mass per volume [mass / length^3].
     expansion : float or sequence of 3, optional
         As of `Orthotropic` [1 / temperature].
+    incompatible_modes : bool
+        As of `LinearElastic`.
     """
 
     D: Any
     axes: Axes = None
     density: float | None = None
     expansion: float | Sequence[float] | None = None
+    incompatible_modes: bool = False
 
     def __post_init__(self) -> None:
         try:

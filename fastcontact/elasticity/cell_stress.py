@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact._jit import parallel
-from fastcontact.elasticity import dilatation, dilatation_kernels, element_kernels
+from fastcontact.elasticity import dilatation, dilatation_kernels, element_kernels, incompatible_modes
 from fastcontact.elasticity.temperature import ThermalStress
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
@@ -27,7 +27,8 @@ class CellStress:
     displacement : ndarray (n_points, dim)
         Of all points [length].
     averaged : ndarray of bool (n_materials,), optional
-        Which materials have a mean dilatation, see `dilatation`; none by default.
+        Which materials have a mean dilatation, see `dilatation`, or incompatible modes (`MaterialField.treatment`); none by
+        default.
     thermal : ThermalStress, optional
         What stresses lose by the temperature.
     """
@@ -81,6 +82,23 @@ class CellStress:
         parallel.shared(part, parallel.portions(len(out), cells.shape[1]))
         if self._thermal is not None:
             self._subtract_thermal(self._thermal, name, xi, cells, material, out)
+        self._add_modes(name, xi, cells, material, out)
+
+    def _add_modes(
+        self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32], out: Array
+    ) -> None:
+        """Add the stresses of incompatible modes."""
+        for rows in incompatible_modes.batches(incompatible_modes.asked(name, self._averaged, material)):
+            own, corners = cells[rows], self._mesh.points[cells[rows]]
+            moduli, thermal = self._moduli[material[rows]], None
+            if self._thermal is not None:
+                rise = self._thermal.rise[own] @ elements.get(name).tables[0].T
+                thermal = rise[:, :, None] * self._thermal.per_degree[material[rows]][:, None, :]
+            found = incompatible_modes.operators(name, corners, moduli.shape[1])
+            displacement = self._displacement[own].reshape(len(rows), -1)
+            amounts = incompatible_modes.amplitudes(found, moduli, displacement, thermal)
+            strains = incompatible_modes.mode_strains(name, corners, xi, moduli.shape[1])
+            out[rows] += np.einsum("cij,cqja,ca->cqi", moduli, strains, amounts, optimize=True)
 
     def _subtract_thermal(
         self,

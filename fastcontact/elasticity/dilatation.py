@@ -21,7 +21,8 @@ from fastcontact.elasticity.energy import cell_volumes
 from fastcontact.mesh import elements
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+# Which moduli have a mean dilatation: True or 1, see `MaterialField.treatment`.
+Mask = NDArray[np.bool_] | NDArray[np.uint8]
 # Bulk over shear modulus at nu = 0.3: 2 (1 + nu) / (3 (1 - 2 nu)).
 REMAINDER = 2.6 / 1.2
 
@@ -51,8 +52,9 @@ def split(name: str, moduli: Array, averaged: Mask | None) -> Split | None:
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
         From `LinearElastic.moduli` [pressure].
     averaged : ndarray of bool (n_materials,), optional
-        Which materials have a mean dilatation; none by default.
+        Which materials have a mean dilatation, those with a 1 (`MaterialField.treatment`); none by default.
     """
+    averaged = None if averaged is None else np.asarray(averaged) == 1
     if averaged is None or not averaged.any() or elements.get(name).dilatation is None:
         return None
     bulk = np.where(averaged, moduli[:, :3, :3].sum(axis=(1, 2)) / 9.0, 0.0)

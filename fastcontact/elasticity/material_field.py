@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.elasticity.incompatible_modes import MODES
 from fastcontact.elasticity.materials import Material
 from fastcontact.elasticity.temperature import ThermalStress
 from fastcontact.mesh.mesh import Mesh
@@ -53,6 +54,18 @@ class MaterialField:
         """Which moduli (n_moduli,) have a mean dilatation; none in plane stress, where none locks."""
         averaged = np.array([material.averaged for material in self.materials], bool)
         return np.asarray(averaged[self.owner] & (self.kinematics != "plane_stress"))
+
+    @cached_property
+    def treatment(self) -> NDArray[np.uint8]:
+        """What elements make of the strain, by moduli (n_moduli,): 1 a mean dilatation, 2 incompatible modes, 0 nothing.
+
+        Axisymmetric cells have no incompatible modes.
+        """
+        modes = np.array([material.incompatible_modes for material in self.materials], bool)[self.owner]
+        found = self.averaged.astype(np.uint8)
+        if self.kinematics != "axisymmetric":
+            found[modes] = MODES
+        return found
 
     @cached_property
     def compliance(self) -> Array:

@@ -40,12 +40,15 @@ class Material:
         Unit vectors in rows (3, 3) [-], or a function, see `Orthotropic`; None: those of the mesh.
     averaged : bool
         Whether elements have a mean dilatation, where they can and kinematics are not plane stress.
+    incompatible_modes : bool
+        Whether linear quadrangles and hexahedra have incompatible modes, where kinematics are not axisymmetric.
     """
 
     density: float | None
     expansion: Any
     axes: Axes = None
     averaged: bool = False
+    incompatible_modes: bool = False
 
     @property
     def young(self) -> tuple[float, float]:
@@ -191,6 +194,9 @@ class LinearElastic(Material):
         Mass per volume [mass / length^3], for gravity and centrifugal loads; zero or more.
     expansion : float, optional
         Coefficient of thermal expansion [1 / temperature].
+    incompatible_modes : bool
+        Linear quadrangles and hexahedra get incompatible modes, so that thin parts of them bend without locking in shear;
+        nothing changes in other elements and in axisymmetry. Excludes a mean dilatation.
     """
 
     E: float
@@ -198,6 +204,7 @@ class LinearElastic(Material):
     volumetric: str = "auto"
     density: float | None = None
     expansion: float | None = None
+    incompatible_modes: bool = False
 
     def __post_init__(self) -> None:
         check_positive("Young's modulus E", self.E)
@@ -209,6 +216,8 @@ class LinearElastic(Material):
             )
         if self.volumetric not in VOLUMETRIC:
             raise ModelError(unknown("volumetric", self.volumetric, VOLUMETRIC))
+        if self.incompatible_modes and self.volumetric == "mean_dilatation":
+            raise ModelError("a material has either incompatible modes or a mean dilatation, not both")
         check_density(self.density)
         check_expansion(self.expansion, 1)
 
@@ -237,6 +246,8 @@ class LinearElastic(Material):
     @property
     def averaged(self) -> bool:  # type: ignore[override]
         """Whether elements have a mean dilatation, where they can and kinematics are not plane stress."""
+        if self.incompatible_modes:  # which do not lock in volume either
+            return False
         return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and self.nu >= NEARLY_INCOMPRESSIBLE)
 
     @property

@@ -43,7 +43,8 @@ def stress_at_points(
     displacement : ndarray (n_points, dim)
         Of all points [length].
     averaged : ndarray of bool (n_materials,), optional
-        Which materials have a mean dilatation, see `dilatation`; none by default.
+        Which materials have a mean dilatation, see `dilatation`, or incompatible modes (`MaterialField.treatment`); none by
+        default.
     thermal : ThermalStress, optional
         What stresses lose by the temperature.
     """

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 
 from fastcontact._jit import parallel
-from fastcontact.elasticity import dilatation, dilatation_kernels, element_kernels
+from fastcontact.elasticity import dilatation, dilatation_kernels, element_kernels, incompatible_modes
 from fastcontact.elasticity import stiffness_kernels as pattern_kernels
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
@@ -90,7 +90,8 @@ def stiffness(
     pattern : Sparsity, optional
         From `sparsity`, to reuse it.
     averaged : ndarray of bool (n_materials,), optional
-        Which materials have a mean dilatation, see `dilatation`; none by default.
+        Which materials have a mean dilatation, see `dilatation`, or incompatible modes (`MaterialField.treatment`); none by
+        default.
 
     Returns
     -------
@@ -110,8 +111,24 @@ def stiffness(
             raise MeshError(
                 f"cell {bad} of {name} near {where} is degenerate or inside out: its Jacobian is not positive"
             )
+        _take_modes(mesh, name, moduli, material[name], averaged, pattern, data)
     size = mesh.n_points * mesh.dim
     return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
+
+
+def _take_modes(
+    mesh: Mesh, name: str, moduli: Array, material: NDArray[np.int32], treatment: dilatation.Mask | None,
+    pattern: Sparsity, data: Array,
+) -> None:  # fmt: skip
+    """Take what incompatible modes give way from `data` (n_blocks, dim, dim), in place."""
+    dim = mesh.dim
+    for rows in incompatible_modes.batches(incompatible_modes.asked(name, treatment, material)):
+        cells = mesh.cells[name][rows]
+        found = incompatible_modes.operators(name, mesh.points[cells], moduli.shape[1])
+        taken = incompatible_modes.condensed(found, moduli[material[rows]])
+        nodes = cells.shape[1]
+        blocks = taken.reshape(len(rows), nodes, dim, nodes, dim).transpose(0, 1, 3, 2, 4)
+        np.subtract.at(data, pattern.slots[name][rows], blocks)
 
 
 def of_special_form(moduli: Array) -> NDArray[np.bool_]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastcontact.errors import MeshError, unknown
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.facet_search import added, facets_with_nodes
 from fastcontact.mesh.html_table import html_table
 
 Array = NDArray[np.float64]
@@ -237,6 +238,53 @@ class Mesh:
             cell_groups={**self.cell_groups, **(cells or {})},
             point_groups={**self.point_groups, **(points or {})},
         )
+
+    @typed(MeshError)
+    def with_facet_group(self, name: str, where: Callable[[Array], ArrayLike], *, between: bool = False) -> Mesh:
+        """Return the mesh with a new group of facets of its solids, chosen by place; facets that it lacks are added.
+
+        Parameters
+        ----------
+        name : str
+            Of the group; one of that name is replaced.
+        where : callable
+            From positions (n_points, dim) [length] to bool (n_points,). A facet belongs to the group if all its nodes do.
+        between : bool
+            Facets between two cells, such as a section through a body; by default those on the outside.
+
+        MeshError if there is no such facet, there is a group of points of that name, or `where` returns anything else.
+
+        Examples
+        --------
+        >>> mesh = Mesh([[0, 0], [1, 0], [1, 1], [0, 1]], {"quad4": [[0, 1, 2, 3]]})
+        >>> mesh.with_facet_group("TOP", lambda x: x[:, 1] > 0.99).cells_of("TOP")["line2"].tolist()
+        [[2, 3]]
+        """
+        if name in self.point_groups:
+            raise MeshError(f"'{name}' is a group of points already: give the facets another name")
+        chosen = np.asarray(where(np.array(self.points)))
+        if chosen.shape != (self.n_points,) or chosen.dtype != bool:
+            raise MeshError(
+                f"the function of facet group '{name}' returned {chosen.dtype} of shape {chosen.shape}: it must return True "
+                f"or False for each point, shape ({self.n_points},)"
+            )
+        facets = facets_with_nodes(self.solids, chosen, between)
+        if not facets:
+            raise MeshError(
+                f"facet group '{name}' would be empty: its function chooses {int(chosen.sum())} points, but no facet "
+                f"{'between two cells' if between else 'on the outside'} has all its nodes among them; compare coordinates "
+                "with a tolerance"
+            )
+        cells, rows = dict(self.cells), {}
+        for kind, block in facets.items():
+            cells[kind], rows[kind] = added(cells.get(kind, block[:0]), block)
+        starts = dict(zip(cells, np.cumsum([0, *map(len, cells.values())]).tolist(), strict=False))
+        groups = {
+            own: np.concatenate([starts[kind] + place for kind, place in self.split(members).items()] or [members])
+            for own, members in self.cell_groups.items()
+        }
+        groups[name] = np.concatenate([starts[kind] + place for kind, place in rows.items()])
+        return self.replace(cells=cells, cell_groups=groups)
 
     @typed(MeshError)
     def merged_groups(self, name: str, members: Iterable[str]) -> Mesh:

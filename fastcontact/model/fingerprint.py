@@ -40,6 +40,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         **({"the temperatures": _unordered(model.temperatures, mesh)} if model.temperatures else {}),
         "the relations": _unordered(model.relations, mesh),
         "the springs": _unordered(model.springs, mesh),
+        **({"the pretension sections": _unordered(model.pretensions, mesh)} if model.pretensions else {}),
         "the list of contact pairs": [pair.name for pair in model.contact],
         **{f"contact '{pair.name}'": pair for pair in model.contact},
         **{f"the option {name}": value for name, value in (options or {}).items()},
@@ -98,7 +99,7 @@ def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: A
     elif not fields and callable(value):
         _take(_called(value, points), add, mesh, points)
     if isinstance(value, Material):  # a density or expansion that is not given counts as little as in older files
-        fields = [field for field in fields if getattr(value, field.name) is not None]
+        fields = [field for field in fields if getattr(value, field.name) not in (None, False)]
     if isinstance(value, LinearElastic):  # what the choice comes to, and nothing where it is plain, as in older files
         fields = [field for field in fields if field.name != "volumetric"]
         add(b"mean dilatation" if value.averaged else b"")

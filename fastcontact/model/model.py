@@ -63,6 +63,7 @@ from fastcontact.model.description import sentences
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
 from fastcontact.model.prescribed_overlap import Supports, check_prescribed
+from fastcontact.model.pretension import Pretension, PretensionForce, check_locks, pretension
 from fastcontact.model.ramp import History, Ramp, Table, combined, multiplier, table_of
 from fastcontact.model.relation_rows import NORMAL, along, directions_of, matched, normals_of
 from fastcontact.model.repeated_pairs import check_repeated
@@ -147,6 +148,7 @@ class Model:
         self.temperatures: list[Temperature] = []
         self.relations: list[Relation] = []
         self.springs: list[Springs] = []
+        self.pretensions: list[Pretension] = []
         self.contact: list[ContactPair] = []
 
     def __repr__(self) -> str:
@@ -366,7 +368,7 @@ class Model:
                     "it expansion=..., 0.0 if it does not expand"
                 )
             held = stress_at_points(
-                self.mesh, self.kinematics, field.moduli, field.rows, np.zeros(self.mesh.points.shape), field.averaged,
+                self.mesh, self.kinematics, field.moduli, field.rows, np.zeros(self.mesh.points.shape), field.treatment,
                 field.thermal(rise),
             )  # fmt: skip
             by_ramp[own.ramp] = by_ramp.get(own.ramp, 0.0) - internal_force(self.mesh, self.kinematics, held)
@@ -400,6 +402,55 @@ class Model:
         kind: type[TotalForce] | type[NodalForce] = TotalForce if distribute else NodalForce
         axes = axes_of(f"the force on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
         self._add(kind(group, axes, table_of(ramp, f"the ramp of the force on '{group}'")))
+
+    @typed(ModelError)
+    def add_pretension(
+        self,
+        name: str,
+        section: str,
+        *,
+        force: float | None = None,
+        shortening: float | None = None,
+        locked_from: float | None = None,
+        opposite: str | None = None,
+        normal: Sequence[float] | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Tighten a bolt across a section through it: its sides approach each other along the bolt, without shear.
+
+        The mesh is cut there, see `fastcontact.generate.cut`. Results are in ``step.pretension[name]``.
+
+        Parameters
+        ----------
+        name : str
+        section : str
+            Group on one side of the cut.
+        force : float, optional
+            In the bolt, positive in tension [force]; in axisymmetry over the full circle.
+        shortening : float, optional
+            By how much the sides approach, instead of the force [length].
+        locked_from : float, optional
+            Instant, the end of a load step, from which the bolt keeps the length that the force has brought it to.
+        opposite : str, optional
+            Group on the other side, by default ``"<section> opposite"``.
+        normal : sequence of float (dim,), optional
+            Along the bolt [-]; by default across the plane of the nodes.
+        ramp : Ramp or iterable of (float, float), optional
+            History of the force or the shortening.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If the sides do not lie upon each other, share points, or the numbers do not fit.
+        """
+        if name in {other.label for other in self.pretensions}:
+            raise ModelError(f"there is already a pretension '{name}': names must differ")
+        table = table_of(ramp, f"the ramp of pretension '{name}'")
+        own = pretension(self.mesh, name, section, opposite, normal, (force, shortening, locked_from), table)
+        self.pretensions.append(own)
+        self.relations.extend(own.relations(self.n_dofs))
+        if force is not None:
+            self._add(PretensionForce(own))
 
     def _add(self, load: Load) -> None:
         load.check(self.mesh, self.kinematics)
@@ -821,12 +872,12 @@ class Model:
         displacement : ndarray (n_points, dim)
             Of a step result [length].
         """
-        moduli, material = self.material_numbers()
+        field = self.material_field()
         if np.size(displacement) != self.n_dofs:
             raise ModelError(
                 f"the displacement has the shape {np.shape(displacement)}, but the mesh {self.mesh.points.shape}"
             )
-        K = stiffness(self.mesh, self.kinematics, moduli, material, None, self.averaged_materials())
+        K = stiffness(self.mesh, self.kinematics, field.moduli, field.rows, None, field.treatment)
         return np.asarray(K @ np.ravel(displacement)).reshape(-1, self.mesh.dim)
 
     def prescribed(self) -> tuple[NDArray[np.bool_], Array]:
@@ -916,6 +967,7 @@ class Model:
             named += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]
             named += [(f"the clearance of contact '{p.name}'", p.clearance_ramp) for p in self.contact]
             check_ramps(named, ramp.instants)
+            check_locks(self.pretensions, ramp.instants)
         self._check_relations(fixed, prescribed, ramp or Ramp((1.0,)))
         check_supports(self.mesh, [(s.name, s.group) for s in self.supports], self._related())
         bound = [(pair, self.bind(pair)) for pair in self.contact]

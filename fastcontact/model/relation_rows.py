@@ -54,7 +54,7 @@ def along(nodes: Nodes, directions: Array, n_dofs: int) -> csr_array:
     """Return rows (m, n_dofs): the displacement of each node (m,) along its unit vector (m, dim) [-]."""
     m, dim = directions.shape
     dofs = nodes[:, None] * dim + np.arange(dim)
-    rows = csr_array((directions.ravel(), dofs.ravel(), dim * np.arange(m + 1)), shape=(m, n_dofs))
+    rows = csr_array((directions.flatten(), dofs.ravel(), dim * np.arange(m + 1)), shape=(m, n_dofs))
     rows.eliminate_zeros()
     return rows
 

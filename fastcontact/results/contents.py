@@ -274,8 +274,8 @@ def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> No
         row["dissipation"] = contact.dissipation
         moved = contact.obstacle_displacement
         row["obstacle_displacement"] = np.nan if moved is None else moved
-        if "middle" in (row.dtype.names or ()):  # not in a file of an earlier schema that is resumed
-            row["middle"] = contact.middle
+        if "tangent" in (row.dtype.names or ()):  # not in a file of an earlier schema that is resumed
+            row["middle"], row["tangent"] = contact.middle, np.nan if contact.tangent is None else contact.tangent
         _extend(pair["rows"], table)
         if "primary" in pair:  # not in files begun before there was such a table
             faced = np.zeros(len(contact.primary_points), pair["primary"].dtype)

@@ -397,6 +397,7 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
         dissipation=float(step["dissipation"]) if "dissipation" in known else 0.0,
         obstacle_displacement=moved if np.isfinite(moved).all() else None,
         middle=step["middle"].copy() if "middle" in known else None,  # type: ignore[arg-type]
+        tangent=step["tangent"].copy() if "tangent" in known and np.isfinite(step["tangent"]).all() else None,
         **faced,
         **columns,
     )

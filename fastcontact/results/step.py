@@ -14,23 +14,24 @@ from fastcontact.results.material_stress import MaterialStress
 Array = NDArray[np.float64]
 
 
-def half_width(place: Array, closed: NDArray[np.bool_]) -> tuple[float, float]:
+def half_width(place: Array, closed: NDArray[np.bool_], across: Array | None = None) -> tuple[float, float]:
     """Return the bracket of the half-width of a contact [length]: (NaN, NaN) where nothing is closed.
 
     From `place` (n,) from the middle, with a sign where they lie on both sides of it [length], and which are `closed`: half
-    the width up to the outermost closed places, and up to the next ones beyond. Where all places lie on one side, the
-    other half is the mirror image.
+    the width up to the outermost closed places, and up to the next ones beyond, measured in `across` (n,), by default the
+    places themselves [length]. Where all places lie on one side, the other half is the mirror image.
     """
     if not closed.any():
         return float("nan"), float("nan")
-    low, high = float(place[closed].min()), float(place[closed].max())
-    if place.min() >= 0.0:
-        return high, float(place[place > high].min(initial=np.inf))
-    beyond, before = place[place > high].min(initial=np.inf), place[place < low].max(initial=-np.inf)
-    if not (np.isfinite(beyond) or np.isfinite(before)):
-        return 0.5 * (high - low), float("inf")
-    beyond, before = min(beyond, place.max()), max(before, place.min())  # on one side the surface ends
-    return 0.5 * (high - low), float(0.5 * (beyond - before))
+    across, one_sided = place if across is None else across, bool(place.min() >= 0.0)
+    beyond = place == place[place > place[closed].max()].min(initial=np.inf)
+    if not one_sided:  # where the surface ends on one side, it is no wider there
+        beyond |= place == place[place < place[closed].min()].max(initial=-np.inf)
+
+    def half(nodes: NDArray[np.bool_]) -> float:
+        return float(np.abs(across[nodes]).max() if one_sided else 0.5 * np.ptp(across[nodes]))
+
+    return half(closed), half(closed | beyond) if beyond.any() else float("inf")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,8 +68,8 @@ class ContactResult:
     force : ndarray (dim,)
         Resultant on the secondary side [force].
     radius : (float, float)
-        Bracket of the contact radius, in plane problems the half-width: from the `middle` to the outermost closed
-        constraint, and to the first open one beyond it [length]; NaN without contact.
+        Bracket of the contact radius, in plane problems the half-width along the `tangent`: from the `middle` to the
+        outermost closed constraint, and to the first open one beyond it [length]; NaN without contact.
     shear : ndarray (m, dim)
         Tangential traction on the secondary side, zero without friction or tie [pressure].
     sticking : ndarray of bool (m,)
@@ -84,6 +85,9 @@ class ContactResult:
         How far from the middle each node lies: in axisymmetry its radius; in plane problems, and where an axisymmetric
         surface runs along the axis, the length along the surface, negative on one side of the middle; in 3D the distance from
         the line through the middle along the mean normal [length].
+    tangent : ndarray (dim,), optional
+        In plane problems the direction along which half-widths are measured, either way [-]; None where `place` counts: in
+        axisymmetry, in 3D, and on a ring that is pressed all round.
     primary_points : ndarray of int (k,)
         Point numbers of the primary side; none for a rigid obstacle.
     primary_force_vectors : ndarray (k, dim)
@@ -109,6 +113,7 @@ class ContactResult:
     obstacle_displacement: Array | None = None
     middle: Array = None  # type: ignore[assignment]
     place: Array = None  # type: ignore[assignment]
+    tangent: Array | None = None
     primary_points: NDArray[np.int32] = None  # type: ignore[assignment]
     primary_force_vectors: Array = None  # type: ignore[assignment]
 
@@ -154,7 +159,12 @@ class ContactResult:
     @property
     def stick_radius(self) -> tuple[float, float]:
         """Bracket of the stick zone, as `radius`: the outermost node that sticks, and the next one; NaN if none does."""
-        return half_width(self.place, self.active & self.sticking)
+        return half_width(self.place, self.active & self.sticking, self.across)
+
+    @property
+    def across(self) -> Array:
+        """How far from the middle each node (m,) lies, seen along the normal there: radii and half-widths [length]."""
+        return self.place if self.tangent is None else (self.coordinates - self.middle) @ self.tangent
 
     @property
     def pressure_max(self) -> float:
@@ -194,7 +204,8 @@ class StepResult:
         ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``, ``history`` (list of dict). If contact
         alone holds bodies, ``regularised``: their springs and the forces in them. If round-off kept the contact geometry
         from settling to the criterion, ``scatter``: by how much ``displacement`` and contact ``force`` still vary [-].
-        With temperatures, ``temperature_factors``: what each of them is multiplied with [-].
+        With temperatures, ``temperature_factors``: what each of them is multiplied with [-]. With pretension sections,
+        ``pretension``, see the property of that name.
     warnings : tuple of str
         Warnings of the step.
     cell_fields : dict of str to ndarray (n_solids,)
@@ -243,6 +254,11 @@ class StepResult:
         warnings = [("warning", text) for text in self.warnings]
         own = html_table([*self.shown.items(), *warnings], caption=f"Step {self.index}")
         return own + "".join(contact._repr_html_() for contact in self.contact.values())
+
+    @property
+    def pretension(self) -> dict[str, dict[str, float]]:
+        """By pretension section its ``force``, positive in tension [force], and its ``shortening`` [length]."""
+        return dict(self.iterations.get("pretension", {}))
 
     def stress_of_material(self, number: int) -> Array:
         """Return the nodal stress (n_points, 4) or (n_points, 6) with the side of one material where several meet [pressure].

@@ -23,6 +23,7 @@ from fastcontact.studies.adaptive_report import AdaptiveStudy, Round
 from fastcontact.studies.error_estimate import ErrorEstimate, estimate_error
 from fastcontact.studies.job import case_data, last_step
 from fastcontact.studies.levels import make_mesh, recipe
+from fastcontact.studies.report import of_case
 from fastcontact.studies.settings import Combination, Settings, one_combination, settings
 
 Array = NDArray[np.float64]
@@ -91,8 +92,8 @@ def adaptive_study(
             break
         forest.refine(_marked(_indicator(solved, last, error, quantity, chosen.pair), leaf, forest.n_leaves))
     return AdaptiveStudy(
-        case.name, case.title, case.text, case.units, str(member), quantity, tolerance, reached, rounds, solved, last, error,
-    )  # fmt: skip
+        **of_case(case), combination=str(member), quantity=quantity, tolerance=tolerance, reached=reached, rounds=rounds,
+        case=solved, last=last, error=error)  # fmt: skip
 
 
 def _checked(case: Case | str | Path, tolerance: float) -> Case:

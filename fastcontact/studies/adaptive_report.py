@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.cases.case import Case
-from fastcontact.mesh import elements
+from fastcontact.results.plot.patches import outlines
 from fastcontact.results.step import StepResult
 from fastcontact.studies.error_estimate import ErrorEstimate
 from fastcontact.studies.quantities import column, title, unit
@@ -127,7 +127,9 @@ class AdaptiveStudy(Report):
     def figure(self) -> Any:
         """Return a matplotlib figure: errors over degrees of freedom, and the last mesh coloured by its error."""
         heading = f"{self.title}: {self.combination}, refined for the {title(self.quantity)}"
-        return figure([[self._error_panel(), self._mesh_panel()]], (12.0, 5.2), heading)
+        width, height = np.ptp(self.case.mesh.points, axis=0)
+        beside = float(np.clip(4.2 * width / height, 2.0, 8.0)) + 1.3  # [inch], the scale of colours included
+        return figure([[self._error_panel(), self._mesh_panel()]], (6.2 + beside, 5.2), heading, widths=(6.2, beside))
 
     def html(self) -> str:
         """Return the study as one self-contained HTML page."""
@@ -176,7 +178,8 @@ class AdaptiveStudy(Report):
         ]
         curves = [curve for curve in curves if np.isfinite(curve.y).any()]
         heading, asked = f"Error of the {title(self.quantity)}", Line(self.tolerance, style="--", label="asked for")
-        return Panel(heading, "degrees of freedom", "relative error", curves, [asked], x_scale="log", y_scale="log")
+        label = "relative error [-]"
+        return Panel(heading, "degrees of freedom", label, curves, [asked], x_scale="plain log", y_scale="log")
 
     def _mesh_panel(self) -> Panel:
         length = self.units["length"]
@@ -188,8 +191,7 @@ class AdaptiveStudy(Report):
         from matplotlib.colors import LogNorm
 
         mesh, cells = self.case.mesh, self.error.cells
-        corners = [block[:, : elements.get(name).n_corners] for name, block in mesh.solids.items()]
-        shapes = [polygon for block in corners for polygon in mesh.points[block]]
+        shapes = [polygon for name, block in mesh.solids.items() for polygon in outlines(name, mesh.points[block])]
         error = np.maximum(cells, 1e-6 * cells.max())
         drawn = PolyCollection(shapes, array=error, norm=LogNorm(), cmap="viridis", edgecolors="white", linewidths=0.1)
         ax.add_collection(drawn)

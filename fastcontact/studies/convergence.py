@@ -16,6 +16,7 @@ from fastcontact.studies.execute import Progress, Result, raise_first, run_all
 from fastcontact.studies.fit import Limit, fit_limit
 from fastcontact.studies.job import Job, fields_of, job_of
 from fastcontact.studies.quantities import EXACT_THEORIES, LABELS, of_theory
+from fastcontact.studies.report import of_case
 from fastcontact.studies.series import Level, Series
 from fastcontact.studies.settings import Combination, Settings, combinations, settings
 
@@ -101,7 +102,7 @@ def gathered(case: Case, jobs: Sequence[Job], results: Sequence[Result], wanted:
             failed[str(member)] = str(runs[0][1]["error"])
         else:
             series.append(_series(member, runs, [*wanted], checked, (theory, share, compared)))
-    return Study(case.name, case.title, case.text, case.units, series, failed, theory)
+    return Study(**of_case(case), series=series, failed=failed, theory=theory)
 
 
 def _series(

@@ -168,7 +168,7 @@ def stress_in_cells(
     N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
     cells, field = mesh.cells[name][rows], model.material_field()
     numbers = field.rows[name][rows]
-    found = CellStress(mesh, model.kinematics, field.moduli, displacement, field.averaged, field.thermal(rise))
+    found = CellStress(mesh, model.kinematics, field.moduli, displacement, field.treatment, field.thermal(rise))
     stress = found.at(name, xi, cells, numbers)
     elastic = field.compliance[numbers]
     return N, stress, cell_volumes(mesh.points[cells], N, dN, axisymmetric) * weights, elastic

@@ -84,7 +84,7 @@ def contact_radius(contact: ContactResult) -> float:
     if not np.isfinite(inside):
         return float("nan")
     outside = outside if np.isfinite(outside) else inside
-    r = np.abs(contact.place)
+    r = np.abs(contact.across)
     used = np.flatnonzero(contact.active & (contact.pressure > 0) & (r > 0.4 * inside) & (r < outside))
     used = used[np.argsort(r[used])]
     if len(used) < 3:

@@ -5,9 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from fastcontact.cases.case import Case
 from fastcontact.cases.summary import versions
 from fastcontact.mesh.html_table import html_table
+from fastcontact.results.units import units_of_results
 from fastcontact.studies.render.table import Rows
+
+
+def of_case(case: Case) -> dict[str, Any]:
+    """Return the fields of a `Report` that are those of its case."""
+    units = units_of_results(case.units, case.model.kinematics)
+    return {"name": case.name, "title": case.title, "text": case.text, "units": units}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -19,7 +27,7 @@ class Report:
     name, title, text : str
         Of the case: file name without suffix, title, text of the file.
     units : dict of str to str
-        Names of the units of length, force and pressure.
+        Names of the units of length, force and pressure; of plane models, of forces per thickness.
     """
 
     name: str

@@ -8,20 +8,29 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from math import prod
 from pathlib import Path
+from typing import Any
 
-from fastcontact.cases.case import Case, build_case, read_case
-from fastcontact.errors import CaseError
+import numpy as np
+
+from fastcontact.cases.case import Case, build_case, described, read_case
+from fastcontact.errors import CaseError, FastcontactError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.studies.affordable import check_runs
 from fastcontact.studies.case_parameters import substituted
 from fastcontact.studies.execute import Progress, raise_first, run_all
 from fastcontact.studies.job import Job, fields_of, job_of
 from fastcontact.studies.levels import make_mesh, recipe
+from fastcontact.studies.quantities import of_theory
+from fastcontact.studies.report import of_case
 from fastcontact.studies.settings import one_combination, settings
-from fastcontact.studies.sweep_report import Point, Sweep, Value
+from fastcontact.studies.sweep_figures import label_of
+from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
+from fastcontact.studies.sweep_report import Sweep
 
 # The level of the study's meshes by default: fine enough for trends larger than the mesh error.
 LEVEL = 2
+# Points of a theory's curve.
+CURVE = 60
 
 
 @typed(CaseError)
@@ -75,15 +84,47 @@ def parameter_sweep(
     raise_first("no point of the sweep could be solved", jobs, results)
     runs = list(zip(choices, results, strict=True))
     return Sweep(
-        name=case.name,
-        title=case.title,
-        text=case.text,
-        units=case.units,
+        **of_case(case),
         combination=str(jobs[0].marks["combination"]),
         parameters={name: tuple(values) for name, values in parameters.items()},
         points=[Point(parameters=choice, **fields_of(Point, r)) for choice, r in runs if "error" not in r],
         failed=[(choice, str(result["error"])) for choice, result in runs if "error" in result],
+        theories=_theory_curves(case, parameters, jobs[0].pair),
+        compared="at equal approach" if jobs[0].pair in case.approach else "",
     )
+
+
+def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: str | None) -> tuple[TheoryCurve, ...]:
+    """Return the theory of a pair over the first parameter, for each choice of the others."""
+    (first, values), *others = parameters.items()
+    numbers = [float(value) for value in values if not isinstance(value, (str, bool))]
+    if len(numbers) < len(values) or min(numbers) == max(numbers):
+        return ()
+    low, high = min(numbers), max(numbers)
+    x = np.geomspace(low, high, CURVE) if low > 0 else np.linspace(low, high, CURVE)
+    data = tomllib.loads(case.text)
+    linked = data.get("study", {}).get("parameters", {})
+    curves = []
+    for choice in itertools.product(*(own for _, own in others)):
+        rest = dict(zip((name for name, _ in others), choice, strict=True))
+        rows = [_theory_at(data, {first: float(value), **rest}, linked, pair) for value in x]
+        known = [name for name in rows[0] if all(name in row for row in rows)]
+        columns = {name: np.array([row[name] for row in rows]) for name in known}
+        curves.append(TheoryCurve(label_of(rest, list(rest)), x, columns))
+    return tuple(curves)
+
+
+def _theory_at(
+    data: dict[str, Any], choice: Mapping[str, Value], linked: Mapping[str, Any], pair: str | None
+) -> dict[str, float]:
+    """Return what the theory of a pair gives for a choice of the parameters; nothing where it is not defined."""
+    for parameter, value in choice.items():
+        data = substituted(data, parameter, value, linked)
+    try:
+        theories = described(data)["theories"].get(pair or "", {})
+    except FastcontactError:  # such as a Poisson's ratio for which no theory is known
+        return {}
+    return of_theory(theories.get("theory"), theories.get("share", 1.0))
 
 
 def _job(case: Case, choice: dict[str, Value], element: str | None, formulation: str | None, level: int | None) -> Job:

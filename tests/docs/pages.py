@@ -13,7 +13,7 @@ the option ``caption: NAME`` is the file NAME. A block that needs something says
 from __future__ import annotations
 
 import contextlib
-import importlib.util
+import importlib
 import io
 import os
 import re
@@ -55,10 +55,16 @@ PLACES = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH
 
 
 def available(name: str) -> bool:
-    """Whether a program or module is there; the network never is."""
-    return name != "network" and (
-        shutil.which(name, path=PLACES) is not None or importlib.util.find_spec(name) is not None
-    )
+    """Whether a program or module is there and can be used; the network never is."""
+    if name == "network":
+        return False
+    if shutil.which(name, path=PLACES) is not None:
+        return True
+    try:
+        importlib.import_module(name)
+    except (ImportError, OSError):  # gmsh is installed, but a library of the system that it needs is not
+        return False
+    return True
 
 
 def pages() -> list[Path]:

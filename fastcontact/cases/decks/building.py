@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,12 @@ from fastcontact.cases.decks.content import Content, Material, Pair, Section, St
 from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
+from fastcontact.cases.decks.temperatures import add_temperatures
+from fastcontact.cases.decks.tightening import add_sections, cut_sections
 from fastcontact.contact.obstacles.shapes import HalfSpace
+from fastcontact.elasticity.anisotropic_materials import Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes
+from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.relations import Relation
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
@@ -54,16 +59,19 @@ class Building:
         conditions.run()
         groups = self._groups(conditions)
         gaps = self._gap_groups()
-        self.model = Model(self.found.mesh(), self.found.kinematics, case_text)
+        mesh = cut_sections(self.found, self.found.mesh())
+        self.model = Model(mesh, self.found.kinematics, case_text)
         for material, group in materials:
             self.model.add_material(material, group)
         self.local_supports: list[Relation] = []
         self._supports(conditions)
         self.links = relations_of(self.found, self.model.mesh)
         self.model.relations.extend(self.links)
+        self.links += add_sections(self.model, self.found, conditions.locks)
         self._forces(conditions)
         self._pressures(groups)
         self._body_forces(conditions)
+        add_temperatures(self.model, conditions.temperatures)
         self._springs()
         self._contact()
         self.gap_ends = self._gaps(gaps, conditions)
@@ -91,18 +99,24 @@ class Building:
                         )
                     owner[key] = (section, material)
         self._check_sections(owner)
-        by_material: dict[tuple[str, str], list[Any]] = {}
+        by_material: dict[tuple[str, str, bool], list[Any]] = {}
         for key in self.made.solids:
             section, material = owner[key]
-            by_material.setdefault((folded(material.name), folded(section.orientation)), []).append(key)
+            modes = self.made.solids[key].type.modes
+            by_material.setdefault((folded(material.name), folded(section.orientation), modes), []).append(key)
         self.densities = {key: owner[key][1] for key in self.made.solids}
         found = []
-        for (name, turned), keys in by_material.items():
+        for (name, turned, modes), keys in by_material.items():
             material = self.content.materials[name]
             axes = self._axes(owner[keys[0]][0])
             group = f"material {material.name}" + (f" along {turned.lower()}" if turned else "")
-            assert material.law is not None
-            found.append((material.law(axes), self.found.add_solids(group, keys)))
+            group += " with incompatible modes" if modes else ""
+            found.append(
+                (
+                    replace(_law(self.content, material, axes), incompatible_modes=modes),
+                    self.found.add_solids(group, keys),
+                )
+            )
         return found, thickness or 1.0
 
     def _axes(self, section: Section) -> Any:
@@ -367,12 +381,28 @@ class Building:
         if any(pair.options.get("friction") for pair in self.model.contact):
             for number, step in enumerate(steps):
                 instants.update(number + part for part in _parts(step))
-        for histories in (conditions.supports, conditions.forces, conditions.loads):
+        for histories in (conditions.supports, conditions.forces, conditions.loads, conditions.temperatures):
             for track in histories.tracks.values():
                 instants.update(round(time, 12) for time, _ in track.points if abs(time - round(time)) > 1e-6)
         if len(instants) > LONGEST_RAMP:
             raise steps[0].place.refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
         return Ramp(tuple(sorted(instants)), ((0.0, 0.0), (float(len(steps)), 1.0)))
+
+
+def _law(content: Content, material: Material, axes: Any) -> Any:
+    """Return the material of the model along axes, with its expansion."""
+    assert material.law is not None
+    law, expansion = material.law(axes), material.expansion
+    heated = any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
+    if expansion is None:
+        if heated:
+            content.note(material.place, f"material '{material.name}' has no *EXPANSION: temperatures do not strain it")
+        return replace(law, expansion=0.0) if heated else law
+    if not heated:
+        content.note(material.place, f"material '{material.name}': without temperatures the expansion has no effect")
+    if isinstance(law, LinearElastic) and isinstance(expansion, tuple):
+        law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (law.E / (2.0 * (1.0 + law.nu)),) * 3, axes)
+    return replace(law, expansion=expansion)
 
 
 def _parts(step: Step) -> list[float]:

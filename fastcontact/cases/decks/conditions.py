@@ -12,6 +12,9 @@ from fastcontact.cases.decks.blocks import Place, Row
 from fastcontact.cases.decks.content import Axes, Given
 from fastcontact.cases.decks.histories import Histories
 from fastcontact.cases.decks.meshing import DeckMesh
+from fastcontact.cases.decks.temperatures import give as give_temperatures
+from fastcontact.cases.decks.temperatures import initial_temperatures
+from fastcontact.cases.decks.tightening import Locks
 
 Array = NDArray[np.float64]
 NAMED = {"XSYMM": (1,), "YSYMM": (2,), "ZSYMM": (3,), "ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3)}
@@ -41,6 +44,9 @@ class Conditions:
         self.supports: Histories[Component] = Histories(content)
         self.forces: Histories[Component] = Histories(content)
         self.loads: Histories[Distributed] = Histories(content)
+        initial = initial_temperatures(self.made, content.initial)
+        self.temperatures: Histories[int] = Histories(content, rest=initial)
+        self.locks = Locks(self.made)
         self.directions: dict[int, Array] = {}
         for axes in content.axes:
             for point in self.made.nodes(axes.nodes, axes.place):
@@ -53,8 +59,9 @@ class Conditions:
             self._supports(given, before=True)
         self.supports.begin()
         for number, step in enumerate(content.steps, start=1):
+            self.locks.begin(number, [g for g in step.given if g.block.keyword == "BOUNDARY"], self.made)
             for given in step.given:
-                {"BOUNDARY": self._supports, "CLOAD": self._forces}.get(given.block.keyword, self._loads)(given)
+                self._take(given)
             held = {name for name, track in self.supports.tracks.items() if track.alive}
             lost = [name for name in self.supports.tracks if name not in held and name not in self.supports.changing]
             if lost:
@@ -71,6 +78,14 @@ class Conditions:
                 )
             self.forces.advance(number, step)
             self.loads.advance(number, step)
+            self.temperatures.advance(number, step)
+
+    def _take(self, given: Given) -> None:
+        keyword = given.block.keyword
+        if keyword == "TEMPERATURE":
+            give_temperatures(self.made, self.temperatures, given)
+        else:
+            {"BOUNDARY": self._supports, "CLOAD": self._forces}.get(keyword, self._loads)(given)
 
     @staticmethod
     def _new_list(given: list[Given]) -> Place:
@@ -114,6 +129,8 @@ class Conditions:
         if name is None:
             if value:
                 raise row.place.refuse(f"component {component} does not exist at nodes of this model")
+            return
+        if self.locks.take(point, component, "FIXED" in given.block.parameters):
             return
         sign = 1.0
         if point in self.directions and component <= 3:

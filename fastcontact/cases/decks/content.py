@@ -101,6 +101,7 @@ class Material:
     place: Place
     law: Callable[[Any], Any] | None = None
     density: float | None = None
+    expansion: float | tuple[float, ...] | None = None
 
 
 @dataclass
@@ -156,6 +157,16 @@ class Link:
 
 
 @dataclass(frozen=True)
+class PretensionSection:
+    """A section through a bolt: its surface, the node that has its shortening and its force, and its normal."""
+
+    place: Place
+    surface: str
+    node: str
+    normal: tuple[float, ...] | None
+
+
+@dataclass(frozen=True)
 class Axes:
     """Local axes of nodes or materials: rectangular by points of the first axis and plane, or cylindrical about a line."""
 
@@ -177,7 +188,7 @@ class Amplitude:
 
 @dataclass(frozen=True)
 class Given:
-    """Values of a *BOUNDARY, *CLOAD, *DLOAD or *DSLOAD: its block, what remains of earlier steps, its amplitude."""
+    """Values of supports, loads or temperatures: their block, what remains of earlier steps, their amplitude."""
 
     block: Block
     new: bool
@@ -210,11 +221,13 @@ class Content:
     equations: list[Equation] = field(default_factory=list)
     links: list[Link] = field(default_factory=list)
     axes: list[Axes] = field(default_factory=list)
+    pretensions: list[PretensionSection] = field(default_factory=list)
     orientations: dict[str, Axes] = field(default_factory=dict)
     amplitudes: dict[str, Amplitude] = field(default_factory=dict)
     gaps: dict[str, tuple[Place, float, tuple[float, ...]]] = field(default_factory=dict)
     springs: dict[str, tuple[Place, float]] = field(default_factory=dict)
     supports: list[Given] = field(default_factory=list)
+    initial: list[Block] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     outputs: list[Place] = field(default_factory=list)

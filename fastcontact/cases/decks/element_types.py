@@ -34,12 +34,15 @@ class ElementType:
         Corners of the faces 1, 2, ..., as places in the connectivity.
     note : str
         How the element here differs, empty where it does not.
+    modes : bool
+        Whether it has incompatible modes.
     """
 
     name: str
     element: str
     kinematics: str
     note: str = ""
+    modes: bool = False
 
     @property
     def faces(self) -> tuple[tuple[int, ...], ...]:
@@ -49,19 +52,21 @@ class ElementType:
 
 def element_type(name: str) -> ElementType | None:
     """Return what an element type of decks (in upper case) becomes, None for what is no solid known here."""
-    base, note = name, ""
+    base, note, modes = name, "", False
     for ending, meaning in (
-        ("RH", "integrated fully, without hybrid pressure"), ("IH", "without incompatible modes"),
-        ("R", "integrated fully here"), ("I", "without incompatible modes: stiffer where thin parts of linear elements bend"),
+        ("RH", "integrated fully, without hybrid pressure"), ("IH", "without hybrid pressure"),
+        ("R", "integrated fully here"), ("I", ""),
         ("H", "without hybrid pressure: nearly incompressible materials have a mean dilatation"),
         ("M", "an ordinary quadratic one here"), ("T", ""),
     ):  # fmt: skip
-        if meaning and base.endswith(ending):
-            base, note = base[: -len(ending)], meaning
+        if (meaning or ending == "I") and base.endswith(ending):
+            base, note, modes = base[: -len(ending)], meaning, ending[0] == "I"
             break
     table, kinematics = (SOLIDS, "3d") if base[:3] == "C3D" else (PLANES, FAMILIES.get(base[:3], ""))
     element = table.get(base[3:])
-    return ElementType(name, element, kinematics, note) if element and kinematics else None
+    if modes and kinematics == "axisymmetric":
+        modes, note = False, "without incompatible modes: stiffer where thin parts of linear elements bend"
+    return ElementType(name, element, kinematics, note, modes) if element and kinematics else None
 
 
 def described(name: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
@@ -46,12 +46,14 @@ class Track:
 class Histories(Generic[Name]):
     """Histories by what they act on.
 
-    `changing` are those given in the current step, with the place of each.
+    `changing` are those given in the current step, with the place of each; `rest` what quantities have before they are given,
+    zero where it does not say.
     """
 
     content: Content
     tracks: dict[Name, Track] = field(default_factory=dict)
     changing: dict[Name, tuple[float, str, Place]] = field(default_factory=dict)
+    rest: Mapping[Name, float] = field(default_factory=dict)
 
     def give(self, name: Name, value: float, amplitude: str, place: Place) -> None:
         """Give a value for the current step; CaseError if the step has another one for the same."""
@@ -85,7 +87,8 @@ class Histories(Generic[Name]):
         for name, (value, amplitude, place) in self.changing.items():
             if name not in self.tracks:
                 new.append(name)
-                self.tracks[name] = Track([(0.0, 0.0)] + [(begin, 0.0)] * (number > 1), place)
+                rest = self.rest.get(name, 0.0)
+                self.tracks[name] = Track([(0.0, rest)] + [(begin, rest)] * (number > 1), place)
             track = self.tracks[name]
             track.alive, track.lasting = True, None
             if amplitude:
@@ -100,7 +103,7 @@ class Histories(Generic[Name]):
             if track.lasting and track.alive:
                 track.add(_shaped(*track.lasting, begin, start, step.period))
             else:
-                track.add([(begin, track.last), (begin + 1, track.last if track.alive else 0.0)])
+                track.add([(begin, track.last), (begin + 1, track.last if track.alive else self.rest.get(name, 0.0))])
         self.changing = {}
         return new
 

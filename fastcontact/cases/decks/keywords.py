@@ -30,6 +30,7 @@ TRANSLATED = {
     "CLOAD": _keyword("OP; AMPLITUDE"),
     "CONTACT PAIR": _keyword("INTERACTION; TYPE; ADJUST; SMALL SLIDING", "CPSET"),
     "COUPLING": _keyword("REF NODE; SURFACE", "CONSTRAINT NAME"),
+    "CONDUCTIVITY": Keyword(anything=True),
     "DENSITY": _keyword(),
     "DISTRIBUTING": _keyword(),
     "DLOAD": _keyword("OP; AMPLITUDE"),
@@ -42,10 +43,11 @@ TRANSLATED = {
     "END PART": _keyword(),
     "END STEP": _keyword(),
     "EQUATION": _keyword(),
-    "EXPANSION": _keyword("", "ZERO; TYPE"),
+    "EXPANSION": _keyword("TYPE", "ZERO"),
     "FRICTION": _keyword(),
     "GAP": _keyword("ELSET"),
     "HEADING": Keyword(anything=True),
+    "INITIAL CONDITIONS": _keyword("TYPE"),
     "INSTANCE": _keyword("NAME; PART"),
     "KINEMATIC": _keyword(),
     "MATERIAL": _keyword("NAME"),
@@ -53,14 +55,17 @@ TRANSLATED = {
     "NSET": _keyword("NSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED"),
     "ORIENTATION": _keyword("NAME; SYSTEM"),
     "PART": _keyword("NAME"),
+    "PRE-TENSION SECTION": _keyword("SURFACE; NODE"),
     "RIGID BODY": _keyword("NSET; ELSET; REF NODE; ROT NODE"),
     "SOLID SECTION": _keyword("ELSET; MATERIAL; ORIENTATION", "CONTROLS"),
+    "SPECIFIC HEAT": Keyword(anything=True),
     "SPRING": _keyword("ELSET"),
     "STATIC": _keyword("", "SOLVER; DIRECT; STABILIZE; ALLSDTOL; CONTINUE; EXPLICIT"),
     "STEP": _keyword("NLGEOM; AMPLITUDE", "NAME; INC; PERTURBATION; UNSYMM; EXTRAPOLATION; CONVERT SDI; SOLVER"),
     "SURFACE": _keyword("NAME; TYPE", "INTERNAL"),
     "SURFACE BEHAVIOR": _keyword("PRESSURE-OVERCLOSURE; NO SEPARATION"),
     "SURFACE INTERACTION": _keyword("NAME"),
+    "TEMPERATURE": _keyword("OP; AMPLITUDE"),
     "TIE": _keyword("POSITION TOLERANCE; ADJUST", "NAME; TYPE; NO ROTATION"),
     "TRANSFORM": _keyword("NSET; TYPE"),
 }
@@ -75,7 +80,7 @@ OUTPUT = (
 LINEAR = "is outside of fastcontact (linear elastic)"
 STATIC = "is outside of fastcontact (quasi-static: *STATIC only)"
 SOLIDS = "is outside of fastcontact (solid elements only)"
-HEAT = "is not supported: fastcontact has no temperatures yet, leave them out to solve the cold state"
+HEAT = "is outside of fastcontact (temperatures are given by *TEMPERATURE, not computed)"
 NOT_YET = "is not supported"
 REFUSED = {
     **dict.fromkeys(
@@ -95,10 +100,9 @@ REFUSED = {
          "CONNECTOR SECTION", "COHESIVE SECTION", "GASKET SECTION", "MASS", "ROTARY INERTIA", "DASHPOT", "NODAL THICKNESS",
          "SURFACE SECTION", "RIGID SURFACE", "TRANSVERSE SHEAR STIFFNESS"), SOLIDS),
     **dict.fromkeys(
-        ("TEMPERATURE", "CONDUCTIVITY", "SPECIFIC HEAT", "CFLUX", "DFLUX", "FILM", "RADIATE", "INITIAL CONDITIONS",
-         "PHYSICAL CONSTANTS", "GAP CONDUCTANCE", "GAP HEAT GENERATION"), HEAT),
+        ("CFLUX", "DFLUX", "FILM", "RADIATE", "PHYSICAL CONSTANTS", "GAP CONDUCTANCE", "GAP HEAT GENERATION"), HEAT),
     **dict.fromkeys(
-        ("PRE-TENSION SECTION", "MPC", "CONTACT", "CONTACT INCLUSIONS", "CONTACT PROPERTY ASSIGNMENT",
+        ("MPC", "CONTACT", "CONTACT INCLUSIONS", "CONTACT PROPERTY ASSIGNMENT",
          "BASE MOTION",
          "CYCLIC SYMMETRY MODEL", "SUBMODEL", "MODEL CHANGE", "CHANGE FRICTION", "CHANGE CONTACT TYPE", "CONTACT CONTROLS",
          "CONTACT INITIALIZATION DATA", "CONTACT STABILIZATION", "SYSTEM", "DISTRIBUTION", "NGEN", "NFILL", "ELGEN", "NCOPY",

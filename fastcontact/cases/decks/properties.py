@@ -104,13 +104,6 @@ def density(content: Content, current: Material, block: Block) -> None:
         raise block.place.refuse(f"material '{current.name}': the density {current.density:g} must be positive")
 
 
-def expansion(content: Content, current: Material, block: Block) -> None:
-    """*EXPANSION: means something only with temperatures, which are refused where they stand."""
-    for row in block.rows:
-        row.number(0)
-    content.note(block.place, f"material '{current.name}': without temperatures the expansion has no effect")
-
-
 def section(content: Content, part: Part, block: Block) -> None:
     """*SOLID SECTION: which material the elements of a set have."""
     thickness = None

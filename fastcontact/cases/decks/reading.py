@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
-from fastcontact.cases.decks import connections, geometry, properties, stepping
+from fastcontact.cases.decks import connections, geometry, properties, stepping, temperatures, tightening
 from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Instance, Interaction, Material, Part, Step
 from fastcontact.cases.decks.keywords import OUTPUT, check
@@ -21,7 +21,9 @@ IN_PARTS: dict[str, Callable[[Content, Part, Block], None]] = {
 OF_MATERIALS: dict[str, Callable[[Content, Material, Block], None]] = {
     "ELASTIC": properties.elastic,
     "DENSITY": properties.density,
-    "EXPANSION": properties.expansion,
+    "EXPANSION": temperatures.expansion,
+    "CONDUCTIVITY": temperatures.without_effect,
+    "SPECIFIC HEAT": temperatures.without_effect,
 }
 OF_INTERACTIONS: dict[str, Callable[[Content, Interaction, Block], None]] = {
     "SURFACE BEHAVIOR": properties.behaviour,
@@ -30,7 +32,9 @@ OF_INTERACTIONS: dict[str, Callable[[Content, Interaction, Block], None]] = {
 OF_MODELS: dict[str, Callable[[Content, Block], None]] = {
     "AMPLITUDE": properties.amplitude,
     "GAP": properties.gap,
+    "INITIAL CONDITIONS": temperatures.initial_conditions,
     "ORIENTATION": properties.orientation,
+    "PRE-TENSION SECTION": tightening.pretension_section,
     "SPRING": properties.spring,
     "CONTACT PAIR": connections.contact_pair,
     "CLEARANCE": connections.clearance,
@@ -39,7 +43,7 @@ OF_MODELS: dict[str, Callable[[Content, Block], None]] = {
     "RIGID BODY": connections.rigid_body,
     "TRANSFORM": connections.transform,
 }
-IN_STEPS = ("BOUNDARY", "CLOAD", "DLOAD", "DSLOAD")
+IN_STEPS = ("BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE")
 
 
 @dataclass

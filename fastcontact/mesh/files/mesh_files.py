@@ -10,7 +10,7 @@ from types import MappingProxyType
 from fastcontact.errors import FileError
 from fastcontact.mesh import topology
 from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.files import med, meshio_files
+from fastcontact.mesh.files import aster_mail, med, meshio_files
 from fastcontact.mesh.files.paths import PathLike, checked_target, existing_file, replacing
 from fastcontact.mesh.mesh import Mesh
 
@@ -18,6 +18,8 @@ logger = logging.getLogger("fastcontact")
 
 # code_aster's names for the meshes and results it reads and writes are MED files too.
 MED_SUFFIXES = (".med", ".mmed", ".rmed")
+# Its older one in text, which is read only.
+MAIL_SUFFIX = ".mail"
 
 
 @dataclass(frozen=True)
@@ -45,9 +47,9 @@ class MeshReport:
 def read_mesh(path: PathLike, *, mesh_name: str | None = None, orient: bool = True) -> Mesh:
     """Read a mesh with its named groups.
 
-    The format follows from the suffix: MED (``.med``, ``.mmed``, ``.rmed``), Gmsh (``.msh``), Abaqus
-    (``.inp``), VTK (``.vtk``, ``.vtu``), XDMF, Medit (``.mesh``) and all others of meshio. MED groups, Gmsh
-    physical groups, Medit references and Abaqus sets all become groups of cells and points. A flat mesh in 3D
+    The format follows from the suffix: MED (``.med``, ``.mmed``, ``.rmed``), code_aster's text (``.mail``), Gmsh of any
+    version (``.msh``), Abaqus (``.inp``), VTK (``.vtk``, ``.vtu``), XDMF, Medit (``.mesh``) and all others of meshio. MED
+    groups, Gmsh physical groups, Medit references and Abaqus sets all become groups of cells and points. A flat mesh in 3D
     coordinates becomes a 2D one; points without cells are kept. How many cells were turned goes to the logger
     ``fastcontact`` at level INFO, and to `read_mesh_report`.
 
@@ -86,6 +88,9 @@ def read_mesh_report(path: PathLike, *, mesh_name: str | None = None, orient: bo
         dropped = {"vertex": content.n_vertices}
     elif mesh_name is not None:
         raise FileError(f"'{path}' is no MED file, so its mesh has no name: leave out mesh_name='{mesh_name}'")
+    elif found.suffix.lower() == MAIL_SUFFIX:
+        mesh, dropped = aster_mail.read(found)
+        file_format, name = "code_aster", ""
     else:
         mesh, file_format, dropped = meshio_files.read(found)
         name = ""

@@ -6,12 +6,13 @@ import contextlib
 import difflib
 import io
 import logging
+import tempfile
 import threading
 import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote, unquote
+from urllib.parse import quote
 from xml.etree import ElementTree
 
 import numpy as np
@@ -19,9 +20,10 @@ from numpy.typing import NDArray
 
 from fastcontact.errors import FastcontactWarning, FileError, MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.files import abaqus, hdf5
-from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_known, merged, without_duplicates
-from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, TAGS, library, read_in_process
+from fastcontact.mesh.files import abaqus, gmsh_versions, hdf5
+from fastcontact.mesh.files.blocks import VERTEX
+from fastcontact.mesh.files.meshio_content import NODE_ORDER, UNFIT, Orders, mesh_of
+from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, library, read_in_process
 from fastcontact.mesh.files.paths import existing_file
 from fastcontact.mesh.mesh import Mesh
 
@@ -30,8 +32,6 @@ logger = logging.getLogger("fastcontact")
 # meshio's writers print through the standard streams; only one thread at a time may divert them.
 _STREAMS = threading.Lock()
 
-# What Gmsh calls things of dimension 0 to 3: a tag without a name becomes a group like "curve_7".
-SHAPES = ("point", "curve", "surface", "volume")
 # Formats with named arrays: every group is one.
 ARRAY_FORMATS = ("vtk", "vtu", "xdmf")
 # Formats whose writers are known to keep all our cells; of the others, the result is read back.
@@ -40,14 +40,6 @@ COMPLETE_FORMATS = ("vtk", "vtu", "gmsh22", "abaqus")
 FLAT_FORMATS = ("gmsh22", "abaqus", "medit", "su2", "dolfin-xml")
 # Formats that are HDF5 files.
 HDF5_FORMATS = ("cgns", "h5m", "hmf", "exodus")
-
-# Cells that meshio gets in another order than ours: our node k is its node NODE_ORDER[format][element][k]. It mirrors
-# the linear wedge of VTK, as old documents of VTK want and VTK 9.7 does not, and leaves Gmsh's wedge of 18 nodes alone.
-Orders = Mapping[str, tuple[int, ...]]
-NODE_ORDER: dict[str, Orders] = {
-    **{key: {"wedge6": elements.get("wedge6").reversed} for key in ("vtk", "vtu")},
-    **{key: {"wedge18": (0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16)} for key in ("gmsh", "gmsh22")},
-}
 
 # How much of what meshio says goes into a message.
 LONGEST = 300
@@ -105,24 +97,21 @@ def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
     """Return a mesh with its groups, the format, and the numbers of cells left out as vertices and as duplicates."""
     file_format = _format(path, writing=False)
     _check_before(path, file_format)
-    found = read_in_process(path, file_format)
+    if file_format == "gmsh":
+        with tempfile.TemporaryDirectory() as folder:
+            found = read_in_process(gmsh_versions.readable(path, Path(folder)), file_format)
+    else:
+        found = read_in_process(path, file_format)
     if "error" in found:
         raise _refusal("read", path, found["error"])
     _log("read", path, found["said"])
     try:
-        blocks = merged(_blocks(found, NODE_ORDER.get(file_format, {})))
-        n_duplicates = sum(len(block.nodes) for block in blocks)
-        if file_format == "gmsh":  # version 2 of that format repeats a cell for each of its groups
-            blocks = [block if block.kind == VERTEX else without_duplicates(block) for block in blocks]
-        n_duplicates -= sum(len(block.nodes) for block in blocks)
-        mesh = build_mesh(found["points"], blocks, _point_groups(found), _cell_group_names(found, file_format))
+        mesh, dropped = mesh_of(found, file_format)
     except MeshError as error:
         raise MeshError(f"'{path}': {error}") from None
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        # meshio has taken what stands in the file as it is: arrays of any shape and kind.
+    except UNFIT as error:
         raise FileError(f"the parts of '{path}' do not fit together: check the file, or convert it to .med") from error
-    n_vertices = sum(len(block.nodes) for block in blocks if block.kind == VERTEX)
-    return mesh, file_format, {"vertex": n_vertices, "duplicate": n_duplicates}
+    return mesh, file_format, dropped
 
 
 def _check_before(path: Path, file_format: str) -> None:
@@ -154,69 +143,6 @@ def _check_references(path: Path) -> None:
         if item.get("Format") == "HDF":
             with hdf5.opened(beside):
                 pass
-
-
-def _cell_group_names(found: Mapping[str, Any], file_format: str) -> list[str]:
-    """Return the names of all groups of cells, also of those without any."""
-    names = [name for name in found["cell_sets"] if not name.startswith("gmsh:")]
-    names += [unquote(key[len(CELL_PREFIX) :]) for key in found["cell_data"] if key.startswith(CELL_PREFIX)]
-    if file_format == "gmsh":
-        names += [name for name, (_, dim) in found["field_data"].items() if dim > 0]
-    return names
-
-
-def _blocks(found: Mapping[str, Any], order: Orders) -> list[Block]:
-    foreign: dict[str, int] = {}
-    for kind, count, _ in found["cells"]:
-        if kind not in elements.BY_MESHIO and kind != VERTEX:
-            foreign[kind] = foreign.get(kind, 0) + count
-    check_known(foreign, elements.BY_MESHIO)
-    return [_block(found, index, kind, nodes, order) for index, (kind, _, nodes) in enumerate(found["cells"])]
-
-
-def _block(found: Mapping[str, Any], index: int, kind: str, nodes: NDArray[Any], order: Orders) -> Block:
-    kind = VERTEX if kind == VERTEX else elements.BY_MESHIO[kind].name
-    dim = 0 if kind == VERTEX else elements.get(kind).dim
-    groups: dict[str, NDArray[Any]] = {}
-    for key, parts in found["cell_data"].items():
-        if key in TAGS:
-            _add(groups, _tagged(parts[index], dim, found["field_data"]))
-        else:
-            _add(groups, {unquote(key[len(CELL_PREFIX) :]): np.flatnonzero(parts[index])})
-    for name, sets in found["cell_sets"].items():
-        if not name.startswith("gmsh:") and index < len(sets):
-            _add(groups, {name: np.asarray(sets[index], np.intp).reshape(-1)})
-    nodes = nodes[:, order[kind]] if kind in order else nodes
-    return Block(kind, nodes, {name: rows for name, rows in groups.items() if len(rows)})
-
-
-def _add(groups: dict[str, NDArray[Any]], more: Mapping[str, NDArray[Any]]) -> None:
-    for name, rows in more.items():
-        groups[name] = np.union1d(groups[name], rows) if name in groups else rows
-
-
-def _tagged(tags: NDArray[Any], dim: int, field_data: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-    """Return the members of each tag, by its name for this dimension or else by a name made of the tag."""
-    if tags.ndim != 1 or tags.dtype.kind not in "iu":
-        return {}
-    names = {(int(entry[0]), int(entry[1])): name for name, entry in field_data.items() if np.size(entry) == 2}
-    return {
-        names.get((tag, dim), f"{SHAPES[dim]}_{tag}"): np.flatnonzero(tags == tag)
-        for tag in np.unique(tags).tolist()
-        if tag
-    }
-
-
-def _point_groups(found: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-    groups: dict[str, NDArray[Any]] = {}
-    for key, data in found["point_data"].items():
-        if key in TAGS:
-            _add(groups, _tagged(data, 0, {}))
-        else:
-            _add(groups, {unquote(key[len(POINT_PREFIX) :]): np.flatnonzero(data)})
-    for name, members in found["point_sets"].items():
-        _add(groups, {name: np.asarray(members, np.intp).reshape(-1)})
-    return groups
 
 
 def write(path: Path, temporary: Path, mesh: Mesh) -> None:

@@ -95,14 +95,15 @@ def plain_content(path: Path, file_format: str) -> dict[str, Any]:
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             found = library().read(path, file_format=file_format)
-            return {**_plain(found), "said": said.getvalue()}
+            return {**plain_parts(found), "said": said.getvalue()}
     except MemoryError:
         return {"error": "it announces more than memory can hold"}
     except (Exception, SystemExit) as error:
         return {"error": (said.getvalue() if isinstance(error, SystemExit) else str(error)) or type(error).__name__}
 
 
-def _plain(found: Any) -> dict[str, Any]:
+def plain_parts(found: Any) -> dict[str, Any]:
+    """Return a ``meshio.Mesh`` as the plain data that `plain_content` tells of."""
     cell_data = {key: data for key, data in found.cell_data.items() if key in TAGS or key.startswith(CELL_PREFIX)}
     point_data = {key: data for key, data in found.point_data.items() if key in TAGS or key.startswith(POINT_PREFIX)}
     return {

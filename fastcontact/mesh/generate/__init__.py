@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from fastcontact.mesh.generate.blocks import block, block_on_block, cylinder_on_block
 from fastcontact.mesh.generate.box import box
+from fastcontact.mesh.generate.cut import cut
 from fastcontact.mesh.generate.forest import Forest
 from fastcontact.mesh.generate.half_planes import crowned_blocks, graded_block, punched_block
 from fastcontact.mesh.generate.half_spheres import half_spheres, quarter_disc
@@ -36,7 +37,7 @@ GENERATORS: dict[str, Callable[..., Mesh]] = {
 
 __all__ = [
     "GENERATORS", "Circle", "Forest", "block", "block_on_block", "box", "circles", "crowned_blocks",
-    "cylinder_on_block", "graded_block", "half_spheres", "linearised", "merge_points", "mirrored", "punched_block",
+    "cut", "cylinder_on_block", "graded_block", "half_spheres", "linearised", "merge_points", "mirrored", "punched_block",
     "quarter_disc", "refined", "renamed", "rings", "sphere_octant", "sphere_on_block", "to_quadratic", "transformed",
     "union",
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Pictures: pressure against theory, the deformed shape with its stresses, history over the load.
+"""Pictures: pressure against theory, maps of it, the deformed shape and sections with their stresses, history over the load.
 
 Every function takes an optional ``ax`` and returns the axes it drew on; save with ``ax.figure.savefig``.
 """
@@ -6,13 +6,19 @@ Every function takes an optional ``ax`` and returns the axes it drew on; save wi
 from __future__ import annotations
 
 from fastcontact.results.plot._axes import UNITS
+from fastcontact.results.plot.animation import animate
 from fastcontact.results.plot.axis import axis_stress
+from fastcontact.results.plot.contact_map import contact_map
 from fastcontact.results.plot.history import contact_zones, history
 from fastcontact.results.plot.profile import pressure_profile
+from fastcontact.results.plot.section import section
 from fastcontact.results.plot.shape import deformed_shape
 from fastcontact.results.plot.view import view
 
-__all__ = ["UNITS", "axis_stress", "contact_zones", "deformed_shape", "history", "pressure_profile", "view"]
+__all__ = [
+    "UNITS", "animate", "axis_stress", "contact_map", "contact_zones", "deformed_shape", "history", "pressure_profile",
+    "section", "view",
+]  # fmt: skip
 
 
 def __dir__() -> list[str]:

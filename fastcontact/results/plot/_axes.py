@@ -7,12 +7,16 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fastcontact.errors import FastcontactError, unknown
 from fastcontact.results.step import ContactResult, StepResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+Array = NDArray[np.float64]
 Units = Mapping[str, str]
 UNITS: Units = {"length": "mm", "force": "N", "pressure": "MPa"}
 UNKNOWN: Units = {}
@@ -21,6 +25,23 @@ UNKNOWN: Units = {}
 def labelled(text: str, units: Units, quantity: str) -> str:
     """Return the label of an axis, with the unit of its quantity where that is known."""
     return f"{text} [{units[quantity]}]" if units.get(quantity) else text
+
+
+def valued(value: float, units: Units, quantity: str, digits: int = 4) -> str:
+    """Return a value as text with its unit, where that is known."""
+    return f"{value:.{digits}g} {units.get(quantity, '')}".rstrip()
+
+
+def placed(place: Array, size: float) -> str:
+    """Return a place (dim,) as text; coordinates below a millionth of the `size` of the body are zero [length]."""
+    kept = np.where(np.abs(place) <= 1e-6 * size, 0.0, place)
+    return f"({', '.join(f'{x:.4g}' for x in kept)})"
+
+
+def part_shown(middle: Array, half: float, place: Array) -> tuple[Array, Array]:
+    """Return the corners of a square around its middle (2,), of a half width, without what lies beyond places (n, 2)."""
+    low, high = place.min(axis=0) - 0.05 * half, place.max(axis=0) + 0.05 * half
+    return np.maximum(middle - half, low), np.minimum(middle + half, high)
 
 
 def contacts_of(steps: Sequence[StepResult], pair: str) -> list[ContactResult]:

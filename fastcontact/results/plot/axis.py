@@ -59,7 +59,7 @@ def axis_stress(
     depth, side, stress = stresses_on_axis(mesh, step, pair)
     upright = abs(_axis(step, pair)[1][1]) > 0.5
     bodies = ("upper body", "lower body") if upright else ("right body", "left body")
-    axes = new_axes(ax, (7.4, 5.4))
+    axes = new_axes(ax, (6.4, 4.8))
     reach = DEEP * np.nan_to_num(contacts_of([step], pair)[0].radius[0]) or float(depth.max())
     shown = depth <= reach
     for number, (name, marker) in enumerate(zip(bodies, ("^", "v"), strict=True)):
@@ -79,7 +79,8 @@ def axis_stress(
         labelled("depth under the surface", units, "length"),
         labelled("stress", units, "pressure"),
     )
-    axes.set(xlabel=depth_name, ylabel=stress_name, title=title)
+    axes.set(xlabel=depth_name, ylabel=stress_name)
+    axes.set_title(title, fontsize="medium")
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
     return axes

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from fastcontact.analytic.pressure_curve import NAMES
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, contacts_of, labelled, new_axes
@@ -15,6 +17,9 @@ from fastcontact.results.step import StepResult
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+Array = NDArray[np.float64]
+# So many numbers of closed nodes stand beside each other above the zones.
+MOST_COUNTS = 20
 STATES = {"open": "0.85", "closed": "C0", "sliding": "C1"}
 
 
@@ -25,6 +30,7 @@ def history(
     *,
     law: Any = None,
     approach: float | None = None,
+    share: float = 1.0,
     title: str = "",
     units: Units = UNKNOWN,
     axes: Sequence[Axes] | None = None,
@@ -39,35 +45,54 @@ def history(
         A theory, drawn where `approach` is given.
     approach : float, optional
         Approach of the bodies at load factor 1 [length]; the abscissa is then the approach.
+    share : float
+        Part of the theory's contact that the model holds [-]: 0.25 for a quarter of it.
     title, units
         As in `pressure_profile`.
     axes : two matplotlib Axes, optional
     """
     if axes is None:
-        first = new_axes(None, (7.0, 6.4))
+        first = new_axes(None, (6.0, 5.8))
         figure = first.figure
         first.remove()
         axes = Panels(figure.subplots(2, 1, sharex=True))
     upper, lower = axes
     contacts = contacts_of(steps, pair)
     x = np.array([step.load_factor for step in steps]) * (approach or 1.0)
-    upper.plot(x, [np.linalg.norm(c.force) for c in contacts], "o-", ms=4, label="computed")
-    bracket = np.array([c.radius for c in contacts])
-    legend = "computed (between closed and open)"
-    lower.fill_between(x, bracket[:, 0], bracket[:, 1], alpha=0.3, label=legend, step="mid")
+    upper.plot(x, [np.linalg.norm(c.force) for c in contacts], "o", ms=4, label="computed")
+    _brackets(lower, x, np.array([c.radius for c in contacts]))
     if law is not None and approach is not None:
-        fine = np.linspace(1e-3, 1.0, 200) * x[-1]
+        name = f"{NAMES.get(type(law), 'theory')}, equal approach"
+        fine = x.max() * np.linspace(0.0, 1.0, 200)[1:] ** 2
         curves = [law.at_approach(d) for d in fine]
-        upper.plot(fine, [c.force for c in curves], "k-", lw=1, label="Hertz, equal approach")
-        lower.plot(fine, [c.radius for c in curves], "k-", lw=1, label="Hertz, equal approach")
-    upper.set(ylabel=labelled("contact force", units, "force"), title=title or f"Contact '{pair}' over the load")
+        upper.plot([0.0, *fine], [0.0, *(share * c.force for c in curves)], "k-", lw=1, label=name)
+        lower.plot([0.0, *fine], [0.0, *(c.radius for c in curves)], "k-", lw=1, label=name)
+    upper.set(ylabel=labelled("contact force", units, "force"))
+    upper.set_title(title or f"Contact '{pair}' over the load", fontsize="medium")
     along = labelled("approach", units, "length") if approach else "load factor"
-    lower.set(xlabel=along, ylabel=labelled("contact radius", units, "length"))
+    round_contact = contacts[-1].measured_from_axis or contacts[-1].coordinates.shape[1] == 3
+    size = "contact radius" if round_contact else "half-width of the contact"
+    lower.set(xlabel=along, ylabel=labelled(size, units, "length"))
     for ax in axes:
         ax.grid(alpha=0.3)
-        ax.legend()
+        if ax.get_legend_handles_labels()[0]:
+            ax.legend(fontsize=9)
         ax.set_ylim(bottom=0.0)
+        ax.set_xlim(left=min(0.0, float(x.min())))
     return axes
+
+
+def _brackets(ax: Any, x: Array, bracket: Array) -> None:
+    """Draw at each step a bar from the outermost closed place to the first open one; a tick where nothing is open."""
+    low, high = bracket.T
+    known = np.isfinite(low)
+    both = known & np.isfinite(high)
+    name = "computed: outermost closed to first open node"
+    if both.any():
+        ax.vlines(x[both], low[both], high[both], lw=4, alpha=0.5, color="tab:blue", label=name)
+        ax.plot([x[both], x[both]], [low[both], high[both]], "_", ms=6, color="tab:blue")
+    if (known & ~both).any():
+        ax.plot(x[known & ~both], low[known & ~both], "_", ms=9, color="tab:blue", label="computed: all nodes closed")
 
 
 @typed(FastcontactError)
@@ -90,7 +115,7 @@ def contact_zones(
     """
     if not steps:
         raise FastcontactError("there is no step whose contact could be plotted")
-    axes = new_axes(ax, (7.4, 5.2))
+    axes = new_axes(ax, (6.4, 4.8))
     contacts = contacts_of(steps, pair)
     x = np.concatenate([np.full(len(c.points), step.load_factor) for step, c in zip(steps, contacts, strict=True)])
     y = np.concatenate([c.place for c in contacts])
@@ -99,15 +124,16 @@ def contact_zones(
     for name, here in (("open", ~closed), ("closed", closed & ~sliding), ("sliding", sliding)):
         if here.any():
             axes.plot(x[here], y[here], "o" if name != "open" else ".", ms=4, color=STATES[name], label=name)
-    for step, contact in zip(steps, contacts, strict=True):
+    every = -(-len(contacts) // MOST_COUNTS)
+    for step, contact in list(zip(steps, contacts, strict=True))[(len(contacts) - 1) % every :: every]:
         place = {"xycoords": ("data", "axes fraction"), "ha": "center", "va": "bottom"}
-        axes.annotate(str(int(contact.active.sum())), (step.load_factor, 1.0), fontsize=7, **place)
+        axes.annotate(str(int(contact.active.sum())), (step.load_factor, 1.0), fontsize=8, **place)
     reach, farthest = 1.5 * np.abs(y[closed]).max(initial=0.0), np.abs(y).max(initial=0.0)
     top = reach if 0.0 < reach < farthest else None
     axes.set_ylim((-top if top else None) if y.min(initial=0.0) < 0 else 0.0, top)
     start = "axis" if contacts[-1].measured_from_axis else "middle of the contact"
     distance = labelled(f"distance from the {start}", units, "length")
     axes.set(xlabel="load factor (above: closed nodes)", ylabel=distance)
-    axes.set_title(title or f"Contact '{pair}' over the load", pad=16)
+    axes.set_title(title or f"Contact '{pair}' over the load", pad=16, fontsize="medium")
     axes.legend(loc="upper left", fontsize=8)
     return axes

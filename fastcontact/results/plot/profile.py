@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
-from fastcontact.results.plot._axes import UNKNOWN, Units, labelled, new_axes
-from fastcontact.results.step import ContactResult
+from fastcontact.results.plot._axes import UNKNOWN, Units, labelled, new_axes, valued
+from fastcontact.results.step import ContactResult, half_width
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,7 +51,7 @@ def pressure_profile(
         Names of the units of ``length``, ``force`` and ``pressure`` for the labels, which have none without; see `UNITS`.
     ax : matplotlib Axes, optional
     """
-    ax = new_axes(ax, (7.0, 4.6))
+    ax = new_axes(ax, (6.4, 4.4))
     order = np.argsort(contact.place, kind="stable")
     place, flat = contact.place[order], contact.coordinates.shape[1] == 2
     curves = _curves(theory, other_theories or {})
@@ -60,26 +60,31 @@ def pressure_profile(
     for style, (legend, curve) in zip(("-", "--", ":", "-."), curves.items(), strict=False):
         end = min(curve.radius, high)
         x = np.unique(np.concatenate([[low, high], np.linspace(max(-end, low), end, 400)]))
-        label = f"{legend} ($p_0$ = {curve.pressure_max:.4g})"
+        label = f"{legend}: {_largest(curve, units)}"
         ax.plot(x, curve.pressure(np.abs(x)), style, color="black", lw=1.1, label=label)
-    label = f"{contact.formulation.replace('_', '-')} ($p$ max = {contact.pressure_max:.4g})"
+    found = f"$p_{{max}}$ = {valued(contact.pressure_max, units, 'pressure')}"
+    label = f"{contact.formulation.replace('_', '-')}: {found}"
     pressure = contact.pressure[order][shown]
     ax.plot(place[shown], pressure, "o-" if flat else "o", color="tab:blue", ms=4, lw=0.8, label=label)
     if stress is not None:
         label = r"$-n \cdot \sigma \cdot n$ at the nodes"
         ax.plot(place[shown], -stress[order][shown], "x", color="tab:red", ms=5, label=label)
-    _mark_edges(ax, contact, place)
+    _mark_edges(ax, contact, place, units)
     start = "axis" if contact.measured_from_axis else "middle of the contact"
     along = "distance along the surface" if flat and not contact.measured_from_axis else "distance"
-    x_name, y_name = (
-        labelled(f"{along} from the {start}", units, "length"),
-        labelled("contact pressure", units, "pressure"),
-    )
-    ax.set(xlabel=x_name, ylabel=y_name, title=title or f"Contact '{contact.name}'", xlim=(low, high))
+    ax.set(xlabel=labelled(f"{along} from the {start}", units, "length"), xlim=(low, high))
+    ax.set(ylabel=labelled("contact pressure", units, "pressure"), title=title or f"Contact '{contact.name}'")
     ax.set_ylim(min(0.0, 1.05 * float(pressure.min(initial=0.0))), 1.05 * ax.dataLim.y1 or None)
     ax.grid(alpha=0.3)
-    ax.legend()
+    ax.title.set_fontsize("medium")
+    ax.legend(fontsize=9)
     return ax
+
+
+def _largest(curve: PressureCurve, units: Units) -> str:
+    """Return the largest pressure of a theory as text; a theory whose pressure is the same everywhere has one alone."""
+    name = "$p_0$" if np.isfinite(curve.radius) else "$p$"
+    return f"{name} = {valued(curve.pressure_max, units, 'pressure')}"
 
 
 def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
@@ -100,9 +105,9 @@ def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) ->
     return (max(-reach, 1.02 * float(low)) if low < 0 else 0.0), reach
 
 
-def _mark_edges(ax: Axes, contact: ContactResult, place: Array) -> None:
+def _mark_edges(ax: Axes, contact: ContactResult, place: Array, units: Units) -> None:
     """Shade where the edge of the contact lies: between the outermost closed place and the first open one."""
-    inside, outside = contact.radius
+    inside, outside = half_width(contact.place, contact.active)
     if not (np.isfinite(inside) and np.isfinite(outside)):
         return
     centre = 0.0
@@ -110,5 +115,5 @@ def _mark_edges(ax: Axes, contact: ContactResult, place: Array) -> None:
         closed = contact.place[contact.active]
         centre = 0.5 * float(closed.min() + closed.max()) if len(closed) else 0.0
         ax.axvspan(centre - outside, centre - inside, color="tab:blue", alpha=0.15, lw=0)
-    label = f"edge: {inside:.4g} to {outside:.4g}"
+    label = f"edge: {inside:.4g} to {valued(outside, units, 'length')}"
     ax.axvspan(centre + inside, centre + outside, color="tab:blue", alpha=0.15, lw=0, label=label)

@@ -1,4 +1,4 @@
-"""The deformed mesh coloured by its von Mises stress."""
+"""The deformed mesh coloured by a field, by default its von Mises stress."""
 
 from __future__ import annotations
 
@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.contact.search.facet_tables import flat_triangles
-from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FastcontactError
-from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNKNOWN, Units, labelled, new_axes
-from fastcontact.results.plot.solid import MOST_EDGES, draw_solid
-from fastcontact.results.separated import separated
+from fastcontact.results.plot._axes import UNKNOWN, Units, labelled, new_axes, part_shown, placed, valued
+from fastcontact.results.plot.fields import Field, field_of
+from fastcontact.results.plot.patches import fill, outlines
+from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen
 from fastcontact.results.step import StepResult
 
 if TYPE_CHECKING:
@@ -40,63 +38,94 @@ def deformed_shape(
     mesh: Mesh,
     step: StepResult,
     *,
+    field: str = "von_mises",
     scale: float = 1.0,
     edges: bool | None = None,
     mirrored: bool = False,
+    zoom: float | None = None,
+    limits: tuple[float, float] | None = None,
     title: str = "",
     units: Units = UNKNOWN,
     view: tuple[float, float] = (25.0, -60.0),
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot the deformed mesh coloured by the von Mises stress, its maximum marked.
-
-    In three dimensions its outer surface is drawn, as far as it faces the eye.
+    """Plot the deformed mesh, in 3D what is seen of its surface, coloured by a field, its largest value marked.
 
     Parameters
     ----------
-    mesh : Mesh
-    step : StepResult
+    mesh, step
+        Mesh and results of a step.
+    field : str
+        ``"von_mises"``, ``"von_mises_signed"``, ``"tresca"``; ``"stress.xx"`` and so on, ``"stress.principal_max"``,
+        ``_mid``, ``_min``; ``"displacement"`` (its length), ``"displacement.x"`` and so on.
     scale : float
         Factor on the displacements.
     edges : bool, optional
         Draw the cells' edges; by default up to 5000 cells, or facets of the surface in 3D.
     mirrored : bool
         In 2D, draw the other half beyond x = 0, too: the full section of an axisymmetric body.
+    zoom : float, optional
+        In 2D, half the width of the part to draw, around the marked place [length].
+    limits : (float, float), optional
+        Values of the first and the last colour, in the unit of the field.
     title, units
         As in `pressure_profile`.
     view : (float, float)
         In 3D, height of the eye over the x-y plane and its direction around z [degrees].
     ax : matplotlib Axes, optional
         In 3D with ``projection="3d"``.
+
+    Raises FastcontactError if there is no such field, or `zoom` is not positive or asked for in 3D.
     """
-    solid, (whole, (mesh, node, stress)) = mesh.dim == 3, (mesh, separated(mesh, step))
-    values = step.von_mises if mesh is whole else von_mises(stress)  # each material's own, where they meet
-    place = scaled(mesh.points, scale, step.displacement[node])
-    both = np.concatenate([place, place * [-1.0, 1.0]]) if mirrored and not solid else place
-    axes = new_axes(ax, (7.0, 7.0) if solid else _size(both), "3d" if solid else None)
-    field = (
-        draw_solid(axes, mesh, place, values, edges, view, node) if solid else _draw(axes, mesh, place, values, edges)
-    )
-    if both is not place:
-        _draw(axes, mesh, place * [-1.0, 1.0], values, edges)
-    top = int(np.argmax(step.von_mises))
-    where = ", ".join(f"{x:.4g}" for x in mesh.points[top])
-    label = f"maximum {step.von_mises[top]:.5g} at ({where})"
-    axes.plot(*([x] for x in place[top]), "o", mfc="none", mec="red", ms=9, mew=1.5, label=label, zorder=10)
-    axes.figure.colorbar(
-        field, ax=axes, label=labelled("von Mises stress", units, "pressure"), shrink=0.6 if solid else 0.8
-    )
+    if zoom is not None and (mesh.dim == 3 or not 0.0 < zoom < LARGEST):
+        raise FastcontactError(f"zoom = {zoom:g}: in the plane half a width > 0 can be drawn; in 3D draw a section")
+    shown = field_of(mesh, step, field)
+    place = scaled(shown.mesh.points, scale, step.displacement[shown.node])
+    heading = title or f"Deformed shape (displacements x {scale:g}), load factor {step.load_factor:g}"
+    if mesh.dim == 3:
+        axes = new_axes(ax, (6.4, 6.2), "3d")
+        drawn = draw_solid(axes, shown, place, edges, view, limits or shown.range)
+        _mark(axes, shown, place, mesh, units, hidden=not is_seen(shown, place, view))
+        return _framed(axes, drawn, shown, heading, units, 0.02)
+    part = np.concatenate([place, place * [-1.0, 1.0]]) if mirrored else place
+    part = part if zoom is None else np.array(part_shown(place[shown.extreme], zoom, part))
+    axes = new_axes(ax, _size(part))
+    for turned in (place, place * [-1.0, 1.0]) if mirrored else (place,):
+        drawn = _draw(axes, shown, turned, edges, limits or shown.range, part)
+    if zoom is not None:
+        axes.set(xlim=part[:, 0], ylim=part[:, 1])
+    _mark(axes, shown, place, mesh, units)
+    return _framed(axes, drawn, shown, heading, units, -0.09 if ax is not None else _below(part))
+
+
+def _framed(axes: Any, drawn: Any, shown: Field, heading: str, units: Units, below: float) -> Any:
+    """Give axes their colour bar, title, labels, and a legend that begins at a height [-]; return them."""
+    caption, dim = labelled(shown.caption, units, shown.quantity), shown.mesh.dim
+    axes.figure.colorbar(drawn, ax=axes, label=caption, shrink=0.6 if dim == 3 else 0.8)
     axes.set_aspect("equal")
-    axes.set_title(title or f"Deformed shape (displacements x {scale:g}), load factor {step.load_factor:g}")
-    axes.set(**{f"{axis}label": labelled(f"{axis}", units, "length") for axis in "xyz"[: mesh.dim]})
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.02 if solid else -0.09 if ax is not None else _below(both)))
+    axes.set_title(heading, fontsize="medium")
+    axes.set(**{f"{axis}label": labelled(axis, units, "length") for axis in "xyz"[:dim]})
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, below))
     return axes
+
+
+def _mark(axes: Any, shown: Field, place: Array, mesh: Mesh, units: Units, hidden: bool = False) -> None:
+    """Mark the extreme value: where it stands in the picture, and in another line where it was before the load."""
+    before = mesh.points[shown.node[shown.extreme]]
+    at, size = place[shown.extreme], float(np.ptp(place, axis=0).max())
+    value = shown.values[shown.extreme]
+    here, there = placed(at, size), placed(before, size)
+    label = f"{'maximum' if value >= 0.0 else 'minimum'} {valued(value, units, shown.quantity, 5)} at {here}"
+    label += ", hidden" if hidden else ""
+    label += f"\nundeformed at {there}" if here != there else ""
+    style = {"mfc": "none", "mec": "red", "ms": 9, "mew": 1.5, "zorder": 10}
+    axes.plot(*([x] for x in at), "o", label=label, **style)
 
 
 def _size(place: Array) -> tuple[float, float]:
     """Return width and height of a picture that the body fills, beside colours, labels and title [inches]."""
     width, height = np.ptp(place, axis=0) / np.ptp(place, axis=0).max()
-    return max(5.0 * float(width) + 2.2, 5.0), max(5.0 * float(height) + 2.0, 3.6)
+    return max(4.2 * float(width) + 1.9, 5.0), max(4.2 * float(height) + 2.0, 3.6)
 
 
 def _below(place: Array) -> float:
@@ -104,29 +133,20 @@ def _below(place: Array) -> float:
     return -0.5 / (_size(place)[1] - 2.0)
 
 
-def _draw(ax: Axes, mesh: Mesh, place: Array, values: Array, edges: bool | None) -> Any:
-    """Draw the cells of a mesh in the plane at positions `place` (n_points, 2), coloured by `values` (n_points,).
+def _draw(
+    ax: Axes, shown: Field, place: Array, edges: bool | None, colours: tuple[float, float], part: Array
+) -> Any:  # fmt: skip
+    """Draw the cells of a mesh in the plane at positions `place` (n_points, 2) in `colours` from one value to the other.
 
-    Return what carries the colours.
+    By default edges are drawn where there are few cells within the box around `part` (n, 2). Return what carries the colours.
     """
     from matplotlib.collections import PolyCollection
-    from matplotlib.tri import Triangulation
 
-    loops = [cells[:, _outline(name)] for name, cells in mesh.solids.items()]
-    flat = [cells[:, flat_triangles(cells.shape[1])].reshape(-1, 3) for cells in mesh.solids.values()]
-    field = ax.tripcolor(
-        Triangulation(place[:, 0], place[:, 1], np.concatenate(flat)), values, shading="gouraud", cmap="viridis"
-    )
-    if edges if edges is not None else sum(map(len, loops)) <= MOST_EDGES:
+    drawn = fill(ax, shown.mesh.solids, place, shown.values, shown.colours, colours)
+    loops = [outlines(name, place[cells]) for name, cells in shown.mesh.solids.items()]
+    low, high = part.min(axis=0), part.max(axis=0)
+    inside = [((loop.max(axis=1) >= low) & (loop.min(axis=1) <= high)).all(axis=1) for loop in loops]
+    if edges if edges is not None else sum(int(kept.sum()) for kept in inside) <= MOST_EDGES:
         for loop in loops:
-            outlines = list(place[loop])
-            ax.add_collection(PolyCollection(outlines, facecolors="none", edgecolors="black", lw=0.15, alpha=0.6))
-    return field
-
-
-def _outline(name: str) -> list[int]:
-    """Return the nodes of a 2D element in order around it."""
-    element = elements.get(name)
-    if element.order == 1:
-        return list(range(element.n_corners))
-    return [node for facet in element.facets for node in (facet[0], facet[2])]
+            ax.add_collection(PolyCollection(list(loop), facecolors="none", edgecolors="black", lw=0.15, alpha=0.6))
+    return drawn

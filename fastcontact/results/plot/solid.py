@@ -11,6 +11,8 @@ from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
+from fastcontact.results.plot.fields import Field
+from fastcontact.results.plot.hiding import Screen
 
 Array = NDArray[np.float64]
 
@@ -18,54 +20,109 @@ Array = NDArray[np.float64]
 MOST_EDGES = 5000
 # Each flat triangle between the nodes is cut into so many along its sides, to show how a field varies in it.
 CUTS = 2
+# How often a piece that is hidden in part is cut in four.
+FINEST = 4
 
 
 def draw_solid(
-    ax: Any, mesh: Mesh, place: Array, values: Array, edges: bool | None, view: tuple[float, float],
-    node: NDArray[np.int32],
-) -> Any:  # fmt: skip
-    """Draw the facets of the outer surface that face the eye; return what a colour bar is made of.
+    ax: Any, shown: Field, place: Array, edges: bool | None, view: tuple[float, float], colours: tuple[float, float]
+) -> Any:
+    """Draw what is seen of the outer surface; return what a colour bar is made of.
 
-    The points stand at `place` (n_points, 3) [length] and are coloured by `values` (n_points,). Outlines of facets are drawn
-    if `edges` says so, by default up to MOST_EDGES. `view` is height and direction of the eye [degrees]. Points of one `node`
-    (n_points,) are one: the mesh may be cut along borders inside.
+    The points stand at `place` (n_points, 3) [length]; `colours` are the values of the first and the last colour. Outlines
+    of facets are drawn if `edges` says so, by default up to MOST_EDGES. `view` is height and direction of the eye [degrees].
     """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    height, direction = np.radians(view)
-    eye = np.array([np.cos(height) * np.cos(direction), np.cos(height) * np.sin(direction), np.sin(height)])
-    pieces, colours, outlines = [], [], []
-    outer = outer_facets(mesh) if len(node) == node.max(initial=-1) + 1 else _without_cuts(mesh, node)
-    for name, facets in outer.items():
-        corners = place[facets]
-        flat = flat_triangles(facets.shape[1])
-        a, b, c = np.moveaxis(corners[:, flat], -2, 0)
-        seen = np.cross(b - a, c - a).sum(axis=1) @ eye > 0
+    eye = towards(view)
+    facing = _facing(shown, place, eye)
+    screen = Screen(np.concatenate([corners[:, flat].reshape(-1, 3, 3) for _, corners, _, flat in facing]), eye)
+    pieces, values, strokes = [], [], []
+    for name, corners, field, flat in facing:
         weights = _cut(CUTS if elements.get(name).order == 1 else 1)
-        triangles = np.einsum("pcw,ftwd->ftpcd", weights, corners[seen][:, flat])
-        pieces.append(triangles.reshape(-1, 3, 3))
-        centre = np.einsum("pw,ftw->ftp", weights.mean(axis=1), values[facets[seen]][:, flat])
-        colours.append(centre.ravel())
-        outlines.append(_outline(name, corners[seen], eye))
-    field = np.concatenate(colours)
-    norm = Normalize(float(values.min()), float(values.max()))
-    faces = colormaps["viridis"](norm(field))
+        triangles = np.einsum("pcw,ftwd->ftpcd", weights, corners[:, flat]).reshape(-1, 3, 3)
+        corner_values = np.einsum("pcw,ftw->ftpc", weights, field[:, flat]).reshape(-1, 3)
+        seen, of_piece = _seen(triangles, corner_values, screen)
+        pieces.append(seen)
+        values.append(of_piece.mean(axis=1))
+        strokes.append(_seen_strokes(_outline(name, corners), screen))
+    norm = Normalize(*colours)
+    faces = colormaps[shown.colours](norm(np.concatenate(values)))
     polygons = list(np.concatenate(pieces))
     lines = faces.copy()  # the colour of the face itself closes the hair cracks between neighbours
-    if edges if edges is not None else sum(map(len, outer.values())) <= MOST_EDGES:
-        strokes = np.concatenate(outlines)
-        polygons += list(strokes)
-        faces = np.vstack([faces, np.zeros((len(strokes), 4))])
-        lines = np.vstack([lines, np.tile([0.0, 0.0, 0.0, 0.6], (len(strokes), 1))])
+    if edges if edges is not None else sum(len(corners) for _, corners, _, _ in facing) <= MOST_EDGES:
+        # Whatever is nearer is drawn later: all strokes are moved to the eye, in a parallel projection along themselves.
+        drawn = np.concatenate(strokes) + 4.0 * np.ptp(place, axis=0).max() * eye
+        polygons += list(drawn)
+        faces = np.vstack([faces, np.zeros((len(drawn), 4))])
+        lines = np.vstack([lines, np.tile([0.0, 0.0, 0.0, 0.6], (len(drawn), 1))])
     ax.add_collection3d(Poly3DCollection(polygons, facecolors=faces, edgecolors=lines, linewidths=0.3))
     ax.set_proj_type("ortho")
     ax.view_init(elev=view[0], azim=view[1])
     for setter, low, high in zip((ax.set_xlim, ax.set_ylim, ax.set_zlim), place.min(axis=0), place.max(axis=0)):
         setter(low, high)
-    return ScalarMappable(norm, "viridis")
+    return ScalarMappable(norm, shown.colours)
+
+
+def is_seen(shown: Field, place: Array, view: tuple[float, float]) -> bool:
+    """Return whether nothing hides the extreme value of a field, on points at `place` (n_points, 3) [length]."""
+    eye = towards(view)
+    facing = _facing(shown, place, eye)
+    screen = Screen(np.concatenate([corners[:, flat].reshape(-1, 3, 3) for _, corners, _, flat in facing]), eye)
+    return not bool(screen.hidden(place[[shown.extreme]])[0])
+
+
+def towards(view: tuple[float, float]) -> Array:
+    """Return the unit vector (3,) towards the eye [-] from its height and direction [degrees]."""
+    height, direction = np.radians(view)
+    return np.array([np.cos(height) * np.cos(direction), np.cos(height) * np.sin(direction), np.sin(height)])
+
+
+def _facing(shown: Field, place: Array, eye: Array) -> list[tuple[str, Array, Array, NDArray[np.intp]]]:
+    """Return of each kind of facet, for those that face the eye: name, corners, values of the field, flat triangles."""
+    cut = len(shown.node) != shown.node.max(initial=-1) + 1
+    found = []
+    for name, facets in (_without_cuts(shown.mesh, shown.node) if cut else outer_facets(shown.mesh)).items():
+        flat = flat_triangles(facets.shape[1])
+        a, b, c = np.moveaxis(place[facets][:, flat], -2, 0)
+        kept = facets[np.cross(b - a, c - a).sum(axis=1) @ eye > 0]
+        found.append((name, place[kept], shown.values[kept], flat))
+    return found
+
+
+def _seen(triangles: Array, values: Array, screen: Screen) -> tuple[Array, Array]:
+    """Return the parts of triangles (n, 3, 3) that nothing hides, and the values (n, 3) at their corners.
+
+    A triangle that is hidden in part is cut in four, again and again; of the last ones those are kept whose middle is seen.
+    """
+    kept: list[tuple[Array, Array]] = []
+    for left in range(FINEST, -1, -1):
+        middle = triangles.mean(axis=1, keepdims=True)
+        tests = np.concatenate([middle, middle + 0.98 * (triangles - middle)], axis=1)
+        hidden = screen.hidden(tests)
+        seen = ~hidden[:, 0] if left == 0 else ~hidden.any(axis=1)
+        kept.append((triangles[seen], values[seen]))
+        rest = ~seen & ~hidden.all(axis=1)
+        if left == 0 or not rest.any():
+            break
+        weights = _cut(2)
+        triangles = np.einsum("pcw,nwd->npcd", weights, triangles[rest]).reshape(-1, 3, 3)
+        values = np.einsum("pcw,nw->npc", weights, values[rest]).reshape(-1, 3)
+    return np.concatenate([part for part, _ in kept]), np.concatenate([part for _, part in kept])
+
+
+def _seen_strokes(strokes: Array, screen: Screen) -> Array:
+    """Return the parts of strokes (n, 2, 3) that nothing hides: of those hidden in part, sixteenths."""
+    ends = np.linspace(0.0, 1.0, 17)[:, None]
+    points = strokes[:, None, 0] + ends * (strokes[:, None, 1] - strokes[:, None, 0])
+    parts = np.stack([points[:, :-1], points[:, 1:]], axis=2)
+    hidden = screen.hidden(parts.mean(axis=2))
+    whole = ~hidden.any(axis=1)
+    partly = ~whole & ~hidden.all(axis=1)
+    return np.concatenate([strokes[whole], parts[partly][~hidden[partly]]])
 
 
 def _without_cuts(mesh: Mesh, node: NDArray[np.int32]) -> dict[str, NDArray[np.int32]]:
@@ -89,17 +146,11 @@ def _cut(n: int) -> Array:
     return np.concatenate([1.0 - steps.sum(axis=2, keepdims=True), steps], axis=2)
 
 
-def _outline(name: str, corners: Array, eye: Array) -> Array:
-    """Return the sides of facets (n, 2, 3) as strokes between neighbouring nodes, a facet's length nearer to the eye.
-
-    What is nearer is drawn later, so that no piece of the facets beside it covers a stroke; in a parallel projection it
-    stays where it is in the picture.
-    """
+def _outline(name: str, corners: Array) -> Array:
+    """Return the sides of facets as strokes (n, 2, 3) between neighbouring nodes."""
     element = elements.get(name)
     ends = [(a, b) for a, b in element.edges]
     if element.order == 2:
         middles = range(element.n_corners, element.n_corners + len(ends))
         ends = [side for (a, b), middle in zip(ends, middles) for side in ((a, middle), (middle, b))]
-    size = np.linalg.norm(np.ptp(corners, axis=1), axis=1)
-    nearer = corners[:, np.array(ends)] + (size[:, None] * eye)[:, None, None]
-    return np.asarray(nearer.reshape(-1, 2, 3))
+    return np.asarray(corners[:, np.array(ends)].reshape(-1, 2, 3))

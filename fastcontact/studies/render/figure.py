@@ -48,7 +48,7 @@ class Panel:
     curves: Sequence[Curve] = ()
     lines: Sequence[Line] = ()
     x_scale: str = "linear"  # or "log", or "plain log": few plain numbers instead of powers of ten
-    y_scale: str = "linear"  # or "log"
+    y_scale: str = "linear"  # or "log", or "plain log"
     x_end: float | None = None  # end of the x axis, in its unit; the y axis starts from zero then
     x_start: float = 0.0  # where the x axis then begins
     grid: float = 0.4  # opacity at major ticks; 0: no grid
@@ -64,8 +64,17 @@ def marker(number: int) -> str:
     return MARKERS[number % len(MARKERS)]
 
 
-def figure(panels: Sequence[Sequence[Panel]], size: tuple[float, float], title: str = "", **style: Any) -> Any:
-    """Return a figure of rows of panels, of a `size` [inch], for which matplotlib is needed; `style` is of its title."""
+def figure(
+    panels: Sequence[Sequence[Panel]],
+    size: tuple[float, float],
+    title: str = "",
+    widths: Sequence[float] | None = None,
+    **style: Any,
+) -> Any:
+    """Return a figure of rows of panels, of a `size` [inch], for which matplotlib is needed; `style` is of its title.
+
+    `widths` are those of the columns, in any unit; all are alike by default.
+    """
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
@@ -73,7 +82,7 @@ def figure(panels: Sequence[Sequence[Panel]], size: tuple[float, float], title: 
         raise FastcontactError("pictures need matplotlib: pip install 'fastcontact[plot]'") from error
     made = Figure(figsize=size, layout="constrained", dpi=130)
     FigureCanvasAgg(made)
-    axes = made.subplots(len(panels), max(map(len, panels)), squeeze=False)
+    axes = made.subplots(len(panels), max(map(len, panels)), squeeze=False, width_ratios=widths)
     for ax, panel in zip(axes.flat, (panel for row in panels for panel in row), strict=True):
         _draw(panel, ax)
     if title:
@@ -102,6 +111,11 @@ def _draw(panel: Panel, ax: Any) -> None:
     ax.set_xlabel(panel.x_label)
     ax.set_ylabel(panel.y_label)
     ax.set_title(panel.title, fontsize=panel.title_size or "large")
+    if panel.y_scale == "linear":
+        ax.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 7))
+        low, high = ax.dataLim.intervaly
+        if high - low < 1e-6 * max(abs(low), abs(high)):  # round-off is no trend
+            ax.set_ylim(sorted((0.9 * low, 1.1 * low)))
     if panel.x_end is not None:
         ax.set_xlim(panel.x_start, panel.x_end or None)
         ax.set_ylim(bottom=0.0)
@@ -114,13 +128,20 @@ def _draw(panel: Panel, ax: Any) -> None:
 
 
 def _scale(panel: Panel, ax: Any) -> None:
+    for axis, scale, setter in ((ax.xaxis, panel.x_scale, ax.set_xscale), (ax.yaxis, panel.y_scale, ax.set_yscale)):
+        if scale == "plain log":
+            setter("log")
+            _plain(axis)
+        elif scale != "linear":
+            setter(scale)
+
+
+def _plain(axis: Any) -> None:
+    """Label a logarithmic axis with few plain numbers instead of powers of ten."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    if panel.x_scale != "linear":
-        ax.set_xscale("log")
-    if panel.x_scale == "plain log":
-        ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        ax.xaxis.set_minor_formatter(NullFormatter())
-    if panel.y_scale != "linear":
-        ax.set_yscale(panel.y_scale)
+    low, high = axis.get_data_interval()
+    many = low > 0 and high > 30.0 * low
+    axis.set_major_locator(LogLocator(subs=(1.0,) if many else (1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.10g}"))
+    axis.set_minor_formatter(NullFormatter())

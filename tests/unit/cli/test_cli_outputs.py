@@ -26,7 +26,7 @@ def files(solved_case: Path, tmp_path: Path) -> Path:
 # Of each command that writes: its arguments with one source, and its options for files.
 WRITERS = {
     "profile": (["profile", "old.vtkhdf"], ["--csv", "--agr", "--png"], ["old.vtkhdf"]),
-    "plot": (["plot", "old.vtkhdf"], ["--png"], ["old.vtkhdf"]),
+    "plot": (["plot", "old.vtkhdf"], ["--png", "--animate"], ["old.vtkhdf"]),
     "export": (["export", "old.vtkhdf"], ["--med", "--xdmf"], ["old.vtkhdf"]),
     "run": (["run", "case.toml"], ["-o", "--json", "--plot"], ["case.toml", "coarse.med"]),
     "converge": (["converge", "case.toml"], ["--json", "--csv", "--png", "--html", "-o"], ["case.toml", "coarse.med"]),

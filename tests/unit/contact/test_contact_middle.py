@@ -180,6 +180,28 @@ def test_the_half_width_lies_between_the_closed_and_the_open_places(place, close
     assert half_width(np.array(place, float), np.array(closed, bool)) == pytest.approx(bracket, nan_ok=True)
 
 
+@pytest.mark.parametrize("half", [True, False], ids=["half", "whole"])
+def test_of_an_arc_the_half_width_is_half_the_chord(half):
+    angle = np.radians(np.arange(0.0 if half else -90.0, 91.0, 5.0))
+    bracket = half_width(R * angle, np.abs(angle) < np.radians(62.0), R * np.sin(angle))
+    assert bracket == pytest.approx((R * np.sin(np.radians(60.0)), R * np.sin(np.radians(65.0))))
+
+
+@pytest.mark.parametrize(("x0", "facing"), [(0.0, "up"), (-7.0, "left"), (20.0, "right")])
+def test_a_file_keeps_the_direction_of_half_widths(x0, facing, tmp_path):
+    contact, step = pressed(x0, facing, half=False)
+    assert abs(contact.tangent["xy".index(SIDES[facing][0])]) < 1e-3
+    np.testing.assert_allclose(np.abs(contact.across), np.abs(contact.place), atol=1e-6)  # the block is flat
+    mesh = fc.generate.graded_block("quad8", width=8.0, contact_radius=1.2, contact_size=SIZE)
+    mesh = fc.generate.transformed(whole(mesh), rotate=SIDES[facing][2], translate=(x0, -2 * x0))
+    with fc.ResultWriter(tmp_path / "a.vtkhdf", mesh) as out:
+        out.write(step)
+    with fc.open_results(tmp_path / "a.vtkhdf") as results:
+        read = results[0].contact["c"]
+    np.testing.assert_array_equal(read.tangent, contact.tangent)
+    assert read.stick_radius == contact.stick_radius
+
+
 def test_a_theory_is_named_after_what_was_given():
     contact, _ = pressed(0.0, "up", True)
     line = fc.analytic.hertz_line(E1=E, nu1=0.3, R1=R, force=7.0)

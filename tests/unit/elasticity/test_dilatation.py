@@ -220,3 +220,20 @@ def test_two_materials_of_one_mesh_are_each_as_alone():
         part = mesh.replace(cells={"quad4": mesh.cells["quad4"][numbers == number]}, cell_groups={})
         expected += assembled(part, "plane_strain", averaged, material).toarray()
     assert np.abs(K - expected).max() < 1e-13 * np.abs(expected).max()
+
+
+def test_incompatible_modes_exclude_a_mean_dilatation():
+    with pytest.raises(fc.ModelError, match="either incompatible modes or a mean dilatation, not both"):
+        fc.LinearElastic(E=1.0, nu=0.3, volumetric="mean_dilatation", incompatible_modes=True)
+    assert not fc.LinearElastic(E=1.0, nu=0.4999, incompatible_modes=True).averaged
+
+
+def test_modes_count_in_the_fingerprint_and_their_absence_does_not():
+    from fastcontact.model.fingerprint import fingerprint
+
+    prints = []
+    for options in ({}, {"incompatible_modes": False}, {"incompatible_modes": True}):
+        model = fc.Model(fc.generate.block(), "plane_strain")
+        model.add_material(fc.LinearElastic(E=1.0, nu=0.3, **options))
+        prints.append(fingerprint(model)["the materials"])
+    assert prints[0] == prints[1] != prints[2]

@@ -58,7 +58,7 @@ def test_the_deformation_is_drawn_and_the_maximum_is_marked():
     ax = fc.plot.deformed_shape(mesh, step_of(mesh, values, 0.1 * mesh.points), scale=5.0)
     (mark,) = ax.lines
     assert [float(v[0]) for v in mark.get_data_3d()] == pytest.approx([1.5, 1.5, 1.5])
-    assert mark.get_label() == "maximum 1.7321 at (1, 1, 1)"
+    assert mark.get_label() == "maximum 1.7321 at (1.5, 1.5, 1.5)\nundeformed at (1, 1, 1)"
     assert ax.get_xlim()[1] == pytest.approx(1.5, rel=0.05)
 
 

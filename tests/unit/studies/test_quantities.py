@@ -38,7 +38,7 @@ def test_where_no_vertex_is_near_the_node_itself_is_taken():
 def contact(pressure, radius, r=None):
     r = np.linspace(0.0, 1.0, len(pressure)) if r is None else r
     pressure = np.asarray(pressure, float)
-    return SimpleNamespace(radius=radius, place=r, active=pressure > 0, pressure=pressure)
+    return SimpleNamespace(radius=radius, across=r, active=pressure > 0, pressure=pressure)
 
 
 def test_the_radius_is_where_the_pressure_of_hertz_ends():

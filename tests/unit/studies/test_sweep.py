@@ -71,6 +71,55 @@ def test_a_failed_point_is_told_and_the_others_go_on(case, capsys):
     assert "0.3" in shown.out
 
 
+def drawn(sweep):
+    """The axes of the figure of a sweep by title, with all curves by label."""
+    found = {}
+    for ax in sweep.figure().axes:
+        found[ax.get_title()] = ax
+    return found
+
+
+def curves(ax):
+    return {line.get_label(): (np.array(line.get_xdata()), np.array(line.get_ydata())) for line in ax.lines}
+
+
+def test_theory_is_a_curve_between_the_points_and_axes_are_of_one_kind(sweep):
+    pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+    axes = drawn(sweep)
+    x, force = curves(axes["contact force"])["theory at equal approach"]
+    assert len(x) > 20
+    # Hertz: F = 4/3 E* sqrt(R) d^1.5 with E* = E / (2 (1 - nu^2)) and R = 25.
+    np.testing.assert_allclose(force, 4 / 3 * 2e4 / (2 * 0.91) * 5.0 * x**1.5, rtol=1e-12)
+    assert {(ax.get_xscale(), ax.get_yscale()) for name, ax in axes.items() if "ratio" not in name} == {("log", "log")}
+    assert axes["contact force"].get_xlabel() == "approach [mm]"
+    assert axes["largest pressure"].get_ylabel() == "largest pressure [MPa]"
+    np.testing.assert_allclose(
+        curves(axes["contact force: ratio to theory"])["to theory at equal approach"][1],
+        [point.ratio("force") for point in sweep.points],
+    )
+
+
+def test_a_theory_that_the_parameter_does_not_change_is_told(case):
+    pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+    found = parameter_sweep(case, {"material[0].E": (1e4, 2e4), "approach": (0.4, 4.0)}, level=0, workers=1)
+    ax = drawn(found)["contact force"]
+    assert ax.get_xlabel() == "Young's modulus of material 1 [MPa]"
+    assert "theory at equal approach\n(the same for every material[0].E)" in curves(ax)
+    assert (ax.get_xscale(), ax.get_yscale()) == ("linear", "linear")
+    turned = parameter_sweep(case, {"approach": (0.4, 0.8), "material[0].E": (1e4, 2e4)}, level=0, workers=1)
+    labels = curves(drawn(turned)["contact force"])
+    assert {"material[0].E = 10000.0", "material[0].E = 20000.0", "theory at equal approach"} <= set(labels)
+    assert len(turned.theories) == 2
+
+
+def test_values_that_are_no_numbers_have_no_curve(case):
+    pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+    found = parameter_sweep(case, {"contact.hertz.formulation": ("continuous", "mortar")}, level=0, workers=1)
+    assert found.theories == ()
+    ax = drawn(found)["contact force"]
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["continuous", "mortar"]
+
+
 @pytest.mark.parametrize(
     ("parameters", "words"),
     [

@@ -1,0 +1,184 @@
+"""Random models: does each end in a result that is right, or in an error of our own?
+
+    python bench/random_models.py [--count 2000] [--first 0] [--workers 1] [--limit 120] [--json FILE]
+    python bench/random_models.py --seed 137 --show
+
+Each seed is a model (tests/random_models): two- and three-dimensional, one to three contact pairs, any element, materials
+of any contrast, rigid obstacles, clearances, friction, meshes shifted, turned, graded, partly covered. What must hold for any
+result is checked (tests/mechanics.py). Printed are counts by dimension, formulation and outcome, errors by their first words,
+and the seeds of all findings; exit code 1 if there are any.
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import json
+import multiprocessing
+import sys
+import time
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parents[1]
+for folder in ("tests", "tests/random_models"):
+    sys.path.insert(0, str(HERE / folder))
+
+FINDINGS = ("failed check", "raw error", "too long", "process died")
+
+
+def work(pipe: Any) -> None:
+    """Answer seeds with rows until there are no more."""
+    from outcome import outcome
+
+    while (seed := pipe.recv()) is not None:
+        pipe.send(outcome(seed))
+
+
+class Worker:
+    """A process that solves one model at a time."""
+
+    def __init__(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.pipe, other = context.Pipe()
+        self.process = context.Process(target=work, args=(other,), daemon=True)
+        self.process.start()
+        other.close()
+        self.seed, self.begin = -1, 0.0
+
+    def give(self, seed: int) -> None:
+        self.seed, self.begin = seed, time.monotonic()
+        self.pipe.send(seed)
+
+    def answer(self, limit: float) -> dict[str, Any] | None:
+        """Return the row of the model, if it is there; a process that died or takes too long is one, too."""
+        try:
+            if self.pipe.poll(0.0):
+                return dict(self.pipe.recv())
+        except (EOFError, OSError):
+            return {"seed": self.seed, "outcome": "process died", "text": f"exit code {self.process.exitcode}"}
+        if time.monotonic() - self.begin > limit:
+            return {"seed": self.seed, "outcome": "too long", "text": f"more than {limit:g} s"}
+        return None
+
+    def end(self) -> None:
+        self.process.kill()
+        self.process.join()
+
+
+def rows(seeds: list[int], workers: int, limit: float) -> Iterator[dict[str, Any]]:
+    """Yield the rows of all seeds, in the order in which they are ready."""
+    waiting = seeds[::-1]
+    pool = [Worker() for _ in range(min(workers, len(seeds)))]
+    for worker in pool:
+        worker.give(waiting.pop())
+    while pool:
+        for worker in list(pool):
+            row = worker.answer(limit)
+            if row is None:
+                continue
+            yield row
+            if row["outcome"] in ("process died", "too long"):
+                worker.end()
+                pool.remove(worker)
+                worker = Worker() if waiting else worker
+                pool += [worker] if waiting else []
+            if waiting:
+                worker.give(waiting.pop())
+            elif worker in pool:
+                worker.end()
+                pool.remove(worker)
+        time.sleep(0.01)
+
+
+def table(found: list[dict[str, Any]], key: str) -> str:
+    """Return counts of outcomes by a label in Markdown, with the part that ends in results."""
+    outcomes = ["result", "own error", *FINDINGS]
+    counts: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
+    for row in found:
+        counts[str(row.get(key, "(not built)"))][row["outcome"]] += 1
+        counts["all"][row["outcome"]] += 1
+    lines = [f"| {key} | models | " + " | ".join(outcomes) + " | results |", "| --- " * (3 + len(outcomes)) + "|"]
+    for name, count in sorted(counts.items(), key=lambda item: (item[0] == "all", -sum(item[1].values()))):
+        total = sum(count.values())
+        cells = " | ".join(str(count[outcome]) for outcome in outcomes)
+        lines.append(f"| {name} | {total} | {cells} | {100 * count['result'] / total:.1f} % |")
+    return "\n".join(lines)
+
+
+def first_words(text: str) -> str:
+    """Return the beginning of a message without its numbers and names, for counting."""
+    words = ["*" if any(sign.isdigit() or sign in "'\"" for sign in word) else word for word in text.split()]
+    return " ".join(words[:14])
+
+
+def summary(found: list[dict[str, Any]]) -> str:
+    """Return all tables, the errors by their first words, and the findings."""
+    parts = [table(found, key) for key in ("kinematics", "family", "formulation", "pairs")]
+    errors = [row for row in found if row["outcome"] == "own error"]
+    by_text: dict[str, list[int]] = collections.defaultdict(list)
+    for row in errors:
+        by_text[first_words(row["text"])].append(row["seed"])
+    lines = [
+        f"{len(seeds):4d}  {text} ... (seeds {', '.join(map(str, seeds[:5]))})"
+        for text, seeds in sorted(by_text.items(), key=lambda item: -len(item[1]))
+    ]
+    worst = []
+    for name in ("balance", "given back", "moment", "penetration", "tension", "product", "cone", "driving", "carried"):
+        row = max(found, key=lambda one: one.get(name, 0.0))
+        worst.append(f"{name} {row.get(name, 0.0):.2g} (seed {row['seed']})")
+    findings = [
+        f"seed {row['seed']}: {row['outcome']}: {row['text'][:300]}" for row in found if row["outcome"] in FINDINGS
+    ]
+    return "\n\n".join([*parts, "\n".join(lines), "largest: " + ", ".join(worst), "\n".join(findings)])
+
+
+def show(seed: int) -> None:
+    """Print one model in words, and how it ends."""
+    from drawing import drawn
+    from outcome import outcome
+
+    try:
+        model = drawn(seed)
+        print(model.model.describe(), f"ramp {model.ramp}, options {model.options}", model.labels, sep="\n")
+        for pair in model.model.contact:
+            print(pair)
+    except Exception:
+        traceback.print_exc()
+    for name, value in outcome(seed).items():
+        print(f"{name:>14} {value}")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--count", type=int, default=2000)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--seed", type=int, action="append")
+    parser.add_argument("--show", action="store_true", help="print the models, and solve them in this process")
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--limit", type=float, default=120.0, help="seconds for one model")
+    parser.add_argument("--json", type=Path)
+    given = parser.parse_args()
+    seeds = given.seed or list(range(given.first, given.first + given.count))
+    if given.show:
+        for seed in seeds:
+            show(seed)
+        return 0
+    begin, found = time.perf_counter(), []
+    for row in rows(seeds, given.workers, given.limit):
+        found.append(row)
+        if row["outcome"] in FINDINGS:
+            print(f"seed {row['seed']}: {row['outcome']}: {row['text'][:200]}", flush=True)
+        if given.json and (len(found) % 20 == 0 or len(found) == len(seeds)):
+            given.json.write_text(json.dumps(found, indent=0, default=str))
+    print(summary(found))
+    print(
+        f"{len(found)} models, {sum(row.get('seconds', 0.0) for row in found):.0f} CPU s, {time.perf_counter() - begin:.0f} s"
+    )
+    return 1 if any(row["outcome"] in FINDINGS for row in found) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,221 @@
+"""The result of one contact pair at the end of a load step: pressures, closed nodes, forces, friction, middle and width."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.contact.closed_nodes import carried
+from fastcontact.contact.configuration import Configuration
+from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.contact_middle import contact_middle
+from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.pairing import normals
+from fastcontact.contact.surface import Surface
+from fastcontact.results.step import ContactResult, half_width
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def contact_result(
+    name: str, pair: Formulation, part: Constraints, solution: Solution, rows: slice, at: Configuration,
+    axis: tuple[Array, Array] | None = None, displacement: Array | None = None,
+) -> ContactResult:  # fmt: skip
+    """Return the state of one pair at the end of a load step.
+
+    Parameters
+    ----------
+    name : str
+    pair : Formulation
+    part : Constraints
+        Those of the pair in the last pairing.
+    solution : Solution
+        Of all pairs; those of this one are its `rows`.
+    rows : slice
+    at : Configuration
+        In which the sides are paired at the end of the step.
+    axis : (ndarray (dim,), ndarray (dim,)), optional
+        In space, where the bodies met first [length] and the normal there [-].
+    displacement : ndarray (n_points, dim), optional
+        That gaps are measured with, by default that of `at` [length].
+    """
+    points = pair.secondary.points
+    coordinates = pair.points[points]
+    multiplier, active = solution.multiplier[rows], solution.active[rows]
+    gap, normal = pair.nodal_gap(at, displacement=displacement)
+    found = _closed(pair, part, multiplier, active, gap, at)
+    closed = found.nodes
+    if part.tied is not None:  # as the bodies lay at rest
+        normal = pair.nodal_gap(replace(at, displacement=np.zeros_like(at.displacement)))[1]
+    along = _along_the_surface(part, solution, rows, normal, found)
+    forces = _forces(pair, part, multiplier, along)
+    faced = np.where(np.isfinite(normal), normal, 0.0)
+    middle = contact_middle(pair, faced, np.einsum("nd,nd->n", forces.secondary, faced), closed, gap)
+    return ContactResult(
+        name=name,
+        formulation=pair.name,
+        points=points,
+        coordinates=coordinates,
+        abscissa=pair.secondary.abscissa if axis is None else _distance(coordinates, axis),
+        gap=gap,
+        pressure=found.pressure,
+        multiplier=found.multiplier,
+        force_vectors=forces.secondary,
+        normal=normal,
+        active=closed,
+        force=forces.total,
+        radius=half_width(middle.places(part.positions), active, middle.across(part.positions)),
+        shear=along.shear,
+        sticking=closed & along.sticking,
+        dissipation=along.dissipation,
+        obstacle_displacement=at.obstacle.copy() if isinstance(pair.primary, RigidSide) else None,
+        middle=middle.position,
+        place=middle.places(coordinates),
+        tangent=middle.tangent,
+        primary_points=forces.primary_points,
+        primary_force_vectors=forces.primary,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Forces:
+    """Contact forces on the secondary nodes, their sum, and those on the primary ones, where nodes of both sides count
+    [force].
+    """
+
+    secondary: Array
+    total: Array
+    primary_points: NDArray[np.int32]
+    primary: Array
+
+
+def _forces(pair: Formulation, part: Constraints, multiplier: Array, along: _AlongTheSurface) -> _Forces:
+    """Return the contact forces on both sides of a pair."""
+    everywhere = part.force(multiplier, along.force).reshape(-1, pair.points.shape[1])
+    opposite = pair.primary.points if isinstance(pair.primary, Surface) else np.empty(0, np.int32)
+    forces = np.where(np.isin(pair.secondary.points, opposite)[:, None], 0.0, everywhere[pair.secondary.points])
+    total = forces.sum(axis=0)
+    if pair.axisymmetric:
+        total[0] = 0.0  # radial forces cancel over the full circle
+    return _Forces(forces, total, opposite, everywhere[opposite])
+
+
+@dataclass(frozen=True, eq=False)
+class _AlongTheSurface:
+    """Nodal traction (n_nodes, dim) [pressure], nodes that stick, dissipation [energy], tangential forces (m, k) [force]."""
+
+    shear: Array
+    sticking: Mask
+    dissipation: float = 0.0
+    force: Array | None = None
+
+
+def _along_the_surface(
+    part: Constraints, solution: Solution, rows: slice, normal: Array, found: _Closed
+) -> _AlongTheSurface:
+    """Return what a pair does along its surface: nothing without friction or tie."""
+    multiplier, everywhere = solution.multiplier[rows], np.ones(len(normal), bool)
+    if part.tied is not None:
+        _, tangential = part.tied.forces(multiplier)
+        shear = _nodal_shear(part, part.tied.directions, tangential, normal)
+        return _AlongTheSurface(np.where(found.nodes[:, None], shear, 0.0), everywhere)
+    if not (isinstance(solution, FrictionalEquilibrium) and part.tangents):
+        return _AlongTheSurface(np.zeros_like(normal), everywhere)
+    tangential, slip = solution.tangential[rows], solution.slip[rows]
+    shear = _nodal_shear(part, part.directions, tangential, normal, part.normal_forces(multiplier))
+    return _AlongTheSurface(
+        shear * found.kept[:, None],
+        _mostly_sticking(part, solution.sticking[rows], multiplier, part.pressure(multiplier)),
+        float(-(tangential * slip).sum()),
+        tangential,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Closed:
+    """The closed nodes, their pressures (m,), and the pressures of all nodes as the formulation finds them [pressure]:
+    as a field (multiplier), and with which friction at the nodes goes (own).
+    """
+
+    nodes: Mask
+    pressure: Array
+    multiplier: Array
+    own: Array
+
+    @property
+    def kept(self) -> Array:
+        """What part of the pressures found (m,) closed nodes keep: friction keeps as much.
+
+        At most all where a field undershoots: next to nothing of it may then be left at a node, and its shear anything.
+        """
+        part = np.divide(self.pressure, self.own, out=np.ones_like(self.pressure), where=self.own > 0.0)
+        return np.where(self.nodes, np.minimum(part, 1.0) if self.own.min() < 0.0 else part, 0.0)
+
+
+def _closed(
+    pair: Formulation, part: Constraints, multiplier: Array, active: Mask, gap: Array, at: Configuration
+) -> _Closed:
+    """Return the closed nodes of a pair, and their pressures: those whose integral is the force."""
+    assert part.nodal is not None
+    forces, excluded = part.normal_forces(multiplier), pair.options.excluded_nodes(pair.secondary)
+    over_side, shares = part.nodal.over_whole_side(forces), part.nodal.shares(forces)
+    closed = _closed_nodes(pair, part, active, gap, over_side, at) & ~excluded
+    may_pull = part.equality is not None
+    closed, pressure = carried(closed, over_side, shares, part.nodal.nodal_areas, pair.secondary, may_pull)
+    own = part.nodal.pressure(forces) * part.nodal.covered
+    return _Closed(closed, pressure, np.where(excluded, 0.0, over_side), own)
+
+
+def _closed_nodes(
+    pair: Formulation, part: Constraints, active: Mask, gap: Array, pressure: Array, at: Configuration
+) -> Mask:
+    """Return which secondary nodes are in contact: by their pressure, or because they never open again."""
+    assert part.nodal is not None
+    if pair.options.always_closed:
+        covered = part.nodal.covered
+        # Nodes that stand out beyond the other side face nothing themselves, but parts of their facets may.
+        return np.isfinite(gap) if isinstance(covered, float) else np.isfinite(gap) | (covered > 0.0)
+    closed = part.nodal.closed_nodes(active, gap, pressure)
+    for_good = pair.never_opening(pair.points[pair.secondary.points], at)
+    return closed if for_good is None else closed | (for_good & np.isfinite(gap))
+
+
+def _nodal_shear(
+    part: Constraints,
+    directions: tuple[Array, ...],
+    tangential: Array,
+    normal: Array,
+    along_normal: Array | None = None,
+) -> Array:
+    """Return the tangential traction on the secondary nodes (n_nodes, dim) [pressure].
+
+    Frames turn from point to point: the traction is that of the Cartesian components of the forces, and its part along
+    the nodal normals is no shear.
+    """
+    nodal = part.nodal
+    assert nodal is not None
+    forces = np.einsum("nk,ndk->nd", tangential, np.stack(directions, axis=2))
+    if along_normal is not None:
+        forces += along_normal[:, None] * normals(directions)
+    traction = np.column_stack([nodal.pressure(component) * nodal.covered for component in forces.T])
+    return traction - np.einsum("nd,nd->n", traction, normal)[:, None] * normal
+
+
+def _mostly_sticking(part: Constraints, sticking: Mask, multiplier: Array, pressure: Array) -> Mask:
+    """Return the nodes to which more force comes from sticking constraints than from sliding ones."""
+    if len(sticking) == len(pressure):
+        return sticking
+    assert part.nodal is not None
+    return part.nodal.pressure(np.where(sticking, multiplier, 0.0)) > 0.5 * pressure
+
+
+def _distance(positions: Array, axis: tuple[Array, Array]) -> Array:
+    """Return the distances (n,) of reference positions from an axis (place, direction) [length]."""
+    foot, direction = axis
+    arm = positions - foot
+    return np.linalg.norm(arm - (arm @ direction)[:, None] * direction, axis=1)

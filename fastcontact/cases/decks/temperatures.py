@@ -1,0 +1,117 @@
+"""Temperatures of a deck: initial ones, their histories over the steps, and what they mean for the model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.cases.decks.assembled import Assembled
+from fastcontact.cases.decks.blocks import Block, Row
+from fastcontact.cases.decks.content import Content, Given, Material
+from fastcontact.cases.decks.histories import Histories
+from fastcontact.model.model import Model
+from fastcontact.model.ramp import Table
+
+Array = NDArray[np.float64]
+# Coefficients of expansion by type.
+EXPANSIONS = {"ISO": 1, "ORTHO": 3}
+# Digits to which histories of two nodes must agree, up to a factor, to count as one.
+ALIKE = 12
+
+
+def expansion(content: Content, current: Material, block: Block) -> None:
+    """*EXPANSION: coefficients of one temperature, one for all directions or one along each axis."""
+    kind = block.choice("TYPE", tuple(EXPANSIONS))
+    if len(block.rows) != 1:
+        raise block.place.refuse(
+            f"material '{current.name}': {len(block.rows)} data lines where one is needed: coefficients that depend on "
+            "temperatures are not supported"
+        )
+    row, count = block.rows[0], EXPANSIONS[kind]
+    values = tuple(row.number(index) for index in range(count))
+    if any(row.entries[count + 1 :]):
+        raise row.place.refuse(f"material '{current.name}': TYPE={kind} has {count} coefficients, at one temperature")
+    current.expansion = values[0] if kind == "ISO" else values
+    if "ZERO" in block.parameters:
+        content.note(
+            block.place, "ZERO has no effect: strains count from the initial temperatures, coefficients are constant"
+        )
+
+
+def without_effect(content: Content, current: Material, block: Block) -> None:
+    """*CONDUCTIVITY, *SPECIFIC HEAT: properties that static steps do not use."""
+    content.note(block.place, f"material '{current.name}': no effect, temperatures are given, not computed")
+
+
+def initial_conditions(content: Content, block: Block) -> None:
+    """*INITIAL CONDITIONS: temperatures of nodes before the first step."""
+    kind = " ".join(block.required("TYPE").upper().split())
+    if kind != "TEMPERATURE":
+        raise block.place.refuse(f"TYPE={kind[:40]} is not supported, only TEMPERATURE")
+    content.initial.append(block)
+
+
+def initial_temperatures(made: Assembled, blocks: Iterable[Block]) -> dict[int, float]:
+    """Return initial temperatures by point; the last of several counts."""
+    return {point: value for block in blocks for point, value in _by_point(made, block)}
+
+
+def give(made: Assembled, histories: Histories[int], given: Given) -> None:
+    """Give the temperatures of a *TEMPERATURE for the current step."""
+    if given.new:
+        histories.forget()
+    for row in given.block.rows:
+        for point, value in _of_row(made, given.block, row):
+            histories.give(point, value, given.amplitude, row.place)
+
+
+def _by_point(made: Assembled, block: Block) -> Iterable[tuple[int, float]]:
+    for row in block.rows:
+        yield from _of_row(made, block, row)
+
+
+def _of_row(made: Assembled, block: Block, row: Row) -> list[tuple[int, float]]:
+    if any(row.entries[2:]):
+        raise row.place.refuse("gradients of the temperature are those of beams and shells: give one number")
+    value = row.number(1)
+    return [(point, value) for point in made.nodes(row.text(0), row.place)]
+
+
+def add_temperatures(model: Model, histories: Histories[int]) -> None:
+    """Add the rises over the initial temperatures to a model, as few fields as the histories allow."""
+    rises: dict[int, Table] = {}
+    for point in histories.tracks:
+        rest = histories.rest.get(point, 0.0)
+        rises[point] = tuple((time, value - rest) for time, value in histories.table(point))
+    by_shape: dict[Table, list[tuple[int, float]]] = {}
+    for point, table in rises.items():
+        size = max((value for _, value in table), key=abs)
+        if size:
+            shape = tuple((time, round(value / size, ALIKE)) for time, value in table)
+            by_shape.setdefault(shape, []).append((point, size))
+    times = sorted({time for table in rises.values() for time, _ in table})
+    if len(by_shape) <= len(times):
+        for shape, members in by_shape.items():
+            _add(model, members, shape)
+        return
+    for place, time in enumerate(times):  # histories that differ from node to node: one field for each corner of them
+        hat = tuple((other, float(other == time)) for other in times[max(place - 1, 0) : place + 2])
+        values = {point: _at(table, time) for point, table in rises.items()}
+        _add(model, [(point, value) for point, value in values.items() if value], hat)
+
+
+def _at(table: Table, time: float) -> float:
+    times, values = zip(*table, strict=True)
+    return float(np.interp(time, times, values))
+
+
+def _add(model: Model, members: list[tuple[int, float]], ramp: Table) -> None:
+    if members:
+        values = np.zeros(model.mesh.n_points)
+        points, rises = zip(*members, strict=True)
+        values[list(points)] = rises
+        for section in model.pretensions:  # whose opposite nodes the deck does not know
+            values[section.opposite] = values[section.nodes]
+        model.add_temperature(values, ramp=ramp)

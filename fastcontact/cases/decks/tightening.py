@@ -1,0 +1,102 @@
+"""Pretension sections of a deck: *PRE-TENSION SECTION, and *BOUNDARY, FIXED at its node, which locks it."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from fastcontact.cases.decks.assembled import Assembled
+from fastcontact.cases.decks.blocks import Block
+from fastcontact.cases.decks.content import Content, Given, PretensionSection
+from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
+from fastcontact.elasticity.relations import Relation
+from fastcontact.errors import MeshError
+from fastcontact.mesh.generate.cut import cut
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.model.model import Model
+
+
+def pretension_section(content: Content, block: Block) -> None:
+    """*PRE-TENSION SECTION: a surface through a bolt, and the node that has its shortening and its force."""
+    if len(block.rows) > 1:
+        raise block.place.refuse(f"{len(block.rows)} data lines where one is needed, the normal")
+    row = block.rows[0] if block.rows else None
+    normal = None if row is None else (row.number(0), row.number(1, 0.0), row.number(2, 0.0))
+    if normal is not None and not any(normal):
+        raise block.place.refuse("the normal has no length")
+    content.pretensions.append(
+        PretensionSection(block.place, block.required("SURFACE"), block.required("NODE"), normal)
+    )
+
+
+def section_points(made: Assembled) -> dict[int, PretensionSection]:
+    """Return the sections by the points of their nodes; CaseError where such a point belongs to a body or to another one."""
+    used = {point for solid in made.solids.values() for point in solid.points}
+    found: dict[int, PretensionSection] = {}
+    for section in made.content.pretensions:
+        point = made.node(section.node, section.place)
+        if point in used:
+            raise section.place.refuse(f"node {section.node} belongs to an element: a section needs one of its own")
+        if point in found:
+            raise section.place.refuse(f"node {section.node} has a section already, in line {found[point].place.line}")
+        found[point] = section
+    return found
+
+
+class Locks:
+    """The load factors from which pretension sections keep their length."""
+
+    def __init__(self, made: Assembled) -> None:
+        self.points = section_points(made)
+        self.begins: dict[int, float] = {}
+        self.number = 0
+
+    def begin(self, number: int, supports: list[Given], made: Assembled) -> None:
+        """Go on to a step; CaseError where it leaves out a section that was locked before."""
+        self.number = number
+        if not any(given.new for given in supports):
+            return
+        named = {p for given in supports for row in given.block.rows for p in made.nodes(row.text(0), row.place)}
+        for point in self.begins:
+            if point not in named:
+                place = next(given.block.place for given in supports if given.new)
+                raise place.refuse(
+                    f"node {self.points[point].node} of a pretension section is let go here: once locked it stays so"
+                )
+
+    def take(self, point: int, component: int, fixed: bool) -> bool:
+        """Return whether a support locks a section, which is remembered."""
+        if point not in self.points or component != 1 or not fixed:
+            return False
+        self.begins.setdefault(point, float(self.number - 1))
+        return True
+
+
+def cut_sections(found: DeckMesh, mesh: Mesh) -> Mesh:
+    """Return the mesh cut along all pretension sections."""
+    for section in found.made.content.pretensions:
+        found.made.surface(section.surface, section.place)
+        normal = None if section.normal is None else section.normal[: found.dim]
+        try:
+            mesh = cut(mesh, group_of_surface(found, section.surface), normal)
+        except MeshError as error:
+            raise section.place.refuse(str(error)) from error
+    return mesh
+
+
+def add_sections(model: Model, found: DeckMesh, locks: Locks) -> list[Relation]:
+    """Add the pretension sections to a model; return all relations that they have at any time, and those to their nodes."""
+    before, links, locked = len(model.relations), [], []
+    for point, section in locks.points.items():
+        group, place = group_of_surface(found, section.surface), section.place
+        normal = None if section.normal is None else section.normal[: found.dim]
+        if any(p.label == group for p in model.pretensions):
+            raise place.refuse(f"surface '{group}' has a pretension section already")
+        model.add_pretension(group, group, force=0.0, locked_from=locks.begins.get(point), normal=normal)
+        row = model.pretensions[-1].row(model.n_dofs)
+        node = csr_array((np.ones(1), ([0], [point * found.dim])), shape=row.shape)
+        links.append(Relation(f"*{place.keyword} of line {place.line}", csr_array(row - node)))
+        if point in locks.begins:
+            locked.append(Relation(f"the locked length of line {place.line}", row))
+    model.relations.extend(links)
+    return [*model.relations[before:], *locked]

@@ -1,0 +1,117 @@
+"""What meshio has read, as plain data, becomes a Mesh: node orders, groups by tags, sets and arrays of 0 and 1."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.mesh import elements
+from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_known, merged, without_duplicates
+from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, TAGS
+from fastcontact.mesh.mesh import Mesh
+
+# What Gmsh calls things of dimension 0 to 3: a tag without a name becomes a group like "curve_7".
+SHAPES = ("point", "curve", "surface", "volume")
+# Cells that meshio gets in another order than ours: our node k is its node NODE_ORDER[format][element][k]. It mirrors
+# the linear wedge of VTK, as old documents of VTK want and VTK 9.7 does not, and leaves Gmsh's wedge of 18 nodes alone.
+Orders = Mapping[str, tuple[int, ...]]
+NODE_ORDER: dict[str, Orders] = {
+    **{key: {"wedge6": elements.get("wedge6").reversed} for key in ("vtk", "vtu")},
+    **{key: {"wedge18": (0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16)} for key in ("gmsh", "gmsh22")},
+}
+
+# meshio takes what stands in a file as it is, arrays of any shape and kind: these come of parts that do not fit together.
+UNFIT = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+
+
+def mesh_of(found: Mapping[str, Any], file_format: str = "") -> tuple[Mesh, dict[str, int]]:
+    """Return a mesh with its groups, and the numbers of cells left out as vertices and as duplicates.
+
+    Parameters
+    ----------
+    found : mapping
+        See `meshio_process.plain_content`.
+    file_format : str
+        meshio's name of the format it comes from.
+
+    Raises
+    ------
+    MeshError
+        If it has no cells, or of a kind that fastcontact does not know. Arrays that do not fit together end in one of the
+        exceptions `UNFIT`.
+    """
+    blocks = merged(_blocks(found, NODE_ORDER.get(file_format, {})))
+    n_duplicates = sum(len(block.nodes) for block in blocks)
+    if file_format == "gmsh":  # version 2 of that format repeats a cell for each of its groups
+        blocks = [block if block.kind == VERTEX else without_duplicates(block) for block in blocks]
+    n_duplicates -= sum(len(block.nodes) for block in blocks)
+    mesh = build_mesh(found["points"], blocks, _point_groups(found), _cell_group_names(found, file_format))
+    n_vertices = sum(len(block.nodes) for block in blocks if block.kind == VERTEX)
+    return mesh, {"vertex": n_vertices, "duplicate": n_duplicates}
+
+
+def _cell_group_names(found: Mapping[str, Any], file_format: str) -> list[str]:
+    """Return the names of all groups of cells, also of those without any."""
+    names = [name for name in found["cell_sets"] if not name.startswith("gmsh:")]
+    names += [unquote(key[len(CELL_PREFIX) :]) for key in found["cell_data"] if key.startswith(CELL_PREFIX)]
+    if file_format == "gmsh":
+        names += [name for name, (_, dim) in found["field_data"].items() if dim > 0]
+    return names
+
+
+def _blocks(found: Mapping[str, Any], order: Orders) -> list[Block]:
+    foreign: dict[str, int] = {}
+    for kind, count, _ in found["cells"]:
+        if kind not in elements.BY_MESHIO and kind != VERTEX:
+            foreign[kind] = foreign.get(kind, 0) + count
+    check_known(foreign, elements.BY_MESHIO)
+    return [_block(found, index, kind, nodes, order) for index, (kind, _, nodes) in enumerate(found["cells"])]
+
+
+def _block(found: Mapping[str, Any], index: int, kind: str, nodes: NDArray[Any], order: Orders) -> Block:
+    kind = VERTEX if kind == VERTEX else elements.BY_MESHIO[kind].name
+    dim = 0 if kind == VERTEX else elements.get(kind).dim
+    groups: dict[str, NDArray[Any]] = {}
+    for key, parts in found["cell_data"].items():
+        if key in TAGS:
+            _add(groups, _tagged(parts[index], dim, found["field_data"]))
+        else:
+            _add(groups, {unquote(key[len(CELL_PREFIX) :]): np.flatnonzero(parts[index])})
+    for name, sets in found["cell_sets"].items():
+        if not name.startswith("gmsh:") and index < len(sets):
+            _add(groups, {name: np.asarray(sets[index], np.intp).reshape(-1)})
+    nodes = nodes[:, order[kind]] if kind in order else nodes
+    return Block(kind, nodes, {name: rows for name, rows in groups.items() if len(rows)})
+
+
+def _add(groups: dict[str, NDArray[Any]], more: Mapping[str, NDArray[Any]]) -> None:
+    for name, rows in more.items():
+        groups[name] = np.union1d(groups[name], rows) if name in groups else rows
+
+
+def _tagged(tags: NDArray[Any], dim: int, field_data: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    """Return the members of each tag, by its name for this dimension or else by a name made of the tag."""
+    if tags.ndim != 1 or tags.dtype.kind not in "iu":
+        return {}
+    names = {(int(entry[0]), int(entry[1])): name for name, entry in field_data.items() if np.size(entry) == 2}
+    return {
+        names.get((tag, dim), f"{SHAPES[dim]}_{tag}"): np.flatnonzero(tags == tag)
+        for tag in np.unique(tags).tolist()
+        if tag
+    }
+
+
+def _point_groups(found: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    groups: dict[str, NDArray[Any]] = {}
+    for key, data in found["point_data"].items():
+        if key in TAGS:
+            _add(groups, _tagged(data, 0, {}))
+        else:
+            _add(groups, {unquote(key[len(POINT_PREFIX) :]): np.flatnonzero(data)})
+    for name, members in found["point_sets"].items():
+        _add(groups, {name: np.asarray(members, np.intp).reshape(-1)})
+    return groups

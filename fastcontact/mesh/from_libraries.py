@@ -1,0 +1,169 @@
+"""Meshes that other libraries hold in memory: gmsh, meshio, PyVista, each imported when it is asked for."""
+
+from __future__ import annotations
+
+import importlib
+import tempfile
+import warnings
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+
+from fastcontact.errors import FastcontactWarning, FileError, MeshError
+from fastcontact.mesh import elements, topology
+from fastcontact.mesh.files.blocks import VERTEX
+from fastcontact.mesh.files.mesh_files import read_mesh
+from fastcontact.mesh.files.meshio_content import UNFIT, mesh_of
+from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, TAGS, plain_parts
+from fastcontact.mesh.mesh import Mesh
+
+# Groups in arrays of 0 and 1 of our own result files.
+RESULT_PREFIX = "group_"
+# How gmsh writes the open model: in its newest format, what belongs to a physical group or, without any group, everything.
+GMSH_OPTIONS = {"Mesh.MshFileVersion": 4.1, "Mesh.Binary": 1.0, "Mesh.SaveAll": 0.0, "Mesh.SaveParametric": 0.0}
+
+
+def from_meshio(mesh: Any) -> Mesh:
+    """Return the mesh that meshio holds, with its groups.
+
+    Groups are its cell and point sets, the tags of Gmsh and Medit, and arrays of 0 and 1 called ``cell_group:...`` and
+    ``point_group:...``. Cells that are inside out are turned; a flat mesh in 3D coordinates becomes a 2D one.
+
+    Parameters
+    ----------
+    mesh : meshio.Mesh
+
+    Raises
+    ------
+    MeshError
+        If it has no cells, or of a kind that fastcontact does not know, or its arrays do not fit together.
+    """
+    if not all(hasattr(mesh, name) for name in ("points", "cells", "cell_data", "cell_sets", "field_data")):
+        raise MeshError(f"from_meshio takes a meshio.Mesh, not {type(mesh).__name__}")
+    # Of Gmsh's tags meshio's readers keep the dimension of each name; their format repeats a cell for each of its groups.
+    file_format = "gmsh" if any(key.startswith("gmsh:") for key in mesh.cell_data) else ""
+    return _made(plain_parts(mesh), file_format, "meshio's mesh")
+
+
+def from_pyvista(grid: Any) -> Mesh:
+    """Return the cells of a PyVista data set as a mesh, with its groups.
+
+    Groups are its arrays of truth values, by their names, and those of 0 and 1 called ``cell_group:...``,
+    ``point_group:...`` (mesh files) or ``group_...`` (result files). Cells that are inside out are turned; a flat mesh in 3D
+    coordinates becomes a 2D one. Surfaces of a solid are no cells of such a data set: see `Mesh.with_facet_group`.
+
+    Parameters
+    ----------
+    grid : pyvista.UnstructuredGrid, or another data set that PyVista can cast to one
+
+    Raises
+    ------
+    MeshError
+        If it has no cells, or of a kind that fastcontact does not know.
+    """
+    if not hasattr(grid, "celltypes") and hasattr(grid, "cast_to_unstructured_grid"):
+        grid = grid.cast_to_unstructured_grid()
+    if not all(hasattr(grid, name) for name in ("points", "celltypes", "cells_dict", "cell_data", "point_data")):
+        raise MeshError(f"from_pyvista takes a pyvista.UnstructuredGrid, not {type(grid).__name__}")
+    types = np.asarray(grid.celltypes)
+    kinds = {int(kind): np.flatnonzero(types == kind) for kind in dict.fromkeys(types.tolist())}
+    names = {
+        kind: VERTEX if kind == 1 else elements.BY_VTK[kind].meshio for kind in kinds if kind in (1, *elements.BY_VTK)
+    }
+    if len(names) < len(kinds):
+        unknown = ", ".join(f"{len(kinds[kind])} of VTK's type {kind}" for kind in kinds if kind not in names)
+        raise MeshError(
+            f"PyVista's data set has cells that fastcontact does not know ({unknown}): use {', '.join(elements.ELEMENTS)}"
+        )
+    found = {
+        "points": np.asarray(grid.points, np.float64),
+        "cells": [[names[kind], len(rows), np.asarray(grid.cells_dict[kind])] for kind, rows in kinds.items()],
+        "cell_data": {k: [v[rows] for rows in kinds.values()] for k, v in _flags(grid.cell_data, CELL_PREFIX).items()},
+        "point_data": _flags(grid.point_data, POINT_PREFIX),
+        "cell_sets": {}, "point_sets": {}, "field_data": {},
+    }  # fmt: skip
+    return _made(found, "", "PyVista's data set")
+
+
+def from_gmsh() -> Mesh:
+    """Return the mesh of the model that is open in gmsh, with its physical groups.
+
+    As in Gmsh's own files, cells that belong to no physical group are left out if there are any groups. Cells that are inside
+    out are turned; a flat mesh in 3D coordinates becomes a 2D one.
+
+    Raises
+    ------
+    FileError
+        If the package gmsh is not installed.
+    MeshError
+        If no model is open, or it has no mesh yet, or cells that fastcontact does not know.
+
+    Warns
+    -----
+    FastcontactWarning
+        If solid cells are left out, with their number.
+    """
+    try:
+        gmsh = importlib.import_module("gmsh")
+    except (ImportError, OSError) as error:
+        raise FileError(f"gmsh cannot be imported ({error}): pip install gmsh") from error
+    if not gmsh.isInitialized():
+        raise MeshError("no model is open in gmsh: call gmsh.initialize() and make one")
+    dim = gmsh.model.getDimension()
+    if not any(map(len, gmsh.model.mesh.getElements(dim)[1])) if dim >= 0 else True:
+        raise MeshError("the model that is open in gmsh has no mesh: call gmsh.model.mesh.generate(2) or (3)")
+    _tell_what_is_left_out(gmsh, dim)
+    before = {name: gmsh.option.getNumber(name) for name in GMSH_OPTIONS}
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "model.msh"
+            for name, value in GMSH_OPTIONS.items():
+                gmsh.option.setNumber(name, value)
+            gmsh.write(str(path))
+            return read_mesh(path)
+    finally:
+        for name, value in before.items():
+            gmsh.option.setNumber(name, value)
+
+
+def _tell_what_is_left_out(gmsh: Any, dim: int) -> None:
+    """Warn of solid cells without a physical group, which Gmsh does not write where there are groups."""
+    if not gmsh.model.getPhysicalGroups():
+        return
+    alone = [tag for _, tag in gmsh.model.getEntities(dim) if not len(gmsh.model.getPhysicalGroupsForEntity(dim, tag))]
+    count = sum(sum(map(len, gmsh.model.mesh.getElements(dim, tag)[1])) for tag in alone)
+    if count:
+        kind = "volumes" if dim == 3 else "surfaces"
+        warnings.warn(
+            f"{count} solid cells belong to no physical group and are left out (those of the {kind} "
+            f"{', '.join(map(str, alone[:6]))}): give every body a group",
+            FastcontactWarning,
+            stacklevel=3,
+        )
+
+
+def _flags(data: Any, prefix: str) -> dict[str, Any]:
+    """Return the arrays that mean groups, under the names that `mesh_of` knows."""
+    found = {}
+    for name in data.keys():  # noqa: SIM118, PyVista's data are no mapping
+        values = np.asarray(data[name])
+        if name in TAGS or name.startswith(prefix):
+            found[name] = values
+        elif values.ndim == 1 and values.dtype == bool:
+            found[prefix + quote(name)] = values
+        elif name.startswith(RESULT_PREFIX) and values.ndim == 1 and np.isin(values, (0, 1)).all():
+            found[prefix + quote(name.removeprefix(RESULT_PREFIX))] = values
+    return found
+
+
+def _made(found: dict[str, Any], file_format: str, what: str) -> Mesh:
+    """Return the mesh of plain data, its cells turned where they are inside out."""
+    try:
+        mesh, _ = mesh_of(found, file_format)
+    except MeshError as error:
+        raise MeshError(f"{what}: {error}") from None
+    except UNFIT as error:
+        raise MeshError(f"the arrays of {what} do not fit together: {error}") from error
+    return topology.oriented(mesh)[0]

@@ -1,0 +1,174 @@
+"""Cut a mesh open along a group of facets inside of it, as the pretension section of a bolt needs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from fastcontact.errors import MeshError
+from fastcontact.mesh import elements
+from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int32]
+OPPOSITE = " opposite"
+Facet = frozenset[int]
+
+
+@typed(MeshError)
+def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
+    """Return the mesh cut open along a group of facets: both sides get nodes of their own, at the same places.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    group : str
+        Facets between solids, through a whole body: the cut ends at its surface.
+    normal : sequence of float (dim,), optional
+        The side it points to gets the new nodes [-]. By default across the plane that fits the facets best, with its largest
+        component positive.
+
+    Returns
+    -------
+    Mesh
+        `group` are the facets of the old side, ``"<group> opposite"`` those of the new one, in the same order. New nodes
+        belong to the groups of points of the old ones; facets on the new side follow their solids.
+
+    Raises
+    ------
+    MeshError
+        If there is no such group of facets, if some do not lie between two solids, or if the cut ends inside of a body.
+
+    Examples
+    --------
+    >>> from fastcontact.mesh.generate import box
+    >>> bar = box((1.0, 1.0, 2.0), (1, 1, 2))
+    >>> bar = bar.with_facet_group("CUT", lambda x: abs(x[:, 2] - 1.0) < 1e-9, between=True)
+    >>> cut(bar, "CUT").n_points - bar.n_points
+    4
+    """
+    facets = {name: block for name, block in mesh.cells_of(group).items() if elements.get(name).dim == mesh.dim - 1}
+    if not facets:
+        raise MeshError(f"group '{group}' holds no facets, so nothing can be cut along it")
+    section = {frozenset(map(int, facet)) for block in facets.values() for facet in block}
+    points = np.unique(np.concatenate([block.ravel() for block in facets.values()]))
+    direction = _direction(mesh, group, points, normal)
+    beyond = _cells_beyond(mesh, group, section, points, direction)
+    new = np.full(mesh.n_points, -1, np.int32)
+    new[points] = mesh.n_points + np.arange(len(points), dtype=np.int32)
+    return _opened(mesh, group, section, facets, beyond, new)
+
+
+def _direction(mesh: Mesh, group: str, points: Indices, normal: Sequence[float] | None) -> Array:
+    """Return the unit vector (dim,) across a section."""
+    if normal is None:
+        places = mesh.points[points] - mesh.points[points].mean(axis=0)
+        found = np.linalg.svd(places, full_matrices=True)[2][-1]
+        return np.asarray(found * np.sign(found[np.argmax(np.abs(found))]))
+    vector = np.asarray(normal, float)
+    length = np.linalg.norm(vector)
+    if vector.shape != (mesh.dim,) or not (np.isfinite(length) and length > 0):
+        raise MeshError(f"the normal {normal} of section '{group}' must be {mesh.dim} numbers, not all zero")
+    return np.asarray(vector / length)
+
+
+def _sides(mesh: Mesh, touched: NDArray[np.bool_]) -> Iterator[tuple[str, int, Facet]]:
+    """Yield the facets of all solids that have touched points: element, row and nodes."""
+    for name, block in mesh.solids.items():
+        rows = np.flatnonzero(touched[block].any(axis=1))
+        for facet in elements.get(name).facets:
+            for row, nodes in zip(rows.tolist(), block[rows][:, list(facet)].tolist(), strict=True):
+                yield name, row, frozenset(nodes)
+
+
+def _cells_beyond(
+    mesh: Mesh, group: str, section: set[Facet], points: Indices, direction: Array
+) -> dict[str, list[int]]:
+    """Return by element the solids at a section that lie beyond it, where `direction` points."""
+    touched = np.zeros(mesh.n_points, bool)
+    touched[points] = True
+    number: dict[tuple[str, int], int] = {}
+    owners: dict[Facet, list[int]] = {}
+    for name, row, facet in _sides(mesh, touched):
+        owners.setdefault(facet, []).append(number.setdefault((name, row), len(number)))
+    if any(len(owners.get(facet, ())) != 2 for facet in section):
+        wrong = sum(len(owners.get(facet, ())) != 2 for facet in section)
+        raise MeshError(
+            f"{wrong} of {len(section)} facets of '{group}' do not lie between two solids that share their nodes: a cut "
+            "needs facets inside of a body"
+        )
+    joined = np.array([pair for facet, pair in owners.items() if len(pair) == 2 and facet not in section], int)
+    joined = joined.reshape(-1, 2)
+    graph = coo_array((np.ones(len(joined)), (joined[:, 0], joined[:, 1])), shape=(len(number), len(number)))
+    part = connected_components(graph, directed=False)[1]
+    middle = np.array([mesh.points[mesh.cells[name][row]].mean(axis=0) for name, row in number])
+    side = _sides_of_parts(mesh, group, {facet: owners[facet] for facet in section}, part, middle, direction)
+    found: dict[str, list[int]] = {}
+    for (name, row), own, place in zip(number, part, middle, strict=True):
+        nodes = mesh.cells[name][row]
+        at = mesh.points[nodes[touched[nodes]]].mean(axis=0)  # of a cell that touches the section in an edge or a node
+        if side.get(int(own), bool((place - at) @ direction > 0)):
+            found.setdefault(name, []).append(row)
+    return found
+
+
+def _sides_of_parts(
+    mesh: Mesh, group: str, between: dict[Facet, list[int]], part: Indices, middle: Array, direction: Array
+) -> dict[int, bool]:
+    """Return by part of the cells at a section whether it lies beyond it; MeshError if one lies on both sides."""
+    side: dict[int, bool] = {}
+    for facet, pair in between.items():
+        here, there = sorted(pair, key=lambda cell: float(middle[cell] @ direction))
+        for own, beyond in ((int(part[here]), False), (int(part[there]), True)):
+            if side.setdefault(own, beyond) != beyond:
+                where = mesh.points[list(facet)].mean(axis=0)
+                raise MeshError(
+                    f"the facets of '{group}' do not cut through: the cells on both sides are joined beside them (near "
+                    f"{where}); let the group reach through the whole body, and across its normal {direction}"
+                )
+    return side
+
+
+def _opened(
+    mesh: Mesh, group: str, section: set[Facet], facets: dict[str, Indices], beyond: dict[str, list[int]], new: Indices
+) -> Mesh:
+    """Return the mesh with the `new` nodes (n_points,), -1 where there are none, in the cells beyond."""
+    cells = {name: np.array(block) for name, block in mesh.cells.items()}
+    moved = [_with_nodes(cells, name, np.array(rows), new) for name, rows in beyond.items()]
+    outer = {facet for sides in moved for facet in sides} - section
+    for name, block in mesh.facets.items():
+        rows = np.flatnonzero((new[block] >= 0).any(axis=1))
+        follow = [row for row in rows.tolist() if frozenset(block[row].tolist()) in outer]
+        _with_nodes(cells, name, np.array(follow, int), new)
+    groups, starts, total = {}, {}, 0
+    for name, block in cells.items():
+        starts[name] = total
+        total += len(block) + len(facets.get(name, ()))
+    for own, members in mesh.cell_groups.items():
+        parts = [starts[name] + rows for name, rows in mesh.split(members).items()]
+        groups[own] = np.concatenate(parts) if parts else members
+    groups[group + OPPOSITE] = np.concatenate(
+        [starts[name] + len(cells[name]) + np.arange(len(block)) for name, block in facets.items()]
+    )
+    for name, block in facets.items():
+        cells[name] = np.concatenate([cells[name], new[block]])
+    old = np.flatnonzero(new >= 0)
+    point_groups = {
+        name: np.concatenate([members, new[members[new[members] >= 0]]]) for name, members in mesh.point_groups.items()
+    }
+    return Mesh(np.concatenate([mesh.points, mesh.points[old]]), cells, groups, point_groups)
+
+
+def _with_nodes(cells: dict[str, Indices], name: str, rows: NDArray[np.intp], new: Indices) -> list[Facet]:
+    """Give some cells of an element the new nodes, in place; return their facets as they were, none of facets themselves."""
+    if not len(rows):
+        return []
+    block = cells[name][rows]
+    sides = [frozenset(block[i, list(f)].tolist()) for f in elements.get(name).facets for i in range(len(rows))]
+    cells[name][rows] = np.where(new[block] >= 0, new[block], block)
+    return sides

@@ -1,0 +1,239 @@
+"""Pretension sections: a cut through a bolt whose sides a force pulls together, until their approach is locked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, vstack
+
+from fastcontact.elasticity.loads import Load, Table, check_number
+from fastcontact.elasticity.relations import Relation
+from fastcontact.errors import ModelError
+from fastcontact.mesh.generate.cut import OPPOSITE
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.model.relation_rows import along, matched
+
+Array = NDArray[np.float64]
+Nodes = NDArray[np.intp]
+# How far nodes of a section may lie off its plane, relative to its size.
+FLAT = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Pretension:
+    """A pretension section: its sides move against each other only along its normal, all nodes by the same.
+
+    Attributes
+    ----------
+    label : str
+        What results call it.
+    nodes, opposite : ndarray of int (m,)
+        Points of both sides, one upon the other.
+    normal : ndarray (dim,)
+        Unit vector from the first side to the opposite one, along the bolt [-].
+    force : float
+        That pulls the sides together, at multiplier 1 [force].
+    shortening : float or None
+        By which they approach, at multiplier 1 [length]; None where the force decides.
+    locked_from : float or None
+        Instant from which the shortening stays as it is.
+    ramp : tuple, optional
+        History of force or shortening.
+    """
+
+    label: str
+    nodes: Nodes
+    opposite: Nodes
+    normal: Array
+    force: float
+    shortening: float | None
+    locked_from: float | None
+    ramp: Table | None
+
+    @property
+    def name(self) -> str:
+        """What it is, for messages."""
+        return f"pretension '{self.label}'"
+
+    def row(self, n_dofs: int) -> csr_array:
+        """Return the row (1, n_dofs) whose product with displacements is the shortening [-]."""
+        m = len(self.nodes)
+        return csr_array(csr_array(np.full((1, m), 1.0 / m)) @ self._approach(self.normal, n_dofs))
+
+    def _approach(self, direction: Array, n_dofs: int) -> csr_array:
+        """Return rows (m, n_dofs): by how much each node approaches the opposite one along a unit vector (dim,) [-]."""
+        each = np.tile(direction, (len(self.nodes), 1))
+        return csr_array(along(self.nodes, each, n_dofs) - along(self.opposite, each, n_dofs))
+
+    def relations(self, n_dofs: int) -> list[Relation]:
+        """Return the relations that hold at all times: no shear, one shortening of all nodes, the prescribed one if any."""
+        rows = [self._approach(direction, n_dofs) for direction in _across(self.normal)]
+        own = self._approach(self.normal, n_dofs)
+        if len(self.nodes) > 1:
+            rows.append(own[1:] - csr_array(vstack([own[[0]]] * (len(self.nodes) - 1))))
+        matrix = csr_array(vstack(rows, format="csr"))
+        matrix.eliminate_zeros()
+        found = [Relation(f"the sides of {self.name}", matrix)]
+        if self.shortening is not None:
+            found.append(Relation(f"the shortening of {self.name}", self.row(n_dofs), self.shortening, self.ramp))
+        return found
+
+    def locked(self, n_dofs: int, displacement: Array) -> Relation:
+        """Return the relation that keeps the shortening of displacements (n_points, dim) [length]."""
+        row = self.row(n_dofs)
+        reached = float((row @ displacement.ravel())[0])
+        return Relation(f"the locked length of {self.name}", row, reached, ((0.0, 1.0),))
+
+
+@dataclass(frozen=True, eq=False)
+class PretensionForce(Load):
+    """The force that pulls the sides of a pretension section together."""
+
+    KIND = "the force"
+    section: Pretension
+
+    @property
+    def name(self) -> str:
+        """Where it acts, for messages."""
+        return f"the force of {self.section.name}"
+
+    @property
+    def components(self) -> Mapping[int, float]:  # type: ignore[override]
+        """Components of the force on the first side [force]."""
+        return {axis: self.section.force * float(n) for axis, n in enumerate(self.section.normal) if n}
+
+    @property
+    def ramp(self) -> Table | None:  # type: ignore[override]
+        """Its history."""
+        return self.section.ramp
+
+    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+        pass
+
+    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
+        own = self.section
+        share = own.force / len(own.nodes) * own.normal
+        forces[own.nodes] += share
+        forces[own.opposite] -= share
+
+
+def pretension(
+    mesh: Mesh, label: str, section: str, opposite: str | None, normal: Sequence[float] | None,
+    amounts: tuple[float | None, float | None, float | None], ramp: Table | None,
+) -> Pretension:  # fmt: skip
+    """Return a pretension section, checked.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    label, section, opposite, normal
+        As of `Model.add_pretension`.
+    amounts : (float or None, float or None, float or None)
+        Force [force], shortening [length], instant from which it is locked.
+    ramp : tuple, optional
+
+    Raises
+    ------
+    MeshError, ModelError
+        If the sides do not fit, or the amounts do not.
+    """
+    force, shortening, locked_from = amounts
+    name = f"pretension '{label}'"
+    if (force is None) == (shortening is None):
+        raise ModelError(f"{name} needs either a force or a shortening")
+    if shortening is not None and locked_from is not None:
+        raise ModelError(f"{name} has a shortening, which is known at all times: locked_from belongs to a force")
+    for what, value in (("force", force), ("shortening", shortening), ("locked_from", locked_from)):
+        if value is not None:
+            check_number(f"the {what} of {name}", value)
+    nodes, facing = _sides(mesh, name, section, opposite)
+    direction = _normal(mesh, name, nodes, normal)
+    return Pretension(label, nodes, facing, direction, force or 0.0, shortening, locked_from, ramp)
+
+
+def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[Nodes, Nodes]:
+    """Return the points of both sides of a section, one upon the other."""
+    other = section + OPPOSITE if opposite is None else opposite
+    nodes = mesh.points_of(section).astype(np.intp)
+    if opposite is None and other not in mesh.group_names:
+        raise ModelError(
+            f"{name}: the mesh is not cut along '{section}', there is no group '{other}': make the model of "
+            f"fc.generate.cut(mesh, '{section}'), or name the opposite side"
+        )
+    facing = mesh.points_of(other).astype(np.intp)
+    shared = np.intersect1d(nodes, facing)
+    if len(shared):
+        raise ModelError(
+            f"{name}: '{section}' and '{other}' share point {shared[0]}: both sides need nodes of their own"
+        )
+    place = matched(mesh, (section, nodes), (other, facing), [0.0] * mesh.dim)
+    return nodes, facing[place]
+
+
+def _normal(mesh: Mesh, name: str, nodes: Nodes, normal: Sequence[float] | None) -> Array:
+    """Return the unit normal (dim,) of a section, of its plane where none is given."""
+    if normal is not None:
+        vector = np.asarray(normal, float)
+        length = np.linalg.norm(vector)
+        if vector.shape != (mesh.dim,) or not (np.isfinite(length) and length > 0):
+            raise ModelError(f"the normal {normal} of {name} must be {mesh.dim} numbers, not all zero")
+        return np.asarray(vector / length)
+    places = mesh.points[nodes] - mesh.points[nodes].mean(axis=0)
+    spread, axes = np.linalg.svd(places, full_matrices=True)[1:]
+    if len(nodes) < mesh.dim or (len(spread) >= mesh.dim and spread[-1] > FLAT * spread[0]):
+        raise ModelError(f"the nodes of {name} determine no plane: give its normal, along the bolt")
+    found = axes[-1] * np.sign(axes[-1][np.argmax(np.abs(axes[-1]))])
+    return np.asarray(np.where(np.abs(found) < 1e-12, 0.0, found))
+
+
+def _across(normal: Array) -> Array:
+    """Return the unit vectors (dim - 1, dim) across a normal, parallel to axes where it is."""
+    axis = int(np.argmax(np.abs(normal)))
+    found = [unit for k, unit in enumerate(np.eye(len(normal))) if k != axis]
+    basis = np.linalg.qr(np.column_stack([normal, *found]))[0][:, 1:].T
+    return np.asarray(np.where(np.abs(basis) < 1e-14, 0.0, basis))
+
+
+def with_locks(sections: Sequence[Pretension], begin: float, displacement: Array) -> list[Relation]:
+    """Return the relations of the sections that are locked at an instant, at the lengths of displacements (n_points, dim)."""
+    return [
+        own.locked(displacement.size, displacement)
+        for own in sections
+        if own.locked_from is not None and begin >= own.locked_from
+    ]
+
+
+def check_locks(sections: Sequence[Pretension], instants: Sequence[float]) -> None:
+    """Raise ModelError if a section is locked inside of a load step."""
+    for own in sections:
+        at = own.locked_from
+        if at is not None and instants[0] < at < instants[-1] and at not in instants:
+            raise ModelError(
+                f"{own.name} is locked from {at:g}, but no load step ends there: give the ramp that instant, or lock it at "
+                f"the end of a step, such as {min(instants, key=lambda t: abs(t - at)):g}"
+            )
+
+
+def section_results(
+    sections: Sequence[Pretension], displacement: Array, reaction: Array, factors: Sequence[float]
+) -> dict[str, dict[str, float]]:
+    """Return by name the ``force`` in each section, positive in tension [force], and its ``shortening`` [length].
+
+    Parameters
+    ----------
+    sections : sequence of Pretension
+    displacement, reaction : ndarray (n_points, dim)
+        Of a step [length], [force]; reactions include the forces of relations.
+    factors : sequence of float
+        What the force of each section is multiplied with [-].
+    """
+    found = {}
+    for own, factor in zip(sections, factors, strict=True):
+        pulled = float(reaction[own.nodes].sum(axis=0) @ own.normal) + factor * own.force
+        found[own.label] = {
+            "force": pulled, "shortening": float((own.row(displacement.size) @ displacement.ravel())[0])
+        }  # fmt: skip
+    return found

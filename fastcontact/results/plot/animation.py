@@ -1,0 +1,128 @@
+"""The deformed shape over the load as a moving picture."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import FastcontactError
+from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.files.paths import checked_target, replacing
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes
+from fastcontact.results.plot.fields import field_of
+from fastcontact.results.plot.shape import deformed_shape, scaled
+from fastcontact.results.step import StepResult
+
+Array = NDArray[np.float64]
+# Suffixes of moving pictures; all but the first are written by the program ffmpeg.
+SUFFIXES = (".gif", ".mp4", ".mkv", ".webm")
+# Dots an inch: a moving picture holds many pictures.
+RESOLUTION = 90
+
+
+@typed(FastcontactError)
+def animate(
+    mesh: Mesh,
+    steps: Sequence[StepResult],
+    path: str | os.PathLike[str],
+    *,
+    field: str = "von_mises",
+    scale: float = 1.0,
+    mirrored: bool = False,
+    pictures_per_second: int = 5,
+    title: str = "",
+    units: Units = UNKNOWN,
+    view: tuple[float, float] = (25.0, -60.0),
+) -> None:
+    """Write the deformed shape at all load steps as a moving picture; its colours and axes stand still.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    steps : sequence of StepResult
+    path : str or path
+        File to write: ``.gif``, or where the program ffmpeg is installed ``.mp4``, ``.mkv``, ``.webm``.
+    field, scale, mirrored, units, view
+        As in `deformed_shape`.
+    pictures_per_second : int
+        How fast it goes [1/s].
+    title : str
+        Title of every picture, below which the load factor stands.
+
+    Raises
+    ------
+    FastcontactError
+        If there are no steps, the suffix is another one, or ffmpeg is missing.
+    FileError
+        If the file cannot be written.
+    """
+    if not len(steps):
+        raise FastcontactError("there are no steps to animate")
+    if pictures_per_second < 1:
+        raise FastcontactError(f"pictures_per_second = {pictures_per_second}: one or more a second can be shown")
+    target = checked_target(path)
+    first = new_axes(None, _size(mesh, mirrored), "3d" if mesh.dim == 3 else None)
+    writer = writer_of(target, pictures_per_second)
+    colours, box = _over_all(mesh, steps, field, scale, mirrored)
+    figure = first.figure
+    with replacing(target) as temporary, writer.saving(figure, temporary, RESOLUTION):
+        for step in steps:
+            figure.clear()
+            axes = figure.add_subplot(projection="3d" if mesh.dim == 3 else None)
+            heading = f"{title}\nload factor {step.load_factor:.3g}, displacements x {scale:g}".strip()
+            deformed_shape(
+                mesh, step, field=field, scale=scale, mirrored=mirrored, limits=colours, title=heading, units=units,
+                view=view, ax=axes,
+            )  # fmt: skip
+            for axis, low, high in zip("xyz", *box, strict=False):
+                getattr(axes, f"set_{axis}lim")(low, high)
+            writer.grab_frame()
+
+
+def writer_of(path: Path, pictures_per_second: int) -> Any:
+    """Return what writes a moving picture; raises FastcontactError if the suffix is unknown or ffmpeg is missing."""
+    from matplotlib.animation import FFMpegWriter, PillowWriter
+
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise FastcontactError(f"'{path}' has a suffix that no moving picture has: use {', '.join(SUFFIXES)}")
+    if suffix == ".gif":
+        return PillowWriter(fps=pictures_per_second)
+    if not FFMpegWriter.isAvailable():
+        raise FastcontactError(f"'{path}' needs the program ffmpeg, which is not installed: write a .gif instead")
+    # An even number of dots on both sides, which most codecs ask for.
+    return FFMpegWriter(
+        fps=pictures_per_second, extra_args=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]
+    )
+
+
+def _size(mesh: Mesh, mirrored: bool) -> tuple[float, float]:
+    """Return width and height of the pictures [inches]."""
+    if mesh.dim == 3:
+        return 6.4, 6.0
+    width, height = np.ptp(mesh.points, axis=0) * [2.0 if mirrored else 1.0, 1.0]
+    larger = max(width, height)
+    return max(4.2 * width / larger + 1.9, 5.0), max(4.2 * height / larger + 2.0, 3.8)
+
+
+def _over_all(
+    mesh: Mesh, steps: Sequence[StepResult], field: str, scale: float, mirrored: bool
+) -> tuple[tuple[float, float], tuple[Array, Array]]:
+    """Return the ends of the colours, and the corners of the box that the bodies stay in, over all steps."""
+    low, high = np.full(mesh.dim, np.inf), np.full(mesh.dim, -np.inf)
+    colours = (np.inf, -np.inf)
+    for step in steps:
+        smallest, largest = field_of(mesh, step, field).range
+        colours = min(colours[0], smallest), max(colours[1], largest)
+        place = scaled(mesh.points, scale, step.displacement)
+        low, high = np.minimum(low, place.min(axis=0)), np.maximum(high, place.max(axis=0))
+    if mirrored and mesh.dim == 2:
+        low[0], high[0] = min(low[0], -high[0]), max(high[0], -low[0])
+    margin = 0.03 * float((high - low).max())
+    return colours, (low - margin, high + margin)

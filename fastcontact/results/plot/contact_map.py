@@ -1,0 +1,165 @@
+"""The pressure over a contact surface in three dimensions, and the shear beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.contact.search.facet_tables import flat_triangles
+from fastcontact.errors import FastcontactError
+from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import outer_facets
+from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, labelled, new_axes, valued
+from fastcontact.results.plot.hiding import across
+from fastcontact.results.plot.patches import fill
+from fastcontact.results.step import ContactResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+# The part of the surface that is drawn reaches so far beyond the closed one, in its own half widths.
+MARGIN = 0.35
+# Least length of the mean of the facets' normals for a surface to be drawn as it is seen along it.
+LEAST_MEAN = 0.3
+
+
+@typed(FastcontactError)
+def contact_map(
+    mesh: Mesh,
+    contact: ContactResult,
+    *,
+    everything: bool = False,
+    title: str = "",
+    units: Units = UNKNOWN,
+    axes: Sequence[Axes] | None = None,
+) -> Sequence[Axes]:
+    """Plot the pressure over the secondary surface of a contact, and the shear beside it where there is any.
+
+    The undeformed surface is seen along its mean normal. Closed nodes are dots, open ones are not marked; where there is
+    shear, the nodes that slide are orange and arrows show its direction.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Three-dimensional.
+    contact : ContactResult
+    everything : bool
+        Draw the whole surface; by default the closed part and its surroundings.
+    title, units
+        As in `pressure_profile`.
+    axes : matplotlib Axes, two where there is shear, optional
+
+    Returns a tuple of Axes: of the pressure, and where there is any of the shear. Raises FastcontactError if the mesh is not
+    three-dimensional, its surface is not that of the contact, or what is closed of it goes around a body.
+    """
+    if mesh.dim != 3:
+        raise FastcontactError("maps of a contact are for meshes in three dimensions: draw the pressure profile")
+    blocks = _facets(mesh, contact)
+    basis, labels = _seen_along(contact, blocks)
+    flat = contact.coordinates @ basis.T
+    if labels is None:
+        flat -= contact.middle @ basis.T
+        labels = ("across the contact", "up the contact")
+    shear = np.linalg.norm(contact.shear, axis=1)
+    both = bool(shear.max(initial=0.0) > 1e-9 * contact.pressure_max > 0.0)
+    panels = _panels(axes, both)
+    fields = [(contact.pressure, "contact pressure"), (shear, "shear traction")]
+    for ax, (values, caption) in zip(panels, fields, strict=False):
+        ends = min(0.0, float(values.min(initial=0.0))), float(values.max(initial=0.0)) or 1.0
+        drawn = fill(ax, blocks, flat, values, "viridis", ends)
+        ax.figure.colorbar(drawn, ax=ax, label=labelled(caption, units, "pressure"), shrink=0.75)
+        _nodes(ax, flat, contact, both)
+        ax.set(xlabel=labelled(labels[0], units, "length"), ylabel=labelled(labels[1], units, "length"), aspect="equal")
+        ax.set_title(
+            f"{caption}, largest {valued(float(values.max(initial=0.0)), units, 'pressure')}", fontsize="medium"
+        )
+        _limit(ax, flat, contact.active & ~np.array(everything))
+    if both:
+        _arrows(panels[1], flat, contact.shear @ basis.T, shear)
+    panels[0].figure.suptitle(title or f"Contact '{contact.name}'", fontsize="large")
+    if contact.active.any():
+        panels[0].legend(loc="upper right", fontsize=8)
+    return Panels(panels)
+
+
+def _panels(axes: Sequence[Any] | None, both: bool) -> list[Any]:
+    """Return one or two axes; raises FastcontactError if too few are given."""
+    if axes is not None:
+        given = list(np.atleast_1d(np.array(axes, dtype=object)))
+        if len(given) < 1 + both:
+            raise FastcontactError(f"this contact has shear: it takes two axes, and {len(given)} are given")
+        return given[: 1 + both]
+    first = new_axes(None, (9.6 if both else 5.6, 4.6))
+    figure = first.figure
+    first.remove()
+    return list(figure.subplots(1, 1 + both, squeeze=False)[0])
+
+
+def _facets(mesh: Mesh, contact: ContactResult) -> dict[str, Indices]:
+    """Return by element the facets (n, m) of the secondary surface, as places in the arrays of the contact."""
+    inside = contact.points.max(initial=-1) < mesh.n_points
+    place = np.full(max(mesh.n_points, int(contact.points.max(initial=-1)) + 1), -1)
+    place[contact.points] = np.arange(len(contact.points))
+    here = {name: place[facets] for name, facets in outer_facets(mesh).items()}
+    found = {name: facets[(facets >= 0).all(axis=1)] for name, facets in here.items()}
+    if not inside or not any(map(len, found.values())):
+        raise FastcontactError(f"contact '{contact.name}' is not on the surface of this mesh")
+    return found
+
+
+def _seen_along(contact: ContactResult, blocks: dict[str, Indices]) -> tuple[Array, tuple[str, str] | None]:
+    """Return axes (2, 3) across the mean normal, and their names where they are coordinates.
+
+    Facets count by what they carry; all alike where nothing is carried.
+    """
+    total, whole = np.zeros(3), 0.0
+    for facets in blocks.values():
+        flat = facets[:, flat_triangles(facets.shape[1])].reshape(-1, 3)
+        a, b, c = np.moveaxis(contact.coordinates[flat], 1, 0)
+        carried = np.maximum(contact.pressure[flat].mean(axis=1), 0.0) if contact.pressure_max > 0.0 else 1.0
+        areas = np.cross(b - a, c - a) * np.reshape(carried, (-1, 1))
+        total, whole = total + areas.sum(axis=0), whole + float(np.linalg.norm(areas, axis=1).sum())
+    if np.linalg.norm(total) < LEAST_MEAN * whole:
+        raise FastcontactError(
+            f"the surface of contact '{contact.name}' goes around its body: draw a section, or look at it with view"
+        )
+    direction = total / np.linalg.norm(total)
+    along = int(np.argmax(np.abs(direction)))
+    if abs(direction[along]) < 0.9:
+        return across(direction)[:2], None
+    first, second = [axis for axis in range(3) if axis != along]
+    return np.eye(3)[[first, second]], ("xyz"[first], "xyz"[second])
+
+
+def _nodes(ax: Any, flat: Array, contact: ContactResult, both: bool) -> None:
+    """Mark closed nodes, and those that slide where there is shear."""
+    sliding = contact.active & ~contact.sticking if both else np.zeros(len(flat), bool)
+    for name, here, colour in (
+        ("sticking" if both else "closed", contact.active & ~sliding, "white"),
+        ("sliding", sliding, "tab:orange"),
+    ):
+        if here.any():
+            ax.plot(*flat[here].T, "o", ms=3, mfc=colour, mec="black", mew=0.4, label=name)
+
+
+def _arrows(ax: Any, flat: Array, shear: Array, size: Array) -> None:
+    """Draw the direction of the shear at the nodes that have a tenth of the largest."""
+    here = size > 0.1 * size.max()
+    ax.quiver(*flat[here].T, *shear[here].T, color="white", width=0.004, pivot="tail")
+
+
+def _limit(ax: Any, flat: Array, closed: NDArray[np.bool_]) -> None:
+    """Show the closed part with a margin around it, or everything if nothing is closed."""
+    kept = flat[closed] if closed.any() else flat
+    low, high = kept.min(axis=0), kept.max(axis=0)
+    margin = MARGIN * max(0.5 * float((high - low).max()), 0.02 * float(np.ptp(flat, axis=0).max()))
+    low = np.maximum(low - margin, flat.min(axis=0) - 0.05 * margin)
+    high = np.minimum(high + margin, flat.max(axis=0) + 0.05 * margin)
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    ax.set_facecolor("0.9")

@@ -1,0 +1,128 @@
+"""Fields at the points of a mesh that can be drawn, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.elasticity.recovery import von_mises, von_mises_signed
+from fastcontact.errors import FastcontactError, unknown
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.results.separated import separated
+from fastcontact.results.step import StepResult
+from fastcontact.results.tables import AXES, STRESS_COMPONENTS
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """A field at the points of a mesh, which is cut along borders of materials for stresses.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        On whose points the values stand.
+    node : ndarray of int (m,)
+        Node of the whole mesh at each of these points.
+    values : ndarray (m,)
+        In the unit of `quantity`.
+    caption : str
+        Name in words.
+    quantity : str
+        ``"pressure"`` or ``"length"``: what the unit belongs to.
+    """
+
+    mesh: Mesh
+    node: NDArray[np.int32]
+    values: Array
+    caption: str
+    quantity: str
+
+    @property
+    def extreme(self) -> int:
+        """Number of the point with the largest value, or with the smallest where that is larger without its sign."""
+        return int(np.argmax(np.abs(self.values)))
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Smallest and largest value of its colours: as far on both sides of zero where the values have both signs."""
+        low, high = float(self.values.min()), float(self.values.max())
+        if self.signed:
+            return -max(-low, high), max(-low, high)
+        return low, high
+
+    @property
+    def signed(self) -> bool:
+        """Whether the values have both signs, each by a tenth of the other at least."""
+        low, high = float(self.values.min()), float(self.values.max())
+        return low < 0.0 < high and min(-low, high) > 0.1 * max(-low, high)
+
+    @property
+    def colours(self) -> str:
+        """Name of the colours: blue to red over white in the middle for both signs."""
+        return "RdBu_r" if self.signed else "viridis"
+
+
+def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
+    """Return a field of a step by its name, as `names` lists them; raises FastcontactError if there is no such field."""
+    if name in DISPLACEMENTS:
+        kept = np.arange(mesh.n_points, dtype=np.int32)
+        axis = AXES.index(name[-1]) if "." in name else None
+        if axis is not None and axis >= mesh.dim:
+            raise FastcontactError(unknown("field", name, names(mesh)))
+        values = np.linalg.norm(step.displacement, axis=1) if axis is None else step.displacement[:, axis]
+        return Field(mesh, kept, values, "displacement" if axis is None else f"displacement along {name[-1]}", "length")
+    apart, node, stress = separated(mesh, step)
+    if name == "von_mises" and apart is mesh:
+        return Field(mesh, node, step.von_mises, CAPTIONS[name], "pressure")
+    if name not in names(mesh):
+        raise FastcontactError(unknown("field", name, names(mesh)))
+    if name in CAPTIONS:
+        return Field(apart, node, OF_STRESS[name](stress), CAPTIONS[name], "pressure")
+    component = name.removeprefix("stress.")
+    values = stress[:, STRESS_COMPONENTS.index(component)]
+    return Field(apart, node, values, f"stress {component}", "pressure")
+
+
+def names(mesh: Mesh) -> list[str]:
+    """Return the names of all fields that a mesh can have."""
+    components = STRESS_COMPONENTS[: 4 if mesh.dim == 2 else 6]
+    displacements = [name for name in DISPLACEMENTS if "." not in name or name[-1] in AXES[: mesh.dim]]
+    return [*CAPTIONS, *(f"stress.{name}" for name in components), *displacements]
+
+
+def principal_stresses(stress: Array) -> Array:
+    """Return the principal stresses (n, 3) of stresses (n, 4) or (n, 6), the smallest first [pressure]."""
+    full = np.zeros((len(stress), 6))
+    full[:, : stress.shape[1]] = stress
+    xx, yy, zz, xy, yz, xz = full.T
+    tensor = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], axis=1).reshape(-1, 3, 3)
+    return np.asarray(np.linalg.eigvalsh(tensor))
+
+
+def _tresca(stress: Array) -> Array:
+    principal = principal_stresses(stress)
+    return np.asarray(principal[:, 2] - principal[:, 0])
+
+
+CAPTIONS = {
+    "von_mises": "von Mises stress",
+    "von_mises_signed": "von Mises stress with the sign of the trace",
+    "tresca": "Tresca stress (largest less smallest principal)",
+    "stress.principal_max": "largest principal stress",
+    "stress.principal_mid": "middle principal stress",
+    "stress.principal_min": "smallest principal stress",
+}
+OF_STRESS: dict[str, Callable[[Array], Array]] = {
+    "von_mises": von_mises,
+    "von_mises_signed": von_mises_signed,
+    "tresca": _tresca,
+    "stress.principal_max": lambda stress: principal_stresses(stress)[:, 2],
+    "stress.principal_mid": lambda stress: principal_stresses(stress)[:, 1],
+    "stress.principal_min": lambda stress: principal_stresses(stress)[:, 0],
+}
+DISPLACEMENTS = ("displacement", "displacement.x", "displacement.y", "displacement.z")

@@ -1,0 +1,85 @@
+"""What triangles hide from the eye, in a parallel projection."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+# A place closer behind a triangle than this part of the whole size lies on it.
+ON_IT = 1e-4
+
+
+class Screen:
+    """Triangles sorted by where they stand on the screen.
+
+    Parameters
+    ----------
+    triangles : ndarray (n, 3, 3)
+        Corners [length].
+    eye : ndarray (3,)
+        Unit vector towards the eye [-].
+    """
+
+    def __init__(self, triangles: Array, eye: Array) -> None:
+        self.axes = across(eye)
+        flat = triangles @ self.axes.T
+        self.corners, self.origin = flat[..., :2], flat[..., :2].reshape(-1, 2).min(axis=0)
+        self.depth = flat[..., 2]
+        size = np.ptp(flat.reshape(-1, 3), axis=0).max()
+        self.tolerance = ON_IT * size
+        self.n_bins = int(np.clip(np.sqrt(len(flat)), 1, 256))
+        self.bin = 1.0001 * max(np.ptp(flat[..., :2].reshape(-1, 2), axis=0).max(), 1e-300) / self.n_bins
+        self._sort()
+
+    def _sort(self) -> None:
+        """List the triangles of every square of the screen, one square after the other."""
+        low, high = self._square(self.corners.min(axis=1)), self._square(self.corners.max(axis=1))
+        across, up = (high - low + 1).T
+        count = across * up
+        number = np.repeat(np.arange(len(count)), count)
+        within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        column, row = within % across[number], within // across[number]
+        square = (low[number, 0] + column) * self.n_bins + low[number, 1] + row
+        order = np.argsort(square, kind="stable")
+        self.members = number[order]
+        self.starts = np.searchsorted(square[order], np.arange(self.n_bins**2 + 1))
+
+    def _square(self, place: Array) -> NDArray[np.int64]:
+        return np.clip(((place - self.origin) / self.bin).astype(np.int64), 0, self.n_bins - 1)
+
+    def hidden(self, places: Array) -> Mask:
+        """Return which places (..., 3) [length] lie behind a triangle."""
+        flat = places.reshape(-1, 3) @ self.axes.T
+        column, row = self._square(flat[:, :2]).T
+        square = column * self.n_bins + row
+        first, count = self.starts[square], self.starts[square + 1] - self.starts[square]
+        place = np.repeat(np.arange(len(flat)), count)
+        triangle = self.members[
+            np.repeat(first, count) + np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        ]
+        behind = self._behind(flat[place], triangle)
+        return np.asarray(np.bincount(place[behind], minlength=len(flat)).astype(bool).reshape(places.shape[:-1]))
+
+    def _behind(self, flat: Array, triangle: NDArray[np.int64]) -> Mask:
+        """Return which places (n, 3) on the screen lie within and behind their triangle (n,)."""
+        a, b, c = np.moveaxis(self.corners[triangle], 1, 0)
+        area = _cross(b - a, c - a)
+        area = np.where(area == 0.0, np.inf, area)
+        p = flat[:, :2]
+        weights = np.stack([_cross(b - p, c - p), _cross(c - p, a - p), _cross(a - p, b - p)], axis=1) / area[:, None]
+        depth = (weights * self.depth[triangle]).sum(axis=1)
+        return np.asarray((weights > 0.0).all(axis=1) & (depth > flat[:, 2] + self.tolerance))
+
+
+def across(eye: Array) -> Array:
+    """Return unit vectors (3, 3): two across the line of sight, and that to the eye [-]."""
+    helper = np.eye(3)[int(np.argmin(np.abs(eye)))]
+    first = np.cross(helper, eye)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(eye, first), eye])
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

@@ -1,0 +1,220 @@
+"""A plane section through a body in three dimensions, coloured by a field."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.contact.search.facet_tables import flat_triangles
+from fastcontact.errors import FastcontactError
+from fastcontact.mesh import elements
+from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.results.plot._axes import UNKNOWN, Units, labelled, new_axes, part_shown, placed, valued
+from fastcontact.results.plot.fields import Field, field_of
+from fastcontact.results.plot.hiding import across
+from fastcontact.results.plot.shape import scaled
+from fastcontact.results.plot.solid import MOST_EDGES
+from fastcontact.results.step import StepResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+# By how much of the size of the body a plane that only touches it is moved inside.
+INSIDE = 1e-7
+# The corners of a tetrahedron in an order in which those on one side come first, by which of the four lie there.
+_FIRST = {k: [i for i in range(4) if k >> i & 1] for k in range(16)}
+_REST = {k: [i for i in range(4) if not k >> i & 1] for k in range(16)}
+
+
+@typed(FastcontactError)
+def section(
+    mesh: Mesh,
+    step: StepResult,
+    point: Sequence[float],
+    normal: Sequence[float],
+    *,
+    field: str = "von_mises",
+    scale: float = 1.0,
+    edges: bool | None = None,
+    zoom: float | None = None,
+    title: str = "",
+    units: Units = UNKNOWN,
+    ax: Axes | None = None,
+) -> Axes:
+    """Plot a plane section through a mesh in three dimensions, coloured by a field, its largest value on it marked.
+
+    The section is that through the undeformed bodies, drawn where its material has moved to, seen along the normal.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Three-dimensional.
+    step : StepResult
+    point, normal : sequence of 3 floats
+        A point of the plane on the undeformed bodies [length]; its normal, of any length [-].
+    field, scale, edges, title, units
+        As in `deformed_shape`; edges are the lines along which the plane cuts facets.
+    zoom : float, optional
+        Half the width of the part to draw, around the marked place [length].
+    ax : matplotlib Axes, optional
+
+    Raises
+    ------
+    FastcontactError
+        If the mesh is not three-dimensional, the normal is zero, or the plane does not meet the mesh.
+    """
+    at, direction = _plane(mesh, point, normal)
+    shown = field_of(mesh, step, field)
+    triangles, lines = _touching(shown, step, at, direction)
+    basis, labels = _plane_axes(direction)
+    place = scaled(triangles[..., :3], scale, triangles[..., 3:6])
+    flat, values = place @ basis.T - (0.0 if labels else at @ basis.T), triangles[..., 6]
+    axes = new_axes(ax, (6.4, 5.6))
+    drawn = _fill(axes, flat, values, shown)
+    strokes = scaled(lines[..., :3], scale, lines[..., 3:6]) @ basis.T - (0.0 if labels else at @ basis.T)
+    if edges if edges is not None else len(strokes) <= 4 * MOST_EDGES:
+        _stroke(axes, strokes)
+    best = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
+    before = triangles[best][:3] - ((triangles[best][:3] - at) @ direction) * direction
+    _mark(axes, flat[best], values[best], before, place.reshape(-1, 3), units, shown)
+    if zoom is not None:
+        low, high = part_shown(flat[best], zoom, flat.reshape(-1, 2))
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    plane = f"section through {placed(at, float(np.ptp(mesh.points, axis=0).max()))}, normal {placed(direction, 1.0)}"
+    axes.set_title(title or f"{plane}, load factor {step.load_factor:g}", fontsize="medium")
+    _frame(axes, drawn, shown, units, labels or ("along the section", "across it"))
+    return axes
+
+
+def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple[Array, Array]:
+    """Return point (3,) [length] and unit normal (3,) [-] of a plane; raises FastcontactError if there is none."""
+    if mesh.dim != 3:
+        raise FastcontactError("sections are for meshes in three dimensions: draw the deformed shape of this one")
+    at, direction = np.array(point, float), np.array(normal, float)
+    both = at.shape == direction.shape == (3,) and bool(np.isfinite([at, direction]).all())
+    if not both or not np.linalg.norm(direction) > 0.0:
+        raise FastcontactError(
+            f"a section takes a point and a normal of 3 numbers, not {list(point)} and {list(normal)}"
+        )
+    return at, direction / np.linalg.norm(direction)
+
+
+def _frame(axes: Any, drawn: Any, shown: Field, units: Units, labels: tuple[str, str]) -> None:
+    """Give axes their colour bar, labels and legend."""
+    axes.figure.colorbar(drawn, ax=axes, label=labelled(shown.caption, units, shown.quantity), shrink=0.8)
+    axes.set_aspect("equal")
+    axes.set(xlabel=labelled(labels[0], units, "length"), ylabel=labelled(labels[1], units, "length"))
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14))
+
+
+def _plane_axes(direction: Array) -> tuple[Array, tuple[str, str] | None]:
+    """Return axes (2, 3) of the section, and their names where they are those of the coordinates."""
+    along = int(np.argmax(np.abs(direction)))
+    if abs(direction[along]) < 1.0 - 1e-12:
+        return across(direction)[:2], None
+    first, second = [axis for axis in range(3) if axis != along]
+    return np.eye(3)[[first, second]], ("xyz"[first], "xyz"[second])
+
+
+def _touching(shown: Field, step: StepResult, at: Array, direction: Array) -> tuple[Array, Array]:
+    """Return the section as triangles (n, 3, 7) and strokes (m, 2, 7): place, displacement, value at their corners.
+
+    A plane along the surface is moved inside by a hair; raises FastcontactError if there is nothing on either side.
+    """
+    size = float(np.ptp(shown.mesh.points, axis=0).max())
+    data = np.column_stack([shown.mesh.points, step.displacement[shown.node], shown.values])
+    for move in (INSIDE, -INSIDE):
+        triangles, lines = _cut_cells(shown.mesh, data, data[:, :3] @ direction - at @ direction - move * size)
+        if len(triangles):
+            return triangles, lines
+    low, high = shown.mesh.points.min(axis=0), shown.mesh.points.max(axis=0)
+    raise FastcontactError(
+        f"the plane through {placed(at, size)} with normal {placed(direction, 1.0)} does not meet the mesh, which lies "
+        f"between {placed(low, size)} and {placed(high, size)}"
+    )
+
+
+def _cut_cells(mesh: Mesh, data: Array, height: Array) -> tuple[Array, Array]:
+    """Return where the heights (n_points,) are zero, of tetrahedra from each cell's middle to the triangles of its facets."""
+    pieces, strokes = [np.empty((0, 3, 7))], [np.empty((0, 2, 7))]
+    for name, block in mesh.solids.items():
+        kind = elements.get(name)
+        kept = block[(height[block].min(axis=1) < 0.0) & (height[block].max(axis=1) >= 0.0)]
+        if not len(kept):
+            continue
+        middle = kind.shape(kind.nodes[: kind.n_corners].mean(axis=0)[None])[0]
+        centre, centre_height = np.einsum("n,end->ed", middle, data[kept]), height[kept] @ middle
+        for facet in kind.facets:
+            for triangle in np.array(facet)[flat_triangles(len(facet))]:
+                corners = kept[:, triangle]
+                corner_data = np.concatenate([data[corners], centre[:, None]], axis=1)
+                heights = np.column_stack([height[corners], centre_height])
+                cut, stroke = _cut_tetrahedra(corner_data, heights)
+                pieces.append(cut)
+                strokes.append(stroke)
+    return np.concatenate(pieces), np.concatenate(strokes)
+
+
+def _cut_tetrahedra(data: Array, height: Array) -> tuple[Array, Array]:
+    """Return triangles (n, 3, k) in which a level cuts tetrahedra (m, 4, k), strokes (n, 2, k) on their first faces.
+
+    `height` (m, 4) is that of the corners over the level; the first face is that of the first three corners.
+    """
+    above = height >= 0.0
+    pattern = above @ np.array([1, 2, 4, 8])
+    pieces, strokes = [np.empty((0, 3, data.shape[2]))], [np.empty((0, 2, data.shape[2]))]
+    for kind in range(1, 15):
+        here = pattern == kind
+        if not here.any():
+            continue
+        up, down = _FIRST[kind], _REST[kind]
+        pairs = [(i, j) for i in up for j in down]
+        if len(pairs) == 4:  # around the quadrangle
+            pairs = [pairs[0], pairs[1], pairs[3], pairs[2]]
+        points = np.stack([_between(data[here], height[here], i, j) for i, j in pairs], axis=1)
+        pieces.append(points[:, :3])
+        if len(pairs) == 4:
+            pieces.append(points[:, [0, 2, 3]])
+        on_face = [k for k, (i, j) in enumerate(pairs) if i < 3 and j < 3]
+        if len(on_face) == 2:
+            strokes.append(points[:, on_face])
+    return np.concatenate(pieces), np.concatenate(strokes)
+
+
+def _between(data: Array, height: Array, i: int, j: int) -> Array:
+    """Return the data (n, k) where the height is zero between two corners."""
+    t = (height[:, i] / (height[:, i] - height[:, j]))[:, None]
+    return np.asarray((1.0 - t) * data[:, i] + t * data[:, j])
+
+
+def _fill(axes: Any, flat: Array, values: Array, shown: Field) -> Any:
+    """Fill triangles (n, 3, 2) by the values (n, 3) at their corners; return what carries the colours."""
+    from matplotlib.tri import Triangulation
+
+    corners = flat.reshape(-1, 2)
+    low, high = shown.range if shown.signed else (float(values.min()), float(values.max()))
+    return axes.tripcolor(
+        Triangulation(corners[:, 0], corners[:, 1], np.arange(len(corners)).reshape(-1, 3)), values.ravel(),
+        shading="gouraud", cmap=shown.colours, vmin=low, vmax=high,
+    )  # fmt: skip
+
+
+def _stroke(axes: Any, strokes: Array) -> None:
+    from matplotlib.collections import LineCollection
+
+    axes.add_collection(LineCollection(list(strokes), colors="black", linewidths=0.2, alpha=0.6))
+
+
+def _mark(axes: Any, at: Array, value: float, before: Array, place: Array, units: Units, shown: Field) -> None:
+    """Mark the largest value of the section, at (2,) in the picture, at `before` (3,) on the undeformed bodies."""
+    size = float(np.ptp(place, axis=0).max())
+    kind = "maximum" if value >= 0.0 else "minimum"
+    label = (
+        f"{kind} on the section {valued(float(value), units, shown.quantity, 5)}\nundeformed at {placed(before, size)}"
+    )
+    axes.plot([at[0]], [at[1]], "o", mfc="none", mec="red", ms=9, mew=1.5, label=label, zorder=10)

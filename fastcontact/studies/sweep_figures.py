@@ -1,0 +1,154 @@
+"""Panels of a parameter sweep: quantities over the first parameter with theory as a curve, and ratios to theory."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fastcontact.studies.quantities import column, title
+from fastcontact.studies.render.figure import Curve, Line, Panel, marker
+
+if TYPE_CHECKING:
+    from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
+
+# From this ratio of the largest to the smallest value of the parameter on, axes are logarithmic.
+WIDE = 9.0
+# What the last word of a parameter's path means, and the kind of its unit, empty for ratios.
+MEANINGS = {
+    "E": ("Young's modulus", "pressure"),
+    "nu": ("Poisson's ratio", ""),
+    "friction": ("friction coefficient", ""),
+    "approach": ("approach", "length"),
+    "clearance": ("clearance", "length"),
+    "interference": ("interference", "length"),
+    "R": ("radius", "length"),
+    "radius": ("radius", "length"),
+    "size": ("element size", "length"),
+    "contact_size": ("element size at the contact", "length"),
+}
+_TABLE = re.compile(r"(?P<table>\w+)(?:\[(?P<number>\d+)\]|\.(?P<name>[\w-]+))\.")
+
+
+def parameter_label(parameter: str, units: Mapping[str, str]) -> str:
+    """Return a parameter in words with its unit; paths that are not known stay as they are.
+
+    Examples
+    --------
+    >>> parameter_label("material[0].E", {"pressure": "MPa"})
+    "Young's modulus of material 1 [MPa]"
+    >>> parameter_label("contact.hertz.friction", {})
+    "friction coefficient of contact 'hertz' [-]"
+    """
+    last = parameter.rsplit(".", 1)[-1]
+    if last not in MEANINGS:
+        return parameter
+    words, kind = MEANINGS[last]
+    found = _TABLE.match(parameter)
+    if found is not None:
+        words += f" of {found['table']} " + (f"'{found['name']}'" if found["name"] else str(int(found["number"]) + 1))
+    elif "." in parameter:
+        words += f" of the {parameter.split('.', 1)[0]}"
+    unit = units.get(kind, "") if kind else "-"
+    return f"{words} [{unit}]" if unit else words
+
+
+class Panels:
+    """What is drawn of a sweep over its first parameter; points that differ in the others are curves of their own.
+
+    Parameters
+    ----------
+    parameters : dict of str to values
+    points : list of Point
+    theories : list of TheoryCurve
+    units : dict of str to str
+    compared : str
+        See `Sweep`.
+    """
+
+    def __init__(
+        self, parameters: Mapping[str, Sequence[Value]], points: Sequence[Point], theories: Sequence[TheoryCurve],
+        units: Mapping[str, str], compared: str,
+    ) -> None:  # fmt: skip
+        self.first, *self.others = parameters
+        self.points, self.theories, self.units = points, theories, units
+        self.theory = f"theory {compared}".strip()
+        values = parameters[self.first]
+        numbers = [float(v) for v in values if not isinstance(v, (str, bool))]
+        wide = len(numbers) == len(values) and min(numbers) > 0 and max(numbers) >= WIDE * min(numbers)
+        self.scale = "plain log" if wide else "linear"
+
+    def values(self, quantity: str) -> Panel:
+        """Return values over the parameter, and the theory as a curve; both axes are of one kind."""
+        curves = []
+        for k, (label, x, points) in enumerate(self._curves()):
+            y = [point.values.get(quantity, math.nan) for point in points]
+            curves.append(Curve(x, y, marker(k), label or "computed", color=f"C{k}", size=5))
+            curves += self._theory(quantity, label, x, points, k)
+        positive = all(point.values.get(quantity, 1.0) > 0 for point in self.points)
+        scale = self.scale if positive else "linear"
+        return self._panel(title(quantity), column(title(quantity), quantity, self.units), curves, y_scale=scale)
+
+    def _theory(self, quantity: str, label: str, x: Sequence[Any], points: Sequence[Point], k: int) -> list[Curve]:
+        """Return the theory of one choice of the other parameters; between the points where it is known there, too."""
+        name = (self.theory + self._unmoved(quantity)) if k == 0 else None
+        color = "black" if not self.others else f"C{k}"
+        for curve in self.theories:
+            if curve.label == label and quantity in curve.values:
+                return [Curve(curve.x, curve.values[quantity], "--", name, color=color, width=1.1)]
+        exact = [point.theory.get(quantity, math.nan) for point in points]
+        return [Curve(x, exact, "_", name, color=color, size=9)] if np.isfinite(exact).any() else []
+
+    def _unmoved(self, quantity: str) -> str:
+        """Return what is to be said of a theory that is the same at all values of the first parameter; else nothing."""
+        several = False
+        for _, _, points in self._curves():
+            known = {point.theory[quantity] for point in points if quantity in point.theory}
+            several |= len(points) > 1
+            if len(known) != 1 and points:
+                return ""
+        return f"\n(the same for every {self.first})" if several else ""
+
+    def ratios(self, quantity: str) -> Panel:
+        """Return the ratios to theory at equal approach and at equal force over the parameter."""
+        styles = {"theory": ("-", self.theory), "equal_force": ("--", "theory at equal force")}
+        curves: list[Curve] = []
+        for k, (label, x, points) in enumerate(self._curves()):
+            for other, (style, name) in styles.items():
+                ratios = [point.ratio(quantity, other) for point in points]
+                if np.isfinite(ratios).any() and (other, quantity) != ("equal_force", "force"):
+                    name = (
+                        f"to {name}"
+                        + (self._unmoved(quantity) if other == "theory" else "")
+                        + (f", {label}" if label else "")
+                    )
+                    color = f"C{k if self.others else len(curves)}"
+                    curves.append(Curve(x, ratios, f"{marker(k)}{style}", name, color=color))
+        if not curves:
+            return Panel(instead=f"no theory of the {title(quantity)}")
+        heading = f"{title(quantity)}: ratio to theory"
+        return self._panel(heading, "computed / theory [-]", curves, lines=[Line(1.0, width=0.8)])
+
+    def _panel(self, heading: str, y_label: str, curves: list[Curve], **more: Any) -> Panel:
+        label = parameter_label(self.first, self.units)
+        return Panel(heading, label, y_label, curves, x_scale=self.scale, title_size=10, **more)
+
+    def _curves(self) -> list[tuple[str, Sequence[Any], list[Point]]]:
+        """Return label, values of the first parameter and points, for each choice of the other parameters."""
+        found: dict[str, list[Point]] = {}
+        for point in self.points:
+            found.setdefault(label_of(point.parameters, self.others), []).append(point)
+        curves: list[tuple[str, Sequence[Any], list[Point]]] = []
+        for label, points in found.items():
+            x = [point.parameters[self.first] for point in points]
+            plain = all(isinstance(value, (int, float)) for value in x)
+            curves.append((label, x if plain else list(map(str, x)), points))
+        return curves
+
+
+def label_of(parameters: Mapping[str, Value], others: Sequence[str]) -> str:
+    """Return what tells a curve from others: its values of all parameters but the first."""
+    return ", ".join(f"{name} = {parameters[name]}" for name in others)

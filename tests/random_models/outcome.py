@@ -1,0 +1,105 @@
+"""How a random model ends: in a result that is checked, in an error of our own, or in a finding."""
+
+from __future__ import annotations
+
+import time
+import traceback
+import warnings
+from typing import Any
+
+import mechanics
+import numpy as np
+from drawing import Drawn, drawn
+from stepping import watching
+
+import fastcontact as fc
+
+# What may be left of what vanishes in an exact solution, by figure; see `mechanics`.
+BOUNDS = {
+    "balance": 1.05e-6,  # the promise of `Criteria.relative`
+    "given back": 1e-10,
+    "penetration": 1e-8,
+    "tension": 1e-8,
+    "product": 1e-8,
+    "cone": 1e-8,
+    "driving": 1e-8,
+    "carried": 5e-4,  # rules of the points on coarse curved facets differ so much
+    "moment": 1e-2,  # of normals that are means, over the size of the force times the extent of the side
+}
+# With iterative solvers gaps are as accurate as displacements are.
+ITERATIVE = {"penetration": 1e-6, "product": 1e-6}
+
+
+def outcome(seed: int) -> dict[str, Any]:
+    """Return a row about the model of a seed."""
+    begin = time.process_time()
+    row: dict[str, Any] = {"seed": seed}
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", fc.FastcontactWarning)
+            warnings.simplefilter("error", RuntimeWarning)
+            model = drawn(seed)
+            row |= model.labels
+            row |= solved(model)
+    except fc.FastcontactError as error:
+        row |= {"outcome": "own error", "text": f"{type(error).__name__}: {error}"}
+    except Exception as error:
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        row |= {"outcome": "raw error", "text": f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})"}
+    return row | {"seconds": round(time.process_time() - begin, 2)}
+
+
+def solved(given: Drawn) -> dict[str, Any]:
+    """Solve a model and check its last step."""
+    with watching() as watched:
+        steps = fc.solve(given.model, given.ramp, **given.options)
+    last, factor = steps[-1], float(np.interp(given.ramp.instants[-1], *zip(*given.ramp.table, strict=True)))
+    iterative = given.options.get("linear_solver") == "amg"
+    found = figures(given.model, last, watched.settled, factor, 1e-10 * iterative)
+    bounds = BOUNDS | (ITERATIVE if iterative else {})
+    wrong = [name for name, bound in bounds.items() if not found[name] <= bound]
+    wrong += unfit(last)
+    closed = sum(int(contact.active.sum()) for contact in last.contact.values())
+    found |= {"closed": closed, "updates": last.iterations["geometry_updates"], "warnings": len(last.warnings)}
+    if wrong:
+        text = ", ".join(f"{name} {found[name]:.2g}" if name in found else name for name in wrong)
+        return {"outcome": "failed check", "text": text, **found}
+    return {"outcome": "result", "text": "", **found}
+
+
+def figures(model: fc.Model, step: fc.StepResult, settled, factor: float, tolerance: float = 0.0) -> dict[str, float]:
+    """Return what must vanish; see `mechanics`."""
+    balance, sizes = mechanics.out_of_balance(model, step, factor, tolerance)
+    penetration, tension, product = mechanics.complementarity(settled, sizes)
+    cone, driving = mechanics.friction(settled, sizes)
+    both = [mechanics.given_back(model, step, sizes, pair.name) for pair in model.contact if pair.obstacle is None]
+    return {
+        "balance": balance,
+        "given back": max((force for force, _ in both), default=0.0),
+        "moment": max((moment for _, moment in both), default=0.0),
+        "penetration": penetration,
+        "tension": tension,
+        "product": product,
+        "cone": cone,
+        "driving": driving,
+        "carried": max(mechanics.carried(model, step, settled, sizes, name) for name in step.contact),
+    }
+
+
+def unfit(step: fc.StepResult) -> list[str]:
+    """Return what of a result is not finite, or contradicts itself."""
+    found = []
+    for name in ("displacement", "stress", "von_mises", "reaction"):
+        if not np.isfinite(getattr(step, name)).all():
+            found.append(f"{name} not finite")
+    for contact in step.contact.values():
+        for name in ("pressure", "multiplier", "force_vectors", "force", "shear", "place", "middle", "normal"):
+            if not np.isfinite(getattr(contact, name)).all():
+                found.append(f"{name} not finite")
+        if contact.pressure[~contact.active].any():
+            found.append("pressure on open nodes")
+        if contact.active.any() and not contact.radius[0] <= contact.radius[1]:
+            found.append(f"radius {contact.radius}")
+        if contact.dissipation < -1e-9 * np.linalg.norm(contact.force) * np.abs(step.displacement).max(initial=0.0):
+            found.append("negative dissipation")
+    return found

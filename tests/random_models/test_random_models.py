@@ -1,0 +1,143 @@
+"""Random models end in results that are right, or in errors of our own; `bench/random_models.py` solves two thousand."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import mechanics
+import numpy as np
+import pytest
+from drawing import drawn
+from outcome import BOUNDS, figures, outcome, unfit
+from stepping import watching
+
+import fastcontact as fc
+
+# The least part of models that must end in results: errors are for models that deserve them.
+SOLVED = 0.85
+
+
+def check(seeds):
+    rows = [outcome(seed) for seed in seeds]
+    findings = [row for row in rows if row["outcome"] not in ("result", "own error")]
+    assert not findings
+    assert sum(row["outcome"] == "result" for row in rows) >= SOLVED * len(rows)
+    return rows
+
+
+def test_random_models_end_right():
+    rows = check(range(24))
+    assert {row["kinematics"] for row in rows if "kinematics" in row} >= {"plane_strain", "axisymmetric", "3d"}
+    assert sum(row.get("closed", 0) > 0 for row in rows) >= 0.8 * len(rows)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(1000, 1300, 50))
+def test_more_random_models_end_right(first):
+    check(range(first, first + 50))
+
+
+def test_a_seed_is_a_model():
+    one, other = drawn(3), drawn(3)
+    assert one.model.describe() == other.model.describe()
+    np.testing.assert_array_equal(one.model.mesh.points, other.model.mesh.points)
+    assert one.ramp == other.ramp
+    assert one.labels == other.labels
+
+
+@pytest.fixture(scope="module")
+def rubbing():
+    """Two blocks that do not match, one drawn over the other."""
+    mesh = fc.generate.block_on_block(divisions_lower=(6, 3), divisions_upper=(5, 3))
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(1000.0, 0.3))
+    model.fix("LOWER_BOTTOM", "xy")
+    model.prescribe("UPPER_TOP", x=0.05, y=-0.05)
+    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.2)
+    with watching() as watched:
+        step = fc.solve(model, 1)[-1]
+    return model, step, watched.settled
+
+
+def spoilt(found, **changes):
+    """A contact result, a step or a solution with other values."""
+    return replace(found, **changes)
+
+
+def test_what_is_right_vanishes(rubbing):
+    found = figures(*rubbing, 1.0)
+    assert all(found[name] <= bound for name, bound in BOUNDS.items())
+    assert not unfit(rubbing[1])
+
+
+WRONG = {
+    "balance": lambda step: spoilt(step, reaction=step.reaction * (1 + 1e-5)),
+    "given back": lambda step: pair(step, primary_force_vectors=lambda own: own * (1 + 1e-8)),
+    "moment": lambda step: pair(step, force_vectors=lambda own: own[::-1] * np.linspace(0.5, 1.5, len(own))[:, None]),
+    "carried": lambda step: pair(step, pressure=lambda own: own * 1.001),
+}
+
+
+def pair(step, **changes):
+    """The step with the contact result changed."""
+    own = step.contact["pair"]
+    return replace(
+        step, contact={"pair": replace(own, **{name: by(getattr(own, name)) for name, by in changes.items()})}
+    )
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_wrong_shows(rubbing, name):
+    model, step, settled = rubbing
+    assert figures(model, WRONG[name](step), settled, 1.0)[name] > BOUNDS[name]
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("penetration", {"gap": -1e-6}),
+        ("tension", {"multiplier": -1e-6}),
+        ("product", {"gap": 1e-6}),
+        ("cone", {"tangential": 1e-5}),
+        ("driving", {"slip": 1.0}),
+    ],
+)
+def test_what_breaks_an_inequality_shows(rubbing, name, change):
+    model, step, settled = rubbing
+    ((what, by),) = change.items()
+    state = settled.solution
+    values = getattr(state, what).copy()
+    if what == "slip":
+        values = by * state.tangential / np.abs(state.tangential).max()
+    elif what == "tangential":
+        values = values + by * np.sign(values) * state.multiplier.max()
+    else:
+        values[np.argmax(state.multiplier)] = by * (1.0 if what == "gap" else state.multiplier.max())
+    wrong = SimpleNamespace(solution=replace(state, **{what: values}), constraints=settled.constraints)
+    assert figures(model, step, wrong, 1.0)[name] > BOUNDS[name]
+
+
+def test_results_that_are_not_finite_show(rubbing):
+    _, step, _ = rubbing
+    assert unfit(spoilt(step, displacement=step.displacement * np.nan)) == ["displacement not finite"]
+    assert "pressure on open nodes" in unfit(pair(step, active=lambda own: ~own))
+    assert unfit(pair(step, dissipation=lambda own: -own)) == ["negative dissipation"]
+
+
+def test_forces_that_are_round_off_are_none():
+    """A body moved freely: what is left of its internal forces is compared with what they are the sum of."""
+    model, step, settled = moved_freely()
+    _, sizes = mechanics.out_of_balance(model, step, 1.0)
+    assert sizes.force == np.inf
+    assert figures(model, step, settled, 1.0)["balance"] == 0.0
+
+
+def moved_freely():
+    mesh = fc.generate.block_on_block(divisions_lower=(3, 2), divisions_upper=(2, 2))
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(1000.0, 0.3))
+    model.fix("LOWER_BOTTOM", "xy")
+    model.prescribe("UPPER_TOP", x=0.1, y=0.3)
+    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER")
+    with watching() as watched, pytest.warns(fc.FastcontactWarning):
+        step = fc.solve(model, 1)[-1]
+    return model, step, watched.settled

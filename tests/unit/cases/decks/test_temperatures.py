@@ -1,0 +1,107 @@
+"""Temperatures of decks: free expansion, stresses where it is held, histories over steps, and what is refused."""
+
+import numpy as np
+import pytest
+from deck_text import STEP, WHOLE, deck_of
+
+import fastcontact as fc
+
+ALL = "*Nset, nset=all, generate\n1, 8\n11, 18\n"
+EXPANSION = "*Expansion\n1.e-5\n"
+TIED = ("name=si\n", "name=si\n*Surface Behavior, pressure-overclosure=TIED\n")
+HELD = ("bottom, 3\n", "bottom, 3\ntop, 3\n")
+INITIAL = "*Initial conditions, type=TEMPERATURE\nall, 20.\n"
+
+
+def heated(expansion=EXPANSION, steps="*Temperature\nall, 120.\n", initial=INITIAL, change=TIED):
+    """Return the two cubes, heated instead of pressed."""
+    head = WHOLE.replace(STEP, "").replace("200000., 0.\n", "200000., 0.\n" + expansion)
+    assert head.count(change[0]) == 1
+    head = head.replace(*change)
+    blocks = steps if isinstance(steps, list) else [steps]
+    return head + ALL + initial + "".join(f"*Step\n*Static\n{lines}*End Step\n" for lines in blocks)
+
+
+def heights(deck):
+    return {step.load_factor: step.displacement[deck.point(17), 2] for step in deck.solve()}
+
+
+@pytest.mark.parametrize("kind", ["", ", type=ISO", ", zero=50."])
+def test_free_expansion_counts_from_the_initial_temperature(tmp_path, kind):
+    deck = deck_of(tmp_path, heated(EXPANSION.replace("\n1", f"{kind}\n1")))
+    (step,) = deck.solve()
+    lower = deck.points_of("bottom")
+    assert step.displacement[deck.point(7)] == pytest.approx(1e-5 * 100.0 * np.ones(3), rel=1e-9)
+    assert np.abs(step.stress).max() < 1e-6 * 200_000 * 1e-3
+    assert np.abs(step.reaction[lower]).max() < 1e-6
+    assert bool(kind == ", zero=50.") == any("ZERO has no effect" in note for note in deck.notes)
+
+
+def test_expansion_along_axes(tmp_path):
+    deck = deck_of(tmp_path, heated("*Expansion, type=ORTHO\n1.e-5, 2.e-5, 3.e-5\n"))
+    (step,) = deck.solve()
+    assert step.displacement[deck.point(7)] == pytest.approx([1e-3, 2e-3, 3e-3], rel=1e-9)
+
+
+def test_a_held_bar_is_pressed(tmp_path):
+    deck = deck_of(tmp_path, heated(change=HELD))
+    (step,) = deck.solve()
+    assert step.contact["ss/sm"].force[2] == pytest.approx(200_000 * 1e-5 * 100.0, rel=1e-9)
+
+
+def test_temperatures_ramp_stay_go_back_and_follow_amplitudes(tmp_path):
+    amplitude = "*Amplitude, name=wave\n0., 0.5, 0.25, 2., 1., 1.\n"
+    steps = [
+        "*Temperature\nall, 120.\n",
+        "*Dsload\nroof, P, 0.\n",
+        "*Temperature, op=NEW\n",
+        "*Temperature, amplitude=wave\nall, 70.\n",
+    ]
+    found = heights(deck_of(tmp_path, heated(steps=steps, initial=INITIAL + amplitude)))
+    rises = {1.0: 100.0, 2.0: 100.0, 3.0: 0.0, 3.25: 120.0, 4.0: 50.0}
+    assert found == pytest.approx({t: 2e-5 * rise for t, rise in rises.items()}, rel=1e-9, abs=1e-15)
+
+
+def test_nodes_with_histories_of_their_own(tmp_path):
+    """Every node goes its own way through three steps: one field for each corner, the sums as the deck says."""
+    steps = [
+        "*Temperature\n" + "".join(f"{n}, {20.0 + n * (-1) ** k * (k + 1)}\n" for n in (*range(1, 9), *range(11, 19)))
+        for k in range(3)
+    ]
+    deck = deck_of(tmp_path, heated(steps=steps))
+    assert len(deck.model.temperatures) <= 4
+    for step in deck.solve():
+        rise = deck.model.temperature_rise(step.iterations["temperature_factors"])
+        k = round(step.load_factor) - 1
+        assert [rise[deck.point(n)] for n in (1, 5, 18)] == pytest.approx([n * (-1) ** k * (k + 1) for n in (1, 5, 18)])
+
+
+def test_a_material_without_expansion_keeps_its_size(tmp_path):
+    deck = deck_of(tmp_path, heated(""))
+    assert heights(deck)[1.0] == pytest.approx(0.0, abs=1e-15)
+    assert any("has no *EXPANSION" in note for note in deck.notes)
+
+
+def test_expansion_without_temperatures_is_noted(tmp_path):
+    text = WHOLE.replace("200000., 0.\n", "200000., 0.\n" + EXPANSION + "*Conductivity\n50.\n*Specific Heat\n4e8\n")
+    notes = "\n".join(deck_of(tmp_path, text).notes)
+    assert "without temperatures the expansion has no effect" in notes
+    assert notes.count("temperatures are given, not computed") == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (heated("*Expansion\n1.e-5, 20.\n2.e-5, 100.\n"), r"\*EXPANSION: material 'steel': 2 data lines"),
+        (heated("*Expansion, type=ANISO\n1.e-5\n"), r"\*EXPANSION: TYPE=ANISO is not supported"),
+        (heated("*Expansion\n1.e-5, 20., 3.\n"), r"\*EXPANSION: .*has 1 coefficients"),
+        (heated(initial=INITIAL.replace("TEMPERATURE", "STRESS")), r"\*INITIAL CONDITIONS: TYPE=STRESS is not supp"),
+        (heated(steps="*Temperature, file=heat.frd\n"), r"\*TEMPERATURE: the parameter FILE"),
+        (heated(steps="*Temperature\nall, 120., 3.\n"), r"\*TEMPERATURE: gradients"),
+        (heated(steps="*Temperature\nnone, 120.\n"), r"\*TEMPERATURE: set 'none' is not defined"),
+        (heated(steps="*Cflux\n17, 11, 3.\n"), r"\*CFLUX: \*CFLUX is outside"),
+    ],
+)
+def test_what_is_refused(tmp_path, text, said):
+    with pytest.raises(fc.CaseError, match=said):
+        deck_of(tmp_path, text)

@@ -1,0 +1,109 @@
+"""Pretension sections of decks: a bar of two cubes, stretched by a force, then locked."""
+
+import pytest
+from deck_text import deck_of
+
+import fastcontact as fc
+
+BAR = """*Node
+1, 0., 0., 0.
+2, 1., 0., 0.
+3, 1., 1., 0.
+4, 0., 1., 0.
+5, 0., 0., 1.
+6, 1., 0., 1.
+7, 1., 1., 1.
+8, 0., 1., 1.
+15, 0., 0., 2.
+16, 1., 0., 2.
+17, 1., 1., 2.
+18, 0., 1., 2.
+99, 0., 0., 9.
+*Element, type=C3D8, elset=bar
+1, 1, 2, 3, 4, 5, 6, 7, 8
+2, 5, 6, 7, 8, 15, 16, 17, 18
+*Nset, nset=bottom, generate
+1, 4
+*Nset, nset=top, generate
+15, 18
+*Nset, nset=bolt
+99
+*Surface, name=cut
+1, S2
+*Surface, name=outside
+1, S1
+*Material, name=steel
+*Elastic
+1000., 0.
+*Expansion
+1.e-3
+*Solid Section, elset=bar, material=steel
+*Pre-tension Section, surface=cut, node=99
+0., 0., 1.
+*Boundary
+bottom, 1, 3
+top, 1, 3
+"""
+TIGHT = "*Step\n*Static\n*Cload\nbolt, 1, 3.\n*End Step\n"
+HELD = "*Boundary, fixed\nbolt, 1\n"
+
+
+def cooled(lines):
+    return (
+        f"*Step\n*Static\n{lines}*Temperature\n"
+        + "".join(f"{n}, -20.\n" for n in (*range(1, 9), *range(15, 19)))
+        + "*End Step\n"
+    )
+
+
+def test_force_first_then_the_length_stays(tmp_path):
+    """Shortening F L / (E A), then the cooled bar pulls with E A alpha T more."""
+    deck = deck_of(tmp_path, BAR + TIGHT + cooled(HELD + "*Cload, op=new\n") + cooled("*Cload, op=new\nbolt, 1, 8.\n"))
+    tight, *locked = deck.solve()
+    assert tight.displacement[deck.point(99)] == pytest.approx([3.0 * 2 / 1000, 0.0, 0.0], rel=1e-9)
+    assert tight.pretension["cut"] == pytest.approx({"force": 3.0, "shortening": 0.006}, rel=1e-9)
+    for step in locked:
+        assert step.pretension["cut"] == pytest.approx({"force": 23.0, "shortening": 0.006}, rel=1e-8)
+        assert step.displacement[deck.point(99), 0] == pytest.approx(0.006, rel=1e-9)
+        assert step.reaction[deck.points_of("top")].sum(axis=0)[2] == pytest.approx(23.0, rel=1e-8)
+        assert abs(step.reaction[deck.points_of("cut")]).max() < 1e-7  # of supports alone
+
+
+def test_without_a_lock_the_force_stays(tmp_path):
+    deck = deck_of(tmp_path, BAR + TIGHT + cooled(""))
+    assert deck.solve()[-1].pretension["cut"]["force"] == pytest.approx(3.0)
+
+
+def test_a_shortening_in_the_place_of_a_force(tmp_path):
+    text = (
+        BAR.replace("0., 0., 1.\n*Boundary", "*Boundary") + "*Step\n*Static\n*Boundary\nbolt, 1, 1, 0.01\n*End Step\n"
+    )
+    (step,) = deck_of(tmp_path, text).solve()
+    assert step.pretension["cut"] == pytest.approx({"force": 5.0, "shortening": 0.01}, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (BAR.replace("node=99", "node=17") + TIGHT, r"\*PRE-TENSION SECTION: node 17 belongs to an element"),
+        (BAR.replace("surface=cut", "surface=gone") + TIGHT, r"\*PRE-TENSION SECTION: surface 'gone' is not defined"),
+        (
+            BAR.replace("surface=cut", "surface=outside") + TIGHT,
+            r"\*PRE-TENSION SECTION: 1 of 1 facets of 'outside' do",
+        ),
+        (BAR.replace("0., 0., 1.\n*B", "0., 0., 0.\n*B") + TIGHT, r"\*PRE-TENSION SECTION: the normal has no length"),
+        (BAR.replace("surface=cut, ", "") + TIGHT, r"\*PRE-TENSION SECTION: the parameter SURFACE is missing"),
+        (BAR.replace("surface=cut, node", "element=3, node") + TIGHT, r"the parameter ELEMENT of \*PRE-TENSION SECT"),
+        (
+            BAR.replace("*Boundary", "*Pre-tension Section, surface=cut, node=99\n*Boundary") + TIGHT,
+            "node 99 has a section already, in line 34",
+        ),
+        (
+            BAR + TIGHT + cooled(HELD) + cooled("*Boundary, op=new\nbottom, 1, 3\ntop, 1, 3\n"),
+            "node 99 of a pretension section is let go here: once locked it stays so",
+        ),
+    ],
+)
+def test_what_is_refused(tmp_path, text, said):
+    with pytest.raises(fc.CaseError, match=said):
+        deck_of(tmp_path, text)

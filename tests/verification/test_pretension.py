@@ -1,0 +1,132 @@
+"""Pretension sections: a bar, and a bolted joint as two springs, force first, then the length; exact up to round-off."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+
+E, LENGTH, FORCE = 1000.0, 2.0, 3.0
+
+
+def bar(kinematics="plane_stress", element="quad4"):
+    """Return a bar along y, cut in the middle; its width is 1, in axisymmetry its radius, in space its depth too."""
+    if kinematics == "3d":
+        mesh = fc.generate.box((1.0, LENGTH, 1.0), (2, 4, 2), element)
+        mesh = fc.generate.renamed(mesh, {"YMIN": "BOTTOM", "YMAX": "TOP"})
+    else:
+        mesh = fc.generate.block((1.0, LENGTH), (2, 4), element)
+    mesh = mesh.with_facet_group("CUT", lambda x: np.abs(x[:, 1] - LENGTH / 2) < 1e-9, between=True)
+    model = fc.Model(fc.generate.cut(mesh, "CUT"), kinematics)
+    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    for end in ("BOTTOM", "TOP"):
+        model.fix(end, "xyz"[: mesh.dim])
+    return model
+
+
+AREAS = {"plane_stress": 1.0, "plane_strain": 1.0, "axisymmetric": np.pi, "3d": 1.0}
+ELEMENTS = {
+    **dict.fromkeys(("plane_stress", "plane_strain", "axisymmetric"), ("tri3", "quad4", "tri6", "quad8")),
+    "3d": ("hex8", "tet4", "tet10", "hex20", "wedge15"),
+}
+
+
+@pytest.mark.parametrize(("kinematics", "element"), [(k, e) for k, names in ELEMENTS.items() for e in names])
+def test_a_bar_between_walls_is_stretched_by_the_force(kinematics, element):
+    """``shortening = F L / (E A)``."""
+    model = bar(kinematics, element)
+    model.add_pretension("bolt", "CUT", force=FORCE)
+    (step,) = fc.solve(model, 1)
+    exact = FORCE * LENGTH / (E * AREAS[kinematics])
+    assert step.pretension["bolt"] == pytest.approx({"force": FORCE, "shortening": exact}, rel=1e-9)
+    assert step.stress[:, 1] == pytest.approx(np.full(model.mesh.n_points, FORCE / AREAS[kinematics]), rel=1e-8)
+
+
+def test_a_shortening_makes_the_force():
+    model = bar()
+    model.add_pretension("bolt", "CUT", shortening=0.01)
+    steps = fc.solve(model, 2)
+    assert [s.pretension["bolt"]["force"] for s in steps] == pytest.approx([E * 0.005 / LENGTH, E * 0.01 / LENGTH])
+
+
+def test_a_locked_bar_keeps_its_length_and_cools():
+    """Locked at ``F L / (E A)``, then cooled by T: the force grows by ``E A alpha T``."""
+    model = bar()
+    model.materials.clear()
+    model.add_material(fc.LinearElastic(E=E, nu=0.0, expansion=1e-4))
+    model.add_pretension("bolt", "CUT", force=FORCE, locked_from=1.0, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)])
+    model.add_temperature(-20.0, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
+    before, after = fc.solve(model, [1.0, 2.0])
+    assert after.pretension["bolt"]["shortening"] == pytest.approx(before.pretension["bolt"]["shortening"], rel=1e-12)
+    assert after.pretension["bolt"]["force"] == pytest.approx(FORCE + E * 1e-4 * 20.0, rel=1e-9)
+
+
+SOLVERS = ("direct", "amg")
+
+
+def joint(pull, formulation="mortar", locked_from=1.0, first=1.0):
+    """Return a bolt (1 wide) beside clamped plates (2 wide), all of height L, their tops moving as one.
+
+    The plates' lower half stands on the ground and touches the upper one at the middle; the bolt stands on the ground.
+    """
+    half = LENGTH / 2
+    bolt = fc.generate.block((1.0, LENGTH), (2, 4), name="BOLT")
+    low = fc.generate.block((2.0, half), (3, 2), origin=(2.0, 0.0), name="LOW")
+    across = 4 if formulation == "mortar" else 3  # only mortar passes a uniform pressure on meshes that do not match
+    up = fc.generate.block((2.0, half), (across, 2), origin=(2.0, half), name="UP")
+    parts = [
+        fc.generate.renamed(mesh, lambda group, prefix=prefix: group if group == prefix else f"{prefix} {group}")
+        for prefix, mesh in (("BOLT", bolt), ("LOW", low), ("UP", up))
+    ]
+    mesh = fc.generate.union(*parts)
+    mesh = mesh.with_facet_group("CUT", lambda x: (np.abs(x[:, 1] - half) < 1e-9) & (x[:, 0] < 1.5), between=True)
+    mesh = mesh.with_facet_group("HEAD", lambda x: np.abs(x[:, 1] - LENGTH) < 1e-9)
+    model = fc.Model(fc.generate.cut(mesh, "CUT"), "plane_stress")
+    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    for group in ("BOLT BOTTOM", "LOW BOTTOM"):
+        model.fix(group, "xy")
+    model.fix("UP", "x")
+    model.couple("HEAD", "y")
+    model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", formulation=formulation)
+    model.add_pretension(
+        "bolt", "CUT", force=FORCE, locked_from=locked_from, ramp=[(0.0, 0.0), (first, 1.0), (2.0, 1.0)]
+    )
+    model.add_traction("HEAD", y=pull / 3.0, ramp=[(0.0, 0.0), (first, 0.0), (2.0, 1.0)])
+    return model
+
+
+@pytest.mark.filterwarnings("ignore:contact 'joint' is lost at the end")
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("formulation", ["mortar", "node_to_segment", "continuous"])
+@pytest.mark.parametrize("pull", [-2.0, 1.5, 4.4, 6.0])
+def test_a_bolted_joint_is_two_springs(pull, formulation, solver):
+    """Bolt ``F + P kb / (kb + kp)`` and clamped plates ``F - P kp / (kb + kp)`` until they part, then the bolt has P alone.
+
+    kb = E A / L of the bolt, kp that of the plates, twice as wide: shares of 1/3 and 2/3 (textbook joint diagram, as in
+    VDI 2230).
+    """
+    model = joint(pull, formulation)
+    tight, pulled = fc.solve(model, [1.0, 2.0], linear_solver=solver, linear_tolerance=1e-12)
+    assert tight.pretension["bolt"]["force"] == pytest.approx(FORCE, rel=1e-8)
+    assert tight.contact["joint"].force[1] == pytest.approx(FORCE, rel=1e-8)
+    assert tight.pretension["bolt"]["shortening"] == pytest.approx(FORCE * LENGTH / E * (1.0 + 0.5), rel=1e-8)
+    clamped = max(FORCE - pull * 2.0 / 3.0, 0.0)
+    assert pulled.pretension["bolt"]["force"] == pytest.approx(clamped + pull, rel=1e-8)
+    assert pulled.contact["joint"].force[1] == pytest.approx(clamped, rel=1e-8, abs=1e-12)
+
+
+def test_without_a_lock_the_force_stays():
+    _, pulled = fc.solve(joint(1.5, locked_from=None), [1.0, 2.0])
+    assert pulled.pretension["bolt"]["force"] == pytest.approx(FORCE, rel=1e-9)
+    assert pulled.contact["joint"].force[1] == pytest.approx(FORCE - 1.5, rel=1e-9)
+
+
+def test_the_number_of_steps_does_not_matter_and_a_run_goes_on_from_any():
+    model = joint(4.4)
+    once = fc.solve(model, [1.0, 2.0])
+    steps = fc.solve(model, [0.5, 1.0, 1.5, 2.0])
+    assert steps[-1].displacement == pytest.approx(once[-1].displacement, rel=1e-9, abs=1e-14)
+    for done in (1, 2, 3):
+        begun = list(fc.solve(model, [0.5, 1.0, 1.5, 2.0][:done]))
+        whole = fc.solve(model, [0.5, 1.0, 1.5, 2.0], resume=begun)
+        assert whole[-1].displacement == pytest.approx(steps[-1].displacement, rel=1e-12, abs=1e-16)
+        assert whole[-1].pretension["bolt"]["force"] == pytest.approx(steps[-1].pretension["bolt"]["force"], rel=1e-12)
