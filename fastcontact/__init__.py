@@ -30,6 +30,7 @@ _MODULES = {
     "topology": "mesh.topology",
 }
 _NAMES = {
+    "analysis.contact_answers": ("ContactAnswers", "contact_answers", "contact_history", "contact_moment", "wear"),
     "analysis.criteria": ("Criteria",),
     "analysis.run": ("solve", "solve_steps"),
     "cases.decks.deck": ("Deck", "read_deck"),

@@ -17,7 +17,7 @@ from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.errors import ModelError
-from fastcontact.model.fingerprint import different, fingerprint
+from fastcontact.model.fingerprint import different, fingerprint, formulation_behind
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, table_value
 from fastcontact.results.step import StepResult
@@ -35,8 +35,8 @@ def identity(model: Model, ramp: Ramp, criteria: Criteria) -> dict[str, Any]:
     return {"parts": fingerprint(model, options), "table": [list(row) for row in ramp.table]}
 
 
-def check(step: StepResult, case: dict[str, Any]) -> None:
-    """Raise ModelError if nothing can go on after `step`, or not the `case` of `identity`; the message says why."""
+def check(step: StepResult, case: dict[str, Any], model: Model) -> None:
+    """Raise ModelError if nothing can go on after `step`, or not the `case` of `identity` of a model; it says why."""
     state = step.restart
     if state is None or state.get("format") != FORMAT:
         raise ModelError(
@@ -50,8 +50,16 @@ def check(step: StepResult, case: dict[str, Any]) -> None:
     if parts:
         raise ModelError(
             f"the steps so far belong to another case; changed since: {', '.join(parts)}. Go on with what they "
-            "were computed for, or start anew without resuming"
+            f"were computed for, or start anew without resuming{_formulations(then['parts'], case['parts'], model)}"
         )
+
+
+def _formulations(then: dict[str, str], now: dict[str, str], model: Model) -> str:
+    """Return which formulations to name, as the end of a message, where pairs differ in nothing else."""
+    changed = [pair.name for pair in model.contact if then.get(key := f"contact '{pair.name}'") != now[key]]
+    found = {name: formulation_behind(model, name, then.get(f"contact '{name}'")) for name in changed}
+    named = [f"contact '{name}' had {text}" for name, text in found.items() if text]
+    return f" ({'; '.join(named)}: name that)" if named else ""
 
 
 def taken(problem: Problem, state: State, case: dict[str, Any]) -> dict[str, Any]:

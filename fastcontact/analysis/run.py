@@ -134,7 +134,7 @@ def solve_steps(
     case = restart.identity(model, ramp, criteria)
     last = resume[-1] if len(resume) else None
     if last is not None:
-        restart.check(last, case)
+        restart.check(last, case, model)
     instants = restart.remaining(ramp, last)
     if not instants:
         return iter(())

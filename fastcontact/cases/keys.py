@@ -49,6 +49,15 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         ("value",),
     ),
     "force": ({"group": str, **AXES, "distribute": bool, "ramp": list}, ("group",)),
+    "moment": ({"group": str, **AXES, "ramp": list}, ("group",)),
+    "hydrostatic_pressure": (
+        {"group": str, **dict.fromkeys(("weight", "level"), NUMBER), "axis": str, "ramp": list},
+        ("group", "weight", "level"),
+    ),
+    "coupling": (
+        {**dict.fromkeys(("reference", "group", "kind", "components"), str), "place": list},
+        ("reference", "group"),
+    ),
     "couple": ({"group": str, "component": str}, ("group", "component")),
     "group_relation": (
         {

@@ -16,6 +16,7 @@ from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.errors import CaseError, unknown
 from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.generate.cut import OPPOSITE, cut
+from fastcontact.mesh.generate.reference_points import with_reference_points
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
@@ -38,6 +39,11 @@ def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
         if key not in inspect.signature(kind).parameters:
             raise CaseError(f"the key 'material.{key}' is none of a material that is {_LAWS[kind]}")
     model.add_material(kind(**constants), groups)
+
+
+def _add_coupling(model: Model, reference: str, group: str, place: Any = None, **options: Any) -> None:
+    """Add a coupling; the mesh has its reference point already, whose `place` one of the couplings tells."""
+    model.add_coupling(reference, group, **options)
 
 
 def _material_law(entry: dict[str, Any]) -> type[Material]:
@@ -72,6 +78,9 @@ _ADD: dict[str, Callable[..., None]] = {
     "centrifugal": Model.add_centrifugal,
     "temperature": Model.add_temperature,
     "force": Model.add_force,
+    "moment": Model.add_moment,
+    "hydrostatic_pressure": Model.add_hydrostatic_pressure,
+    "coupling": _add_coupling,
     "couple": Model.couple,
     "relation": Model.relate,
     "group_relation": Model.relate_groups,
@@ -82,7 +91,8 @@ _ADD: dict[str, Callable[..., None]] = {
 
 def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
     """Return the model that the parsed `data` of a case file describe; meshes of obstacles lie relative to `folder`."""
-    model = Model(_cut(mesh, data.get("pretension", [])), data["kinematics"], case_text=text)
+    mesh = _with_references(_cut(mesh, data.get("pretension", [])), data.get("coupling", []))
+    model = Model(mesh, data["kinematics"], case_text=text)
     model.units = dict(data.get("units", {}))
     for kind, add in _ADD.items():
         known, needed = LISTS[kind]
@@ -114,6 +124,16 @@ def _cut(mesh: Mesh, sections: Any) -> Mesh:
         if isinstance(name, str) and "opposite" not in entry and name + OPPOSITE not in mesh.group_names:
             with at(f"pretension[{i}]"):
                 mesh = cut(mesh, name, entry.get("normal"))
+    return mesh
+
+
+def _with_references(mesh: Mesh, couplings: Any) -> Mesh:
+    """Return the mesh with the reference points that couplings place."""
+    for i, entry in enumerate(tables("coupling", couplings)):
+        name, place = entry.get("reference"), entry.get("place")
+        if isinstance(name, str) and isinstance(place, list):
+            with at(f"coupling[{i}]"):
+                mesh = with_reference_points(mesh, {name: place})
     return mesh
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact._version import __version__
+from fastcontact.analysis.contact_answers import contact_answers
 from fastcontact.cases.case import Case
 from fastcontact.cases.checks import at_point, evaluated
 from fastcontact.results.step import ContactResult, StepResult
@@ -44,7 +45,10 @@ def summarise(
         "mesh": {"n_points": mesh.n_points, "n_cells": mesh.n_cells},
         "n_dofs": case.model.n_dofs,
         "steps": list(steps),
-        "contact": {name: _contact(contact, penalties.get(name)) for name, contact in last.contact.items()},
+        "contact": {
+            name: {**_contact(contact, penalties.get(name)), **_answers(case, last, name, steps)}
+            for name, contact in last.contact.items()
+        },
         "probes": {name: _probe(last, point) for name, point in case.probes.items()},
         "von_mises_max": {"value": float(last.von_mises[top]), "at": mesh.points[top].tolist()},
         "theory": {
@@ -66,6 +70,9 @@ def of_step(step: StepResult) -> dict[str, Any]:
     found = {"load_factor": step.load_factor, **{name: step.iterations[name] for name in counts}}
     if "substeps" in step.iterations:
         found["substeps"] = step.iterations["substeps"]
+    worked = {name: contact.dissipation for name, contact in step.contact.items() if contact.dissipation}
+    if worked:
+        found["dissipation"] = worked
     if step.pretension:
         found["pretension"] = step.pretension
     return found
@@ -84,6 +91,19 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
         "obstacle_displacement": None if moved is None else moved.tolist(),
         "penetration": contact.penetration,
         "penalty": penalty,
+    }
+
+
+def _answers(case: Case, last: StepResult, name: str, steps: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return what `contact_answers` tell of the last step, with the work of friction of all `steps`."""
+    (found,) = contact_answers(case.model, [last], name)
+    return {
+        "moment": found.moment.tolist(),
+        "area": found.area,
+        "centre": [_finite(value) for value in found.centre],
+        "mean_gap": _finite(found.mean_gap),
+        "pressure_mean": found.pressure_mean,
+        "friction_work": sum(step.get("dissipation", {}).get(name, 0.0) for step in steps),
     }
 
 

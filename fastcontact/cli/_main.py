@@ -19,6 +19,7 @@ from typing import Any
 
 from fastcontact._jit import compiling
 from fastcontact._version import __version__
+from fastcontact.cli._completion import SHELLS, PrintCompletion
 from fastcontact.cli._interrupts import interruptible
 from fastcontact.cli._terminal import add_loudness, encodable, printable, say
 from fastcontact.errors import ConvergenceError, FastcontactError, unknown
@@ -62,6 +63,10 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
     """Return the parser with every sub-command of this package, with arguments only for `command` if it is one of them."""
     top = Parser(prog="fastcontact", description="Elastic contact by finite elements, fast.")
     top.add_argument("--version", action="version", version=f"fastcontact {__version__}")
+    top.add_argument(
+        "--print-completion", metavar="SHELL", choices=SHELLS, action=PrintCompletion,
+        help=f"print what makes a shell complete commands and options: {', '.join(SHELLS)}",
+    )  # fmt: skip
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
     names = [name for _, name, _ in pkgutil.iter_modules([os.path.dirname(__file__)]) if not name.startswith("_")]
     for name in names:

@@ -147,7 +147,7 @@ def _check_same(case: Any, done: list[Any], output: Path) -> None:
 
     if done:
         try:
-            restart.check(done[-1], restart.identity(case.model, case.ramp, case.criteria))
+            restart.check(done[-1], restart.identity(case.model, case.ramp, case.criteria), case.model)
         except ModelError as error:
             raise ModelError(f"'{output}' cannot be resumed: {error}") from error
 

@@ -110,6 +110,19 @@ class Pressure(Load):
 
 
 @dataclass(frozen=True)
+class Hydrostatic:
+    """The pressure of a liquid of a `weight` by volume [force / length^3], below its `level` along an axis [length]."""
+
+    weight: float
+    level: float
+    axis: int
+
+    def __call__(self, points: Array) -> Array:
+        """Return the pressure (n,) [pressure] at `points` (n, dim) [length]."""
+        return np.asarray(self.weight * np.maximum(self.level - points[:, self.axis], 0.0))
+
+
+@dataclass(frozen=True)
 class Traction(Load):
     """Components of a force per area [pressure] on a group of facets."""
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.contact_pair import ContactPair
@@ -51,6 +52,28 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
 def different(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
     """Return the names of the parts in which two fingerprints differ."""
     return [name for name in {**one, **other} if one.get(name) != other.get(name)]
+
+
+def formulation_behind(model: Model, name: str, digest: str | None) -> str | None:
+    """Return what to write for a pair so that it has a `digest` of before, where another formulation is all that differs.
+
+    None where it is not: pairs that named none had other defaults in earlier versions.
+    """
+    (pair,) = (one for one in model.contact if one.name == name)
+    plain = {key: value for key, value in pair.options.items() if key != "multipliers"}
+    for formulation, options in _choices():
+        other = dataclasses.replace(pair, formulation=formulation, options={**plain, **options})
+        if _digest(other, model.mesh) == digest:
+            return ", ".join(f"{key}='{value}'" for key, value in {"formulation": formulation, **options}.items())
+    return None
+
+
+def _choices() -> Iterable[tuple[str, dict[str, str]]]:
+    """Return formulations and what they may need to be told."""
+    for formulation in FORMULATIONS:
+        yield formulation, {}
+    for multipliers in ("standard", "dual"):
+        yield "mortar", {"multipliers": multipliers}
 
 
 def _unordered(items: Iterable[Any], mesh: Mesh) -> list[str]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.default_formulation import default_formulation
+from fastcontact.contact.default_formulation import against_obstacle, default_formulation
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
 from fastcontact.contact.obstacles import MeshedSurface, Obstacle
 from fastcontact.contact.obstacles.rigid_side import RigidSide
@@ -26,6 +26,7 @@ from fastcontact.elasticity.constrained_system import ConstrainedMotion
 from fastcontact.elasticity.inertia_loads import Centrifugal, Gravity, InertiaLoad
 from fastcontact.elasticity.loads import (
     BodyForce,
+    Hydrostatic,
     Load,
     NodalForce,
     Pressure,
@@ -46,6 +47,7 @@ from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
 from fastcontact.elasticity.temperature import Temperature, checked_value
 from fastcontact.errors import ContactError, ModelError, unknown
+from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import check_fields, typed
 from fastcontact.mesh.html_table import html_table
 from fastcontact.mesh.mesh import Mesh
@@ -59,6 +61,7 @@ from fastcontact.model.checks import (
     check_supports,
 )
 from fastcontact.model.contact_pair import ContactPair, Driving, method
+from fastcontact.model.couplings import Moment, coupling
 from fastcontact.model.description import sentences
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
@@ -556,6 +559,78 @@ class Model:
         self.relations.append(Relation(name, rows, float(value), table_of(ramp, f"the ramp of {name}")))
 
     @typed(ModelError)
+    def add_coupling(self, reference: str, group: str, *, kind: str = "rigid", components: str | None = None) -> None:
+        """Couple a reference point with the nodes of a group, for small rotations.
+
+        Forces, moments and supports at the reference point then act on the group; see
+        `fastcontact.generate.with_reference_points`, `add_force` and `add_moment`.
+
+        Parameters
+        ----------
+        reference : str
+            Name of the reference point.
+        group : str
+        kind : str
+            ``"rigid"``: all nodes follow the reference point and its rotation as one stiff body (RBE2).
+            ``"distributing"``: it follows the mean motion of the group, by area where that is one of facets, and stiffens
+            nothing (RBE3).
+        components : str, optional
+            Displacements that follow in a rigid coupling, such as ``"z"``; by default all.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If there are no such groups, or kinematics are axisymmetric.
+        """
+        letters = "xyz"[: self.mesh.dim] if components is None else components
+        axes = axes_of(f"the coupling of '{reference}'", dict.fromkeys(letters, 1.0), self.mesh.dim)
+        self.relations.append(coupling(self.mesh, self.kinematics, (reference, group), kind, sorted(axes)))
+
+    @typed(ModelError)
+    def add_moment(
+        self,
+        group: str,
+        *,
+        x: float | None = None,
+        y: float | None = None,
+        z: float | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Load a reference point, or a group, with a moment [force times length]; in the plane about z.
+
+        On a group of facets it is spread in proportion to area and distance from the middle, without a resultant force.
+        """
+        name = f"the moment on '{group}'"
+        given = {"x": x, "y": y, "z": z}
+        if self.mesh.dim == 2 and (x is not None or y is not None):
+            raise ModelError(f"{name}: in the plane moments are about z")
+        axes = axes_of(name, given, 3)
+        self._add(Moment(group, axes, table_of(ramp, f"the ramp of {name}")))
+
+    @typed(ModelError)
+    def add_hydrostatic_pressure(
+        self, group: str, *, weight: float, level: float, axis: str | None = None, ramp: History = None
+    ) -> None:
+        """Press on a group of outer facets as a liquid does: `weight` times the depth below its level.
+
+        Parameters
+        ----------
+        group : str
+        weight : float
+            Of the liquid by volume [force / length^3].
+        level : float
+            Coordinate of its surface; above it nothing presses [length].
+        axis : str, optional
+            Along which the level is measured, upwards: by default the last one, y or z.
+        ramp : Ramp or iterable of (float, float), optional
+        """
+        name = "xyz"[self.mesh.dim - 1] if axis is None else axis
+        (along,) = axes_of(f"the hydrostatic pressure on '{group}'", {name: 1.0}, self.mesh.dim)
+        for what, value in (("weight", weight), ("level", level)):
+            check_number(f"the {what} of the hydrostatic pressure on '{group}'", value)
+        self.add_pressure(group, Hydrostatic(float(weight), float(level), along), ramp=ramp)
+
+    @typed(ModelError)
     def add_spring(
         self,
         group: str | int,
@@ -698,7 +773,7 @@ class Model:
         motion: Mapping[str, float] | None = None,
         force: Mapping[str, float] | None = None,
         ramp: History = None,
-        formulation: str = "continuous",
+        formulation: str | None = None,
         **options: Any,
     ) -> None:
         """Let the facets of group `secondary` come into contact with a rigid obstacle.
@@ -717,8 +792,9 @@ class Model:
             follows `motion`. Results tell where it is.
         ramp : Ramp or iterable of (float, float), optional
             History of motion and force.
-        formulation : str
-            ``"node_to_segment"`` (then: node against obstacle) or ``"continuous"``.
+        formulation : str, optional
+            ``"node_to_segment"`` (then: node against obstacle), by default on linear triangles and tetrahedra, or
+            ``"continuous"``, on all other elements.
         **options
             Fields of the formulation.
         """
@@ -730,8 +806,21 @@ class Model:
             obstacle.check_apart(self.mesh)
         obstacle.distance(self.mesh.points[:1])  # what does not fit this dimension shows at once
         history = table_of(ramp, f"the ramp of the motion of obstacle '{name}'")
+        if formulation is None:
+            formulation, reason = against_obstacle(self._is_of_simplices(secondary), options)
+            log.info("contact '%s': %s, since %s", name, method(formulation, options), reason)
         driving = self._driving(name, moves, force)
         self._add_pair(ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving))
+
+    def _is_of_simplices(self, group: str) -> bool:
+        """Return whether linear triangles or tetrahedra alone have the facets of a group; no, if there is no such group."""
+        if group not in self.mesh.cell_groups:
+            return False
+        solids, facets = self.mesh.solids, self.mesh.cells_of(group, self.mesh.dim - 1)
+        theirs = [
+            np.isin(self.mesh.points_of(group), solids[name]).all() for name in ("tri3", "tet4") if name in solids
+        ]
+        return bool(facets) and any(theirs) and all(elements.get(name).linear == name for name in facets)
 
     def _driving(self, name: str, moves: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
         """Return the force on obstacle `name` by component, None for prescribed ones; empty without any."""

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 def units_of_results(units: Mapping[str, str], kinematics: str) -> dict[str, str]:
     """Return the names of units for the results of a model: forces of plane models are those per unit of thickness.
 
-    A unit of force that is one per length already stays.
+    A unit of force that is one per length already stays, and so do dashes, which stand for units that nobody named.
 
     Examples
     --------
@@ -16,6 +16,7 @@ def units_of_results(units: Mapping[str, str], kinematics: str) -> dict[str, str
     {'length': 'mm', 'force': 'N/mm', 'pressure': 'MPa'}
     """
     plane = kinematics in ("plane_strain", "plane_stress")
-    if plane and units.get("length") and "/" not in (units.get("force") or "/"):
+    named = all(units.get(key) not in (None, "", "-") for key in ("length", "force"))
+    if plane and named and "/" not in units["force"]:
         return {**units, "force": f"{units['force']}/{units['length']}"}
     return {**units}

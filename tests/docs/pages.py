@@ -32,6 +32,8 @@ DOCS = ROOT / "docs"
 FENCE = re.compile(r"^(?P<fence>`{3,})(?P<language>\S*)[ \t]*(?P<argument>[^\n`]*)$")
 NEEDS = re.compile(r"^<!--\s*needs:\s*(?P<what>.*?)\s*-->$")
 PICTURE = re.compile(r"!\[[^\]]*\]\((?P<path>[^)\s]+\.png)\)")
+# What a stored picture may have: bytes, dots across, colours.
+LARGEST, WIDEST, COLOURS = 60_000, 1000, 256
 FILE = re.compile(r"^:caption:\s*(?P<name>\S+)\s*$", re.MULTILINE)
 
 
@@ -172,6 +174,22 @@ def run_command(command: str, where: str) -> None:
     assert done.returncode == 0, f"{where}: '{command}' returned {done.returncode}:\n{done.stdout}{done.stderr}"
 
 
+def store_small(made: Path, path: Path) -> None:
+    """Store a picture in few colours, and as wide as leaves it below LARGEST."""
+    from PIL import Image
+
+    with Image.open(made) as found:
+        picture = found.convert("RGB")
+    for width in range(min(WIDEST, picture.width), 300, -40):
+        height = round(picture.height * width / picture.width)
+        small = picture.resize((width, height), Image.Resampling.LANCZOS)
+        # Rare colours stay, such as that of a ring around a place.
+        few = small.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, kmeans=1, dither=Image.Dither.NONE)
+        few.save(path, optimize=True)
+        if path.stat().st_size <= LARGEST:
+            return
+
+
 def store_pictures() -> None:
     """Run every page that shows pictures and keep those its commands made."""
     for page in pages():
@@ -184,7 +202,7 @@ def store_pictures() -> None:
                 made = Path(folder) / path.name
                 if made.is_file():
                     path.parent.mkdir(exist_ok=True)
-                    shutil.copyfile(made, path)
+                    store_small(made, path)
                     print(f"{page.relative_to(ROOT)}: {path.relative_to(ROOT)}")
 
 

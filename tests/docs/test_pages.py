@@ -43,6 +43,22 @@ def test_a_block_that_needs_something_is_told_so_in_the_text(page):
             assert text.count(word.casefold()) > text.count(f"needs: {word}".casefold()), f"{name(page)}: {word}"
 
 
+def test_the_gallery_asserts_a_number_for_every_picture():
+    page = pages.DOCS / "gallery.md"
+    text = page.read_text(encoding="utf-8")
+    sections = text.split("\n## ")[1:]
+    assert 8 <= len(sections) == len(pages.pictures(page))
+    for section in sections:
+        assert section.count("![") == section.count("```python") == 1, section.splitlines()[0]
+        assert "\nassert " in section, section.splitlines()[0]
+
+
+def test_pictures_are_small():
+    """A page of them is read on a telephone, and the repository keeps every version."""
+    for path in (pages.DOCS / "images").glob("*.png"):
+        assert path.stat().st_size <= pages.LARGEST, path.name
+
+
 def test_blocks_are_found_with_their_files_and_needs(tmp_path):
     """The finder itself."""
     page = tmp_path / "page.md"

@@ -27,7 +27,7 @@ from fastcontact.linear.elimination import pivot_order
 from fastcontact.linear.multigrid import solver
 from fastcontact.linear.solvers import amg
 from fastcontact.linear.solvers.direct import Direct
-from fastcontact.mesh.files import hdf5, med, meshio_files
+from fastcontact.mesh.files import hdf5, med, meshio_content
 from fastcontact.mesh.generate import _triangulate
 from fastcontact.mesh.generate.transform import renamed
 from fastcontact.results import reader
@@ -173,7 +173,7 @@ def parts_that_do_not_fit(folder, patch):
     def fail(*_):
         raise TypeError("of another kind")
 
-    patch.setattr(meshio_files, "build_mesh", fail)
+    patch.setattr(meshio_content, "build_mesh", fail)
     fc.read_mesh(folder / "a.vtk")
 
 

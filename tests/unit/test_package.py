@@ -1,5 +1,6 @@
 """What is packed: nothing of other folders of the same names, and what the package says of itself."""
 
+import json
 import re
 import tomllib
 
@@ -28,6 +29,11 @@ def test_the_pythons_that_are_named_are_allowed(project):
 def test_the_version_is_the_same_everywhere(project, root):
     version = project["project"]["version"]
     assert f"\nversion: {version}\n" in (root / "CITATION.cff").read_text(encoding="utf-8")
+    deposit = json.loads((root / ".zenodo.json").read_text(encoding="utf-8"))
+    assert deposit["version"] == version
+    assert deposit["license"] == project["project"]["license"]
+    assert deposit["keywords"] == project["project"]["keywords"]
+    assert [author["name"] for author in project["project"]["authors"]] == [who["name"] for who in deposit["creators"]]
     assert f"## {version}" in (root / "CHANGELOG.md").read_text(encoding="utf-8")
 
 

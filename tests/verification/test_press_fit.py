@@ -1,5 +1,7 @@
 """Press fits by a negative clearance, against Lame: nothing is left but the error of the mesh."""
 
+import warnings
+
 import numpy as np
 import pytest
 from two_bodies import rings
@@ -137,3 +139,26 @@ def test_nodes_opposite_nodes_settle_on_one_facet():
     model, last = quarter("quad4", 8, 8, "node_to_segment", clearance=-INTERFERENCE, normals="facet")
     assert last.iterations["geometry_updates"] <= 10
     assert abs(errors(model, last)[1]) < 5e-3
+
+
+@pytest.mark.parametrize("multipliers", ["dual", "standard"])
+@pytest.mark.parametrize("around", [(10, 10), (6, 10), (10, 4), (9, 12)])
+@pytest.mark.parametrize("element", ["tri3", "quad4", "quad8"])
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_fits_settle_with_the_hollow_side_secondary(element, around, multipliers, friction):
+    """The sides overlap by the interference: opposite a hollow corner the closest facet leaps as the rings move."""
+    mesh = fc.generate.rings(
+        element, inner_radius=0.5, interface_radius=1.0, outer_radius=1.6, divisions_inner=(3, around[0]),
+        divisions_outer=(3, around[1]),
+    )  # fmt: skip
+    model = fc.Model(mesh, "plane_stress")
+    model.add_material(fc.LinearElastic(1000.0, 0.3))
+    model.fix("SYMMETRY_X", "x")
+    model.fix("SYMMETRY_Y", "y")
+    model.add_contact(
+        "fit", secondary="CONT_OUTER", primary="CONT_INNER", clearance=-0.05, multipliers=multipliers, friction=friction
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fc.FastcontactWarning)
+        steps = fc.solve(model, 1, criteria=fc.Criteria(max_halvings=0))
+    assert steps[-1].iterations["geometry_updates"] <= 12

@@ -42,7 +42,17 @@ def tie(content: Content, block: Block) -> None:
     """*TIE: sides that neither open nor slide."""
     tolerance = block.get("POSITION TOLERANCE")
     value = as_number(block.place, tolerance) if tolerance else None
-    adjust = block.get("ADJUST", "YES").upper()
+    adjust = block.choice("ADJUST", ("YES", "NO"))
+    if value is not None:
+        if value < 0.0:
+            raise block.place.refuse(f"POSITION TOLERANCE={value:g} is negative")
+        content.note(
+            block.place,
+            f"POSITION TOLERANCE={value:g}: no effect, the surfaces are tied where they face each other, at any distance, "
+            "not node by node",
+        )
+    if adjust == "YES" and "ADJUST" in block.parameters:
+        content.note(block.place, "ADJUST=YES: nodes are not moved, distances of the sides are kept")
     for row in block.rows:
         if len([entry for entry in row.entries if entry]) != 2:
             raise row.place.refuse("a tie needs two surfaces, the secondary and the primary one")

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from fastcontact.cases.decks.assembled import facet_points
 from fastcontact.cases.decks.content import Equation, Link
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.elasticity.loads import Traction
 from fastcontact.elasticity.relations import Relation
+from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows, relation, rigid_rows
 
 Array = NDArray[np.float64]
-Term = tuple[int, int, float]  # point, component, coefficient
 
 
 def make_rotations(found: DeckMesh) -> None:
@@ -33,21 +33,11 @@ def relations_of(found: DeckMesh, mesh: Mesh) -> list[Relation]:
     """Return the relations of all equations, rigid bodies and couplings."""
     content = found.made.content
     rows = [_equation(found, equation) for equation in content.equations]
-    made = [_relation("the equations of the deck", rows, mesh)] if rows else []
+    made = [relation("the equations of the deck", rows, mesh.points.shape)] if rows else []
     for link in content.links:
         rows = _distributing(found, mesh, link) if link.distributing else _rigid(found, link)
-        made.append(_relation(f"*{link.place.keyword} of line {link.place.line}", rows, mesh))
+        made.append(relation(f"*{link.place.keyword} of line {link.place.line}", rows, mesh.points.shape))
     return made
-
-
-def _relation(name: str, rows: list[list[Term]], mesh: Mesh) -> Relation:
-    row = [i for i, terms in enumerate(rows) for _ in terms]
-    column = [point * mesh.dim + axis for terms in rows for point, axis, _ in terms]
-    values = [coefficient for terms in rows for _, _, coefficient in terms]
-    matrix = csr_array((values, (row, column)), shape=(len(rows), mesh.n_points * mesh.dim))
-    matrix.sum_duplicates()
-    matrix.eliminate_zeros()
-    return Relation(name, matrix)
 
 
 def _equation(found: DeckMesh, equation: Equation) -> list[Term]:
@@ -80,53 +70,29 @@ def _points(found: DeckMesh, link: Link) -> list[int]:
     return kept
 
 
-def _turn(dim: int, axis: int, arm: Array) -> list[tuple[int, float]]:
-    """Return the rotation components, with factors, that move the end of an arm (dim,) along an axis."""
-    if dim == 2:
-        return [(0, -arm[1] if axis == 0 else arm[0])]
-    after, last = (axis + 1) % 3, (axis + 2) % 3
-    return [(after, arm[last]), (last, -arm[after])]
+def _reference(found: DeckMesh, link: Link) -> ReferencePoint:
+    point = found.made.node(link.reference, link.place)
+    return ReferencePoint(point, found.rotations[point], tuple(found.made.points[point][: found.dim]))
 
 
 def _rigid(found: DeckMesh, link: Link) -> list[list[Term]]:
     """Return the equations by which nodes follow the motion of a reference point with its rotation."""
-    made, dim = found.made, found.dim
-    reference = made.node(link.reference, link.place)
-    rotation, middle = found.rotations[reference], np.array(made.points[reference])
-    rows = []
-    for point in _points(found, link):
-        arm = np.array(made.points[point]) - middle
-        for axis in (component - 1 for component in link.components if component <= dim):
-            turns = [(rotation, k, -factor) for k, factor in _turn(dim, axis, arm) if factor]
-            rows.append([(point, axis, 1.0), (reference, axis, -1.0), *turns])
-    return rows
+    points = np.array(_points(found, link), np.intp)
+    axes = [component - 1 for component in link.components if component <= found.dim]
+    return rigid_rows(_reference(found, link), points, np.array(found.made.points)[points, : found.dim], axes)
 
 
 def _distributing(found: DeckMesh, mesh: Mesh, link: Link) -> list[list[Term]]:
-    """Return the equations by which a reference point follows the mean motion of a surface, weighted by area.
-
-    The rotation is that of least squares, ``J theta = sum of w r x u`` with r from the middle of the surface.
-    """
-    made, dim = found.made, found.dim
-    reference = made.node(link.reference, link.place)
-    rotation = found.rotations[reference]
+    """Return the equations by which a reference point follows the mean motion of a surface, weighted by area."""
+    made = found.made
     group = found.add_facets(f"coupling of line {link.place.line}", made.faces(link.group, link.place))
     areas = Traction(_known(mesh, found, group), {0: 1.0}, None).vector(mesh, found.kinematics)[:, 0]
-    points = np.array(_points(found, link))
+    points = np.array(_points(found, link), np.intp)
     weight = areas[points] / areas[points].sum()
-    where = np.array(made.points)[points]
-    middle = weight @ where
-    arms = where - middle
-    turn = _mean_rotation(weight, arms, dim)  # (rotations, points, dim)
-    rows = []
-    for k in range(turn.shape[0]):
-        terms = [(int(p), axis, -float(turn[k, i, axis])) for i, p in enumerate(points) for axis in range(dim)]
-        rows.append([(rotation, k, 1.0), *terms])
-    offset = np.array(made.points[reference]) - middle
-    for axis in range(dim):
-        terms = [(int(p), axis, -float(w)) for p, w in zip(points, weight, strict=True)]
-        rows.append([(reference, axis, 1.0), *terms, *((rotation, k, -f) for k, f in _turn(dim, axis, offset) if f)])
-    return rows
+    try:
+        return distributing_rows(_reference(found, link), points, np.array(made.points)[points, : found.dim], weight)
+    except ModelError as error:
+        raise link.place.refuse(str(error)) from error
 
 
 def _known(mesh: Mesh, found: DeckMesh, group: str) -> str:
@@ -134,18 +100,3 @@ def _known(mesh: Mesh, found: DeckMesh, group: str) -> str:
     return next(
         name for name, members in found.groups.items() if members == found.groups[group] and name in mesh.cell_groups
     )
-
-
-def _mean_rotation(weight: Array, arms: Array, dim: int) -> Array:
-    """Return how displacements (points, dim) make the mean rotation (rotations, points, dim) [1 / length]."""
-    x, y, z = arms.T
-    zero = np.zeros_like(x)
-    if dim == 2:
-        cross = np.stack([np.column_stack([-y, x])])
-        inertia = np.array([[weight @ (x * x + y * y)]])
-    else:
-        cross = np.stack(
-            [np.column_stack([zero, -z, y]), np.column_stack([z, zero, -x]), np.column_stack([-y, x, zero])]
-        )
-        inertia = (weight @ (arms**2).sum(axis=1)) * np.eye(3) - np.einsum("n,ni,nj->ij", weight, arms, arms)
-    return np.einsum("kl,lnd,n->knd", np.linalg.inv(inertia), cross, weight)

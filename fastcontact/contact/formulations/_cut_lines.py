@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fastcontact.contact.formulations._overlap import Coupling, Overlap
 from fastcontact.contact.pairing import Candidates, pair
-from fastcontact.contact.projection import nodal_normals
+from fastcontact.contact.projection import CORNER, facet_normals, nodal_normals
 from fastcontact.contact.search.closest import closest
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements, quadrature
@@ -71,14 +71,11 @@ def _cuts(
     block: FacetBlock, primary: Surface, deformed: Array, tolerance: float, borders: tuple[NDArray[np.intp], Array]
 ) -> tuple[NDArray[np.intp], Array, Array]:
     """Return (facet, begin, end) of the pieces of the facets of a block, in their reference coordinate."""
-    ends = np.unique(np.concatenate([other.facets[:, :2].ravel() for other in primary.blocks]))
-    opposite = closest(deformed[ends], deformed[block.facets])
-    along = opposite.xi[:, 0]
-    inside = (opposite.overhang == 0.0) & (np.abs(along) < 1.0 - SLIVER)
     n = len(block.facets)
+    between, along = _opposite_nodes(block, primary, deformed)
     ending, place = _opposite_ends(block, primary, deformed, tolerance)
-    facet = np.concatenate([np.arange(n), np.arange(n), opposite.facet[inside], borders[0], ending])
-    xi = np.concatenate([np.full(n, -1.0), np.full(n, 1.0), along[inside], borders[1], place])
+    facet = np.concatenate([np.arange(n), np.arange(n), between, borders[0], ending])
+    xi = np.concatenate([np.full(n, -1.0), np.full(n, 1.0), along, borders[1], place])
     order = np.lexsort((xi, facet))
     facet, xi = facet[order], xi[order]
     piece = (facet[1:] == facet[:-1]) & (np.diff(xi) > SLIVER)
@@ -90,6 +87,53 @@ def normals_at(block: FacetBlock, coordinates: Array, points: LinePoints) -> Arr
     gradient = elements.get(block.element).gradient(points.xi[:, None])[:, :, 0]
     tangent = np.einsum("nk,nkd->nd", gradient, coordinates[block.facets[points.facet]])
     return np.column_stack([tangent[:, 1], -tangent[:, 0]]) / np.linalg.norm(tangent, axis=1, keepdims=True)
+
+
+def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array) -> tuple[NDArray[np.intp], Array]:
+    """Return (facet, xi) of the points of a block that lie opposite the ends of primary facets.
+
+    Where two of these meet, that is on the line which halves the angle between them: beside it another facet is nearer. The
+    point of the block that is closest to the node does for flat sides alone: opposite a hollow corner of sides that stand
+    apart, or overlap by an interference, it leaps from one facet to the next as the bodies move. It is where the primary side
+    ends, and at its corners, beside which the flank is not faced.
+    """
+    ends, own = np.unique(np.concatenate([other.local[:, :2].ravel() for other in primary.blocks]), return_index=True)
+    normals = nodal_normals(primary, deformed)
+    foot, normal = deformed[primary.points[ends]], normals[ends]
+    opposite = closest(foot, deformed[block.facets])
+    along = opposite.xi[:, 0]
+    inner = primary.inner_ends.ravel()[own]
+    smooth = inner & ~_corners(primary, deformed, normals)[ends]
+    inside = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(along) < 1.0 - SLIVER) & ~smooth)
+    rows = np.flatnonzero(inner)
+    beside = np.column_stack([opposite.facet[rows], _neighbours(block)[opposite.facet[rows]]])
+    crossed = _across(deformed[block.facets[beside]], foot[rows][:, None], normal[rows][:, None])
+    crossed[beside < 0] = 1.0
+    row, xi = _zeros(crossed.reshape(-1, block.facets.shape[1]))
+    return np.concatenate([opposite.facet[inside], beside.ravel()[row]]), np.concatenate([along[inside], xi])
+
+
+def _corners(side: Surface, coordinates: Array, normals: Array) -> NDArray[np.bool_]:
+    """Return which nodes (m,) of a side are corners, where a facet leans much from the nodal `normals` (m, 2)."""
+    lean = np.ones(len(side.points))
+    for block in side.blocks:
+        own = facet_normals(block, coordinates)
+        np.minimum.at(lean, block.local, np.einsum("fad,fad->fa", own, normals[block.local]))
+    return np.asarray(lean < np.cos(np.radians(0.5 * CORNER)))
+
+
+def _across(points: Array, foot: Array, normal: Array) -> Array:
+    """Return how far `points` (..., k, 2) lie beside the lines through `foot` along `normal` (..., 2) [length]."""
+    away = points - foot[..., None, :]
+    return np.asarray(away[..., 0] * normal[..., None, 1] - away[..., 1] * normal[..., None, 0])
+
+
+def _neighbours(block: FacetBlock) -> NDArray[np.intp]:
+    """Return the facets (n, 2) before and behind each facet of a block, -1 where there is none."""
+    size = int(block.local.max()) + 1
+    begins, ends = np.full(size, -1), np.full(size, -1)
+    begins[block.local[:, 0]] = ends[block.local[:, 1]] = np.arange(len(block.local))
+    return np.column_stack([ends[block.local[:, 0]], begins[block.local[:, 1]]])
 
 
 def _opposite_ends(
@@ -106,8 +150,7 @@ def _opposite_ends(
             weights = shape(np.array([[s]]))[0]
             foot = np.einsum("k,fkd->fd", weights, deformed[other.facets[free]])
             normal = np.einsum("k,fkd->fd", weights, normals[other.local[free]])
-            away = deformed[block.facets][None] - foot[:, None, None]
-            crossed = away[..., 0] * normal[:, None, None, 1] - away[..., 1] * normal[:, None, None, 0]
+            crossed = _across(deformed[block.facets][None], foot[:, None], normal[:, None])
             facet, xi = _zeros(crossed.reshape(-1, block.facets.shape[1]))
             facets.append(facet % len(block.facets))
             places.append(xi)

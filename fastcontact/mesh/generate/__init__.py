@@ -15,6 +15,7 @@ from fastcontact.mesh.generate.forest import Forest
 from fastcontact.mesh.generate.half_planes import crowned_blocks, graded_block, punched_block
 from fastcontact.mesh.generate.half_spheres import half_spheres, quarter_disc
 from fastcontact.mesh.generate.quadratic import Circle, to_quadratic
+from fastcontact.mesh.generate.reference_points import with_reference_points
 from fastcontact.mesh.generate.refine import circles, linearised, refined
 from fastcontact.mesh.generate.rings import rings
 from fastcontact.mesh.generate.sphere import sphere_octant, sphere_on_block
@@ -39,7 +40,7 @@ __all__ = [
     "GENERATORS", "Circle", "Forest", "block", "block_on_block", "box", "circles", "crowned_blocks",
     "cut", "cylinder_on_block", "graded_block", "half_spheres", "linearised", "merge_points", "mirrored", "punched_block",
     "quarter_disc", "refined", "renamed", "rings", "sphere_octant", "sphere_on_block", "to_quadratic", "transformed",
-    "union",
+    "union", "with_reference_points",
 ]  # fmt: skip
 
 

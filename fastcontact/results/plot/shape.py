@@ -65,7 +65,7 @@ def deformed_shape(
     mirrored : bool
         In 2D, draw the other half beyond x = 0, too: the full section of an axisymmetric body.
     zoom : float, optional
-        In 2D, half the width of the part to draw, around the marked place [length].
+        In 2D, half the width of the part to draw, around the marked place [length]; FastcontactError in 3D.
     limits : (float, float), optional
         Values of the first and the last colour, in the unit of the field.
     title, units
@@ -74,8 +74,6 @@ def deformed_shape(
         In 3D, height of the eye over the x-y plane and its direction around z [degrees].
     ax : matplotlib Axes, optional
         In 3D with ``projection="3d"``.
-
-    Raises FastcontactError if there is no such field, or `zoom` is not positive or asked for in 3D.
     """
     if zoom is not None and (mesh.dim == 3 or not 0.0 < zoom < LARGEST):
         raise FastcontactError(f"zoom = {zoom:g}: in the plane half a width > 0 can be drawn; in 3D draw a section")
@@ -103,7 +101,7 @@ def _framed(axes: Any, drawn: Any, shown: Field, heading: str, units: Units, bel
     caption, dim = labelled(shown.caption, units, shown.quantity), shown.mesh.dim
     axes.figure.colorbar(drawn, ax=axes, label=caption, shrink=0.6 if dim == 3 else 0.8)
     axes.set_aspect("equal")
-    axes.set_title(heading, fontsize="medium")
+    axes.set_title(heading, fontsize="medium", pad=18 if dim == 3 else None)
     axes.set(**{f"{axis}label": labelled(axis, units, "length") for axis in "xyz"[:dim]})
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, below))
     return axes

@@ -114,7 +114,7 @@ def _draw(panel: Panel, ax: Any) -> None:
     if panel.y_scale == "linear":
         ax.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 7))
         low, high = ax.dataLim.intervaly
-        if high - low < 1e-6 * max(abs(low), abs(high)):  # round-off is no trend
+        if 0.0 <= high - low < 1e-6 * max(abs(low), abs(high)):  # round-off is no trend
             ax.set_ylim(sorted((0.9 * low, 1.1 * low)))
     if panel.x_end is not None:
         ax.set_xlim(panel.x_start, panel.x_end or None)

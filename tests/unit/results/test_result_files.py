@@ -464,6 +464,7 @@ KILLED = """
                 os.write(acknowledged, b".")
                 number += 1
         while os.fstat(acknowledged).st_size < 2 * trial:  # steps, whatever time they take
+            assert os.waitpid(child, os.WNOHANG) == (0, 0), "the writer ended by itself"
             time.sleep(0.001)
         time.sleep(0.02 * random.random())
         os.kill(child, signal.SIGKILL)

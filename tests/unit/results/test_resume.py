@@ -259,6 +259,31 @@ def test_another_case_is_refused_and_changes_nothing(name: str, path: Path) -> N
     assert os.listdir(path.parent) == [path.name]
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"formulation": "node_to_segment"}, "formulation='node_to_segment'"),
+        ({"formulation": "continuous"}, "formulation='continuous'"),
+        ({"formulation": "mortar"}, "formulation='mortar'"),
+        ({"formulation": "mortar", "multipliers": "standard"}, "formulation='mortar', multipliers='standard'"),
+    ],
+)
+def test_a_pair_that_named_no_formulation_is_told_which_one_it_had(options: dict, message: str, path: Path) -> None:
+    """Defaults change from version to version; the steps so far are those of another one."""
+    begun(path, (0.5,), formulated(**options))
+    told = rf"changed since: contact 'hertz'\. .* \(contact 'hertz' had {message}: name that\)"
+    with pytest.raises(ModelError, match=told):
+        resumed(path, fc.linear_ramp(2), formulated())
+    assert len(resumed(path, fc.linear_ramp(2), formulated(**options))) == 2
+
+
+def formulated(**options: str) -> fc.Model:
+    model = spheres()
+    model.contact.clear()
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2", friction=0.0, **options)
+    return model
+
+
 def test_other_options_that_change_the_answer_are_refused(path: Path) -> None:
     begun(path, (0.5,))
     with pytest.raises(ModelError, match="changed since: the option geometry_updates, the option keep_pairing"):

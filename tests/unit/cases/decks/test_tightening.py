@@ -1,7 +1,7 @@
 """Pretension sections of decks: a bar of two cubes, stretched by a force, then locked."""
 
 import pytest
-from deck_text import deck_of
+from deck_text import CONTACT, WHOLE, deck_of
 
 import fastcontact as fc
 
@@ -107,3 +107,14 @@ def test_a_shortening_in_the_place_of_a_force(tmp_path):
 def test_what_is_refused(tmp_path, text, said):
     with pytest.raises(fc.CaseError, match=said):
         deck_of(tmp_path, text)
+
+
+def test_what_a_tie_does_not_do_is_noted(tmp_path):
+    tie = "*Tie, name=glue, position tolerance=0.1, adjust=YES\nss, sm\n"
+    notes = "\n".join(deck_of(tmp_path, WHOLE.replace(CONTACT, tie)).notes)
+    assert "POSITION TOLERANCE=0.1: no effect, the surfaces are tied where they face each other" in notes
+    assert "ADJUST=YES: nodes are not moved" in notes
+    with pytest.raises(fc.CaseError, match="POSITION TOLERANCE=-1 is negative"):
+        deck_of(tmp_path, WHOLE.replace(CONTACT, tie.replace("0.1", "-1.")))
+    with pytest.raises(fc.CaseError, match="ADJUST=MAYBE is not supported"):
+        deck_of(tmp_path, WHOLE.replace(CONTACT, tie.replace("YES", "maybe")))

@@ -1,0 +1,254 @@
+"""What engineers ask of a contact: force, moment, area, centre of pressure, mean gap, work of friction, wear."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastcontact.contact.configuration import Configuration
+from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.pairing import Candidates, rows_along
+from fastcontact.contact.surface import Surface
+from fastcontact.errors import ContactError, unknown
+from fastcontact.mesh import elements
+from fastcontact.mesh.argument_types import typed
+from fastcontact.model.model import Model
+from fastcontact.results.step import ContactResult, StepResult
+
+Array = NDArray[np.float64]
+
+
+@typed(ContactError)
+def contact_moment(contact: ContactResult, about: ArrayLike | None = None) -> Array:
+    """Return the moment of the contact forces on the secondary side, of reference places.
+
+    Parameters
+    ----------
+    contact : ContactResult
+    about : array_like (dim,), optional
+        The place it is about, by default the middle of the contact [length].
+
+    Returns
+    -------
+    ndarray (1,) or (3,)
+        In the plane about z, in space about x, y and z [force times length]. In axisymmetry no moment is left over the
+        circle, and this one means nothing.
+    """
+    place = contact.middle if about is None else np.asarray(about, float)
+    if place.shape != (contact.coordinates.shape[1],) or not np.isfinite(place).all():
+        raise ContactError(f"the moment of contact '{contact.name}' about {about!r} needs a place of the space")
+    arm, force = contact.coordinates - place, contact.force_vectors
+    if arm.shape[1] == 2:
+        return np.array([float((arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]).sum())])
+    return np.asarray(np.cross(arm, force).sum(axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class ContactAnswers:
+    """What a contact pair does in one load step.
+
+    Attributes
+    ----------
+    force : ndarray (dim,)
+        On the secondary side [force].
+    moment : ndarray (1,) or (3,)
+        Of it about the middle of the contact, see `contact_moment`; zero in axisymmetry [force times length].
+    area : float
+        Reference area of the closed nodes, each with its share of its facets; in the plane a length times the unit of
+        thickness, in axisymmetry that of the full circle [length^2]. Off by less than a row of facets at the edge.
+    centre : ndarray (dim,)
+        Centre of pressure, of the normal forces of this model; NaN without any [length]. In axisymmetry its radius means
+        nothing.
+    mean_gap : float
+        Mean over the area that faces the other side [length]; NaN where none does.
+    pressure_mean, pressure_max : float
+        Normal force over area, and the largest nodal pressure [pressure].
+    dissipation, friction_work : float
+        Work of friction in this step, and of all steps so far [energy].
+    """
+
+    force: Array
+    moment: Array
+    area: float
+    centre: Array
+    mean_gap: float
+    pressure_mean: float
+    pressure_max: float
+    dissipation: float
+    friction_work: float
+
+
+@typed(ContactError)
+def contact_answers(model: Model, steps: Iterable[StepResult], name: str) -> list[ContactAnswers]:
+    """Return what a contact pair does in each of the load steps.
+
+    Parameters
+    ----------
+    model : Model
+    steps : iterable of StepResult
+        From the first one on, if the work of friction shall be all of it.
+    name : str
+        Of the contact pair.
+
+    ContactError if the model has no such pair.
+    """
+    pair = _bound(model, name)
+    areas, work, found = nodal_areas(pair.secondary, pair.points, pair.axisymmetric), 0.0, []
+    for step in steps:
+        contact = step.contact[name]
+        work += contact.dissipation
+        found.append(_answers(contact, areas, pair.axisymmetric, work))
+    return found
+
+
+def _answers(contact: ContactResult, areas: Array, axisymmetric: bool, work: float) -> ContactAnswers:
+    closed, facing = contact.active, np.isfinite(contact.gap)
+    normal = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
+    pushed = np.einsum("nd,nd->n", contact.force_vectors, normal)
+    total, area = float(pushed.sum()), float(areas[closed].sum())
+    pressed = bool(total > 0.0)
+    moment = contact_moment(contact)
+    return ContactAnswers(
+        force=contact.force,
+        moment=np.zeros_like(moment) if axisymmetric else moment,
+        area=area,
+        centre=pushed @ contact.coordinates / total if pressed else np.full(contact.coordinates.shape[1], np.nan),
+        mean_gap=float(areas[facing] @ contact.gap[facing] / areas[facing].sum()) if facing.any() else float("nan"),
+        pressure_mean=total / area if area else 0.0,
+        pressure_max=contact.pressure_max,
+        dissipation=contact.dissipation,
+        friction_work=work,
+    )
+
+
+@typed(ContactError)
+def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDArray[np.void]:
+    """Return `contact_answers` as a table, one row for each load step, for `write_csv` and pandas.
+
+    Returns
+    -------
+    structured ndarray (n_steps,)
+        ``step``, ``load_factor``; ``force_x`` ...; ``moment_z``, in space ``moment_x`` ...; ``area``; ``centre_x`` ...;
+        ``mean_gap``, ``pressure_mean``, ``pressure_max``, ``dissipation``, ``friction_work``.
+    """
+    answers = contact_answers(model, steps, name)
+    axes = "xyz"[: model.mesh.dim]
+    turns = "z" if model.mesh.dim == 2 else axes
+    rows = [
+        (step.index, step.load_factor, *own.force, *own.moment, own.area, *own.centre, own.mean_gap, own.pressure_mean,
+         own.pressure_max, own.dissipation, own.friction_work)
+        for step, own in zip(steps, answers, strict=True)
+    ]  # fmt: skip
+    names = [
+        "load_factor", *(f"force_{axis}" for axis in axes), *(f"moment_{axis}" for axis in turns), "area",
+        *(f"centre_{axis}" for axis in axes), "mean_gap", "pressure_mean", "pressure_max", "dissipation", "friction_work",
+    ]  # fmt: skip
+    return np.array(rows, [("step", int), *((column, float) for column in names)])
+
+
+@typed(ContactError)
+def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: float) -> Array:
+    """Return the depth of wear at the secondary nodes of a contact pair after Archard, added up over the load steps.
+
+    ``depth = sum of coefficient * pressure * slip``, with the mean of the pressures at both ends of a step. Slip is the
+    relative tangential displacement of a node and of what it faces at the end of the step; where friction holds nodes it is
+    zero. The geometry is not changed by it; given back as `clearance` it is, in another analysis.
+
+    Parameters
+    ----------
+    model : Model
+    steps : iterable of StepResult
+        One after the other from the first on.
+    name : str
+        Of the contact pair.
+    coefficient : float
+        Archard's, by hardness [1 / pressure].
+
+    Returns
+    -------
+    ndarray (n_steps, m)
+        At the end of each step, at the nodes ``step.contact[name].points`` [length].
+
+    Raises
+    ------
+    ContactError
+        If the model has no such pair, or the coefficient is negative.
+
+    Notes
+    -----
+    Archard, J. Appl. Phys. 24, 1953.
+    """
+    if not (np.isfinite(coefficient) and coefficient >= 0.0):
+        raise ContactError(f"the coefficient of wear {coefficient} must be a number, zero or more")
+    pair = _bound(model, name)
+    rubbing = bool(pair.friction)
+    depth, found = np.zeros(len(pair.secondary.points)), []
+    before: StepResult | None = None
+    for step in steps:
+        contact = step.contact[name]
+        pressure = contact.pressure + (0.0 if before is None else before.contact[name].pressure)
+        slip = np.linalg.norm(_slip(pair, before, step, name), axis=1)
+        if rubbing:
+            slip = np.where(contact.sticking, 0.0, slip)
+        depth = depth + coefficient * 0.5 * np.maximum(pressure, 0.0) * np.where(contact.active, slip, 0.0)
+        found.append(depth)
+        before = step
+    return np.array(found).reshape(len(found), len(depth))
+
+
+def _slip(pair: Formulation, before: StepResult | None, step: StepResult, name: str) -> Array:
+    """Return the slip (m, dim) of the secondary nodes in a step along what they face, else zero [length]."""
+    dim = step.displacement.shape[1]
+    start = np.zeros_like(step.displacement) if before is None else before.displacement
+    now, then = (
+        np.zeros(dim) if own is None or own.contact[name].obstacle_displacement is None
+        else np.asarray(own.contact[name].obstacle_displacement)
+        for own in (step, before)
+    )  # fmt: skip
+    nodes = Candidates(pair.secondary.points[:, None], np.ones((len(pair.secondary.points), 1)))
+    pairing = pair.facing(nodes, Configuration(step.displacement, start, now, then), pair.projection_tolerance or 0.0)
+    moved = (step.displacement - start).ravel()
+    slip = np.zeros((len(nodes.nodes), dim))
+    for axis, unit in enumerate(np.eye(dim)):
+        along = np.tile(unit, (len(slip), 1))
+        slip[:, axis] = rows_along(along, nodes, pairing, pair.primary, moved.size) @ moved
+    if isinstance(pair.primary, RigidSide):
+        slip -= now - then
+    slip -= np.einsum("nd,nd->n", slip, pairing.normal)[:, None] * pairing.normal
+    return np.where(pairing.paired[:, None], slip, 0.0)
+
+
+def nodal_areas(side: Surface, points: Array, axisymmetric: bool) -> Array:
+    """Return the share of each node (m,) of a surface in the area of its facets, positive for all elements [length^2].
+
+    By the squares of the shape functions, as for lumped masses (Hinton, Rock and Zienkiewicz, Earthq. Eng. Struct. Dyn. 4,
+    1976). `points` (n_points, dim) [length].
+    """
+    areas = np.zeros(len(side.points))
+    for block in side.blocks:
+        N, dN, weights = elements.get(block.element).tables
+        x = points[block.facets]
+        tangents = np.einsum("qnk,cnd->cqdk", dN, x)
+        if points.shape[1] == 2:
+            measure = np.linalg.norm(tangents[..., 0], axis=2)
+        else:
+            measure = np.linalg.norm(np.cross(tangents[..., 0], tangents[..., 1]), axis=2)
+        measure = measure * weights
+        if axisymmetric:
+            measure = measure * 2.0 * np.pi * np.einsum("qn,cn->cq", N, x[:, :, 0])
+        shares = measure @ N**2
+        shares *= (measure.sum(axis=1) / shares.sum(axis=1))[:, None]
+        np.add.at(areas, block.local, shares)
+    return areas
+
+
+def _bound(model: Model, name: str) -> Formulation:
+    """Return the formulation of a contact pair; ContactError if the model has none of that name."""
+    for pair in model.contact:
+        if pair.name == name:
+            return model.bind(pair)
+    raise ContactError(unknown("contact pair", name, [pair.name for pair in model.contact]))

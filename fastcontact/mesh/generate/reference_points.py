@@ -1,0 +1,56 @@
+"""Reference points: points of a mesh without cells, each with another one for its rotation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fastcontact.errors import MeshError
+from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.mesh import Mesh
+
+ROTATION = " rotation"
+
+
+@typed(MeshError)
+def with_reference_points(mesh: Mesh, places: Mapping[str, ArrayLike]) -> Mesh:
+    """Return the mesh with reference points, which `Model.add_coupling` relates to groups.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    places : mapping of str to array_like (dim,)
+        Where each stands, by name [length].
+
+    Returns
+    -------
+    Mesh
+        With groups of one point each: ``"<name>"``, and ``"<name> rotation"``, whose displacement is the rotation [radian],
+        in the plane its first component.
+
+    Raises
+    ------
+    MeshError
+        If a name is taken, or a place is no place of the space.
+
+    Examples
+    --------
+    >>> from fastcontact.mesh.generate import block
+    >>> mesh = with_reference_points(block(), {"HANDLE": (0.5, 3.0)})
+    >>> mesh.points[mesh.point("HANDLE")].tolist()
+    [0.5, 3.0]
+    """
+    points = [mesh.points]
+    groups: dict[str, list[int]] = {}
+    for name, place in places.items():
+        position = np.asarray(place, float)
+        if position.shape != (mesh.dim,) or not np.isfinite(position).all():
+            raise MeshError(f"the place {place!r} of reference point '{name}' must be {mesh.dim} numbers")
+        for own in (name, name + ROTATION):
+            if own in mesh.group_names:
+                raise MeshError(f"there is already a group '{own}': give the reference point another name")
+            groups[own] = [mesh.n_points + len(groups)]
+            points.append(position[None])
+    return mesh.replace(points=np.concatenate(points), point_groups={**mesh.point_groups, **groups})

@@ -1,0 +1,219 @@
+"""Couplings of a reference point with a group: rigid, all nodes follow it; distributing, it follows their mean motion.
+
+A reference point has no cells. Its rotation, for small angles, is the displacement of a second point at the same place
+[radian]: about x, y and z in space, about z as the first component in the plane.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from fastcontact.elasticity.loads import Load, Table, Traction
+from fastcontact.elasticity.relations import Relation
+from fastcontact.errors import MeshError, ModelError, unknown
+from fastcontact.mesh.generate.reference_points import ROTATION
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+Points = NDArray[np.intp]
+Term = tuple[int, int, float]  # point, component, coefficient
+KINDS = ("rigid", "distributing")
+
+
+@dataclass(frozen=True)
+class ReferencePoint:
+    """A reference point: its number, that of its rotation, and its position [length]."""
+
+    point: int
+    rotation: int
+    place: tuple[float, ...]
+
+
+def relation(name: str, rows: Sequence[Sequence[Term]], shape: tuple[int, int]) -> Relation:
+    """Return equations, lists of terms that sum to zero, as a relation of a mesh of `shape` (n_points, dim)."""
+    n_points, dim = shape
+    row = [i for i, terms in enumerate(rows) for _ in terms]
+    column = [point * dim + axis for terms in rows for point, axis, _ in terms]
+    values = [coefficient for terms in rows for _, _, coefficient in terms]
+    matrix = csr_array((values, (row, column)), shape=(len(rows), n_points * dim))
+    matrix.sum_duplicates()
+    matrix.eliminate_zeros()
+    return Relation(name, matrix)
+
+
+def _turn(dim: int, axis: int, arm: Array) -> list[tuple[int, float]]:
+    """Return the rotation components, with factors, that move the end of an arm (dim,) along an axis."""
+    if dim == 2:
+        return [(0, -arm[1] if axis == 0 else arm[0])]
+    after, last = (axis + 1) % 3, (axis + 2) % 3
+    return [(after, arm[last]), (last, -arm[after])]
+
+
+def rigid_rows(reference: ReferencePoint, points: Points, places: Array, axes: Sequence[int]) -> list[list[Term]]:
+    """Return the equations by which points follow the motion of a reference point with its rotation.
+
+    Parameters
+    ----------
+    reference : ReferencePoint
+    points : ndarray of int (n,)
+    places : ndarray (n, dim)
+        Their reference coordinates [length].
+    axes : sequence of int
+        Components of the displacement that follow.
+    """
+    dim, rows = places.shape[1], []
+    for point, arm in zip(points.tolist(), places - np.array(reference.place), strict=True):
+        for axis in axes:
+            turns = [(reference.rotation, k, -factor) for k, factor in _turn(dim, axis, arm) if factor]
+            rows.append([(point, axis, 1.0), (reference.point, axis, -1.0), *turns])
+    return rows
+
+
+def distributing_rows(reference: ReferencePoint, points: Points, places: Array, weight: Array) -> list[list[Term]]:
+    """Return the equations by which a reference point follows the mean motion of points.
+
+    The rotation is that of least squares, ``J theta = sum of w r x u`` with r from the middle of the points.
+
+    Parameters
+    ----------
+    reference : ReferencePoint
+    points : ndarray of int (n,)
+    places : ndarray (n, dim)
+        Their reference coordinates [length].
+    weight : ndarray (n,)
+        Whose sum is 1 [-].
+    """
+    dim = places.shape[1]
+    middle = weight @ places
+    turn = mean_rotation(weight, places - middle)
+    rows = []
+    for k in range(turn.shape[0]):
+        terms = [(int(p), axis, -float(turn[k, i, axis])) for i, p in enumerate(points) for axis in range(dim)]
+        rows.append([(reference.rotation, k, 1.0), *terms])
+    offset = np.array(reference.place) - middle
+    for axis in range(dim):
+        terms = [(int(p), axis, -float(w)) for p, w in zip(points, weight, strict=True)]
+        turns = [(reference.rotation, k, -f) for k, f in _turn(dim, axis, offset) if f]
+        rows.append([(reference.point, axis, 1.0), *terms, *turns])
+    return rows
+
+
+def mean_rotation(weight: Array, arms: Array) -> Array:
+    """Return how displacements of n points make the mean rotation (n_rotations, n, dim) [1 / length].
+
+    Of `weight` (n,) [-] and `arms` (n, dim) from their middle [length]. Its products with moments are forces at the points
+    that have this moment, and no resultant.
+    """
+    x, y = arms[:, 0], arms[:, 1]
+    zero = np.zeros_like(x)
+    if arms.shape[1] == 2:
+        cross = np.stack([np.column_stack([-y, x])])
+        inertia = np.array([[weight @ (x * x + y * y)]])
+    else:
+        z = arms[:, 2]
+        cross = np.stack(
+            [np.column_stack([zero, -z, y]), np.column_stack([z, zero, -x]), np.column_stack([-y, x, zero])]
+        )
+        inertia = (weight @ (arms**2).sum(axis=1)) * np.eye(3) - np.einsum("n,ni,nj->ij", weight, arms, arms)
+    if np.linalg.matrix_rank(inertia, tol=1e-12 * np.abs(inertia).max(initial=1e-300)) < len(inertia):
+        raise ModelError(
+            "the points lie in one line or place, so they have no mean rotation about it: take a wider group"
+        )
+    return np.einsum("kl,lnd,n->knd", np.linalg.inv(inertia), cross, weight)
+
+
+def weights_of(mesh: Mesh, kinematics: str, group: str) -> tuple[Points, Array]:
+    """Return the points (n,) of a group, and their shares (n,) of its area, equal ones where it has no facets [-]."""
+    points = mesh.points_of(group).astype(np.intp)
+    if group in mesh.cell_groups and mesh.cells_of(group, dim=mesh.dim - 1):
+        areas = Traction(group, {0: 1.0}, None).vector(mesh, kinematics)[points, 0]
+        return points, areas / areas.sum()
+    return points, np.full(len(points), 1.0 / max(len(points), 1))
+
+
+def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
+    """Return a reference point by the name of its group; ModelError if it is none."""
+    if name + ROTATION not in mesh.point_groups:
+        raise ModelError(
+            f"'{name}' is no reference point: make the model of fc.generate.with_reference_points(mesh, {{'{name}': (...)}})"
+        )
+    point = mesh.point(name)
+    return ReferencePoint(point, mesh.point(name + ROTATION), tuple(mesh.points[point].tolist()))
+
+
+def coupling(mesh: Mesh, kinematics: str, names: tuple[str, str], kind: str, axes: Sequence[int]) -> Relation:
+    """Return the relation of a coupling.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    kinematics : str
+    names : (str, str)
+        Reference point and group.
+    kind : {"rigid", "distributing"}
+    axes : sequence of int
+        Components that follow; all for a distributing one.
+
+    MeshError, ModelError if there are no such groups, or they cannot be coupled.
+    """
+    name = f"the coupling of '{names[0]}' with '{names[1]}'"
+    if kind not in KINDS:
+        raise ModelError(unknown("kind of coupling", kind, KINDS))
+    if kinematics == "axisymmetric":
+        raise ModelError(
+            f"{name}: in axisymmetry nothing can rotate; use couple('{names[1]}', 'y') to move a group as one"
+        )
+    if kind == "distributing" and len(axes) < mesh.dim:
+        raise ModelError(f"{name}: a distributing coupling has all components of the displacement")
+    reference = reference_of(mesh, names[0])
+    points, weight = weights_of(mesh, kinematics, names[1])
+    own = np.isin(points, (reference.point, reference.rotation))
+    if own.any() or not len(points):
+        raise ModelError(f"{name}: the group needs points, without the reference point itself")
+    places = mesh.points[points]
+    try:
+        rows = (
+            rigid_rows(reference, points, places, axes)
+            if kind == "rigid"
+            else distributing_rows(reference, points, places, weight)
+        )
+    except ModelError as error:
+        raise ModelError(f"{name}: {error}") from error
+    return relation(name, rows, mesh.points.shape)
+
+
+@dataclass(frozen=True)
+class Moment(Load):
+    """Components of a moment [force times length] by the axis they turn about, on a reference point or over a group."""
+
+    KIND = "the moment"
+    CONSTANT = True
+    group: str
+    components: Mapping[int, float]
+    ramp: Table | None = None
+
+    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+        if kinematics == "axisymmetric":
+            raise ModelError(f"{self.name}: no moment can act on an axisymmetric model, over the circle it is zero")
+        if not len(mesh.points_of(self.group)):
+            raise MeshError(f"{self.name}: the group is empty")
+
+    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
+        moment = np.zeros(1 if mesh.dim == 2 else 3)
+        for axis, value in self.components.items():
+            moment[0 if mesh.dim == 2 else axis] = value
+        if self.group + ROTATION in mesh.point_groups:
+            forces[mesh.point(self.group + ROTATION), : len(moment)] += moment
+            return
+        points, weight = weights_of(mesh, kinematics, self.group)
+        places = mesh.points[points]
+        try:
+            turn = mean_rotation(weight, places - weight @ places)
+        except ModelError as error:
+            raise ModelError(f"{self.name}: {error}") from error
+        forces[points] += np.einsum("k,knd->nd", moment, turn)

@@ -1,0 +1,189 @@
+"""Force, moment, area, centre, mean gap, work of friction and wear of contacts that are known exactly."""
+
+import json
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.cli._main import main
+
+E, HEIGHT = 1000.0, 2.0
+ELEMENTS = ("tri3", "quad4", "tri6", "quad8")
+
+
+def column(element="quad4", divisions=(4, 2), tilt=0.0, kinematics="plane_stress", **options):
+    """Return a block of width 2 on a rigid plane; nu = 0, so that each column of it is a spring."""
+    mesh = fc.generate.block((2.0, HEIGHT), divisions, element)
+    model = fc.Model(mesh, kinematics)
+    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model.add_obstacle(
+        "plane", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0)),
+        formulation="continuous", **options,
+    )  # fmt: skip
+    return model
+
+
+def pressed(model, push, **ramps):
+    model.prescribe("TOP", y=-push, **ramps)
+
+
+@pytest.mark.parametrize("kinematics", ["plane_stress", "plane_strain", "axisymmetric"])
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_a_uniform_pressure(element, kinematics):
+    model = column(element, kinematics=kinematics)
+    pressed(model, 0.01)
+    model.fix("TOP", "x")
+    steps = fc.solve(model, 2)
+    first, last = fc.contact_answers(model, steps, "plane")
+    area = 4.0 * np.pi if kinematics == "axisymmetric" else 2.0
+    assert last.area == pytest.approx(area, rel=1e-12)
+    assert last.force == pytest.approx([0.0, E * 0.01 / HEIGHT * area], rel=1e-9, abs=1e-9)
+    assert last.pressure_mean == pytest.approx(5.0, rel=1e-9)
+    assert last.pressure_mean == pytest.approx(2.0 * first.pressure_mean, rel=1e-9)
+    assert last.moment == pytest.approx(0.0, abs=1e-9)
+    assert last.mean_gap == pytest.approx(0.0, abs=1e-12)
+    if kinematics != "axisymmetric":
+        assert last.centre == pytest.approx([1.0, 0.0], abs=1e-9)
+
+
+def test_a_punch_off_the_middle_has_a_moment():
+    """A rigid plane pressed by a force at a distance of 0.2 from the middle: centre and moment by statics."""
+    model = column("quad8", (8, 4))
+    model.fix("BOTTOM_LEFT", "x")
+    model.add_traction("TOP", y=lambda x: -(1.0 + 0.6 * (x[:, 0] - 1.0)))  # moment about the middle 0.6 * 2 / 3
+    (step,) = fc.solve(model, 1)
+    (found,) = fc.contact_answers(model, [step], "plane")
+    assert found.force[1] == pytest.approx(2.0, rel=1e-9)
+    assert fc.contact_moment(step.contact["plane"], (1.0, 0.0)) == pytest.approx([0.4], rel=1e-8)
+    assert found.centre[0] == pytest.approx(1.2, rel=1e-9)
+    assert found.moment == pytest.approx([2.0 * (1.2 - step.contact["plane"].middle[0])], rel=1e-8)
+
+
+def test_in_space_the_moment_has_three_components():
+    mesh = fc.generate.box((2.0, 2.0, 1.0), (4, 4, 2))
+    model = fc.Model(mesh, "3d")
+    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model.add_obstacle("plane", secondary="ZMIN", obstacle=fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
+    corners = [int(np.flatnonzero((mesh.points == place).all(axis=1))[0]) for place in ([0, 0, 0], [2, 0, 0])]
+    model.mesh = mesh.with_groups(points={"ONE": corners[:1], "BOTH": corners})
+    model.fix("ONE", "x")
+    model.fix("BOTH", "y")
+    model.add_traction("ZMAX", z=lambda x: -(1.0 + 0.3 * (x[:, 0] - 1.0) - 0.6 * (x[:, 1] - 1.0)))
+    (step,) = fc.solve(model, 1)
+    (found,) = fc.contact_answers(model, [step], "plane")
+    assert found.area == pytest.approx(4.0, rel=1e-9)
+    assert found.force == pytest.approx([0.0, 0.0, 4.0], abs=1e-9)
+    assert fc.contact_moment(step.contact["plane"], (1.0, 1.0, 0.0)) == pytest.approx([-0.8, -0.4, 0.0], abs=1e-9)
+    assert found.centre[:2] == pytest.approx([1.1, 0.8], rel=1e-9)
+
+
+def test_the_area_of_hertz_lies_between_the_brackets_of_the_radius():
+    case = fc.Model(fc.generate.half_spheres(size=2.0), kinematics="axisymmetric")
+    case.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    case.fix("A1A2", "x")
+    case.prescribe("A2B2", y=-2.0)
+    case.prescribe("A1B1", y=2.0)
+    case.add_contact("hertz", secondary="CONT1", primary="CONT2")
+    steps = fc.solve(case, 4)
+    for step, found in zip(steps, fc.contact_answers(case, steps, "hertz"), strict=True):
+        low, high = step.contact["hertz"].radius
+        assert np.pi * low**2 < found.area < np.pi * high**2 * 1.02
+        assert found.moment == pytest.approx(0.0)
+
+
+WEAR = 1e-6
+RAMP_DOWN, RAMP_ALONG = [(0.0, 0.0), (1.0, 1.0), (9.0, 1.0)], [(0.0, 0.0), (1.0, 0.0), (9.0, 1.0)]
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+@pytest.mark.parametrize("steps", [1, 5])
+def test_a_block_that_slides_wears_by_pressure_times_way(element, steps):
+    """Without friction the whole block moves by 0.3 under 5 [pressure]: k p s at every node."""
+    model = column(element)
+    pressed(model, 0.01, ramp=RAMP_DOWN)
+    model.prescribe("TOP", x=0.3, ramp=RAMP_ALONG)
+    found = fc.solve(model, [1.0, *np.linspace(1.0, 9.0, steps + 1)[1:]])
+    depth = fc.wear(model, found, "plane", WEAR)
+    assert depth.shape == (steps + 1, len(model.mesh.points_of("BOTTOM")))
+    assert depth[0] == pytest.approx(0.0, abs=1e-18)
+    assert depth[-1] == pytest.approx(WEAR * 5.0 * 0.3, rel=1e-8)
+    assert (np.diff(depth, axis=0) >= 0.0).all()
+
+
+def test_wear_of_two_bodies_and_of_an_obstacle_that_moves():
+    """The same way, whichever of the two moves."""
+    low = fc.generate.block((4.0, HEIGHT), (8, 2), origin=(-1.0, -HEIGHT), name="LOW")
+    low = fc.generate.renamed(low, lambda g: g if g == "LOW" else f"LOW {g}")
+    model = fc.Model(fc.generate.union(low, fc.generate.block((2.0, HEIGHT), (4, 2))), "plane_stress")
+    model.add_material(fc.LinearElastic(E=E, nu=0.0), "BLOCK")
+    model.add_material(fc.LinearElastic(E=1e4 * E, nu=0.0), "LOW")
+    model.fix("LOW BOTTOM", "y")
+    model.prescribe("LOW BOTTOM", x=-0.3, ramp=RAMP_ALONG)
+    pressed(model, 0.01, ramp=RAMP_DOWN)
+    model.fix("TOP", "x")
+    model.add_contact("plane", secondary="BOTTOM", primary="LOW TOP")
+    found = fc.solve(model, [1.0, 5.0, 9.0])
+    assert fc.wear(model, found, "plane", WEAR)[-1] == pytest.approx(WEAR * 5.0 * 0.3, rel=1e-3)
+    moved = column()
+    moved.contact.clear()
+    moved.add_obstacle(
+        "plane", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0)), motion={"x": -0.3},
+        ramp=RAMP_ALONG,
+    )  # fmt: skip
+    pressed(moved, 0.01, ramp=RAMP_DOWN)
+    moved.fix("TOP", "x")
+    steps = fc.solve(moved, [1.0, 5.0, 9.0])
+    assert fc.wear(moved, steps, "plane", WEAR)[-1] == pytest.approx(WEAR * 5.0 * 0.3, rel=1e-8)
+
+
+@pytest.mark.parametrize("element", ["quad4", "quad8"])
+def test_with_friction_the_volume_of_wear_is_the_work_over_the_coefficient(element):
+    """``sum of areas times depth = k W / mu``: pressure times slip is all that both know of."""
+    mu = 0.2
+    model = column(element, (8, 4), friction=mu)
+    pressed(model, 0.01, ramp=RAMP_DOWN)
+    model.prescribe("TOP", x=0.05, ramp=RAMP_ALONG)
+    steps = fc.solve(model, [1.0, 3.0, 5.0, 7.0, 9.0])
+    depth = fc.wear(model, steps, "plane", WEAR)
+    answers = fc.contact_answers(model, steps, "plane")
+    assert answers[-1].friction_work == pytest.approx(sum(a.dissipation for a in answers))
+    contact = steps[-1].contact["plane"]
+    assert contact.active.sum() > 6
+    assert not contact.sticking.any()
+    mean = np.trapezoid(depth[-1][np.argsort(contact.coordinates[:, 0])], np.sort(contact.coordinates[:, 0]))
+    assert mean == pytest.approx(WEAR * answers[-1].friction_work / mu, rel=0.05)
+
+
+def test_history_is_a_table_and_the_summary_tells(tmp_path, root):
+    model = column()
+    pressed(model, 0.01)
+    model.fix("TOP", "x")
+    table = fc.contact_history(model, fc.solve(model, 3), "plane")
+    assert table.dtype.names[:5] == ("step", "load_factor", "force_x", "force_y", "moment_z")
+    assert table["force_y"] == pytest.approx(np.array([1, 2, 3]) / 3 * 10.0)
+    fc.write_csv(tmp_path / "history.csv", table)
+    case, out, summary = (
+        str(path) for path in (root / "data/cases/forma04c.toml", tmp_path / "a.vtkhdf", tmp_path / "a.json")
+    )
+    assert main(["run", case, "-o", out, "--json", summary, "-q"]) == 0
+    contact = json.loads((tmp_path / "a.json").read_text())["contact"]["hertz"]
+    low, high = contact["radius"]
+    assert np.pi * low**2 < contact["area"] < 1.1 * np.pi * high**2
+    assert contact["friction_work"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda m, s: fc.contact_answers(m, s, "plan"), "unknown contact pair 'plan': did you mean 'plane'"),
+        (lambda m, s: fc.wear(m, s, "plane", -1.0), "coefficient of wear -1.0 must be"),
+        (lambda m, s: fc.contact_moment(s[0].contact["plane"], (0.0, 0.0, 0.0)), "needs a place of the space"),
+    ],
+)
+def test_what_is_refused(call, said):
+    model = column(divisions=(1, 1))
+    pressed(model, 0.01)
+    model.fix("TOP", "x")
+    with pytest.raises(fc.ContactError, match=said):
+        call(model, fc.solve(model, 1))
