@@ -119,7 +119,7 @@ def _start(seed: int, folder: Path, place: Path) -> subprocess.Popen:
     ]
     process = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=place,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"},
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "TMPDIR": str(place)},
     )  # fmt: skip
     if "ready" not in (_answer(process) or {}):
         raise RuntimeError(f"the worker does not start: {' '.join(command)}")

@@ -21,8 +21,8 @@ import fastcontact
 
 MEMORY = 1 << 30  # bytes more than before a file is read
 SECONDS = int(os.environ.get("FUZZ_SECONDS", 10))  # of CPU time, a file
-# Files that are read in this process; those of other formats are read in one of their own.
-OF_THIS_PROCESS = (".med", ".rmed", ".vtkhdf", ".toml", ".deck")
+# Files that are read in this process, and one of those that are read in a process of their own.
+FIRST_READ = (".med", ".rmed", ".vtkhdf", ".toml", ".deck", ".inp")
 _OPENED = 0x20 | 0x2 | 0x100 | 0x200  # IN_OPEN, IN_MODIFY, IN_CREATE, IN_DELETE
 
 
@@ -93,7 +93,7 @@ def main() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     seeds = {name: seeds_folder / file for name, file in json.loads((seeds_folder / "seeds.json").read_text()).items()}
     warnings.simplefilter("ignore")
-    for path in {path.suffix: path for path in seeds.values() if path.suffix in OF_THIS_PROCESS}.values():
+    for path in {path.suffix: path for path in seeds.values() if path.suffix in FIRST_READ}.values():
         fuzz_readers.outcome(path)  # what it imports and compiles is no matter of a damaged file
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     hard = resource.getrlimit(resource.RLIMIT_CPU)[1]

@@ -13,6 +13,8 @@ VERSION_1 = b"$NOD"
 VERSION_4, VERSION_4_0 = b"4", b"4.0"
 # In a line of $Entities: the number of physical groups, behind the number of the entity and its box.
 GROUPS_OF_ENTITY = 7
+# Of a cell, more than the largest has.
+MOST_WORDS = 200
 
 
 def readable(path: Path, folder: Path) -> Path:
@@ -38,7 +40,7 @@ def _check_groups(path: Path) -> None:
     for line in path.read_text(encoding="ascii", errors="replace").splitlines():
         if line.startswith("$"):
             inside = line.strip() == "$Entities"
-        words = line.split()
+        words = line.split(None, GROUPS_OF_ENTITY + 1)  # one line may be the whole file
         if inside and len(words) > GROUPS_OF_ENTITY and words[GROUPS_OF_ENTITY] not in ("0", "1"):
             raise FileError(
                 f"'{path}' is of version 4.0, with cells in several physical groups, of which one would be read: open it in "
@@ -57,7 +59,7 @@ def _write_version_2(path: Path, target: Path) -> None:
         file.writelines(f"{line}\n" for line in _section(path, lines, "NOD"))
         file.write("$EndNodes\n$Elements\n")
         for number, line in enumerate(_section(path, lines, "ELM")):
-            words = line.split()
+            words = line.split(None, MOST_WORDS)
             if number and (len(words) < 6 or not words[4].isdigit() or len(words) != 5 + int(words[4])):
                 raise FileError(f"'{path}': the line of its cell {number} is damaged: '{line[:60]}'")
             file.write(" ".join([*words[:2], "2", *words[2:4], *words[5:]] if number else words) + "\n")

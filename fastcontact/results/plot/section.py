@@ -76,7 +76,7 @@ def section(
     flat, values = place @ basis.T - (0.0 if labels else at @ basis.T), triangles[..., 6]
     axes = new_axes(ax, (6.4, 5.6))
     drawn = _fill(axes, flat, values, shown)
-    strokes = (lines[..., :3] + scale * lines[..., 3:6]) @ basis.T - (0.0 if labels else at @ basis.T)
+    strokes = scaled(lines[..., :3], scale, lines[..., 3:6]) @ basis.T - (0.0 if labels else at @ basis.T)
     if edges if edges is not None else len(strokes) <= 4 * MOST_EDGES:
         _stroke(axes, strokes)
     best = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)

@@ -75,7 +75,7 @@ def deformed_shape(
     ax : matplotlib Axes, optional
         In 3D with ``projection="3d"``.
     """
-    if zoom is not None and (mesh.dim == 3 or zoom <= 0.0):
+    if zoom is not None and (mesh.dim == 3 or not 0.0 < zoom < LARGEST):
         raise FastcontactError(f"zoom = {zoom:g}: in the plane half a width > 0 can be drawn; in 3D draw a section")
     shown = field_of(mesh, step, field)
     place = scaled(shown.mesh.points, scale, step.displacement[shown.node])
