@@ -8,8 +8,8 @@ more on smooth quadratic facets in the plane, but each of their gaps involves th
 closed one costs a linear solution.
 
 Against rigid obstacles it is the continuous one, which also knows what lies between nodes, but node against obstacle on
-linear triangles and tetrahedra: these cannot meet all conditions of the continuous formulation, and its pressures oscillate
-by up to 40 %.
+linear triangles and on linear facets in space. Triangles and tetrahedra cannot meet all conditions of the continuous
+formulation, and its pressures oscillate by up to 40 %; in space each of its integration points costs a linear solution.
 """
 
 from __future__ import annotations
@@ -35,12 +35,13 @@ def default_formulation(dim: int, options: Mapping[str, Any]) -> tuple[str, dict
     return "mortar", {**options, "multipliers": "dual"}, why
 
 
-def against_obstacle(of_simplices: bool, options: Mapping[str, Any]) -> tuple[str, str]:
+def against_obstacle(dim: int, linear: bool, of_triangles: bool, options: Mapping[str, Any]) -> tuple[str, str]:
     """Return the name of the formulation of a side against a rigid obstacle, and why, as the end of a sentence.
 
-    Whether the side is one of linear triangles or tetrahedra alone says `of_simplices`; `options` are those that the user
-    gave.
+    Whether all facets are `linear` and, in 2 dimensions, `of_triangles` alone; `options` are those that the user gave.
     """
-    if of_simplices and "integration" not in options:
+    if linear and of_triangles and "integration" not in options:
         return "node_to_segment", "the pressures of the continuous one oscillate on linear triangles and tetrahedra"
+    if linear and dim == 3 and "integration" not in options:
+        return "node_to_segment", "the continuous one costs many times as much in space"
     return "continuous", "it also knows what lies between nodes"

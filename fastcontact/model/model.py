@@ -793,8 +793,8 @@ class Model:
         ramp : Ramp or iterable of (float, float), optional
             History of motion and force.
         formulation : str, optional
-            ``"node_to_segment"`` (then: node against obstacle), by default on linear triangles and tetrahedra, or
-            ``"continuous"``, on all other elements.
+            ``"node_to_segment"`` (then: node against obstacle), by default on linear triangles and on linear facets in
+            space, or ``"continuous"``, by default on all others.
         **options
             Fields of the formulation.
         """
@@ -807,20 +807,19 @@ class Model:
         obstacle.distance(self.mesh.points[:1])  # what does not fit this dimension shows at once
         history = table_of(ramp, f"the ramp of the motion of obstacle '{name}'")
         if formulation is None:
-            formulation, reason = against_obstacle(self._is_of_simplices(secondary), options)
+            formulation, reason = against_obstacle(self.mesh.dim, *self._facet_kinds(secondary), options)
             log.info("contact '%s': %s, since %s", name, method(formulation, options), reason)
         driving = self._driving(name, moves, force)
         self._add_pair(ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving))
 
-    def _is_of_simplices(self, group: str) -> bool:
-        """Return whether linear triangles or tetrahedra alone have the facets of a group; no, if there is no such group."""
-        if group not in self.mesh.cell_groups:
-            return False
-        solids, facets = self.mesh.solids, self.mesh.cells_of(group, self.mesh.dim - 1)
-        theirs = [
-            np.isin(self.mesh.points_of(group), solids[name]).all() for name in ("tri3", "tet4") if name in solids
-        ]
-        return bool(facets) and any(theirs) and all(elements.get(name).linear == name for name in facets)
+    def _facet_kinds(self, group: str) -> tuple[bool, bool]:
+        """Return whether all facets of a group are linear, and whether triangles or tetrahedra alone have them."""
+        facets = self.mesh.cells_of(group, self.mesh.dim - 1) if group in self.mesh.cell_groups else {}
+        if not facets:  # which `check` tells
+            return False, False
+        simplices = [block for name, block in self.mesh.solids.items() if name in ("tri3", "tet4")]
+        theirs = any(np.isin(self.mesh.points_of(group), block).all() for block in simplices)
+        return all(elements.get(name).linear == name for name in facets), theirs
 
     def _driving(self, name: str, moves: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
         """Return the force on obstacle `name` by component, None for prescribed ones; empty without any."""

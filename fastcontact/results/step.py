@@ -153,7 +153,7 @@ class ContactResult:
     @property
     def measured_from_axis(self) -> bool:
         """Whether places are radii, in axisymmetry, rather than lengths along a surface or distances in space."""
-        flat = self.coordinates.shape[1] == 2
+        flat = self.coordinates.shape[1] == 2 and self.tangent is None  # plane problems have one, but for rings
         return flat and bool(self.middle[0] == 0.0) and bool(np.array_equal(self.place, np.abs(self.coordinates[:, 0])))
 
     @property
