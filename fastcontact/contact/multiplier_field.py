@@ -12,7 +12,11 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import SuperLU
 
+from fastcontact.errors import ContactError
+
 Array = NDArray[np.float64]
+# Closed integration points up to which the dense equations of the continuous formulation are solved, in about a minute.
+MOST_POINTS = 10_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +41,13 @@ class Projection:
     mass: SuperLU | None
 
     def block(self, rows: NDArray[np.intp]) -> Array:
-        """Return rows and columns `rows` of C."""
+        """Return rows and columns `rows` of C, a dense matrix; ContactError where it would be too large to be of use."""
+        if len(rows) > MOST_POINTS:
+            raise ContactError(
+                f"the continuous formulation closes {len(rows)} integration points at once, whose compliance would be a dense "
+                f"matrix of {8e-9 * len(rows) ** 2:.1f} GB: use formulation='node_to_segment' (on cells with quadratic facets: "
+                "hex27 or linear ones) or, between bodies, 'mortar'"
+            )
         if self.mass is None:
             return np.zeros((len(rows), len(rows)))
         areas = self.areas[rows]

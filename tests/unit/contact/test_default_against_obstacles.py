@@ -3,6 +3,7 @@
 import pytest
 
 import fastcontact as fc
+from fastcontact.contact import multiplier_field
 from fastcontact.mesh import elements
 
 CHOICES = {
@@ -45,3 +46,11 @@ def test_triangles_under_a_ball_have_no_oscillating_pressure():
     assert step.contact["ball"].pressure_max == pytest.approx(6957.0, rel=0.08)
     (step,) = fc.solve(pressed("tri3", formulation="continuous"), fc.linear_ramp(1))
     assert step.contact["ball"].pressure_max > 1.3 * 6957.0
+
+
+def test_a_dense_matrix_too_large_to_be_of_use_is_refused(monkeypatch):
+    monkeypatch.setattr(multiplier_field, "MOST_POINTS", 20)
+    with pytest.raises(
+        fc.ContactError, match=r"closes \d+ integration points at once.*use formulation='node_to_segment'"
+    ):
+        fc.solve(pressed("hex20"), fc.linear_ramp(1))
