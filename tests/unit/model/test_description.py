@@ -59,7 +59,7 @@ def test_axis_obstacle_and_kinds():
     told = model.describe()
     assert "points on the axis, by symmetry" in told
     assert "mortar with dual multipliers, tied" in told
-    assert "on a rigid obstacle, node-to-segment, without friction" in told
+    assert "on a rigid obstacle, node_to_segment, without friction" in told
 
 
 def test_a_number_of_steps_solves_so_many():
