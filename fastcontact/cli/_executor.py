@@ -5,6 +5,7 @@ from __future__ import annotations
 import _thread
 import contextlib
 import os
+import signal
 import threading
 from collections.abc import Iterator
 from typing import Any
@@ -76,10 +77,19 @@ def _failing_threads_interrupt() -> Iterator[list[BaseException]]:
     def failed(arguments: threading.ExceptHookArgs) -> None:
         if arguments.exc_value is not None:
             failures.append(arguments.exc_value)
-        _thread.interrupt_main()
+        _interrupt_main()
 
     threading.excepthook = failed
     try:
         yield failures
     finally:
         threading.excepthook = before
+
+
+def _interrupt_main() -> None:
+    """Raise KeyboardInterrupt in the main thread, also while it waits for a lock, from which a signal alone wakes it."""
+    main = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and main is not None:
+        signal.pthread_kill(main, signal.SIGINT)
+    else:
+        _thread.interrupt_main()

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import threading
+import time
 from concurrent.futures import Future, ThreadPoolExecutor
 from types import SimpleNamespace
 
@@ -128,7 +129,7 @@ def test_without_mpiexec_a_study_ends(case, tmp_path, mpiexec):
 class LosingPool(ThreadPoolExecutor):
     """Like the pool of mpi4py when a process is lost: answers so often, then the thread that waits for answers fails."""
 
-    answers = 2
+    answers, delay = 2, 0.0
 
     def submit(self, *task):
         LosingPool.answers -= 1
@@ -138,12 +139,15 @@ class LosingPool(ThreadPoolExecutor):
         return Future()
 
     def _fail(self):
+        time.sleep(LosingPool.delay)
         raise RuntimeError("MPI_ERR_PROC_FAILED: process\nfailure")
 
 
-@pytest.mark.parametrize("answers", [0, 1, 3])
-def test_a_process_that_is_lost_while_the_launcher_goes_on(case, monkeypatch, capsys, answers):
+@pytest.mark.parametrize(("answers", "delay"), [(0, 0.0), (1, 0.0), (3, 0.0), (0, 0.5), (3, 0.5)])
+def test_a_process_that_is_lost_while_the_launcher_goes_on(case, monkeypatch, capsys, answers, delay):
+    """Before the study waits for an answer, and while it does."""
     monkeypatch.setattr(LosingPool, "answers", answers)
+    monkeypatch.setattr(LosingPool, "delay", delay)
     futures = SimpleNamespace(MPIPoolExecutor=LosingPool)
     monkeypatch.setitem(sys.modules, "mpi4py", SimpleNamespace(futures=futures))
     monkeypatch.setitem(sys.modules, "mpi4py.futures", futures)
