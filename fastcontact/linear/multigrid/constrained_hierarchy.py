@@ -26,6 +26,10 @@ from fastcontact.linear.springs import Springs
 Array = NDArray[np.float64]
 Values = NDArray[Any]
 Nodes = NDArray[np.intp]
+# By how much equations may stiffen a node, beside its own stiffness, before the finest spectrum is estimated again.
+STIFFENED = 2.0
+# Largest eigenvalue of the finest level, beside its diagonal, from which it counts as wide; 3 to 4 on well-shaped hexahedra.
+WIDE = 6.0
 
 
 class ConstrainedHierarchy:
@@ -63,9 +67,11 @@ class ConstrainedHierarchy:
         if springs is not None:
             added = SpringChange(springs.under(elimination.pivots, elimination.weights), len(self.A.rows))
         self._change_levels(elimination, added)
-        # Equations raise the spectrum of coarser levels, and that of the finest where pivots follow soft bodies or several
-        # times over.
-        self.hierarchy.set_bounds(range(len(self.hierarchy.levels) - 1))
+        # Equations raise the spectrum of coarser levels, and that of the finest where they or springs stiffen its nodes, or
+        # where it is wide already: on flat and on nearly incompressible cells.
+        self.hierarchy.set_bounds()
+        finest = added is not None or self.stiffening > STIFFENED or self.hierarchy.bounds[0] > WIDE
+        self.hierarchy.set_bounds(range(0 if finest else 1, len(self.hierarchy.levels) - 1))
 
     def _change_levels(self, elimination: Elimination, added: SpringChange | None) -> None:
         top = self.hierarchy.levels[0]
