@@ -9,7 +9,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
@@ -191,7 +191,8 @@ def on_executor(executor: Executor, jobs: Sequence[Job], rest: list[int]) -> Ite
     """Run on any executor and yield number and result of each job as it ends; cancel the others if one raises."""
     futures: dict[Future[Result], int] = {}
     try:
-        with _worker_settings():
+        # Threads read the environment of this process, which must not change under what they compile.
+        with contextlib.nullcontext() if isinstance(executor, ThreadPoolExecutor) else _worker_settings():
             # The largest first, so that none keeps the others waiting at the end.
             for index in sorted(rest, key=lambda index: -jobs[index].size):
                 futures[executor.submit(run, jobs[index], 1)] = index

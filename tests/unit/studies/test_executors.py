@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import pytest
 
 from fastcontact.cli import main
+from fastcontact.studies import execute
 from fastcontact.studies.sweep import parameter_sweep
 
 APPROACHES = (0.4, 1.0, 4.0)
@@ -159,3 +160,15 @@ def test_a_process_that_is_lost_while_the_launcher_goes_on(case, monkeypatch, ca
         "-n N python -m mpi4py.futures -m fastcontact ...'\n"
     )
     assert threading.excepthook is hook
+
+
+def test_threads_keep_the_environment_of_the_process(case, monkeypatch):
+    """What is compiled meanwhile reads it: one thread there would be one for the rest of the process."""
+    seen = []
+    monkeypatch.setattr(
+        "fastcontact.studies.execute.run", lambda job, threads: seen.append(dict(os.environ)) or {"error": ""}
+    )
+    before = dict(os.environ)
+    with ThreadPoolExecutor(1) as pool:
+        assert list(execute.on_executor(pool, [SimpleNamespace(size=1)], [0])) == [(0, {"error": ""})]
+    assert seen == [before]
