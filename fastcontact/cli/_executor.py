@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import _thread
 import contextlib
 import os
 import signal
@@ -10,6 +9,7 @@ import threading
 from collections.abc import Iterator
 from typing import Any
 
+from fastcontact.cli._interrupts import to_main_thread
 from fastcontact.errors import CaseError
 
 MPI_COMMAND = "mpiexec -n N python -m mpi4py.futures -m fastcontact ..."
@@ -77,19 +77,10 @@ def _failing_threads_interrupt() -> Iterator[list[BaseException]]:
     def failed(arguments: threading.ExceptHookArgs) -> None:
         if arguments.exc_value is not None:
             failures.append(arguments.exc_value)
-        _interrupt_main()
+        to_main_thread(signal.SIGINT)
 
     threading.excepthook = failed
     try:
         yield failures
     finally:
         threading.excepthook = before
-
-
-def _interrupt_main() -> None:
-    """Raise KeyboardInterrupt in the main thread, also while it waits for a lock, from which a signal alone wakes it."""
-    main = threading.main_thread().ident
-    if hasattr(signal, "pthread_kill") and main is not None:
-        signal.pthread_kill(main, signal.SIGINT)
-    else:
-        _thread.interrupt_main()

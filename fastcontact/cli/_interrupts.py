@@ -66,8 +66,17 @@ def _lost_ones_come_again() -> Iterator[None]:
         sys.unraisablehook = before
 
 
+def to_main_thread(number: int) -> None:
+    """Send a signal to the main thread, which wakes it also where it waits for a lock."""
+    main = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and main is not None:
+        signal.pthread_kill(main, number)
+    else:
+        signal.raise_signal(number)
+
+
 def _again(number: int) -> None:
-    timer = threading.Timer(AGAIN, signal.raise_signal, (number,))
+    timer = threading.Timer(AGAIN, to_main_thread, (number,))
     timer.daemon = True
     timer.start()
 

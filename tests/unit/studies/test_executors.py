@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import threading
@@ -152,9 +153,12 @@ def test_a_process_that_is_lost_while_the_launcher_goes_on(case, monkeypatch, ca
     futures = SimpleNamespace(MPIPoolExecutor=LosingPool)
     monkeypatch.setitem(sys.modules, "mpi4py", SimpleNamespace(futures=futures))
     monkeypatch.setitem(sys.modules, "mpi4py.futures", futures)
-    hook = threading.excepthook
+    hook, handler = threading.excepthook, signal.signal(signal.SIGINT, signal.default_int_handler)
     command = ["sweep", str(case), "--set", "approach=1,2,3,4", "--level", "0", "--executor", "mpi"]
-    assert main(command) == 1
+    try:
+        assert main(command) == 1
+    finally:
+        signal.signal(signal.SIGINT, handler)
     assert capsys.readouterr().err == (
         "error: --executor mpi has no processes, or lost one (MPI_ERR_PROC_FAILED: process failure): start with 'mpiexec "
         "-n N python -m mpi4py.futures -m fastcontact ...'\n"
