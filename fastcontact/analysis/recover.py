@@ -54,7 +54,7 @@ def recover(
         mesh,
         problem.model.kinematics,
         problem.field.moduli,
-        problem.field.rows,
+        problem.field.loops,
         u,
         problem.field.treatment,
         problem.sides,
