@@ -170,7 +170,6 @@ class Material:
             dataclasses.replace(self, **one)  # type: ignore[type-var]
         except ModelError as error:
             raise ModelError(f"{where}: {error}") from None
-        raise ModelError(f"{where}: no strain may cost less than no energy, but with {one} some does")
 
     def moduli(self, kinematics: str) -> Array:
         """Return the matrix (4, 4), in 3D (6, 6) [pressure] from strains (xx, yy, zz, 2xy, in 3D 2yz, 2xz) to stresses.

@@ -59,7 +59,7 @@ class Tabulated:
         object.__setattr__(self, "table", rows)
 
     def __call__(self, points: Array) -> Array:
-        """Return the values (n,) at `points` (n, dim) [length]."""
+        """Return the values (n,) [unit of the quantity] at `points` (n, dim) [length]."""
         if self.along == "radius":
             at = np.hypot(points[:, 0], points[:, 1])
         elif AXES.index(self.along) < points.shape[1]:
