@@ -50,6 +50,18 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         {"value": PLACE, "groups": (list, str), "reference": NUMBER, "ramp": list},
         ("value",),
     ),
+    **dict.fromkeys(
+        ("initial_stress", "initial_strain"),
+        (
+            {
+                "groups": (list, str),
+                **dict.fromkeys(("xx", "yy", "zz", "xy", "yz", "xz"), PLACE),
+                "axes": (list, dict),
+                "ramp": list,
+            },
+            (),
+        ),
+    ),
     "force": ({"group": str, **AXES, "distribute": bool, "ramp": list}, ("group",)),
     "moment": ({"group": str, **AXES, "ramp": list}, ("group",)),
     "hydrostatic_pressure": (

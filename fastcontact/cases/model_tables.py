@@ -11,6 +11,7 @@ from typing import Any
 from fastcontact.cases.keys import AXES, LISTS, NUMBER, SURFACE, at, called, check_keys, tables
 from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
+from fastcontact.elasticity.initial_states import COMPONENTS
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.elasticity.varying_constants import Tabulated
@@ -23,14 +24,14 @@ from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
 # Keys whose values may depend on the position.
-VALUES = ("E", "nu", "G", "density", "expansion", "value")
+VALUES = ("E", "nu", "G", "density", "expansion", "value", *COMPONENTS)
 
 
 def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
     """Add the material whose constants are given: isotropic, orthotropic where E, nu or G are lists, anisotropic with D."""
     kind = _material_law(constants)
-    if isinstance(constants.get("axes"), dict):
-        constants["axes"] = called("material.axes", CylindricalAxes, constants["axes"])
+    if "axes" in constants:
+        constants["axes"] = _axes("material", constants["axes"])
     if kind is LinearElastic:
         for key in constants:
             if (
@@ -44,6 +45,19 @@ def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
         if key not in inspect.signature(kind).parameters:
             raise CaseError(f"the key 'material.{key}' is none of a material that is {_LAWS[kind]}")
     model.add_material(kind(**constants), groups)
+
+
+def _add_initial_stress(model: Model, axes: Any = None, **given: Any) -> None:
+    model.add_initial_stress(axes=_axes("initial_stress", axes), **given)
+
+
+def _add_initial_strain(model: Model, axes: Any = None, **given: Any) -> None:
+    model.add_initial_strain(axes=_axes("initial_strain", axes), **given)
+
+
+def _axes(where: str, axes: Any) -> Any:
+    """Return axes given as vectors, or by the keys of a cylinder."""
+    return called(f"{where}.axes", CylindricalAxes, axes) if isinstance(axes, dict) else axes
 
 
 def _add_coupling(model: Model, reference: str, group: str, place: Any = None, **options: Any) -> None:
@@ -82,6 +96,8 @@ _ADD: dict[str, Callable[..., None]] = {
     "gravity": Model.add_gravity,
     "centrifugal": Model.add_centrifugal,
     "temperature": Model.add_temperature,
+    "initial_stress": _add_initial_stress,
+    "initial_strain": _add_initial_strain,
     "force": Model.add_force,
     "moment": Model.add_moment,
     "hydrostatic_pressure": Model.add_hydrostatic_pressure,

@@ -40,6 +40,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         "the supports": _unordered(model.supports, mesh),
         "the loads": _unordered(model.loads, mesh),
         **({"the temperatures": _unordered(model.temperatures, mesh)} if model.temperatures else {}),
+        **({"the initial states": _unordered(model.initial_states, mesh)} if model.initial_states else {}),
         "the relations": _unordered(model.relations, mesh),
         "the springs": _unordered(model.springs, mesh),
         **({"the pretension sections": _unordered(model.pretensions, mesh)} if model.pretensions else {}),

@@ -24,6 +24,7 @@ from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.constrained_system import ConstrainedMotion
 from fastcontact.elasticity.inertia_loads import Centrifugal, Densities, Gravity, InertiaLoad
+from fastcontact.elasticity.initial_states import InitialState, StressOffset, initial_state
 from fastcontact.elasticity.loads import (
     BodyForce,
     Hydrostatic,
@@ -38,8 +39,9 @@ from fastcontact.elasticity.loads import (
     check_value,
     evaluated,
 )
+from fastcontact.elasticity.material_axes import Axes
 from fastcontact.elasticity.material_field import MaterialField, material_field
-from fastcontact.elasticity.materials import KINEMATICS, Material
+from fastcontact.elasticity.materials import KINEMATICS, Constant, Material
 from fastcontact.elasticity.recovery import internal_force, stress_at_points
 from fastcontact.elasticity.relations import Relation, stacked_rows
 from fastcontact.elasticity.springs import Springs, between, grounded, stacked
@@ -150,6 +152,7 @@ class Model:
         self.supports: list[Support] = []
         self.loads: list[Load] = []
         self.temperatures: list[Temperature] = []
+        self.initial_states: list[InitialState] = []
         self.relations: list[Relation] = []
         self.springs: list[Springs] = []
         self.pretensions: list[Pretension] = []
@@ -352,6 +355,78 @@ class Model:
         found.check(self.mesh)
         self.temperatures.append(found)
 
+    @typed(ModelError)
+    def add_initial_stress(
+        self,
+        groups: Sequence[str] | str | None = None,
+        *,
+        xx: Constant | None = None,
+        yy: Constant | None = None,
+        zz: Constant | None = None,
+        xy: Constant | None = None,
+        yz: Constant | None = None,
+        xz: Constant | None = None,
+        axes: Axes = None,
+        ramp: History = None,
+    ) -> None:
+        """Give groups of solid cells, by default all, a stress that they have where nothing is displaced.
+
+        What of it is not in balance deforms the bodies. In axisymmetry x, y, z are radius, axis and circumference.
+
+        Parameters
+        ----------
+        groups : str or sequence of str, optional
+        xx, yy, zz, xy, yz, xz : float, callable or ndarray (n,), optional
+            Components, zero where not given; numbers, functions or arrays as E of `LinearElastic` [pressure].
+        axes : sequence or callable, optional
+            What they are along, as of `Orthotropic`: unit vectors in rows (3, 3) [-], or a function, taken at each place.
+        ramp : Ramp or iterable of (float, float), optional
+            History; by default the whole of it is there from the first step on.
+        """
+        given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
+        self._add_initial("stress", groups, given, axes, ramp)
+
+    @typed(ModelError)
+    def add_initial_strain(
+        self,
+        groups: Sequence[str] | str | None = None,
+        *,
+        xx: Constant | None = None,
+        yy: Constant | None = None,
+        zz: Constant | None = None,
+        xy: Constant | None = None,
+        yz: Constant | None = None,
+        xz: Constant | None = None,
+        axes: Axes = None,
+        ramp: History = None,
+    ) -> None:
+        """Give groups of solid cells, by default all, a strain that costs no stress: shrinkage, swelling, misfit.
+
+        Parameters
+        ----------
+        groups : str or sequence of str, optional
+        xx, yy, zz, xy, yz, xz : float, callable or ndarray (n,), optional
+            Components, as of `add_initial_stress`; xy, yz and xz are shears, twice those of the tensor [-].
+        axes : sequence or callable, optional
+            What they are along: unit vectors in rows (3, 3) [-], or a function.
+        ramp : Ramp or iterable of (float, float), optional
+            History; by default the whole of it is there from the first step on.
+        """
+        given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
+        self._add_initial("strain", groups, given, axes, ramp)
+
+    def _add_initial(
+        self, kind: str, groups: Sequence[str] | str | None, given: Mapping[str, Any], axes: Axes, ramp: History
+    ) -> None:
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        for name in names or ():
+            if not self.mesh.cells_of(name, dim=self.mesh.dim):
+                raise ModelError(f"group '{name}' holds no solid cells: it has no initial {kind}")
+        table = table_of(ramp, f"the ramp of the initial {kind}")
+        self.initial_states.append(
+            initial_state(kind, names, self._cells_of(names), given, axes, self.kinematics, table)
+        )
+
     def temperature_rise(self, factors: Sequence[float]) -> Array | None:
         """Return the rise of the temperature (n_points,) [temperature], None without temperatures.
 
@@ -362,15 +437,31 @@ class Model:
         rises = [factor * own.rise(self.mesh) for factor, own in zip(factors, self.temperatures, strict=True)]
         return np.asarray(np.sum(rises, axis=0))
 
+    def stress_offset(
+        self, temperature_factors: Sequence[float] = (), initial_factors: Sequence[float] = (),
+        field: MaterialField | None = None,
+    ) -> StressOffset | None:  # fmt: skip
+        """Return what stresses have beside those of the displacements, by temperatures and initial states; None without any.
+
+        The factors are those of a step result, `StepResult.iterations`; `field` is the `material_field`, where it is known.
+        """
+        rise, states = self.temperature_rise(temperature_factors), []
+        if len(initial_factors):
+            states = list(zip(initial_factors, self.initial_states, strict=True))
+        if rise is None and not states:
+            return None
+        return (field or self.material_field()).offset(rise, states, self.mesh.n_points)
+
     def thermal_forces_by_ramp(self) -> dict[Table | None, Array]:
         """Return by history the nodal forces (n_points, dim) at multiplier 1 by which temperatures load the cells [force].
 
         ModelError if a material that is heated has no expansion.
         """
         by_ramp: dict[Table | None, Array] = {}
-        field = self.material_field() if self.temperatures else None
+        if not self.temperatures:
+            return by_ramp
+        field = self.material_field()
         for own in self.temperatures:
-            assert field is not None
             rise = own.rise(self.mesh)
             missing = field.without_expansion(self.mesh, rise)
             if missing:
@@ -378,12 +469,31 @@ class Model:
                     f"{own.name} acts on {missing} solid cells whose material has no coefficient of thermal expansion: give "
                     "it expansion=..., 0.0 if it does not expand"
                 )
-            held = stress_at_points(
-                self.mesh, self.kinematics, field.moduli, field.loops, np.zeros(self.mesh.points.shape), field.treatment,
-                field.thermal(rise),
-            )  # fmt: skip
-            by_ramp[own.ramp] = by_ramp.get(own.ramp, 0.0) - internal_force(self.mesh, self.kinematics, held)
+            by_ramp[own.ramp] = by_ramp.get(own.ramp, 0.0) + self._forces_of(field, field.offset(rise))
         return by_ramp
+
+    def initial_forces_by_ramp(self) -> dict[Table | None, Array]:
+        """Return by history the nodal forces (n_points, dim) of initial stresses and strains at multiplier 1 [force]."""
+        by_ramp: dict[Table | None, Array] = {}
+        field = self.material_field() if self.initial_states else None
+        for state in self.initial_states:
+            assert field is not None
+            forces = self._forces_of(field, field.offset(None, [(1.0, state)], self.mesh.n_points))
+            by_ramp[state.ramp] = by_ramp.get(state.ramp, 0.0) + forces
+        return by_ramp
+
+    def _forces_of(self, field: MaterialField, offset: StressOffset | None) -> Array:
+        """Return the nodal forces (n_points, dim) [force] of what stresses have beside those of the displacements."""
+        held = stress_at_points(
+            self.mesh,
+            self.kinematics,
+            field.moduli,
+            field.loops,
+            np.zeros(self.mesh.points.shape),
+            field.treatment,
+            offset,
+        )
+        return -internal_force(self.mesh, self.kinematics, held)
 
     @typed(ModelError)
     def add_force(
@@ -960,8 +1070,8 @@ class Model:
     def internal_forces(self, displacement: Array) -> Array:
         """Return the nodal forces (n_points, dim) [force] that hold the solid cells deformed by `displacement`.
 
-        They are in balance with loads, contact, supports, relations, springs and thermal forces (`thermal_forces_by_ramp`);
-        axisymmetric: over the full circle.
+        They are in balance with loads, contact, supports, relations, springs and the forces of heat and initial states
+        (`thermal_forces_by_ramp`, `initial_forces_by_ramp`); axisymmetric: over the full circle.
 
         Parameters
         ----------
@@ -1055,8 +1165,8 @@ class Model:
         forces = self.forces_by_ramp()
         self.thermal_forces_by_ramp()
         if ramp is not None:
-            items: list[Support | Load | Relation | Temperature] = [
-                *self.supports, *self.loads, *self.relations, *self.temperatures
+            items: list[Support | Load | Relation | Temperature | InitialState] = [
+                *self.supports, *self.loads, *self.relations, *self.temperatures, *self.initial_states
             ]  # fmt: skip
             named = [(item.name, item.ramp) for item in items]
             named += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]
