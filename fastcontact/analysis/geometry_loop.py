@@ -90,7 +90,7 @@ class SettledContact:
     @property
     def force(self) -> Array:
         """Nodal contact forces (n_dofs,) [force]."""
-        return self.constraints.force(self.solution.multiplier, getattr(self.solution, "tangential", None))
+        return self.constraints.force(self.solution.multiplier, self.solution.tangential)
 
 
 def settle_geometry(
@@ -149,7 +149,7 @@ def _settle(step: Step, iterate: Iterate, extrapolation: Extrapolation, expected
             return replace(settled, scatter=scatter)
         mixed = mixing.next(moved.before, part, solution, tolerances.inexact)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
-        tolerances.tighten(moved.relative, getattr(solution, "residual", 0.0))
+        tolerances.tighten(moved.relative, solution.residual)
         if plan.extrapolate and update == PATIENT_UPDATES:
             # Nodes that flip between facets may do so for ever from one start and not from another.
             iterate.begin_again(step.state)
