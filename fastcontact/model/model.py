@@ -883,7 +883,6 @@ class Model:
             primary = surface(self.mesh, pair.primary)
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
         modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
-        own = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
         axisymmetric = self.kinematics == "axisymmetric"
         return kind(
             secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, supported=supported, **own

@@ -87,7 +87,7 @@ def figures(model: fc.Model, step: fc.StepResult, settled, factor: float, tolera
 
 
 def told(wrong: list[str], step: fc.StepResult) -> bool:
-    """Whether all that fails is the moment, which curved sides have as accurately as facets resolve them, and a warning says so."""
+    """Whether all that fails is the moment, on curved sides as accurate as facets, which a warning calls too few."""
     return wrong == ["moment"] and any("element across its radius" in text for text in step.warnings)
 
 
