@@ -193,7 +193,7 @@ def prepare(
     )  # fmt: skip
     field = model.material_field()
     sides = material_sides(mesh, field.distinct)
-    K = stiffness(mesh, model.kinematics, field.moduli, field.rows, None, field.treatment)
+    K = stiffness(mesh, model.kinematics, field.moduli, field.loops, None, field.treatment)
     K = stiffened(K, model.springs)
     system = System(
         driven.stiffness(K),

@@ -13,7 +13,7 @@ from fastcontact.analysis.volumetric_locking import locking_warning
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import element_kernels, recovery
-from fastcontact.elasticity.materials import LinearElastic
+from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies
@@ -140,8 +140,8 @@ def _carrying_springs(problem: Problem, state: State) -> list[str]:
 
 def _large_strain(problem: Problem, last: StepResult) -> list[str]:
     laws, field = [material for material, _ in problem.model.materials], problem.field
-    isotropic = np.array([isinstance(law, LinearElastic) for law in laws])
-    shear = np.array([law.shear_modulus if isinstance(law, LinearElastic) else math.inf for law in laws])
+    isotropic = np.array([isinstance(law, LinearElastic) and not law.graded for law in laws])
+    shear = np.array([_shear_modulus(law) for law in laws])
     strain, border = 0.0, last.material_stress
     inside = np.ones(len(last.stress), bool)
     if border is not None:
@@ -159,6 +159,11 @@ def _large_strain(problem: Problem, last: StepResult) -> list[str]:
     if strain <= STRAIN:
         return []
     return [f"the largest equivalent strain is {strain:.3f}, beyond the {STRAIN} where linear kinematics hold well"]
+
+
+def _shear_modulus(law: Material) -> float:
+    """Return the shear modulus of an isotropic material [pressure]; of others, whose strains are computed, infinity."""
+    return law.shear_modulus if isinstance(law, LinearElastic) and not law.graded else math.inf
 
 
 def _large_rotation(problem: Problem, state: State) -> list[str]:

@@ -53,7 +53,7 @@ def recover(
         mesh,
         problem.model.kinematics,
         problem.field.moduli,
-        problem.field.rows,
+        problem.field.loops,
         u,
         problem.field.treatment,
         problem.sides,

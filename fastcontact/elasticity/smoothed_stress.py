@@ -55,7 +55,7 @@ def smoothed_stress(
         for name, chosen in rows.items():
             xi, outward = sampling(name)
             cells = mesh.cells[name][chosen]
-            average.add(cells, outward, stress.at(name, xi, cells, field.rows[name][chosen]))
+            average.add(cells, outward, stress.at(name, xi, cells, field.loops[name][chosen]))
         nodal = average.result()
         for name, chosen in rows.items():
             found[name][chosen] = nodal[mesh.cells[name][chosen]]

@@ -23,7 +23,7 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.constrained_system import ConstrainedMotion
-from fastcontact.elasticity.inertia_loads import Centrifugal, Gravity, InertiaLoad
+from fastcontact.elasticity.inertia_loads import Centrifugal, Densities, Gravity, InertiaLoad
 from fastcontact.elasticity.loads import (
     BodyForce,
     Hydrostatic,
@@ -46,6 +46,7 @@ from fastcontact.elasticity.springs import Springs, between, grounded, stacked
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
 from fastcontact.elasticity.temperature import Temperature, checked_value
+from fastcontact.elasticity.varying_constants import Cells
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.mesh.argument_types import check_fields, typed
 from fastcontact.mesh.html_table import html_table
@@ -183,7 +184,14 @@ class Model:
             raise ModelError(
                 f"{material!r} is no material: give LinearElastic(E=..., nu=...), Orthotropic(...) or Anisotropic(...)"
             )
-        self.materials.append((material, names))
+        self.materials.append((material.bound(self._cells_of(names)), names))
+
+    def _cells_of(self, groups: Sequence[str] | None) -> Cells:
+        """Return the solid cells of groups, or all."""
+        if groups is None:
+            return Cells(self.mesh, {name: np.arange(len(block)) for name, block in self.mesh.solids.items()})
+        found = self.mesh.split(np.unique(np.concatenate([self.mesh.cell_groups[name] for name in groups])))
+        return Cells(self.mesh, {name: found[name] for name in self.mesh.solids if name in found})
 
     @typed(ModelError)
     def fix(self, group: str, components: str) -> None:
@@ -370,7 +378,7 @@ class Model:
                     "it expansion=..., 0.0 if it does not expand"
                 )
             held = stress_at_points(
-                self.mesh, self.kinematics, field.moduli, field.rows, np.zeros(self.mesh.points.shape), field.treatment,
+                self.mesh, self.kinematics, field.moduli, field.loops, np.zeros(self.mesh.points.shape), field.treatment,
                 field.thermal(rise),
             )  # fmt: skip
             by_ramp[own.ramp] = by_ramp.get(own.ramp, 0.0) - internal_force(self.mesh, self.kinematics, held)
@@ -891,7 +899,7 @@ class Model:
     def material_numbers(self) -> tuple[Array, dict[str, NDArray[np.int32]]]:
         """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and by element every solid cell's number there.
 
-        The first are those of the materials; materials with axes that depend on the position have further ones for each cell.
+        The first are those of the materials; materials that vary have further ones, for the middle of each cell.
         """
         field = self.material_field()
         return field.moduli, field.rows
@@ -963,7 +971,7 @@ class Model:
             raise ModelError(
                 f"the displacement has the shape {np.shape(displacement)}, but the mesh {self.mesh.points.shape}"
             )
-        K = stiffness(self.mesh, self.kinematics, field.moduli, field.rows, None, field.treatment)
+        K = stiffness(self.mesh, self.kinematics, field.moduli, field.loops, None, field.treatment)
         return np.asarray(K @ np.ravel(displacement)).reshape(-1, self.mesh.dim)
 
     def prescribed(self) -> tuple[NDArray[np.bool_], Array]:
@@ -1027,8 +1035,7 @@ class Model:
         """Return the nodal forces (n_points, dim) of a load at multiplier 1 [force]."""
         density = None
         if isinstance(load, InertiaLoad):
-            known = np.array([np.nan if m.density is None else m.density for m, _ in self.materials], float)
-            density = {name: known[numbers] for name, numbers in self._material_of_cells().items()}
+            density = Densities([m for m, _ in self.materials], self._material_of_cells())
         return load.vector(self.mesh, self.kinematics, density)
 
     def _related(self) -> NDArray[np.bool_]:
