@@ -75,7 +75,7 @@ class Problem:
         Materials of all solid cells.
     system : System
         Stiffness, supports and relations.
-    bodies : UnsupportedBodies, optional
+    unsupported_bodies : UnsupportedBodies, optional
         Bodies held by contact alone, if there are any.
     dofs : ActiveDofs
         The displacement components that a pairing solves for.
@@ -97,7 +97,7 @@ class Problem:
     field: MaterialField
     sides: MaterialSides
     system: System
-    bodies: UnsupportedBodies | None
+    unsupported_bodies: UnsupportedBodies | None
     dofs: ActiveDofs
     contact_dofs: NDArray[np.intp]
     force_driven: ForceDrivenObstacles

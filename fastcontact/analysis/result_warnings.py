@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.analysis.locking import locking_warning
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
+from fastcontact.analysis.volumetric_locking import locking_warning
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import element_kernels, recovery
@@ -66,7 +66,7 @@ def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> lis
 
 def _unsettled(state: State) -> list[str]:
     """Return a warning where the last of a fixed number of geometry updates still changed much."""
-    update, change = state.unsettled or (0, 0.0)
+    update, change = state.last_change or (0, 0.0)
     if change <= UNSETTLED:
         return []
     return [
@@ -127,9 +127,9 @@ def _interpenetration(problem: Problem, state: State) -> list[str]:
 
 
 def _carrying_springs(problem: Problem, state: State) -> list[str]:
-    if problem.bodies is None or state.rigid is None:
+    if problem.unsupported_bodies is None or state.rigid is None:
         return []
-    told = problem.bodies.report(state.rigid, state.largest_work)
+    told = problem.unsupported_bodies.report(state.rigid, state.largest_rigid_force)
     if told["relative_to_load"] <= problem.criteria.relative:
         return []
     return [

@@ -50,7 +50,6 @@ from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
 from fastcontact.elasticity.temperature import Temperature, checked_value
 from fastcontact.elasticity.varying_constants import Cells
 from fastcontact.errors import ContactError, ModelError, unknown
-from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import check_fields, typed
 from fastcontact.mesh.html_table import html_table
 from fastcontact.mesh.mesh import Mesh
@@ -911,8 +910,8 @@ class Model:
         ramp : Ramp or iterable of (float, float), optional
             History of motion and force.
         formulation : str, optional
-            ``"node_to_segment"`` (then: node against obstacle), by default on linear triangles and on linear facets in
-            space, or ``"continuous"``, by default on all others.
+            ``"node_to_segment"`` (then: node against obstacle), by default on linear triangles and, in space, on
+            facets whose nodes all carry pressure (tri3, quad4, quad9), or ``"continuous"``, by default on all others.
         **options
             Fields of the formulation.
         """
@@ -930,14 +929,14 @@ class Model:
         driving = self._driving(name, moves, force)
         self._add_pair(ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving))
 
-    def _facet_kinds(self, group: str) -> tuple[bool, bool]:
-        """Return whether all facets of a group are linear, and whether triangles or tetrahedra alone have them."""
+    def _facet_kinds(self, group: str) -> tuple[list[str], bool]:
+        """Return the kinds of facets of a group, and whether linear triangles or tetrahedra alone have them."""
         facets = self.mesh.cells_of(group, self.mesh.dim - 1) if group in self.mesh.cell_groups else {}
         if not facets:  # which `check` tells
-            return False, False
+            return [], False
         simplices = [block for name, block in self.mesh.solids.items() if name in ("tri3", "tet4")]
         theirs = any(np.isin(self.mesh.points_of(group), block).all() for block in simplices)
-        return all(elements.get(name).linear == name for name in facets), theirs
+        return list(facets), theirs
 
     def _driving(self, name: str, moves: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
         """Return the force on obstacle `name` by component, None for prescribed ones; empty without any."""
@@ -1002,7 +1001,6 @@ class Model:
             primary = surface(self.mesh, pair.primary)
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
         modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
-        own = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
         axisymmetric = self.kinematics == "axisymmetric"
         return kind(
             secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, supported=supported, **own
