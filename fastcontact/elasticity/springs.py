@@ -94,9 +94,9 @@ def joined(
     along: Mapping[str, float],
     direction: Array | None = None,
 ) -> Springs:
-    """Return springs between pairs of points, `ends` of (n,) each, as `between` describes them for one pair.
+    """Return springs between pairs of the `points` (n_points, dim) [length], as `between` describes them for one pair.
 
-    `points` (n_points, dim) [length]; `direction` (dim,) [-].
+    `ends` (n,) of int each are the first and the second points; `direction` (dim,) [-].
     """
     parts = [
         between(name, points, int(first), int(second), stiffness, along, direction)
