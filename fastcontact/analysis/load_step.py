@@ -58,7 +58,9 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
         settled, u, balanced = equilibrium(problem, start, load, right_side(problem, load), expected, settled)
     balanced.check(index, problem, settled.iterate.history if settled is not None else ())
     iterations = counted(settled, problem.solver.counters.iterations - solved_before)
-    end = replace(start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u))
+    end = replace(
+        start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles
+    )
     end, contact = (end, {}) if settled is None else after_contact(problem, start, load, settled, end)
     if problem.bodies is not None and end.rigid is not None:
         iterations["regularised"] = problem.bodies.report(end.rigid, end.largest_work)

@@ -83,6 +83,8 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
 }
 # A rigid surface: the facets of a group of a file, or of the mesh of the model.
 SURFACE = {"file": str, "group": str, "flip": bool, "crease": NUMBER}
+# How a rigid obstacle turns.
+ROTATION: dict[str, Any] = {"angle": NUMBER, "centre": list, "axis": list, "ramp": list}
 # Studies of this case; `fastcontact.studies.settings` reads them.
 STUDY: dict[str, Any] = {
     "generator": str,

@@ -8,7 +8,7 @@ from pathlib import Path
 from reprlib import repr
 from typing import Any
 
-from fastcontact.cases.keys import AXES, LISTS, NUMBER, SURFACE, at, called, check_keys, tables
+from fastcontact.cases.keys import AXES, LISTS, NUMBER, ROTATION, SURFACE, at, called, check_keys, tables
 from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes
@@ -150,6 +150,9 @@ def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
     for key in ("motion", "force"):
         if key in rest:
             check_keys(f"{where}.{key}", rest[key], AXES)
+    if "rotation" in rest:
+        check_keys(f"{where}.rotation", rest["rotation"], ROTATION)
+        rest["rotation"] = _arguments(f"{where}.rotation", rest["rotation"])
     with at(where):
         model.add_obstacle(name, obstacle=obstacle, **_arguments(where, rest))
 

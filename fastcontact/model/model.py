@@ -64,6 +64,7 @@ from fastcontact.model.contact_pair import ContactPair, Driving, method
 from fastcontact.model.couplings import Moment, coupling
 from fastcontact.model.description import sentences
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
+from fastcontact.model.obstacle_rotation import check_turns, rotation_of
 from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
 from fastcontact.model.prescribed_overlap import Supports, check_prescribed
 from fastcontact.model.pretension import Pretension, PretensionForce, check_locks, pretension
@@ -772,6 +773,7 @@ class Model:
         obstacle: Obstacle,
         motion: Mapping[str, float] | None = None,
         force: Mapping[str, float] | None = None,
+        rotation: Mapping[str, Any] | None = None,
         ramp: History = None,
         formulation: str | None = None,
         **options: Any,
@@ -790,8 +792,12 @@ class Model:
             The force on it at multiplier 1, e.g. ``{"y": -100.0}`` [force], in axisymmetry over the full circle. In
             these components the obstacle is a rigid body that moves freely until contact holds it; in the others it
             follows `motion`. Results tell where it is.
+        rotation : mapping, optional
+            How it turns: ``angle`` at multiplier 1 [radian]; ``centre``, a point of the axis (dim,) before any motion, with
+            which it moves [length]; in space ``axis``, the direction; ``ramp``, a history of its own. Results tell the torque
+            on the obstacle's axis. Not in axisymmetry.
         ramp : Ramp or iterable of (float, float), optional
-            History of motion and force.
+            History of motion and force, and of a rotation without one of its own.
         formulation : str, optional
             ``"node_to_segment"`` (then: node against obstacle), by default on linear triangles and on linear facets in
             space, or ``"continuous"``, by default on all others.
@@ -810,7 +816,10 @@ class Model:
             formulation, reason = against_obstacle(self.mesh.dim, *self._facet_kinds(secondary), options)
             log.info("contact '%s': %s, since %s", name, method(formulation, options), reason)
         driving = self._driving(name, moves, force)
-        self._add_pair(ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving))
+        turned = (None, None) if rotation is None else rotation_of(name, rotation, self.kinematics)
+        self._add_pair(
+            ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving, *turned)
+        )
 
     def _facet_kinds(self, group: str) -> tuple[bool, bool]:
         """Return whether all facets of a group are linear, and whether triangles or tetrahedra alone have them."""
@@ -879,7 +888,7 @@ class Model:
                 raise ContactError(
                     unknown("contact formulation for a rigid obstacle", pair.formulation, AGAINST_OBSTACLES)
                 )
-            primary = RigidSide(pair.obstacle, np.array(pair.motion))
+            primary = RigidSide(pair.obstacle, np.array(pair.motion), pair.rotation)
         else:
             primary = surface(self.mesh, pair.primary)
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
@@ -1054,7 +1063,9 @@ class Model:
             named = [(item.name, item.ramp) for item in items]
             named += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]
             named += [(f"the clearance of contact '{p.name}'", p.clearance_ramp) for p in self.contact]
+            named += [(f"the rotation of obstacle '{p.name}'", p.rotation_ramp) for p in self.contact]
             check_ramps(named, ramp.instants)
+            check_turns(self.contact, ramp)
             check_locks(self.pretensions, ramp.instants)
         self._check_relations(fixed, prescribed, ramp or Ramp((1.0,)))
         check_supports(self.mesh, [(s.name, s.group) for s in self.supports], self._related())
