@@ -67,6 +67,14 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         },
         ("first", "second", "component"),
     ),
+    "periodicity": (
+        {"first": str, "second": str, **AXES, "free": str, "translation": list, "ramp": list},
+        ("first", "second"),
+    ),
+    "cyclic_symmetry": (
+        {"first": str, "second": str, "sectors": int, "origin": list, "direction": list},
+        ("first", "second", "sectors"),
+    ),
     "relation": ({"terms": list, "value": NUMBER, "ramp": list}, ("terms",)),
     "pretension": (
         {

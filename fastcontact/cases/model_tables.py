@@ -84,6 +84,8 @@ _ADD: dict[str, Callable[..., None]] = {
     "couple": Model.couple,
     "relation": Model.relate,
     "group_relation": Model.relate_groups,
+    "periodicity": Model.add_periodicity,
+    "cyclic_symmetry": Model.add_cyclic_symmetry,
     "spring": Model.add_spring,
     "pretension": Model.add_pretension,
 }
