@@ -187,14 +187,14 @@ def test_a_file_that_is_taken_up_and_then_changes_is_left_alone(how: str, path: 
 
 def test_a_pair_is_in_the_file_as_a_whole_or_not_at_all(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Stopped by hand while the first step brings its contact pairs."""
-    from fastcontact.results import contents
+    from fastcontact.results import write_arrays
 
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
     def stopped(which: str) -> None:
         with ResultWriter(path, MESH) as out:
-            monkeypatch.setattr(contents, which, stop)
+            monkeypatch.setattr(write_arrays, which, stop)
             out.write(step_result(1))
 
     for which in ("growing_table", "_append_contact"):
