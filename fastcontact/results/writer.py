@@ -1,7 +1,7 @@
 """Write the steps of an analysis to one result file, step by step, so that a crash costs no finished step.
 
-Data are written first, then the rows of the step, the number of steps last, with a flush after each. Uncompressed tables grow
-in place and the fields of each step are chunks of their own, so that nothing of a finished step moves. Room on the disk is
+Data are written first, then the rows of the step, the number of steps last, with a flush after each. Uncompressed tables and
+small fields grow in place, and larger fields are a chunk of their own for each step, so that nothing of a finished step moves. Room on the disk is
 reserved before, because HDF5 loses the whole file when one of its writes fails.
 """
 
@@ -36,6 +36,8 @@ from fastcontact.results.texts import read_text
 SHORT = 10.0
 # Room for HDF5's own records [bytes].
 MARGIN = 1 << 19
+# Size in the file of the indices that HDF5 keeps in memory [bytes].
+INDICES = 1 << 18
 
 
 class ResultWriter:
@@ -255,6 +257,7 @@ class ResultWriter:
             self._committed = CommittedFile(self.path)
             try:
                 self._file = h5py.File(self._committed, "r+")
+                _limit_index_memory(self._file)
             except BaseException:
                 self._committed.close()
                 raise
@@ -331,6 +334,14 @@ class ResultWriter:
                 contents.write_own(file, self._mesh, kinematics, case_text)
         # Closed in between because Windows renames no open file; without locks viewers may follow.
         self._open()
+
+
+def _limit_index_memory(file: Any) -> None:
+    """Let HDF5 forget nodes of indices: in memory they take ten times their size in the file, and grow with the steps."""
+    settings = file.id.get_mdc_config()
+    settings.set_initial_size = True
+    settings.initial_size = settings.min_size = settings.max_size = INDICES
+    file.id.set_mdc_config(settings)
 
 
 def _materials_that_meet(model: Any) -> Any:
