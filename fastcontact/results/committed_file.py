@@ -6,8 +6,8 @@ memory until HDF5 flushes, and then done in an order in which each is harmless: 
 the superblock with the end of the file; nodes of indices from the root down, so that entries are in their new node before
 they leave the old one; all else; tables of names last (HDF5 File Format Specification 3.0, sections II.A and III.A).
 
-HDF5 writes a node of an index or a part of a table as a whole, of which a step changes a few bytes: only what differs from the
-file is written, from the first such byte to the last.
+HDF5 writes a node of an index or a part of a table as a whole, of which a step changes a few bytes: only what differs from
+the file is written, from the first such byte to the last.
 
 That helps when a process ends, not when the power does: a disk keeps no order. `synchronised` writes are kept in a journal
 until they are done.

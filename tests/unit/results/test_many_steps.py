@@ -8,7 +8,7 @@ import pytest
 from test_result_files import MESH, assert_same, nth_step
 
 from fastcontact import ResultWriter, open_results
-from fastcontact.results import contents, writer
+from fastcontact.results import contents, reader, writer
 from fastcontact.results.committed_file import CommittedFile
 
 
@@ -53,3 +53,33 @@ def test_indices_do_not_gather_in_memory(shared: int, tmp_path: Path, monkeypatc
         assert len(results) == 150
         for number, step in enumerate(results):
             assert_same(step, nth_step(number), f"step {number}")
+
+
+def test_a_resumed_file_is_read_step_by_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A long run of a large model is resumed in the memory of its last step; the others are there when they are asked for."""
+    path, read = tmp_path / "run.vtkhdf", []
+    with ResultWriter(path, MESH) as out:
+        for number in range(6):
+            out.write(nth_step(number))
+    ordinary = reader.Results._read_step
+
+    def noting(self: reader.Results, number: int) -> object:
+        read.append(number)
+        return ordinary(self, number)
+
+    monkeypatch.setattr(reader.Results, "_read_step", noting)
+    with ResultWriter(path, MESH, resume=True) as out:
+        assert (len(out.done), read) == (6, [5])
+        assert repr(out.done).endswith("6 steps)")
+        assert_same(out.done[-1], nth_step(5), "last")
+        assert_same(out.done[-6], nth_step(0), "first")
+        assert [step.index for step in out.done] == [1, 2, 3, 4, 5, 6]
+        for number in range(6, 80):  # the file changes, the index of its fields gets another level
+            out.write(nth_step(number))
+        for number, step in enumerate(out.done):
+            assert_same(step, nth_step(number), f"step {number}")
+        assert [step.index for step in out.done[1:3]] == [2, 3]
+        with pytest.raises(IndexError):
+            out.done[6]
+    with open_results(path) as results:
+        assert len(results) == 80
