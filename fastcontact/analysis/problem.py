@@ -73,7 +73,7 @@ class Problem:
         Materials of all solid cells.
     system : System
         Stiffness, supports and relations.
-    bodies : UnsupportedBodies, optional
+    unsupported_bodies : UnsupportedBodies, optional
         Bodies held by contact alone, if there are any.
     dofs : ActiveDofs
         The displacement components that a pairing solves for.
@@ -95,7 +95,7 @@ class Problem:
     field: MaterialField
     sides: MaterialSides
     system: System
-    bodies: UnsupportedBodies | None
+    unsupported_bodies: UnsupportedBodies | None
     dofs: ActiveDofs
     contact_dofs: NDArray[np.intp]
     force_driven: ForceDrivenObstacles
@@ -193,7 +193,7 @@ def prepare(
     )  # fmt: skip
     field = model.material_field()
     sides = material_sides(mesh, field.distinct)
-    K = stiffness(mesh, model.kinematics, field.moduli, field.rows, None, field.treatment)
+    K = stiffness(mesh, model.kinematics, field.moduli, field.loops, None, field.treatment)
     K = stiffened(K, model.springs)
     system = System(
         driven.stiffness(K),

@@ -13,6 +13,7 @@ from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic, Material
+from fastcontact.elasticity.varying_constants import Tabulated
 from fastcontact.errors import CaseError, unknown
 from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.generate.cut import OPPOSITE, cut
@@ -20,6 +21,9 @@ from fastcontact.mesh.generate.reference_points import with_reference_points
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
+
+# Keys whose values may depend on the position.
+VALUES = ("E", "nu", "G", "density", "expansion", "value")
 
 
 def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
@@ -33,6 +37,7 @@ def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
                 key not in ("volumetric", "incompatible_modes")
                 and not isinstance(constants[key], (list, tuple))
                 and key != "axes"
+                and not callable(constants[key])
             ):
                 constants[key] = float(constants[key])
     for key in constants:
@@ -103,7 +108,7 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
                 if key not in entry:
                     raise CaseError(f"{where} needs '{key}'")
             with at(where):
-                add(model, **_arguments(where, entry))
+                add(model, **_arguments(where, _placed(where, entry)))
     for name, entry in data.get("contact", {}).items():
         if not isinstance(entry, dict):
             raise CaseError(f"'contact' needs a name for each pair: write [contact.NAME] above its keys, not '{name}'")
@@ -115,6 +120,22 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
     for name, entry in data.get("obstacle", {}).items():
         _add_obstacle(model, name, entry, folder)
     return model
+
+
+def _placed(where: str, entry: dict[str, Any]) -> dict[str, Any]:
+    """Return an entry with functions in place of the tables of values that depend on the position."""
+    found = dict(entry)
+    for key in VALUES:
+        value = entry.get(key)
+        if isinstance(value, list):
+            found[key] = [_function(f"{where}.{key}[{i}]", member) for i, member in enumerate(value)]
+        elif key in entry:
+            found[key] = _function(f"{where}.{key}", value)
+    return found
+
+
+def _function(where: str, value: Any) -> Any:
+    return called(where, Tabulated, value) if isinstance(value, dict) else value
 
 
 def _cut(mesh: Mesh, sections: Any) -> Mesh:

@@ -7,11 +7,24 @@ from numpy.typing import NDArray
 
 from fastcontact._jit import parallel
 from fastcontact.elasticity import dilatation, dilatation_kernels, element_kernels, incompatible_modes
+from fastcontact.elasticity.stiffness import of_cells
 from fastcontact.elasticity.temperature import ThermalStress
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
+
+
+# Cells at a time where moduli vary inside them.
+VARYING = 2_000
+
+
+def _beside(name: str, xi: Array) -> Array:
+    """Return the weights (n, n_q) [-] of values at the quadrature points for those at points `xi` (n, dim) [-]."""
+    element = elements.get(name)
+    if xi is element.quadrature[0]:
+        return np.eye(len(xi))
+    return np.asarray(element.shape(xi) @ element.extrapolation)
 
 
 class CellStress:
@@ -49,7 +62,8 @@ class CellStress:
     def at(self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32]) -> Array:
         """Return the stresses (n_cells, n, n_components) [pressure] at points `xi` (n, dim) [-] of cells of an element.
 
-        `cells` (n_cells, n_nodes) of int; `material` (n_cells,) of int, the material number of each.
+        `cells` (n_cells, n_nodes) of int; `material` (n_cells,) of int, the material number of each, or (n_cells, n_q), that
+        of each quadrature point.
         """
         out = np.empty((len(cells), len(xi), self._moduli.shape[1]))
         self.fill(name, xi, cells, material, out)
@@ -58,7 +72,8 @@ class CellStress:
     def fill(self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32], out: Array) -> None:
         """Fill `out` (n_cells, n, n_components) [pressure] in place, shared by threads.
 
-        At points `xi` (n, dim) [-] of `cells` (n_cells, n_nodes) of int of an element, `material` (n_cells,) of int.
+        At points `xi` (n, dim) [-] of `cells` (n_cells, n_nodes) of int of an element; `material` (n_cells,) or
+        (n_cells, n_q) of int, as for `at`.
         """
         element, split = elements.get(name), dilatation.split(name, self._moduli, self._averaged)
         moduli = self._moduli if split is None else split.moduli
@@ -70,8 +85,13 @@ class CellStress:
 
         def part(rows: tuple[int, int]) -> None:
             own = slice(*rows)
-            shared = material[own], self._axisymmetric, self._displacement
-            loops.stress(points, cells[own], N, dN, moduli, *shared, out[own])
+            if material.ndim == 1:
+                loops.stress(
+                    points, cells[own], N, dN, moduli, material[own], self._axisymmetric, self._displacement, out[own]
+                )
+            else:
+                self._fill_varying((name, xi, N, dN), cells[own], material[own], moduli, out[own])
+            shared = of_cells(material[own]), self._axisymmetric, self._displacement
             if split is not None:
                 polynomials = dilatation.basis(name, element.quadrature[0])
                 dilatation_kernels.add_pressure(
@@ -82,7 +102,25 @@ class CellStress:
         parallel.shared(part, parallel.portions(len(out), cells.shape[1]))
         if self._thermal is not None:
             self._subtract_thermal(self._thermal, name, xi, cells, material, out)
-        self._add_modes(name, xi, cells, material, out)
+        self._add_modes(name, xi, cells, of_cells(material), out)
+
+    def _fill_varying(
+        self, at: tuple[str, Array, Array, Array], cells: NDArray[np.int32], material: NDArray[np.int32], moduli: Array,
+        out: Array,
+    ) -> None:  # fmt: skip
+        """Fill `out` where moduli differ from point to point: the strains first, as stresses of moduli that are one.
+
+        Beside the quadrature points moduli are those of the polynomial through them.
+        """
+        name, xi, N, dN = at
+        loops, unit = element_kernels.loops(self._mesh.dim), np.eye(self._moduli.shape[1])[None]
+        first, strain = np.zeros(len(cells), np.int32), np.empty_like(out)
+        loops.stress(self._mesh.points, cells, N, dN, unit, first, self._axisymmetric, self._displacement, strain)
+        weights = _beside(name, xi)
+        for rows in range(0, len(cells), VARYING):
+            own = slice(rows, rows + VARYING)
+            local = np.einsum("nq,cqij->cnij", weights, moduli[material[own]], optimize=True)
+            out[own] = np.einsum("cnij,cnj->cni", local, strain[own])
 
     def _add_modes(
         self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32], out: Array
@@ -112,8 +150,13 @@ class CellStress:
         """Subtract the thermal stresses; the dilatation of the temperature is projected where that of the strain is."""
         element, split = elements.get(name), dilatation.split(name, self._moduli, self._averaged)
         rise = thermal.rise[cells] @ element.shape(xi).T
+        if material.ndim == 1:
+            per_degree = thermal.per_degree[material][:, None, :]
+        else:
+            per_degree = np.einsum("nq,cqi->cni", _beside(name, xi), thermal.per_degree[material])
+            material = of_cells(material)
         projected = np.zeros(len(cells), bool) if split is None else split.bulk[material, 0] != 0.0
-        out -= np.where(projected[:, None], 0.0, rise)[:, :, None] * thermal.per_degree[material][:, None, :]
+        out -= np.where(projected[:, None], 0.0, rise)[:, :, None] * per_degree
         if split is not None and projected.any():
             own, numbers = cells[projected], material[projected]
             parts = dilatation.projected(name, self._mesh.points[own], thermal.rise[own], xi, self._axisymmetric)

@@ -38,8 +38,8 @@ def stress_at_points(
         ``"axisymmetric"``, ``"plane_strain"``, ``"plane_stress"`` or ``"3d"``.
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
         From `LinearElastic.moduli` [pressure].
-    material : dict of str to ndarray of int (n_cells,)
-        By solid element: material number of each cell.
+    material : dict of str to ndarray of int (n_cells,) or (n_cells, n_q)
+        By solid element: material number of each cell, or of each quadrature point (`MaterialField.loops`).
     displacement : ndarray (n_points, dim)
         Of all points [length].
     averaged : ndarray of bool (n_materials,), optional

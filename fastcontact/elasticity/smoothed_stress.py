@@ -49,13 +49,14 @@ def smoothed_stress(
     components = field.moduli.shape[1]
     stress = CellStress(mesh, kinematics, field.moduli, displacement, field.averaged, field.thermal(rise))
     found = {name: np.empty((*block.shape, components)) for name, block in mesh.solids.items()}
-    for number in range(field.n_materials):
+    material = field.distinct
+    for number in np.unique(np.concatenate([*material.values()])):
         average = recovery.NodalAverage(mesh.n_points, components)
-        rows = {name: np.flatnonzero(field.number[name] == number) for name in found}
+        rows = {name: np.flatnonzero(material[name] == number) for name in found}
         for name, chosen in rows.items():
             xi, outward = sampling(name)
             cells = mesh.cells[name][chosen]
-            average.add(cells, outward, stress.at(name, xi, cells, field.rows[name][chosen]))
+            average.add(cells, outward, stress.at(name, xi, cells, field.loops[name][chosen]))
         nodal = average.result()
         for name, chosen in rows.items():
             found[name][chosen] = nodal[mesh.cells[name][chosen]]

@@ -18,6 +18,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.elasticity.materials import LinearElastic, Material
+from fastcontact.elasticity.varying_constants import Varying
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.model import Model
@@ -90,6 +91,8 @@ def _take(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: Array) -
     """Add a value to a digest; functions by their values at `points` (n, dim)."""
     if isinstance(value, Mesh):
         value = [value.points, value.cells, value.cell_groups, value.point_groups]
+    if isinstance(value, Varying):
+        value = value.given
     if isinstance(value, csr_array):
         value = [value.data, value.indices.astype(np.int64), value.indptr.astype(np.int64)]
     if isinstance(value, np.ndarray):

@@ -23,7 +23,7 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.constrained_system import ConstrainedMotion
-from fastcontact.elasticity.inertia_loads import Centrifugal, Gravity, InertiaLoad
+from fastcontact.elasticity.inertia_loads import Centrifugal, Densities, Gravity, InertiaLoad
 from fastcontact.elasticity.loads import (
     BodyForce,
     Hydrostatic,
@@ -46,8 +46,8 @@ from fastcontact.elasticity.springs import Springs, between, grounded, stacked
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
 from fastcontact.elasticity.temperature import Temperature, checked_value
+from fastcontact.elasticity.varying_constants import Cells
 from fastcontact.errors import ContactError, ModelError, unknown
-from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import check_fields, typed
 from fastcontact.mesh.html_table import html_table
 from fastcontact.mesh.mesh import Mesh
@@ -184,7 +184,14 @@ class Model:
             raise ModelError(
                 f"{material!r} is no material: give LinearElastic(E=..., nu=...), Orthotropic(...) or Anisotropic(...)"
             )
-        self.materials.append((material, names))
+        self.materials.append((material.bound(self._cells_of(names)), names))
+
+    def _cells_of(self, groups: Sequence[str] | None) -> Cells:
+        """Return the solid cells of groups, or all."""
+        if groups is None:
+            return Cells(self.mesh, {name: np.arange(len(block)) for name, block in self.mesh.solids.items()})
+        found = self.mesh.split(np.unique(np.concatenate([self.mesh.cell_groups[name] for name in groups])))
+        return Cells(self.mesh, {name: found[name] for name in self.mesh.solids if name in found})
 
     @typed(ModelError)
     def fix(self, group: str, components: str) -> None:
@@ -371,7 +378,7 @@ class Model:
                     "it expansion=..., 0.0 if it does not expand"
                 )
             held = stress_at_points(
-                self.mesh, self.kinematics, field.moduli, field.rows, np.zeros(self.mesh.points.shape), field.treatment,
+                self.mesh, self.kinematics, field.moduli, field.loops, np.zeros(self.mesh.points.shape), field.treatment,
                 field.thermal(rise),
             )  # fmt: skip
             by_ramp[own.ramp] = by_ramp.get(own.ramp, 0.0) - internal_force(self.mesh, self.kinematics, held)
@@ -793,8 +800,8 @@ class Model:
         ramp : Ramp or iterable of (float, float), optional
             History of motion and force.
         formulation : str, optional
-            ``"node_to_segment"`` (then: node against obstacle), by default on linear triangles and on linear facets in
-            space, or ``"continuous"``, by default on all others.
+            ``"node_to_segment"`` (then: node against obstacle), by default on linear triangles and, in space, on
+            facets whose nodes all carry pressure (tri3, quad4, quad9), or ``"continuous"``, by default on all others.
         **options
             Fields of the formulation.
         """
@@ -812,14 +819,14 @@ class Model:
         driving = self._driving(name, moves, force)
         self._add_pair(ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving))
 
-    def _facet_kinds(self, group: str) -> tuple[bool, bool]:
-        """Return whether all facets of a group are linear, and whether triangles or tetrahedra alone have them."""
+    def _facet_kinds(self, group: str) -> tuple[list[str], bool]:
+        """Return the kinds of facets of a group, and whether linear triangles or tetrahedra alone have them."""
         facets = self.mesh.cells_of(group, self.mesh.dim - 1) if group in self.mesh.cell_groups else {}
         if not facets:  # which `check` tells
-            return False, False
+            return [], False
         simplices = [block for name, block in self.mesh.solids.items() if name in ("tri3", "tet4")]
         theirs = any(np.isin(self.mesh.points_of(group), block).all() for block in simplices)
-        return all(elements.get(name).linear == name for name in facets), theirs
+        return list(facets), theirs
 
     def _driving(self, name: str, moves: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
         """Return the force on obstacle `name` by component, None for prescribed ones; empty without any."""
@@ -884,7 +891,6 @@ class Model:
             primary = surface(self.mesh, pair.primary)
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
         modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
-        own = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
         axisymmetric = self.kinematics == "axisymmetric"
         return kind(
             secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, supported=supported, **own
@@ -893,7 +899,7 @@ class Model:
     def material_numbers(self) -> tuple[Array, dict[str, NDArray[np.int32]]]:
         """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and by element every solid cell's number there.
 
-        The first are those of the materials; materials with axes that depend on the position have further ones for each cell.
+        The first are those of the materials; materials that vary have further ones, for the middle of each cell.
         """
         field = self.material_field()
         return field.moduli, field.rows
@@ -965,7 +971,7 @@ class Model:
             raise ModelError(
                 f"the displacement has the shape {np.shape(displacement)}, but the mesh {self.mesh.points.shape}"
             )
-        K = stiffness(self.mesh, self.kinematics, field.moduli, field.rows, None, field.treatment)
+        K = stiffness(self.mesh, self.kinematics, field.moduli, field.loops, None, field.treatment)
         return np.asarray(K @ np.ravel(displacement)).reshape(-1, self.mesh.dim)
 
     def prescribed(self) -> tuple[NDArray[np.bool_], Array]:
@@ -1029,8 +1035,7 @@ class Model:
         """Return the nodal forces (n_points, dim) of a load at multiplier 1 [force]."""
         density = None
         if isinstance(load, InertiaLoad):
-            known = np.array([np.nan if m.density is None else m.density for m, _ in self.materials], float)
-            density = {name: known[numbers] for name, numbers in self._material_of_cells().items()}
+            density = Densities([m for m, _ in self.materials], self._material_of_cells())
         return load.vector(self.mesh, self.kinematics, density)
 
     def _related(self) -> NDArray[np.bool_]:

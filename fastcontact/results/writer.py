@@ -25,9 +25,9 @@ from fastcontact.mesh.files.hdf5_driver import new_hdf5
 from fastcontact.mesh.files.packing import packed
 from fastcontact.mesh.files.paths import PathLike, checked_target, replacing
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results import contents, layout
+from fastcontact.results import layout, write_arrays
 from fastcontact.results.committed_file import CommittedFile, uninterrupted
-from fastcontact.results.locking import PathLock, left_at, reserve
+from fastcontact.results.file_lock import PathLock, left_at, reserve
 from fastcontact.results.reader import Results
 from fastcontact.results.step import StepResult
 from fastcontact.results.stored_steps import StoredSteps
@@ -183,13 +183,13 @@ class ResultWriter:
             self._check_in_place()
             self._committed.synchronised = self._is_synchronised()
             restart = packed({"step": self.n_steps, "restart": step.restart})
-            room = contents.step_size(self._mesh, step) + restart.nbytes
+            room = write_arrays.step_size(self._mesh, step) + restart.nbytes
             self._reserve(2 * room if self._committed.synchronised else room)
-            contents.append_fields(self._file, self._mesh, self.n_steps, step, self._cell_fields)
-            contents.append_tables(self._file, self._mesh, self.n_steps, step, self._pairs, self._notes)
-            contents.set_restart(self._file, self.n_steps, restart)
+            write_arrays.append_fields(self._file, self._mesh, self.n_steps, step, self._cell_fields)
+            write_arrays.append_tables(self._file, self._mesh, self.n_steps, step, self._pairs, self._notes)
+            write_arrays.set_restart(self._file, self.n_steps, restart)
             self._flush_part()
-            contents.append_rows(self._file, self._mesh, self.n_steps, step, self._cell_fields)
+            write_arrays.append_rows(self._file, self._mesh, self.n_steps, step, self._cell_fields)
             self._flush_part()
             self._file["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(self.n_steps + 1))
             self._flush()
@@ -236,8 +236,8 @@ class ResultWriter:
                 try:
                     self._check_ours()
                     if self._committed.writable:
-                        self._reserve(len(contents.as_json(run)))
-                        contents.append_run(self._file, self.n_steps, run, self._flush)
+                        self._reserve(len(write_arrays.as_json(run)))
+                        write_arrays.append_run(self._file, self.n_steps, run, self._flush)
                 finally:
                     try:
                         self._file.close()
@@ -337,11 +337,11 @@ class ResultWriter:
         """Write all but the steps under another name, then put it in the place of the old file."""
         with replacing(self.path) as temporary:
             with open(temporary, "r+b") as probe:
-                size = contents.header_size(self._mesh) + len(case_text) + MARGIN
+                size = write_arrays.header_size(self._mesh) + len(case_text) + MARGIN
                 reserve(probe.fileno(), temporary.parent, 0, size)
             with new_hdf5(temporary) as file:
-                contents.write_geometry(file, self._mesh, self._cell_fields, self._material)
-                contents.write_own(file, self._mesh, kinematics, case_text)
+                write_arrays.write_geometry(file, self._mesh, self._cell_fields, self._material)
+                write_arrays.write_own(file, self._mesh, kinematics, case_text)
         # Closed in between because Windows renames no open file; without locks viewers may follow.
         self._open()
 

@@ -160,8 +160,8 @@ def stress_in_cells(
     """Return shape functions, stresses, volumes and elastic constants at the quadrature points of some cells of a kind.
 
     Shape functions (n_q, n_nodes) [-]; stresses (n_cells, n_q, n_components) [pressure]; volumes (n_cells, n_q) [length^dim];
-    compliances (n_cells, n_components, n_components) [1 / pressure]. `displacement` is (n_points, dim) [length],
-    `rise` (n_points,) that of the temperature [temperature].
+    compliances (n_cells, n_components, n_components), where they vary those of the middle [1 / pressure]. `displacement` is
+    (n_points, dim) [length], `rise` (n_points,) that of the temperature [temperature].
     """
     mesh, element, axisymmetric = model.mesh, elements.get(name), model.kinematics == "axisymmetric"
     xi, weights = integration_rule(element, n_points)
@@ -169,7 +169,7 @@ def stress_in_cells(
     cells, field = mesh.cells[name][rows], model.material_field()
     numbers = field.rows[name][rows]
     found = CellStress(mesh, model.kinematics, field.moduli, displacement, field.treatment, field.thermal(rise))
-    stress = found.at(name, xi, cells, numbers)
+    stress = found.at(name, xi, cells, field.loops[name][rows])
     elastic = field.compliance[numbers]
     return N, stress, cell_volumes(mesh.points[cells], N, dN, axisymmetric) * weights, elastic
 

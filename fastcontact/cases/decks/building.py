@@ -15,10 +15,10 @@ from fastcontact.cases.decks.blocks import Place, folded
 from fastcontact.cases.decks.conditions import Component, Conditions, Distributed, local_axes
 from fastcontact.cases.decks.content import Content, Material, Pair, Section, Step
 from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface
+from fastcontact.cases.decks.pretension import add_sections, cut_sections
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
 from fastcontact.cases.decks.temperatures import add_temperatures
-from fastcontact.cases.decks.tightening import add_sections, cut_sections
 from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.elasticity.anisotropic_materials import Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes

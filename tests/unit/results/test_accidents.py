@@ -20,7 +20,7 @@ import pytest
 from test_result_files import MESH, assert_same, step_result
 
 from fastcontact import FileError, ResultWriter, open_results
-from fastcontact.results import committed_file, contents
+from fastcontact.results import committed_file, write_arrays
 from fastcontact.results.committed_file import uninterrupted
 
 
@@ -60,11 +60,11 @@ def write_until(path: Path, fail: Callable[[], list[int]]) -> list[int]:
     return calls
 
 
-@pytest.mark.parametrize("shared", [contents.SHARED, 0], ids=["steps share a chunk", "a chunk a step"])
+@pytest.mark.parametrize("shared", [write_arrays.SHARED, 0], ids=["steps share a chunk", "a chunk a step"])
 @pytest.mark.parametrize("error", [OSError(errno.EIO, "Input/output error"), KeyboardInterrupt()], ids=["disk", "user"])
 def test_any_write_may_fail(error: BaseException, shared: int, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """HDF5, which does not take exceptions well, never sees one."""
-    monkeypatch.setattr(contents, "SHARED", shared)
+    monkeypatch.setattr(write_arrays, "SHARED", shared)
     with monkeypatch.context() as patch:
         total, lengths = len(write_until(path, lambda: failing_after(10**9, error, patch, "_put"))), set()
     assert total > 60
@@ -190,14 +190,14 @@ def test_a_file_that_is_taken_up_and_then_changes_is_left_alone(how: str, path: 
 
 def test_a_pair_is_in_the_file_as_a_whole_or_not_at_all(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Stopped by hand while the first step brings its contact pairs."""
-    from fastcontact.results import contents
+    from fastcontact.results import write_arrays
 
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
     def stopped(which: str) -> None:
         with ResultWriter(path, MESH) as out:
-            monkeypatch.setattr(contents, which, stop)
+            monkeypatch.setattr(write_arrays, which, stop)
             out.write(step_result(1))
 
     for which in ("growing_table", "_append_contact"):

@@ -8,7 +8,7 @@ import pytest
 from test_result_files import MESH, assert_same, nth_step
 
 from fastcontact import ResultWriter, open_results
-from fastcontact.results import contents, reader, writer
+from fastcontact.results import reader, write_arrays, writer
 from fastcontact.results.committed_file import CommittedFile
 
 
@@ -38,10 +38,10 @@ def test_a_step_writes_what_it_adds_and_little_more(
     assert late < 1.1 * early
 
 
-@pytest.mark.parametrize("shared", [contents.SHARED, 0])
+@pytest.mark.parametrize("shared", [write_arrays.SHARED, 0])
 def test_indices_do_not_gather_in_memory(shared: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """However little HDF5 may keep, the file holds every step."""
-    monkeypatch.setattr(contents, "SHARED", shared)
+    monkeypatch.setattr(write_arrays, "SHARED", shared)
     monkeypatch.setattr(writer, "INDICES", 1 << 13)
     path, kept = tmp_path / "run.vtkhdf", []
     with ResultWriter(path, MESH) as out:

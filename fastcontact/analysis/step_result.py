@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from fastcontact.analysis.contact_result import contact_result
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
 from fastcontact.elasticity import recovery
 from fastcontact.model.pretension import section_results
@@ -54,7 +53,7 @@ def recover(
         mesh,
         problem.model.kinematics,
         problem.field.moduli,
-        problem.field.rows,
+        problem.field.loops,
         u,
         problem.field.treatment,
         problem.sides,
@@ -66,21 +65,6 @@ def recover(
         *place, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises), reaction.reshape(-1, mesh.dim),
         contact, iterations, material_stress=by_material,
     )  # fmt: skip
-
-
-def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> dict[str, tuple[Array, Array]]:
-    """Return by contact pair in space where the bodies meet first [length], and the normal there.
-
-    Once they have met it stays; until then it is where they would meet now, with obstacles and clearances as they are.
-    """
-    if problem.model.mesh.dim == 2:
-        return {}
-    return {
-        name: start.first_contact[name]
-        if name in start.first_contact
-        else pair.first_contact(problem.configuration(name, start, load, problem.displacement(u), u))
-        for name, pair in problem.pairs.items()
-    }
 
 
 def contact_results(
@@ -107,32 +91,6 @@ def contact_results(
         )
         for name, rows in settled.constraints.rows().items()
     }  # fmt: skip
-
-
-def never_opening(
-    problem: Problem, start: State, settled: SettledContact
-) -> dict[str, tuple[Array, NDArray[np.bool_]]]:
-    """Return by contact pair that is bilateral once closed the places of its constraints, and which are closed for good."""
-    found = dict(start.never_opening)
-    for name, rows in settled.constraints.rows().items():
-        if problem.pairs[name].options.kind == "bilateral_once_closed":
-            part, closed = settled.constraints.parts[name], settled.solution.active[rows].copy()
-            if part.equality is not None:  # what stands beside the other side now may come back to it
-                closed |= part.equality
-            found[name] = part.positions, closed
-    return found
-
-
-def tractions(problem: Problem, settled: SettledContact) -> dict[str, tuple[Array, Array]]:
-    """Return by contact pair with a tangential penalty the places of its constraints, and the tangential tractions there."""
-    found = {}
-    for name, rows in settled.constraints.rows().items():
-        part, solution = settled.constraints.parts[name], settled.solution
-        if problem.pairs[name].options.tangential_penalty is not None and isinstance(solution, FrictionalEquilibrium):
-            assert part.areas is not None
-            forces = np.einsum("nk,ndk->nd", solution.tangential[rows], np.stack(part.directions, axis=2))
-            found[name] = part.positions, forces / part.areas[:, None]
-    return found
 
 
 def counted(settled: SettledContact | None, linear_iterations: int) -> dict[str, Any]:
