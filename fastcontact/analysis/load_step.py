@@ -20,7 +20,15 @@ from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import Step
 from fastcontact.analysis.iterate import gaps_and_forces
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.recover import contact_results, counted, first_contacts, never_opening, recover, tractions
+from fastcontact.analysis.recover import (
+    contact_results,
+    counted,
+    first_contacts,
+    never_opening,
+    recover,
+    tractions,
+    worn_off,
+)
 from fastcontact.analysis.state import State
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.rigid_motions import generalised
@@ -142,7 +150,7 @@ def after_contact(
         extrapolation=start.extrapolation.converged(end.u, gaps_and_forces(settled.constraints, settled.solution)),
         never_opening=never_opening(problem, start, settled), traction=tractions(problem, settled),
     )  # fmt: skip
-    results = contact_results(problem, start, load, settled, end)
+    worn, results = worn_off(problem, start, load, end, contact_results(problem, start, load, settled, end))
     touched = end.touched | {name for name, found in results.items() if found.active.any()}
     met = {name: place for name, place in end.first_contact.items() if name in touched}
-    return replace(end, touched=touched, first_contact=met), results
+    return replace(end, touched=touched, first_contact=met, worn=worn), results

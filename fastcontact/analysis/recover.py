@@ -13,6 +13,7 @@ from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
+from fastcontact.analysis.wear import Worn
 from fastcontact.elasticity import recovery
 from fastcontact.model.pretension import section_results
 from fastcontact.model.ramp import multiplier
@@ -107,6 +108,22 @@ def contact_results(
         )
         for name, rows in settled.constraints.rows().items()
     }  # fmt: skip
+
+
+def worn_off(
+    problem: Problem, start: State, load: StepLoad, end: State, results: dict[str, ContactResult]
+) -> tuple[dict[str, Worn], dict[str, ContactResult]]:
+    """Return by contact pair that wears what has been worn off at the end of the step, and the results with it."""
+    found, told, displacement = dict(start.worn), dict(results), problem.displacement(end.u)
+    for name, contact in results.items():
+        pair = problem.pairs[name]
+        if pair.options.wear is None:
+            continue
+        before = start.worn.get(name, Worn.nothing(len(contact.points)))
+        at = problem.configuration(name, start, load, displacement, end.u)
+        found[name] = before.after(pair, at, contact, pair.options.wear)
+        told[name] = dataclasses.replace(contact, wear=found[name].depth)
+    return found, told
 
 
 def never_opening(
