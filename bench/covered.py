@@ -1,8 +1,9 @@
-"""Statement and branch coverage of the package, kernels included: its tests without compiling.
+"""Statement and branch coverage of the package, kernels included.
 
 Usage: python bench/covered.py [--workers N] [--data FOLDER] [--again] [--missing]
 
-Runs the tests that `tests/modes/coverage.toml` names with NUMBA_DISABLE_JIT=1, commands that they start included. Ends with
+Runs the tests that `tests/modes/coverage.toml` names, commands that they start included, and once more without compiling
+(NUMBA_DISABLE_JIT=1) those that it names for the lines of kernels, which a compiled one does not tell. Ends with
 exit code 1 if less than 95 % is covered, or if a line or a branch is not covered that the same file does not list with
 its reason. `--missing` prints such lines in the form of that list, for a reason to be written; `--again` looks at the
 data of the last run.
@@ -27,22 +28,26 @@ Place = tuple[str, str, str]
 
 
 def measure(tests: dict[str, list[str]], workers: int, data: Path) -> int:
-    """Run the tests under coverage; return the exit code of pytest."""
+    """Run the tests under coverage, compiled and not; return the largest exit code of pytest."""
     data.mkdir(parents=True, exist_ok=True)
     for old in data.glob(".coverage*"):
         old.unlink()
-    quick = {
-        "NUMBA_DISABLE_JIT": "1",
+    code = max(_run(tests["compiled"], workers, data, "0"), _run(tests["interpreted"], workers, data, "1"))
+    _coverage(data, "combine", "-q")
+    return code
+
+
+def _run(tests: list[str], workers: int, data: Path, disable: str) -> int:
+    """Run tests under coverage, with `disable` for NUMBA_DISABLE_JIT; return the exit code of pytest."""
+    environment = {
+        "NUMBA_DISABLE_JIT": disable,
         "PYTHONPATH": str(ROOT),  # commands, too, run what stands here, not what is installed
         "OPENBLAS_NUM_THREADS": "1",
         "COVERAGE_CORE": "ctrace",
         "COVERAGE_FILE": f"{data}/.coverage",
     }
-    left_out = [f"--deselect={test}" for test in tests["left_out"]]
     command = ["-m", "coverage", "run", "-m", "pytest", "-n", str(workers), "-p", "no:cacheprovider", "--tb=short"]
-    done = subprocess.run([sys.executable, *command, *left_out, *tests["files"]], cwd=ROOT, env={**os.environ, **quick})
-    _coverage(data, "combine", "-q")
-    return done.returncode
+    return subprocess.run([sys.executable, *command, *tests], cwd=ROOT, env={**os.environ, **environment}).returncode
 
 
 def _coverage(data: Path, *arguments: str) -> None:

@@ -367,14 +367,16 @@ def space_problems() -> Iterator[Problem]:
 def obstacle_problems() -> Iterator[Problem]:
     """Yield the problems with rigid obstacles."""
     for element in (*PLANE, *SOLIDS):
-        fine, best = (2, "quad9") if element in PLANE else (1, "hex27")
-        for shape in ("ball", "wall"):
-            reference = partial(under, best, shape, fine)
-            yield Problem(f"{shape}, {element}", indented(element, shape), obstacle=True, reference=reference)
+        plane = element in PLANE
+        reference = partial(under_ball, *(("quad9", "continuous", 2) if plane else ("hex27", "node_to_segment", 1)))
+        yield Problem(f"ball, {element}", indented(element, "ball"), obstacle=True, reference=reference)
+        pressure, area = E * 0.02 / 10.0, 100.0 * (np.pi if plane else 1.0)
+        given = {"force": pressure * area, "pressure": pressure, "uniform": True}
+        yield Problem(f"wall, {element}", indented(element, "wall"), obstacle=True, **given)
 
 
-def under(element: str, shape: str, level: int) -> fc.Model:
-    return indented(element, shape)({"formulation": "continuous"}, level)
+def under_ball(element: str, formulation: str, level: int) -> fc.Model:
+    return indented(element, "ball")({"formulation": formulation}, level)
 
 
 def _last(make: Any, element: str, mesh: Any, swapped: bool, **more: Any) -> Build:

@@ -37,6 +37,7 @@ _NAMES = {
     "elasticity.anisotropic_materials": ("Anisotropic", "Orthotropic"),
     "elasticity.material_axes": ("CylindricalAxes",),
     "elasticity.materials": ("LinearElastic",),
+    "elasticity.varying_constants": ("Tabulated",),
     "errors": (
         "CaseError",
         "ContactError",

@@ -18,6 +18,7 @@ from fastcontact.elasticity.anisotropic_materials import Anisotropic as Anisotro
 from fastcontact.elasticity.anisotropic_materials import Orthotropic as Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes as CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic as LinearElastic
+from fastcontact.elasticity.varying_constants import Tabulated as Tabulated
 from fastcontact.errors import CaseError as CaseError
 from fastcontact.errors import ContactError as ContactError
 from fastcontact.errors import ConvergenceError as ConvergenceError

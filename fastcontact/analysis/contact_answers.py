@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastcontact.analysis.wear import worn_in_step
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh import elements
@@ -96,7 +97,7 @@ def contact_answers(model: Model, steps: Iterable[StepResult], name: str) -> lis
     ContactError if the model has no such pair.
     """
     pair = _bound(model, name)
-    areas, work, found = nodal_areas(pair.secondary, pair.points, pair.axisymmetric), 0.0, []
+    areas, work, found = lumped_areas(pair.secondary, pair.points, pair.axisymmetric), 0.0, []
     for step in steps:
         contact = step.contact[name]
         work += contact.dissipation
@@ -207,7 +208,7 @@ def _end_of(before: StepResult | None, step: StepResult, name: str) -> Configura
     return Configuration(step.displacement, start, now, then, angle=angles[0], angle_start=angles[1])
 
 
-def nodal_areas(side: Surface, points: Array, axisymmetric: bool) -> Array:
+def lumped_areas(side: Surface, points: Array, axisymmetric: bool) -> Array:
     """Return the share of each node (m,) of a surface in the area of its facets, positive for all elements [length^2].
 
     By the squares of the shape functions, as for lumped masses (Hinton, Rock and Zienkiewicz, Earthq. Eng. Struct. Dyn. 4,
@@ -215,17 +216,9 @@ def nodal_areas(side: Surface, points: Array, axisymmetric: bool) -> Array:
     """
     areas = np.zeros(len(side.points))
     for block in side.blocks:
-        N, dN, weights = elements.get(block.element).tables
-        x = points[block.facets]
-        tangents = np.einsum("qnk,cnd->cqdk", dN, x)
-        if points.shape[1] == 2:
-            measure = np.linalg.norm(tangents[..., 0], axis=2)
-        else:
-            measure = np.linalg.norm(np.cross(tangents[..., 0], tangents[..., 1]), axis=2)
-        measure = measure * weights
-        if axisymmetric:
-            measure = measure * 2.0 * np.pi * np.einsum("qn,cn->cq", N, x[:, :, 0])
-        shares = measure @ N**2
+        xi, weights = fine_rule(block.element)
+        measure = facet_measure(block.facets, block.element, points, xi, axisymmetric) * weights
+        shares = measure @ elements.get(block.element).shape(xi) ** 2
         shares *= (measure.sum(axis=1) / shares.sum(axis=1))[:, None]
         np.add.at(areas, block.local, shares)
     return areas

@@ -13,7 +13,7 @@ from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import Anderson
 from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_moves, nearest_nodes
 from fastcontact.analysis.extrapolation import Extrapolation
-from fastcontact.analysis.inequalities import Step, solve_inequalities
+from fastcontact.analysis.inequalities import StepContext, solve_inequalities
 from fastcontact.analysis.iterate import Iterate, initially_active, pair_surfaces
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.scatter import Scatter, Watch
@@ -57,7 +57,7 @@ class Plan:
         """Return the plan that the criteria, the formulations and the linear solver of a problem ask for."""
         criteria = problem.criteria
         fixed = 0 if criteria.keep_pairing else criteria.geometry_updates
-        free = fixed is None and problem.bodies is None
+        free = fixed is None and problem.unsupported_bodies is None
         return cls(
             until_settled=fixed is None,
             limit=criteria.max_geometry_updates if fixed is None else fixed,
@@ -75,7 +75,7 @@ class SettledContact:
     constraints : StackedConstraints
     solution : Solution
     iterate : Iterate
-    unsettled : (int, float), optional
+    last_change : (int, float), optional
         A fixed number of updates, and the relative change by the last one.
     scatter : Scatter, optional
         Of the last geometries, where round-off did not let them settle to the criterion.
@@ -84,23 +84,23 @@ class SettledContact:
     constraints: StackedConstraints
     solution: Solution
     iterate: Iterate
-    unsettled: tuple[int, float] | None = None
+    last_change: tuple[int, float] | None = None
     scatter: Scatter | None = None
 
     @property
     def force(self) -> Array:
         """Nodal contact forces (n_dofs,) [force]."""
-        return self.constraints.force(self.solution.multiplier, getattr(self.solution, "tangential", None))
+        return self.constraints.force(self.solution.multiplier, self.solution.tangential)
 
 
 def settle_geometry(
-    step: Step, extrapolation: Extrapolation, expected: float, begun: Iterate | None = None
+    step: StepContext, extrapolation: Extrapolation, expected: float, begun: Iterate | None = None
 ) -> SettledContact:
     """Alternate between pairing the surfaces and solving their inequalities until both stand still.
 
     Parameters
     ----------
-    step : Step
+    step : StepContext
     extrapolation : Extrapolation
     expected : float
         Displacement to expect in the first step, if forces alone act [length].
@@ -120,7 +120,7 @@ def settle_geometry(
         raise
 
 
-def _settle(step: Step, iterate: Iterate, extrapolation: Extrapolation, expected: float) -> SettledContact:
+def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, expected: float) -> SettledContact:
     problem, plan = step.problem, Plan.of(step.problem)
     if iterate.history:  # nothing to extrapolate any more
         plan = replace(plan, extrapolate=False)
@@ -149,7 +149,7 @@ def _settle(step: Step, iterate: Iterate, extrapolation: Extrapolation, expected
             return replace(settled, scatter=scatter)
         mixed = mixing.next(moved.before, part, solution, tolerances.inexact)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
-        tolerances.tighten(moved.relative, getattr(solution, "residual", 0.0))
+        tolerances.tighten(moved.relative, solution.residual)
         if plan.extrapolate and update == PATIENT_UPDATES:
             # Nodes that flip between facets may do so for ever from one start and not from another.
             iterate.begin_again(step.state)
@@ -175,7 +175,9 @@ class _Moved:
         return self.change / self.size if self.size else 0.0
 
 
-def _move(step: Step, iterate: Iterate, constraints: StackedConstraints, solution: Solution, part: Array) -> _Moved:
+def _move(
+    step: StepContext, iterate: Iterate, constraints: StackedConstraints, solution: Solution, part: Array
+) -> _Moved:
     """Let the iterate take the active displacements `part` (k,) of a solution."""
     before = step.dofs.of(iterate.u)
     iterate.u = step.dofs.put(iterate.u, part)

@@ -26,7 +26,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class StepContext:
     """What stays the same through all pairings of a load step.
 
     Attributes
@@ -48,13 +48,13 @@ class Step:
 
 
 def solve_inequalities(
-    step: Step, constraints: Constraints, iterate: Iterate, active: Mask, accuracy: Accuracy
+    step: StepContext, constraints: Constraints, iterate: Iterate, active: Mask, accuracy: Accuracy
 ) -> tuple[Solution, Array]:
     """Solve the inequalities of a pairing.
 
     Parameters
     ----------
-    step : Step
+    step : StepContext
     constraints : Constraints
     iterate : Iterate
         Keeps the solution with friction, and the rigid position of unsupported bodies.
@@ -68,14 +68,14 @@ def solve_inequalities(
     part : ndarray (k,)
         The active displacements [length].
     """
-    if step.problem.bodies is not None:
-        return _with_unsupported_bodies(step, step.problem.bodies, constraints, iterate, active, accuracy)
+    if step.problem.unsupported_bodies is not None:
+        return _with_unsupported_bodies(step, step.problem.unsupported_bodies, constraints, iterate, active, accuracy)
     solution = _solve(step, constraints, iterate, active, accuracy, step.load.lift)
     return solution, step.dofs.displacement(solution.u, step.load.lift)
 
 
 def _solve(
-    step: Step, constraints: Constraints, iterate: Iterate, active: Mask, accuracy: Accuracy, lift: Array
+    step: StepContext, constraints: Constraints, iterate: Iterate, active: Mask, accuracy: Accuracy, lift: Array
 ) -> Solution:
     """Solve in the unknowns that supports and relations leave; `lift` (n_dofs,) is what they prescribe [length]."""
     own = constraints_on_unknowns(step.dofs, constraints, lift, step.state.u)
@@ -87,7 +87,12 @@ def _solve(
 
 
 def _with_unsupported_bodies(
-    step: Step, bodies: UnsupportedBodies, constraints: Constraints, iterate: Iterate, active: Mask, accuracy: Accuracy
+    step: StepContext,
+    bodies: UnsupportedBodies,
+    constraints: Constraints,
+    iterate: Iterate,
+    active: Mask,
+    accuracy: Accuracy,
 ) -> tuple[Solution, Array]:
     """Solve for bodies held by contact alone; return the solution and all displacements (n_dofs,)."""
     problem, state, lift = step.problem, step.state, step.load.lift
@@ -104,15 +109,15 @@ def _with_unsupported_bodies(
         moved = _approach(step, bodies, constraints, iterate.u)
         start = start if active.any() else start + moved
     noise = 10 * problem.solver.tolerance
-    found = bodies.settle(solve_at, start, state.largest_work, noise, state.gap_round_off)
+    found = bodies.settle(solve_at, start, state.largest_rigid_force, noise, state.gap_round_off)
     if found.state.settled and not found.slack:
-        raise ConvergenceError(not_balanced(bodies, found, state.largest_work), iterate.history)
+        raise ConvergenceError(not_balanced(bodies, found, state.largest_rigid_force), iterate.history)
     iterate.rigid = found
     at = lift + bodies.rigid(found.position)
     return found.state, problem.system.displacement(found.state.u, at)
 
 
-def _approach(step: Step, bodies: UnsupportedBodies, constraints: Constraints, u: Array) -> Array:
+def _approach(step: StepContext, bodies: UnsupportedBodies, constraints: Constraints, u: Array) -> Array:
     """Return how far (k,) rigid bodies move until the loads hold them in contact [length].
 
     Raises

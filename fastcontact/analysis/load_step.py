@@ -1,8 +1,9 @@
 """One load step: prepare, settle the contact geometry, balance, recover. Start reading the code here.
 
-The loads of a step are prescribed displacements and balanced. The contact geometry is settled first: the surfaces are paired
-on the deformed configuration, the inequalities of contact are solved, and both are repeated until the displacement stands
-still. The contact forces are then known; all displacements, the reactions and the stresses follow from them.
+First the loads and the prescribed displacements at the end of the step are evaluated. Then the contact geometry is settled:
+the surfaces are paired on the deformed configuration, the inequalities of contact are solved, and both are repeated until
+the displacement stands still. The contact forces are then known, and all displacements, the balance of forces and the
+stresses follow from them.
 """
 
 from __future__ import annotations
@@ -17,19 +18,11 @@ from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis.balance import Balance, balance
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
-from fastcontact.analysis.inequalities import Step
-from fastcontact.analysis.iterate import gaps_and_forces
+from fastcontact.analysis.inequalities import StepContext
+from fastcontact.analysis.keep_contact import keep_contact, keep_wear
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.recover import (
-    contact_results,
-    counted,
-    first_contacts,
-    never_opening,
-    recover,
-    tractions,
-    worn_off,
-)
 from fastcontact.analysis.state import State
+from fastcontact.analysis.step_result import contact_results, counted, recover
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.rigid_motions import generalised
 from fastcontact.results.step import ContactResult, StepResult
@@ -59,25 +52,31 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     load = problem.load_at(instant)
     solved_before = problem.solver.counters.iterations
     problem.solver.put_back(state.solver)
-    loaded = right_side(problem, load)
+    loaded = with_loads(problem, load)
     start, expected = prepare_start(problem, state, load, loaded)
     settled, u, balanced = equilibrium(problem, start, load, loaded, expected)
+    # An iterative solver was too inaccurate: it is asked for more, and goes on from the same contact.
     while balanced.excess > 1.0 and problem.solver.improve(balanced.excess):
-        settled, u, balanced = equilibrium(problem, start, load, right_side(problem, load), expected, settled)
+        settled, u, balanced = equilibrium(problem, start, load, with_loads(problem, load), expected, settled)
     balanced.check(index, problem, settled.iterate.history if settled is not None else ())
     iterations = counted(settled, problem.solver.counters.iterations - solved_before)
     end = replace(
         start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles
     )
-    end, contact = (end, {}) if settled is None else after_contact(problem, start, load, settled, end)
-    if problem.bodies is not None and end.rigid is not None:
-        iterations["regularised"] = problem.bodies.report(end.rigid, end.largest_work)
+    contact: dict[str, ContactResult] = {}
+    if settled is not None:
+        end = keep_contact(problem, start, load, settled, end)
+        contact = contact_results(problem, start, load, settled, end)
+        end, contact = keep_wear(problem, start, load, end, contact)
+        end = end.after_touching(name for name, pair in contact.items() if pair.active.any())
+    if problem.unsupported_bodies is not None and end.rigid is not None:
+        iterations["regularised"] = problem.unsupported_bodies.report(end.rigid, end.largest_rigid_force)
     end = replace(end, solver=problem.solver.snapshot())
     return end, recover(problem, end, contact, balanced.reaction, iterations, (index, instant))
 
 
-def right_side(problem: Problem, load: StepLoad) -> Loaded:
-    """Return the prepared matrix with the right-hand side of the step."""
+def with_loads(problem: Problem, load: StepLoad) -> Loaded:
+    """Return the equations of the step: the prepared matrix with the right-hand side of its loads."""
     return problem.solver.load(problem.system.right(load.force, load.lift))
 
 
@@ -86,19 +85,20 @@ def prepare_start(problem: Problem, state: State, load: StepLoad, loaded: Loaded
 
     The latter matters in the first step if forces alone act: nothing else tells how large displacements will be.
     """
-    round_off, largest_work, expected = state.gap_round_off, state.largest_work, 0.0
+    round_off, rigid_force, expected = state.gap_round_off, state.largest_rigid_force, 0.0
     zero = np.zeros(len(load.lift))
     if problem.pairs and load.force.any() and not (state.u.any() or load.lift.any()):
         expected = largest(loaded.full_solution(zero))
     if problem.pairs and problem.model.springs:
-        # Without contact, bodies on weak springs move far; gaps keep round-off of that size.
+        # Springs of the model may be weak: without contact, bodies on them move far, and gaps are differences of such
+        # displacements, of which each has an error of some units in its last place.
         alone = largest(loaded.full_solution(zero))
         round_off = max(round_off, 16 * np.finfo(float).eps * alone)
-    if problem.bodies is not None:
-        work = generalised(problem.bodies.motions, load.force)
-        largest_work = max(largest_work, float(np.abs(work).max()))
+    if problem.unsupported_bodies is not None:
+        forces = generalised(problem.unsupported_bodies.motions, load.force)
+        rigid_force = max(rigid_force, float(np.abs(forces).max()))
     start = replace(
-        state, gap_round_off=round_off, largest_work=largest_work, rigid=None, unsettled=None,
+        state, gap_round_off=round_off, largest_rigid_force=rigid_force, rigid=None, last_change=None,
         largest_force=max(state.largest_force, largest(load.force)),
         extrapolation=state.extrapolation.to(load.lift, load.force),
     )  # fmt: skip
@@ -106,17 +106,18 @@ def prepare_start(problem: Problem, state: State, load: StepLoad, loaded: Loaded
 
 
 def equilibrium(
-    problem: Problem, start: State, load: StepLoad, loaded: Loaded, expected: float, before: SettledContact | None = None
+    problem: Problem, start: State, load: StepLoad, loaded: Loaded, expected: float,
+    previous_try: SettledContact | None = None,
 ) -> tuple[SettledContact | None, Array, Balance]:  # fmt: skip
     """Return the settled contact, all displacements (n_dofs,) [length] and the balance of forces.
 
-    It begins where the contact `before` ended, which less accurate solutions have settled.
+    It begins where a `previous_try` at the same step has settled with less accurate solutions.
     """
     settled = None
     if problem.pairs:
         dofs = problem.dofs.for_step(start.u, load.lift)
-        step = Step(problem, start, load, dofs.loaded(loaded), dofs)
-        settled = settle_geometry(step, start.extrapolation, expected, before.iterate if before else None)
+        step = StepContext(problem, start, load, dofs.loaded(loaded), dofs)
+        settled = settle_geometry(step, start.extrapolation, expected, previous_try.iterate if previous_try else None)
     u, contact_force = solve_displacements(problem, start, load, loaded, settled)
     balanced = balance(problem, u, contact_force, load.force, start.largest_force)
     if settled is not None:
@@ -134,23 +135,7 @@ def solve_displacements(
         v = loaded.solve(*none, guess=system.unknowns(start.u, lift))[0]
         return system.displacement(v, lift), np.zeros(len(lift))
     contact_force, rigid = settled.force, settled.iterate.rigid
-    if problem.bodies is not None and rigid is not None:
-        lift = lift + problem.bodies.rigid(rigid.position)
+    if problem.unsupported_bodies is not None and rigid is not None:
+        lift = lift + problem.unsupported_bodies.rigid(rigid.position)
     v = loaded.full_solution(system.reduced(contact_force), settled.solution.u)
     return system.displacement(v, lift), contact_force
-
-
-def after_contact(
-    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State
-) -> tuple[State, dict[str, ContactResult]]:
-    """Return the end of the step with the contact data that later steps need, and the results of all contact pairs."""
-    end = replace(
-        end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
-        unsettled=settled.unsettled, first_contact=first_contacts(problem, start, load, end.u),
-        extrapolation=start.extrapolation.converged(end.u, gaps_and_forces(settled.constraints, settled.solution)),
-        never_opening=never_opening(problem, start, settled), traction=tractions(problem, settled),
-    )  # fmt: skip
-    worn, results = worn_off(problem, start, load, end, contact_results(problem, start, load, settled, end))
-    touched = end.touched | {name for name, found in results.items() if found.active.any()}
-    met = {name: place for name, place in end.first_contact.items() if name in touched}
-    return replace(end, touched=touched, first_contact=met, worn=worn), results

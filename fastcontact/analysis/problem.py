@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -19,10 +19,12 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.elasticity.constrained_system import System
+from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.material_sides import MaterialSides, material_sides
 from fastcontact.elasticity.springs import stiffened
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
+from fastcontact.elasticity.temperature import Temperature
 from fastcontact.linear import choice
 from fastcontact.linear.protocol import LinearSolver
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
@@ -77,7 +79,7 @@ class Problem:
         Materials of all solid cells.
     system : System
         Stiffness, supports and relations.
-    bodies : UnsupportedBodies, optional
+    unsupported_bodies : UnsupportedBodies, optional
         Bodies held by contact alone, if there are any.
     dofs : ActiveDofs
         The displacement components that a pairing solves for.
@@ -99,7 +101,7 @@ class Problem:
     field: MaterialField
     sides: MaterialSides
     system: System
-    bodies: UnsupportedBodies | None
+    unsupported_bodies: UnsupportedBodies | None
     dofs: ActiveDofs
     contact_dofs: NDArray[np.intp]
     force_driven: ForceDrivenObstacles
@@ -133,9 +135,9 @@ class Problem:
         force = combined(self.forces, self.ramp, instant, self.shape).ravel()
         return StepLoad(lift, force, obstacles, clearances, angles)
 
-    def temperature_factors(self, instant: float) -> list[float]:
-        """Return what each temperature of the model is multiplied with at an instant of the ramp [-]."""
-        return [multiplier(own.ramp, self.ramp, instant) for own in self.model.temperatures]
+    def factors(self, histories: Iterable[Temperature | InitialState], instant: float) -> list[float]:
+        """Return what temperatures or initial states of the model are multiplied with at an instant of the ramp [-]."""
+        return [multiplier(own.ramp, self.ramp, instant) for own in histories]
 
     def displacement(self, u: Array) -> Array:
         """Return the displacements (n_points, dim) of the mesh of all displacements u (n_dofs,) [length]."""
@@ -210,7 +212,7 @@ def prepare(
     )  # fmt: skip
     field = model.material_field()
     sides = material_sides(mesh, field.distinct)
-    K = stiffness(mesh, model.kinematics, field.moduli, field.rows, None, field.treatment)
+    K = stiffness(mesh, model.kinematics, field.moduli, field.loops, None, field.treatment)
     K = stiffened(K, model.springs)
     system = System(
         driven.stiffness(K),
@@ -232,9 +234,9 @@ def prepare(
 
 
 def _forces(model: Model) -> dict[Table | None, Array]:
-    """Return by history the nodal forces (n_points, dim) of loads and temperatures at multiplier 1 [force]."""
+    """Return by history the nodal forces (n_points, dim) of loads, heat and initial states at multiplier 1 [force]."""
     forces = model.forces_by_ramp()
-    for own, values in model.thermal_forces_by_ramp().items():
+    for own, values in (*model.thermal_forces_by_ramp().items(), *model.initial_forces_by_ramp().items()):
         forces[own] = forces[own] + values if own in forces else values
     return forces
 

@@ -7,15 +7,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.analysis.locking import locking_warning
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.seam_warnings import seam_warnings
 from fastcontact.analysis.state import State
+from fastcontact.analysis.volumetric_locking import locking_warning
 from fastcontact.analysis.wear import too_fast
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import element_kernels, recovery
-from fastcontact.elasticity.materials import LinearElastic
+from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies
@@ -79,7 +79,7 @@ def _too_fast(name: str, pair: Formulation, state: State) -> list[str]:
 
 def _unsettled(state: State) -> list[str]:
     """Return a warning where the last of a fixed number of geometry updates still changed much."""
-    update, change = state.unsettled or (0, 0.0)
+    update, change = state.last_change or (0, 0.0)
     if change <= UNSETTLED:
         return []
     return [
@@ -140,9 +140,9 @@ def _interpenetration(problem: Problem, state: State) -> list[str]:
 
 
 def _carrying_springs(problem: Problem, state: State) -> list[str]:
-    if problem.bodies is None or state.rigid is None:
+    if problem.unsupported_bodies is None or state.rigid is None:
         return []
-    told = problem.bodies.report(state.rigid, state.largest_work)
+    told = problem.unsupported_bodies.report(state.rigid, state.largest_rigid_force)
     if told["relative_to_load"] <= problem.criteria.relative:
         return []
     return [
@@ -153,8 +153,8 @@ def _carrying_springs(problem: Problem, state: State) -> list[str]:
 
 def _large_strain(problem: Problem, last: StepResult) -> list[str]:
     laws, field = [material for material, _ in problem.model.materials], problem.field
-    isotropic = np.array([isinstance(law, LinearElastic) for law in laws])
-    shear = np.array([law.shear_modulus if isinstance(law, LinearElastic) else math.inf for law in laws])
+    isotropic = np.array([isinstance(law, LinearElastic) and not law.graded for law in laws])
+    shear = np.array([_shear_modulus(law) for law in laws])
     strain, border = 0.0, last.material_stress
     inside = np.ones(len(last.stress), bool)
     if border is not None:
@@ -172,6 +172,11 @@ def _large_strain(problem: Problem, last: StepResult) -> list[str]:
     if strain <= STRAIN:
         return []
     return [f"the largest equivalent strain is {strain:.3f}, beyond the {STRAIN} where linear kinematics hold well"]
+
+
+def _shear_modulus(law: Material) -> float:
+    """Return the shear modulus of an isotropic material [pressure]; of others, whose strains are computed, infinity."""
+    return law.shear_modulus if isinstance(law, LinearElastic) and not law.graded else math.inf
 
 
 def _large_rotation(problem: Problem, state: State) -> list[str]:

@@ -68,6 +68,16 @@ class Equilibrium:
         """Whether all inequalities hold."""
         return bool(np.array_equal(self.active, self.wanted))
 
+    @property
+    def residual(self) -> float:
+        """By how much the inequalities of the active set do not hold, over the largest force: it is solved exactly."""
+        return 0.0
+
+    @property
+    def tangential(self) -> None:
+        """Tangential forces: none without friction."""
+        return None
+
 
 @dataclass(frozen=True, eq=False)
 class FrictionalEquilibrium:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -49,11 +50,11 @@ class State:
         The last two converged steps.
     gap_round_off : float
         Gaps are no more accurate than this [length].
-    largest_force, largest_work : float
+    largest_force, largest_rigid_force : float
         Of all steps so far: the largest force [force], and the largest force of loads on a free rigid motion [force].
     touched : frozenset of str
         Contact pairs that were closed at the end of a step.
-    unsettled : (int, float), optional
+    last_change : (int, float), optional
         The fixed number of geometry updates of the last step, and the relative change by the last one.
     rigid : RigidPosition, optional
         Rigid position of unsupported bodies in the last step.
@@ -73,18 +74,24 @@ class State:
     traction: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
     extrapolation: Extrapolation = field(default_factory=Extrapolation)
     largest_force: float = 0.0
-    largest_work: float = 0.0
+    largest_rigid_force: float = 0.0
     touched: frozenset[str] = frozenset()
-    unsettled: tuple[int, float] | None = None
+    last_change: tuple[int, float] | None = None
     rigid: RigidPosition | None = None
     solver: Any = None
+
+    def after_touching(self, pairs: Iterable[str]) -> State:
+        """Return the state when these contact pairs are closed; places of first contact count of pairs that have been."""
+        touched = self.touched.union(pairs)
+        met = {name: place for name, place in self.first_contact.items() if name in touched}
+        return dataclasses.replace(self, touched=touched, first_contact=met)
 
     def to_dict(self, n_dofs: int) -> dict[str, Any]:
         """Return what a later process needs to continue, beside the displacements of the `n_dofs` components of the mesh."""
         return {
             "numbers": {
                 "largest_force": float(self.largest_force),
-                "largest_work": float(self.largest_work),
+                "largest_work": float(self.largest_rigid_force),
                 "round_off": float(self.gap_round_off),
             },
             "obstacles": self.u[n_dofs:].copy(),
@@ -140,7 +147,7 @@ class State:
             if "extrapolation" in kept
             else Extrapolation(),
             largest_force=numbers["largest_force"],
-            largest_work=numbers["largest_work"],
+            largest_rigid_force=numbers["largest_work"],
             touched=touched.union(kept.get("touched", ())),
         )
 

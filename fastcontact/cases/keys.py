@@ -11,6 +11,8 @@ from typing import Any
 from fastcontact.errors import CaseError, FastcontactError, unknown
 
 NUMBER = (int, float)
+# A number, or a table of a value that depends on the position.
+PLACE = (int, float, dict)
 AXES = {"x": NUMBER, "y": NUMBER, "z": NUMBER}
 UNITS = {"length": str, "force": str, "pressure": str}
 RAMP = {"steps": int, "end": NUMBER, "instants": list, "table": list}
@@ -24,19 +26,19 @@ SOLVE: dict[str, Any] = {
 LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     "material": (
         {
-            **dict.fromkeys(("E", "nu"), (int, float, list)),
+            **dict.fromkeys(("E", "nu"), (int, float, list, dict)),
             "groups": (list, str),
             "volumetric": str,
             "incompatible_modes": bool,
             **dict.fromkeys(("G", "D"), list),
             "axes": (list, dict),
-            "density": NUMBER,
-            "expansion": (int, float, list),
+            "density": PLACE,
+            "expansion": (int, float, list, dict),
         },
         (),
     ),
     "support": ({"group": str, **AXES, "normal": NUMBER, "ramp": list}, ("group",)),
-    "pressure": ({"group": str, "value": NUMBER, "ramp": list}, ("group", "value")),
+    "pressure": ({"group": str, "value": PLACE, "ramp": list}, ("group", "value")),
     "traction": ({"group": str, **AXES, "ramp": list}, ("group",)),
     "body_force": ({"groups": (list, str), **AXES, "ramp": list}, ()),
     "gravity": ({"groups": (list, str), **AXES, "ramp": list}, ()),
@@ -45,8 +47,20 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         ("speed",),
     ),
     "temperature": (
-        {"value": NUMBER, "groups": (list, str), "reference": NUMBER, "ramp": list},
+        {"value": PLACE, "groups": (list, str), "reference": NUMBER, "ramp": list},
         ("value",),
+    ),
+    **dict.fromkeys(
+        ("initial_stress", "initial_strain"),
+        (
+            {
+                "groups": (list, str),
+                **dict.fromkeys(("xx", "yy", "zz", "xy", "yz", "xz"), PLACE),
+                "axes": (list, dict),
+                "ramp": list,
+            },
+            (),
+        ),
     ),
     "force": ({"group": str, **AXES, "distribute": bool, "ramp": list}, ("group",)),
     "moment": ({"group": str, **AXES, "ramp": list}, ("group",)),

@@ -11,8 +11,10 @@ from typing import Any
 from fastcontact.cases.keys import AXES, LISTS, NUMBER, ROTATION, SURFACE, at, called, check_keys, tables
 from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
+from fastcontact.elasticity.initial_states import COMPONENTS
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic, Material
+from fastcontact.elasticity.varying_constants import Tabulated
 from fastcontact.errors import CaseError, unknown
 from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.generate.cut import OPPOSITE, cut
@@ -21,24 +23,41 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
+# Keys whose values may depend on the position.
+VALUES = ("E", "nu", "G", "density", "expansion", "value", *COMPONENTS)
+
 
 def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
     """Add the material whose constants are given: isotropic, orthotropic where E, nu or G are lists, anisotropic with D."""
     kind = _material_law(constants)
-    if isinstance(constants.get("axes"), dict):
-        constants["axes"] = called("material.axes", CylindricalAxes, constants["axes"])
+    if "axes" in constants:
+        constants["axes"] = _axes("material", constants["axes"])
     if kind is LinearElastic:
         for key in constants:
             if (
                 key not in ("volumetric", "incompatible_modes")
                 and not isinstance(constants[key], (list, tuple))
                 and key != "axes"
+                and not callable(constants[key])
             ):
                 constants[key] = float(constants[key])
     for key in constants:
         if key not in inspect.signature(kind).parameters:
             raise CaseError(f"the key 'material.{key}' is none of a material that is {_LAWS[kind]}")
     model.add_material(kind(**constants), groups)
+
+
+def _add_initial_stress(model: Model, axes: Any = None, **given: Any) -> None:
+    model.add_initial_stress(axes=_axes("initial_stress", axes), **given)
+
+
+def _add_initial_strain(model: Model, axes: Any = None, **given: Any) -> None:
+    model.add_initial_strain(axes=_axes("initial_strain", axes), **given)
+
+
+def _axes(where: str, axes: Any) -> Any:
+    """Return axes given as vectors, or by the keys of a cylinder."""
+    return called(f"{where}.axes", CylindricalAxes, axes) if isinstance(axes, dict) else axes
 
 
 def _add_coupling(model: Model, reference: str, group: str, place: Any = None, **options: Any) -> None:
@@ -77,6 +96,8 @@ _ADD: dict[str, Callable[..., None]] = {
     "gravity": Model.add_gravity,
     "centrifugal": Model.add_centrifugal,
     "temperature": Model.add_temperature,
+    "initial_stress": _add_initial_stress,
+    "initial_strain": _add_initial_strain,
     "force": Model.add_force,
     "moment": Model.add_moment,
     "hydrostatic_pressure": Model.add_hydrostatic_pressure,
@@ -105,7 +126,7 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
                 if key not in entry:
                     raise CaseError(f"{where} needs '{key}'")
             with at(where):
-                add(model, **_arguments(where, entry))
+                add(model, **_arguments(where, _placed(where, entry)))
     for name, entry in data.get("contact", {}).items():
         if not isinstance(entry, dict):
             raise CaseError(f"'contact' needs a name for each pair: write [contact.NAME] above its keys, not '{name}'")
@@ -117,6 +138,22 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
     for name, entry in data.get("obstacle", {}).items():
         _add_obstacle(model, name, entry, folder)
     return model
+
+
+def _placed(where: str, entry: dict[str, Any]) -> dict[str, Any]:
+    """Return an entry with functions in place of the tables of values that depend on the position."""
+    found = dict(entry)
+    for key in VALUES:
+        value = entry.get(key)
+        if isinstance(value, list):
+            found[key] = [_function(f"{where}.{key}[{i}]", member) for i, member in enumerate(value)]
+        elif key in entry:
+            found[key] = _function(f"{where}.{key}", value)
+    return found
+
+
+def _function(where: str, value: Any) -> Any:
+    return called(where, Tabulated, value) if isinstance(value, dict) else value
 
 
 def _cut(mesh: Mesh, sections: Any) -> Mesh:

@@ -8,14 +8,18 @@ more on smooth quadratic facets in the plane, but each of their gaps involves th
 closed one costs a linear solution.
 
 Against rigid obstacles it is the continuous one, which also knows what lies between nodes, but node against obstacle on
-linear triangles and on linear facets in space. Triangles and tetrahedra cannot meet all conditions of the continuous
-formulation, and its pressures oscillate by up to 40 %; in space each of its integration points costs a linear solution.
+linear triangles, and in space on all facets whose nodes carry pressure, corners included. Triangles and tetrahedra cannot
+meet all conditions of the continuous formulation, and its pressures oscillate by up to 40 %; in space each of its
+integration points costs a linear solution.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
+
+from fastcontact.contact.integration import all_nodes_carry
+from fastcontact.mesh import elements
 
 # Options of mortar in the plane that only standard multipliers have.
 OF_STANDARD = ("n_gauss", "augmentation")
@@ -35,13 +39,24 @@ def default_formulation(dim: int, options: Mapping[str, Any]) -> tuple[str, dict
     return "mortar", {**options, "multipliers": "dual"}, why
 
 
-def against_obstacle(dim: int, linear: bool, of_triangles: bool, options: Mapping[str, Any]) -> tuple[str, str]:
+def against_obstacle(
+    dim: int, facets: Collection[str], of_simplices: bool, options: Mapping[str, Any]
+) -> tuple[str, str]:
     """Return the name of the formulation of a side against a rigid obstacle, and why, as the end of a sentence.
 
-    Whether all facets are `linear` and, in 2 dimensions, `of_triangles` alone; `options` are those that the user gave.
+    Parameters
+    ----------
+    dim : int
+    facets : collection of str
+        The kinds of facets on the side.
+    of_simplices : bool
+        Whether linear triangles or tetrahedra alone have them.
+    options : mapping
+        Those that the user gave.
     """
-    if linear and of_triangles and "integration" not in options:
-        return "node_to_segment", "the pressures of the continuous one oscillate on linear triangles and tetrahedra"
-    if linear and dim == 3 and "integration" not in options:
-        return "node_to_segment", "the continuous one costs many times as much in space"
+    if facets and "integration" not in options:
+        if of_simplices and all(elements.get(name).linear == name for name in facets):
+            return "node_to_segment", "the pressures of the continuous one oscillate on linear triangles and tetrahedra"
+        if dim == 3 and all(all_nodes_carry(name) for name in facets):
+            return "node_to_segment", "the continuous one costs many times as much in space"
     return "continuous", "it also knows what lies between nodes"

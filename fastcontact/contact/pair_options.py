@@ -32,7 +32,7 @@ class PairOptions:
     excluded, frictionless : ndarray of bool (n_points,), optional
         Nodes without contact, and without friction.
     kind : str
-        A key of `KINDS`.
+        One of `KINDS`.
     penalty : float, optional
         Pressure by penetration [pressure / length]; None: no penetration.
     tangential_penalty : callable, optional

@@ -1,4 +1,7 @@
-"""Who faces whom: evaluation points of the secondary side projected on the primary facets, and their gap rows."""
+"""Which point faces which facet: places of the secondary side projected on the primary facets, and their gap rows.
+
+Mortar in space pairs facets with facets instead, in `formulations._cut_faces`.
+"""
 
 from __future__ import annotations
 

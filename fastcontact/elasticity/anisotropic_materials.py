@@ -10,14 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.elasticity.loads import LARGEST
 from fastcontact.elasticity.material_axes import Axes, checked_axes
-from fastcontact.elasticity.materials import Material, check_density, check_expansion, check_positive
+from fastcontact.elasticity.materials import Constant, Material, check_density, check_expansion, check_positive
+from fastcontact.elasticity.varying_constants import Varying, wrapped
 from fastcontact.errors import ModelError
 
 Array = NDArray[np.float64]
 NAMES = ("12", "13", "23")
 # Of the stiffness to be symmetric, relative to its largest entry.
 SYMMETRIC = 1e-9
+# Of Poisson's ratios together, above which the energy is positive.
+LEAST = 1e-12
 
 
 @dataclass(frozen=True)
@@ -29,7 +33,8 @@ class Orthotropic(Material):
     Parameters
     ----------
     E : (float, float, float)
-        Young's moduli E1, E2, E3 along the material's axes [pressure].
+        Young's moduli E1, E2, E3 along the material's axes [pressure]. Each of these, of nu and of G may also be a function
+        or an array where it varies, as E of `LinearElastic`.
     nu : (float, float, float)
         Poisson's ratios nu12, nu13, nu23 [-]: nu12 is minus the strain along 2 over that along 1, for a stress along 1.
         The others follow: nu21 = nu12 E2 / E1.
@@ -40,10 +45,11 @@ class Orthotropic(Material):
         (x, y, z) at right angles, of any length; in the plane also the first one, (x, y), alone. Or a function from
         positions (n, dim) [length] to unit vectors in rows (n, 3, 3), such as `CylindricalAxes`, taken at the middle of each
         cell.
-    density : float, optional
+    density : float, callable or ndarray (n,), optional
         Mass per volume [mass / length^3].
-    expansion : float or (float, float, float), optional
-        Coefficients of thermal expansion, one for all or one along each axis [1 / temperature].
+    expansion : float, callable, ndarray (n,) or three of them, optional
+        Coefficients of thermal expansion, one for all or one along each axis [1 / temperature]; functions or arrays where
+        they vary.
     incompatible_modes : bool
         As of `LinearElastic`.
 
@@ -59,27 +65,24 @@ class Orthotropic(Material):
     (6, 6)
     """
 
-    E: Sequence[float]
-    nu: Sequence[float]
-    G: Sequence[float]
+    E: Sequence[Any]
+    nu: Sequence[Any]
+    G: Sequence[Any]
     axes: Axes = None
-    density: float | None = None
-    expansion: float | Sequence[float] | None = None
+    density: Constant | None = None
+    expansion: Constant | Sequence[Constant] | None = None
     incompatible_modes: bool = False
 
     def __post_init__(self) -> None:
         for name in ("E", "nu", "G"):
             object.__setattr__(self, name, _three(name, getattr(self, name)))
         for value, number in zip(self.E, "123", strict=True):
-            check_positive(f"Young's modulus E{number}", value)
+            _check_modulus(f"Young's modulus E{number}", value)
         for value, number in zip(self.G, NAMES, strict=True):
-            check_positive(f"the shear modulus G{number}", value)
-        _check_ratios(self.E, self.nu)
-        object.__setattr__(self, "axes", checked_axes(self.axes))
-        check_density(self.density)
-        check_expansion(self.expansion, 3)
-        if isinstance(self.expansion, (Sequence, np.ndarray)):
-            object.__setattr__(self, "expansion", tuple(float(v) for v in self.expansion))
+            _check_modulus(f"the shear modulus G{number}", value)
+        if not self.graded:  # else where the cells are known
+            _check_ratios(self.E, self.nu)
+        _take_rest(self)
 
     @classmethod
     def transversely_isotropic(
@@ -91,8 +94,8 @@ class Orthotropic(Material):
         G_along: float,
         *,
         axes: Axes = None,
-        density: float | None = None,
-        expansion: float | Sequence[float] | None = None,
+        density: Constant | None = None,
+        expansion: Constant | Sequence[Constant] | None = None,
     ) -> Orthotropic:
         """Return a material that is isotropic across its first axis, such as one with fibres along it.
 
@@ -108,9 +111,9 @@ class Orthotropic(Material):
             Shear modulus in planes that contain the first axis [pressure].
         axes : sequence or callable, optional
             As of `Orthotropic`: unit vectors in rows (3, 3) [-], or a function.
-        density : float, optional
+        density : float, callable or ndarray (n,), optional
             Mass per volume [mass / length^3].
-        expansion : float or (float, float, float), optional
+        expansion : float, callable, ndarray (n,) or three of them, optional
             Coefficients of thermal expansion [1 / temperature].
         """
         if not nu_across > -1.0:
@@ -129,12 +132,30 @@ class Orthotropic(Material):
     @property
     def local_compliance(self) -> Array:
         """Compliance (6, 6) [1 / pressure] in the material's axes."""
-        (E1, E2, E3), (nu12, nu13, nu23), (G12, G13, G23) = self.E, self.nu, self.G
-        S = np.diag([1 / E1, 1 / E2, 1 / E3, 1 / G12, 1 / G23, 1 / G13])
-        S[0, 1] = S[1, 0] = -nu12 / E1
-        S[0, 2] = S[2, 0] = -nu13 / E1
-        S[1, 2] = S[2, 1] = -nu23 / E2
+        return np.asarray(self.compliances(self)[0])
+
+    def compliances(self, constants: Any) -> Array:
+        """Return compliances (n, 6, 6) [1 / pressure] in the material's axes, of constants that may be arrays (n,)."""
+        given = np.broadcast_arrays(*map(np.atleast_1d, (*constants.E, *constants.nu, *constants.G)))
+        E1, E2, E3, nu12, nu13, nu23, G12, G13, G23 = given
+        S = np.zeros((len(E1), 6, 6))
+        for row, modulus in enumerate((E1, E2, E3, G12, G23, G13)):
+            S[:, row, row] = 1 / modulus
+        S[:, 0, 1] = S[:, 1, 0] = -nu12 / E1
+        S[:, 0, 2] = S[:, 2, 0] = -nu13 / E1
+        S[:, 1, 2] = S[:, 2, 1] = -nu23 / E2
         return S
+
+    def admissible(self, constants: Any) -> Any:
+        """Return where (n,) moduli are positive, and Poisson's ratios leave the energy of any strain positive."""
+        E, nu, G = (
+            np.broadcast_arrays(*map(np.atleast_1d, values)) for values in (constants.E, constants.nu, constants.G)
+        )
+        fit = np.all([(v >= 1.0 / LARGEST) & (v <= LARGEST) for v in np.broadcast_arrays(*E, *G)], axis=0)
+        with np.errstate(all="ignore"):  # what is no modulus is found above
+            nu21, nu31, nu32 = nu[0] * E[1] / E[0], nu[1] * E[2] / E[0], nu[2] * E[2] / E[1]
+            single = (nu[0] * nu21 < 1.0) & (nu[1] * nu31 < 1.0) & (nu[2] * nu32 < 1.0)
+            return fit & single & (_determinant(nu, (nu21, nu31, nu32)) > LEAST)
 
 
 @dataclass(frozen=True)
@@ -149,9 +170,9 @@ class Anisotropic(Material):
         Stresses 11, 22, 33, 12, 23, 13 of strains 11, 22, 33, 2*12, 2*23, 2*13 in the material's axes [pressure].
     axes : sequence or callable, optional
         As of `Orthotropic`: unit vectors in rows (3, 3) [-], or a function.
-    density : float, optional
+    density : float, callable or ndarray (n,), optional
         Mass per volume [mass / length^3].
-    expansion : float or sequence of 3, optional
+    expansion : float, callable, ndarray (n,) or three of them, optional
         As of `Orthotropic` [1 / temperature].
     incompatible_modes : bool
         As of `LinearElastic`.
@@ -159,8 +180,8 @@ class Anisotropic(Material):
 
     D: Any
     axes: Axes = None
-    density: float | None = None
-    expansion: float | Sequence[float] | None = None
+    density: Constant | None = None
+    expansion: Constant | Sequence[Constant] | None = None
     incompatible_modes: bool = False
 
     def __post_init__(self) -> None:
@@ -184,11 +205,7 @@ class Anisotropic(Material):
                 "energy; check the order of the components, 11, 22, 33, 12, 23, 13"
             )
         object.__setattr__(self, "D", tuple(tuple(row) for row in D.tolist()))
-        object.__setattr__(self, "axes", checked_axes(self.axes))
-        check_density(self.density)
-        check_expansion(self.expansion, 3)
-        if isinstance(self.expansion, (Sequence, np.ndarray)):
-            object.__setattr__(self, "expansion", tuple(float(v) for v in self.expansion))
+        _take_rest(self)
 
     @property
     def described(self) -> str:
@@ -200,14 +217,48 @@ class Anisotropic(Material):
         """Compliance (6, 6) [1 / pressure] in the material's axes."""
         return np.asarray(np.linalg.inv(np.array(self.D)))
 
+    def compliances(self, constants: Any) -> Array:
+        """Return the compliance (1, 6, 6) [1 / pressure], which does not vary."""
+        return self.local_compliance[None]
 
-def _three(name: str, values: Any) -> tuple[float, float, float]:
+    def admissible(self, constants: Any) -> Any:
+        """Return True: the moduli, which do not vary, are checked already."""
+        return True
+
+
+def _take_rest(material: Orthotropic | Anisotropic) -> None:
+    """Check axes, density and expansion of a material, and put them into their form."""
+    expansion = material.expansion
+    if isinstance(expansion, np.ndarray) and expansion.shape == (3,):  # along the axes
+        expansion = tuple(expansion.tolist())
+    for name, value in (("density", wrapped(material.density)), ("expansion", wrapped(expansion, vector=True))):
+        object.__setattr__(material, name, value)
+    object.__setattr__(material, "axes", checked_axes(material.axes))
+    check_density(material.density)
+    check_expansion(material.expansion, 3)
+    if isinstance(material.expansion, tuple):
+        own = tuple(v if isinstance(v, Varying) else float(v) for v in material.expansion)
+        object.__setattr__(material, "expansion", own)
+
+
+def _check_modulus(name: str, value: Any) -> None:
+    if not isinstance(value, Varying):
+        check_positive(name, value)
+
+
+def _three(name: str, values: Any) -> tuple[Any, Any, Any]:
     try:
-        a, b, c = (float(v) for v in values)
+        a, b, c = (v if isinstance(v, Varying) else float(v) for v in map(wrapped, values))
     except (TypeError, ValueError):
         order = "1, 2 and 3" if name == "E" else "12, 13 and 23"
         raise ModelError(f"{name} = {values!r} of an orthotropic material must be three numbers, for {order}") from None
     return a, b, c
+
+
+def _determinant(nu: Sequence[Any], back: Sequence[Any]) -> Any:
+    """Return 1 - nu12 nu21 - ..., positive where the energy is, from nu12, nu13, nu23 and nu21, nu31, nu32 [-]."""
+    (nu12, nu13, nu23), (nu21, nu31, nu32) = nu, back
+    return 1.0 - nu12 * nu21 - nu23 * nu32 - nu13 * nu31 - 2.0 * nu21 * nu32 * nu13
 
 
 def _check_ratios(E: Sequence[float], nu: Sequence[float]) -> None:
@@ -221,8 +272,8 @@ def _check_ratios(E: Sequence[float], nu: Sequence[float]) -> None:
             )
     nu12, nu13, nu23 = nu
     nu21, nu31, nu32 = nu12 * E[1] / E[0], nu13 * E[2] / E[0], nu23 * E[2] / E[1]
-    determinant = 1.0 - nu12 * nu21 - nu23 * nu32 - nu13 * nu31 - 2.0 * nu21 * nu32 * nu13
-    if not determinant > 1e-12:
+    determinant = _determinant(nu, (nu21, nu31, nu32))
+    if not determinant > LEAST:
         raise ModelError(
             f"Poisson's ratios nu12, nu13, nu23 = {nu12:g}, {nu13:g}, {nu23:g} are too large together: 1 - nu12 nu21 - nu23 "
             f"nu32 - nu13 nu31 - 2 nu21 nu32 nu13 = {determinant:.6g} must be positive"

@@ -2,17 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.elasticity.loads import Table, VolumeLoad, add_density, cell_points
+from fastcontact.elasticity.loads import DensityField, Table, VolumeLoad, add_density, cell_points
+from fastcontact.elasticity.materials import Material
+from fastcontact.elasticity.varying_constants import Varying
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Densities:
+    """The densities of the materials of all solid cells.
+
+    Attributes
+    ----------
+    materials : sequence of Material
+    number : mapping of str to ndarray of int (n_cells,)
+        By solid element: every cell's material.
+    """
+
+    materials: Sequence[Material]
+    number: Mapping[str, NDArray[np.int32]]
+
+    def at(self, name: str, rows: NDArray[np.intp], N: Array) -> Array:
+        """Return the densities (n_rows, n) [mass / length^3] in cells of an element, NaN where there are none.
+
+        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.
+        """
+        found = np.full((len(rows), len(N)), np.nan)
+        own = self.number[name][rows]
+        for index, material in enumerate(self.materials):
+            cells = np.flatnonzero(own == index)
+            if isinstance(material.density, Varying):
+                found[cells] = material.density.at(name, rows[cells], N).reshape(len(cells), len(N))
+            elif material.density is not None:
+                found[cells] = material.density
+        return found
 
 
 class InertiaLoad(VolumeLoad):
@@ -20,23 +52,23 @@ class InertiaLoad(VolumeLoad):
 
     CONSTANT = True
 
-    def vector(self, mesh: Mesh, kinematics: str, density: Mapping[str, Array] | None = None) -> Array:
+    def vector(self, mesh: Mesh, kinematics: str, density: DensityField | None = None) -> Array:
         """Return the nodal forces (n_points, dim) at multiplier 1 [force]; ModelError if some of the cells have no density.
 
         Parameters
         ----------
         mesh : Mesh
         kinematics : str
-        density : mapping of str to ndarray (n_cells,), optional
-            By solid element the mass per volume, NaN where there is none; only `inertia_loads` need it [mass / length^3].
+        density : DensityField, optional
+            Only `inertia_loads` need them.
         """
         forces, missing = np.zeros((mesh.n_points, mesh.dim)), 0
         for element, rows in self.rows(mesh):
-            own = np.full(len(rows), np.nan) if density is None else density[element][rows]
-            missing += int(np.isnan(own).sum())
             cells = mesh.cells[element][rows]
             x, N, volume = cell_points(mesh, element, cells, kinematics)
-            add_density(forces, cells, N, self.acceleration(x, kinematics) * (volume * own[:, None])[:, :, None])
+            own = np.full(volume.shape, np.nan) if density is None else density.at(element, rows, N)
+            missing += int(np.isnan(own).any(axis=1).sum())
+            add_density(forces, cells, N, self.acceleration(x, kinematics) * (volume * own)[:, :, None])
         if missing:
             raise ModelError(
                 f"{self.name} needs densities, but the materials of {missing} solid cells have none: give them density=..., "

@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,16 @@ Components = Mapping[int, Value]
 # Points of the product rule along each direction, and along those of squares, cubes and prisms: exact to degree 7 at least,
 # enough for a constant load on curved quadratic cells of a ring, and for one that varies quadratically over straight facets.
 _POINTS, _STRAIGHT = 5, 4
+
+
+class DensityField(Protocol):
+    """Densities of solid cells."""
+
+    def at(self, name: str, rows: NDArray[np.intp], N: Array) -> Array:
+        """Return the densities (n_rows, n) [mass / length^3] in cells of an element, NaN where there are none.
+
+        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.
+        """
 
 
 class Load:
@@ -63,15 +73,15 @@ class Load:
         for value in self.values:
             (check_number if self.CONSTANT else check_value)(self.name, value)
 
-    def vector(self, mesh: Mesh, kinematics: str, density: Mapping[str, Array] | None = None) -> Array:
+    def vector(self, mesh: Mesh, kinematics: str, density: DensityField | None = None) -> Array:
         """Return the nodal forces (n_points, dim) at multiplier 1 [force]; errors as for `check`.
 
         Parameters
         ----------
         mesh : Mesh
         kinematics : str
-        density : mapping of str to ndarray (n_cells,), optional
-            By solid element the mass per volume, NaN where there is none; only `inertia_loads` need it [mass / length^3].
+        density : DensityField, optional
+            Only `inertia_loads` need it.
         """
         forces = np.zeros((mesh.n_points, mesh.dim))
         self._add_to(forces, mesh, kinematics)

@@ -5,17 +5,46 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.elasticity.incompatible_modes import MODES
-from fastcontact.elasticity.materials import Material
-from fastcontact.elasticity.temperature import ThermalStress
+from fastcontact.elasticity.initial_states import InitialState, StressOffset
+from fastcontact.elasticity.materials import MODULI, Material
+from fastcontact.elasticity.varying_constants import middle
+from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Where some of the moduli are those of a material that varies.
+
+    Attributes
+    ----------
+    material : int
+    first : int
+        Number of the first of them in `MaterialField.moduli`.
+    points : ndarray (n, dim)
+        Where axes are taken: the middles of the cells [length].
+    constants : SimpleNamespace
+        Of `Material.constants_at`.
+    """
+
+    material: int
+    first: int
+    points: Array
+    constants: Any
+
+    @property
+    def rows(self) -> slice:
+        """The numbers of the moduli."""
+        return slice(self.first, self.first + len(self.points))
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,22 +56,29 @@ class MaterialField:
     materials : sequence of Material
     kinematics : str
     moduli : ndarray (n_moduli, n_components, n_components)
-        Of each material, then of each cell of materials with axes that depend on the position [pressure].
-    places : ndarray (n_moduli, dim)
-        Where the axes of the moduli are taken: the middle of a cell; of materials that do not depend on it, zero [length].
+        Of each material, then of the places of materials that vary [pressure].
+    places : sequence of Places
     owner : ndarray of int (n_moduli,)
         Material of each of the moduli.
     number, rows : dict of str to ndarray of int (n_cells,)
-        By solid element: every cell's material, and its place in `moduli`.
+        By solid element: every cell's material, and its place in `moduli`, where it varies that of its middle.
+    inside : dict of str to ndarray of int (n_cells, n_q)
+        By solid element with materials that vary inside cells: place in `moduli` of every quadrature point.
     """
 
     materials: Sequence[Material]
     kinematics: str
     moduli: Array
-    places: Array
+    places: Sequence[Places]
     owner: Indices
     number: dict[str, Indices]
     rows: dict[str, Indices]
+    inside: dict[str, Indices]
+
+    @property
+    def loops(self) -> dict[str, Indices]:
+        """By solid element what element loops take: `inside` where materials vary inside cells, elsewhere `rows`."""
+        return {**self.rows, **self.inside}
 
     @property
     def n_materials(self) -> int:
@@ -72,31 +108,49 @@ class MaterialField:
         """Compliances (n_moduli, n_components, n_components) [1 / pressure], see `Material.compliance_at`."""
         found = np.zeros_like(self.moduli)
         for number, material in enumerate(self.materials):
-            rows = np.flatnonzero(self.owner == number)
-            if material.varies:
-                rows = rows[rows != number]  # the first is that of no cell
-            found[rows] = material.compliance_at(self.places[rows], self.kinematics)
+            if not material.varies:  # else there is no cell of this number
+                found[number] = material.compliance_at(self._anywhere, self.kinematics)[0]
+        for own in self.places:
+            law = self.materials[own.material]
+            found[own.rows] = law.compliance_at(own.points, self.kinematics, own.constants)
         return found
 
     @cached_property
     def expansion(self) -> Array:
         """Thermal strains (n_moduli, n_components) [1 / temperature]; NaN of materials that have no expansion."""
-        found = np.empty(self.moduli.shape[:2])
+        found = np.zeros(self.moduli.shape[:2])
         for number, material in enumerate(self.materials):
-            rows = np.flatnonzero(self.owner == number)
-            if material.varies:
-                rows, found[number] = rows[rows != number], 0.0  # the first is that of no cell
-            found[rows] = material.expansion_at(self.places[rows], self.kinematics)
+            if not material.varies:
+                found[number] = material.expansion_at(self._anywhere, self.kinematics)[0]
+        for own in self.places:
+            law = self.materials[own.material]
+            found[own.rows] = law.expansion_at(own.points, self.kinematics, own.constants)
         return found
 
-    def thermal(self, rise: Array | None) -> ThermalStress | None:
-        """Return what stresses lose by a rise of the temperature (n_points,) [temperature]; None where there is none."""
-        if rise is None:
+    @property
+    def _anywhere(self) -> Array:
+        return np.zeros((1, 3 if self.kinematics == "3d" else 2))
+
+    def offset(
+        self, rise: Array | None, states: Sequence[tuple[float, InitialState]] = (), n_points: int = 0
+    ) -> StressOffset | None:
+        """Return what stresses have beside those of the displacements; None where there is nothing.
+
+        Parameters
+        ----------
+        rise : ndarray (n_points,), optional
+            Of the temperature [temperature].
+        states : sequence of (float, InitialState)
+            Initial stresses and strains, and what they are multiplied with.
+        n_points : int
+            Of the mesh, for initial states without temperatures.
+        """
+        if rise is None and not states:
             return None
         strain = np.nan_to_num(self.expansion)
-        averaged = self.averaged
         per_degree = np.einsum("mij,mj->mi", self.moduli, strain)
-        return ThermalStress(rise, per_degree, np.where(averaged, strain[:, 0], 0.0))
+        expansion = np.where(self.averaged, strain[:, 0], 0.0)
+        return StressOffset(np.zeros(n_points) if rise is None else rise, per_degree, expansion, tuple(states))
 
     def without_expansion(self, mesh: Mesh, rise: Array) -> int:
         """Return how many cells have a rise of the temperature (n_points,) [temperature] and a material without expansion."""
@@ -116,9 +170,7 @@ class MaterialField:
         first: dict[object, int] = {}
         same = np.empty(self.n_materials, np.int32)
         for number, material in enumerate(self.materials):
-            law = self.moduli[number].tobytes() if not material.varies else material.local_compliance.tobytes()
-            own_axes = material.axes if material.varies else None
-            same[number] = first.setdefault((law, id(own_axes), repr(material.expansion)), number)
+            same[number] = first.setdefault(_law(material, self.moduli[number]), number)
         return {name: same[values] for name, values in self.number.items()}
 
 
@@ -137,18 +189,40 @@ def material_field(
     """
     size = 6 if kinematics == "3d" else 4
     moduli = [np.zeros((1, size, size)) if m.varies else m.moduli(kinematics)[None] for m in materials]
-    places = [np.zeros((len(materials), mesh.dim))]
     owner = [np.arange(len(materials), dtype=np.int32)]
-    rows, count = {name: values.copy() for name, values in number.items()}, len(materials)
+    rows, inside = {name: values.copy() for name, values in number.items()}, {}
+    places: list[Places] = []
+
+    def added(index: int, points: Array, constants: Any) -> Indices:
+        """Add the moduli of a material at `points`; return their numbers."""
+        places.append(Places(index, sum(map(len, moduli)), points, constants))
+        moduli.append(materials[index].moduli_at(points, kinematics, constants))
+        owner.append(np.full(len(points), index, np.int32))
+        return places[-1].first + np.arange(len(points), dtype=np.int32)
+
     for index, material in enumerate(materials):
         for name, block in mesh.solids.items() if material.varies else ():
             cells = np.flatnonzero(number[name] == index)
-            middle = mesh.points[block[cells]].mean(axis=1)
-            rows[name][cells] = count + np.arange(len(cells))
-            count += len(cells)
-            moduli.append(material.moduli_at(middle, kinematics))
-            places.append(middle)
-            owner.append(np.full(len(cells), index, np.int32))
+            middles = mesh.points[block[cells]].mean(axis=1)
+            rows[name][cells] = added(index, middles, material.constants_at(name, cells, middle(name)))
+    for index, material in enumerate(materials):
+        for name, block in mesh.solids.items() if material.varies_inside else ():
+            cells = np.flatnonzero(number[name] == index)
+            N = elements.get(name).tables[0]
+            middles = np.repeat(mesh.points[block[cells]].mean(axis=1), len(N), axis=0)
+            if name not in inside:
+                inside[name] = np.repeat(rows[name][:, None], len(N), axis=1)
+            found = added(index, middles, material.constants_at(name, cells, N))
+            inside[name][cells] = found.reshape(len(cells), len(N))
     return MaterialField(
-        materials, kinematics, np.concatenate(moduli), np.concatenate(places), np.concatenate(owner), dict(number), rows
+        materials, kinematics, np.concatenate(moduli), places, np.concatenate(owner), dict(number), rows, inside
     )
+
+
+def _law(material: Material, moduli: Array) -> tuple[object, ...]:
+    """Return what is equal for materials between which stress does not jump."""
+    constants = tuple(getattr(material, name, None) for name in MODULI) if material.graded else None
+    compliance = b"" if material.graded else material.local_compliance.tobytes()
+    own_axes = material.axes if material.varies else None
+    law = (constants, compliance) if material.varies else moduli.tobytes()
+    return law, id(own_axes), repr(material.expansion), material.expansion if material.varies else None

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import copy
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.elasticity.loads import LARGEST
+from fastcontact.elasticity.loads import LARGEST, Value
 from fastcontact.elasticity.material_axes import PAIRS, Axes, frames, rotations
+from fastcontact.elasticity.varying_constants import Cells, Varying, mapped, varying, wrapped
 from fastcontact.errors import ModelError, unknown
 from fastcontact.mesh.argument_types import typed
 
 Array = NDArray[np.float64]
+AnyMaterial = TypeVar("AnyMaterial", bound="Material")
 
 KINEMATICS = ("axisymmetric", "plane_strain", "plane_stress", "3d")
 # What elements make of the dilatation.
@@ -25,6 +30,9 @@ VOLUMETRIC = ("auto", "plain", "mean_dilatation")
 NEARLY_INCOMPRESSIBLE = 0.49
 # Couplings of plane strains with others, relative to the largest modulus, that are round-off of a rotation.
 ROUND_OFF = 1e-12
+# Constants that may vary, those of the moduli first.
+MODULI = ("E", "nu", "G")
+CONSTANTS = (*MODULI, "density", "expansion")
 
 
 class Material:
@@ -32,9 +40,9 @@ class Material:
 
     Attributes
     ----------
-    density : float or None
+    density : float, Varying or None
         Mass per volume [mass / length^3].
-    expansion : float, tuple or None
+    expansion : float, Varying, tuple or None
         Coefficients of thermal expansion [1 / temperature].
     axes : sequence, callable or None
         Unit vectors in rows (3, 3) [-], or a function, see `Orthotropic`; None: those of the mesh.
@@ -44,7 +52,7 @@ class Material:
         Whether linear quadrangles and hexahedra have incompatible modes, where kinematics are not axisymmetric.
     """
 
-    density: float | None
+    density: Any
     expansion: Any
     axes: Axes = None
     averaged: bool = False
@@ -53,15 +61,21 @@ class Material:
     @property
     def young(self) -> tuple[float, float]:
         """The smallest and the largest Young's modulus along the material's axes [pressure]."""
-        diagonal = 1.0 / np.diag(self.local_compliance)[:3]
+        diagonal = 1.0 / np.diagonal(self._all_compliances(), axis1=1, axis2=2)[:, :3]
         return float(diagonal.min()), float(diagonal.max())
 
     @property
     def contact_modulus(self) -> float:
         """The least plane-strain modulus E / (1 - nu^2) along the axes, by which contact is scaled [pressure]."""
-        D = np.linalg.inv(self.local_compliance)
+        D = np.moveaxis(np.linalg.inv(self._all_compliances()), 0, -1)
         free = [D[i, i] - D[i, j] * D[j, i] / D[j, j] for i, j in ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))]
-        return float(min(free))
+        return float(np.min(free))
+
+    def _all_compliances(self) -> Array:
+        """Return compliances (n, 6, 6) [1 / pressure] in the material's axes, those of all samples where constants vary."""
+        if not self.graded:
+            return self.local_compliance[None]
+        return np.concatenate([self.compliances(self.constants_at(*sample)) for sample in self._cells().samples()])
 
     @property
     def local_compliance(self) -> Array:
@@ -75,8 +89,87 @@ class Material:
 
     @property
     def varies(self) -> bool:
-        """Whether the axes, and with them the moduli, depend on the position."""
-        return callable(self.axes)
+        """Whether axes, moduli or expansion depend on the position."""
+        return callable(self.axes) or self.graded or bool(varying(self.expansion))
+
+    @property
+    def graded(self) -> bool:
+        """Whether constants of the moduli depend on the position."""
+        return any(varying(getattr(self, name, None)) for name in MODULI)
+
+    @property
+    def varies_inside(self) -> bool:
+        """Whether moduli or expansion vary inside cells: by functions, or by numbers at points.
+
+        Cells with a mean dilatation or incompatible modes have the constants of their middle.
+        """
+        own = [v for name in (*MODULI, "expansion") for v in varying(getattr(self, name, None))]
+        return any(v.inside for v in own) and not (self.averaged or self.incompatible_modes)
+
+    def bound(self: AnyMaterial, cells: Cells) -> AnyMaterial:
+        """Return the material that knows its cells, which constants that vary need; ModelError where these cannot be."""
+        names = [name for name in CONSTANTS if varying(getattr(self, name, None))]
+        if not names:
+            return self
+
+        def known(name: str) -> Any:
+            label = f"the constant {name} of the material"
+            return mapped(
+                getattr(self, name), lambda v: Varying(v.given, cells, label) if isinstance(v, Varying) else v
+            )
+
+        found = copy.copy(self)
+        for name in names:
+            object.__setattr__(found, name, known(name))
+        for sample in cells.samples():
+            found._check_at(names, *sample)
+        return found
+
+    def constants_at(self, name: str, rows: NDArray[np.intp], N: Array) -> SimpleNamespace:
+        """Return the constants in cells of an element, those that vary as arrays (n_rows * n,) [unit of the constant].
+
+        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.
+        """
+
+        def at(value: Any) -> Any:
+            return mapped(value, lambda v: v.at(name, rows, N) if isinstance(v, Varying) else v)
+
+        return SimpleNamespace(**{key: at(getattr(self, key, None)) for key in CONSTANTS})
+
+    def compliances(self, constants: Any) -> Array:
+        """Return compliances (n, 6, 6) [1 / pressure] in the material's axes, of constants that may be arrays (n,)."""
+        raise NotImplementedError
+
+    def admissible(self, constants: Any) -> Any:
+        """Return for which moduli of constants (n,) the material can be."""
+        raise NotImplementedError
+
+    def _cells(self) -> Cells:
+        """Return the cells that have the material; ModelError if they are not known."""
+        own = [v for name in CONSTANTS for v in varying(getattr(self, name, None))]
+        if not own or own[0].cells is None:
+            raise ModelError("constants of the material depend on the position: ask the one in `materials` of a model")
+        return own[0].cells
+
+    def _check_at(self, names: Sequence[str], element: str, rows: NDArray[np.intp], N: Array) -> None:
+        """Raise ModelError, with the place, where the constants `names` are such that the material cannot be."""
+        found, count = self.constants_at(element, rows, N), len(rows) * len(N)
+        wrong = np.array(np.broadcast_to(~np.asarray(self.admissible(found), bool), count))
+        if found.density is not None:
+            wrong |= np.asarray(found.density) < 0.0
+        if not wrong.any():
+            return
+        row = int(wrong.argmax())
+        one = {
+            name: mapped(getattr(found, name), lambda v: float(np.broadcast_to(np.asarray(v), count)[row]))
+            for name in names
+        }
+        mesh, cell = self._cells().mesh, int(rows[row // len(N)])
+        where = f"in cell {cell} of {element} near {mesh.points[mesh.cells[element][cell]].mean(axis=0)}"
+        try:
+            dataclasses.replace(self, **one)  # type: ignore[type-var]
+        except ModelError as error:
+            raise ModelError(f"{where}: {error}") from None
 
     def moduli(self, kinematics: str) -> Array:
         """Return the matrix (4, 4), in 3D (6, 6) [pressure] from strains (xx, yy, zz, 2xy, in 3D 2yz, 2xz) to stresses.
@@ -88,9 +181,12 @@ class Material:
             raise ModelError("the axes of the material depend on the position: ask for moduli_at(points, kinematics)")
         return np.asarray(self.moduli_at(np.zeros((1, 3 if kinematics == "3d" else 2)), kinematics)[0])
 
-    def moduli_at(self, points: Array, kinematics: str) -> Array:
-        """Return the moduli (n, 4, 4), in 3D (n, 6, 6) [pressure] at `points` (n, dim) [length]; see `moduli`."""
-        compliance = self._compliance6(points, kinematics)
+    def moduli_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
+        """Return the moduli (n, 4, 4), in 3D (n, 6, 6) [pressure] at `points` (n, dim) [length]; see `moduli`.
+
+        `constants` are those of `constants_at` there, where they vary.
+        """
+        compliance = self._compliance6(points, kinematics, constants)
         if kinematics == "3d":
             return np.asarray(np.linalg.inv(compliance))
         if kinematics != "plane_stress":
@@ -100,15 +196,15 @@ class Material:
         D[inner] = np.linalg.inv(compliance[inner])
         return D
 
-    def compliance_at(self, points: Array, kinematics: str) -> Array:
+    def compliance_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the compliance (n, 4, 4), in 3D (n, 6, 6) [1 / pressure] at `points` (n, dim) [length].
 
         Stress : strain is that of the whole stress in any kinematics, since stresses yz and xz are zero in the plane.
         """
         size = 6 if kinematics == "3d" else 4
-        return np.asarray(self._compliance6(points, kinematics)[:, :size, :size])
+        return np.asarray(self._compliance6(points, kinematics, constants)[:, :size, :size])
 
-    def expansion_at(self, points: Array, kinematics: str) -> Array:
+    def expansion_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the strains (n, 4), in 3D (n, 6) [1 / temperature] of a degree at `points` (n, dim) [length].
 
         NaN without expansion. ModelError if it is a shear out of the plane, in kinematics that have none.
@@ -116,25 +212,28 @@ class Material:
         size = 6 if kinematics == "3d" else 4
         if self.expansion is None:
             return np.full((len(points), size), np.nan)
-        along = np.broadcast_to(np.asarray(self.expansion, float), (3,))
+        given, along = (self if constants is None else constants).expansion, np.empty((len(points), 3))
+        for axis in range(3):
+            along[:, axis] = given[axis] if isinstance(given, tuple) else given
         axes = frames(self.axes, points, kinematics)
-        tensor = np.einsum("nai,a,naj->nij", axes, along, axes)
+        tensor = np.einsum("nai,na,naj->nij", axes, along, axes)
         strain = np.stack([tensor[:, i, j] * (1.0 if i == j else 2.0) for i, j in PAIRS], axis=1)
-        if np.abs(strain[:, size:]).max(initial=0.0) > ROUND_OFF * np.abs(along).max():
+        if np.abs(strain[:, size:]).max(initial=0.0) > ROUND_OFF * np.abs(along).max(initial=0.0):
             raise ModelError(
                 f"the expansion of the material with {self.described} shears it out of the plane: turn one axis along z, or "
                 "use a mesh in 3D"
             )
         return np.asarray(strain[:, :size])
 
-    def _compliance6(self, points: Array, kinematics: str) -> Array:
+    def _compliance6(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the compliance (n, 6, 6) in the mesh's axes; ModelError where kinematics of the plane do not hold."""
         if kinematics not in KINEMATICS:
             raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
         of_stress = rotations(frames(self.axes, points, kinematics))
         # Strains turn by the inverse of the transpose, which for stresses in another frame is the rotation back.
         back = np.linalg.inv(of_stress)
-        compliance = np.asarray(back.transpose(0, 2, 1) @ self.local_compliance @ back)
+        local = self.local_compliance if constants is None or not self.graded else self.compliances(constants)
+        compliance = np.asarray(back.transpose(0, 2, 1) @ local @ back)
         across = np.abs(compliance[:, :4, 4:]).max(initial=0.0)
         if kinematics != "3d" and across > ROUND_OFF * np.abs(compliance).max():
             raise ModelError(
@@ -156,9 +255,11 @@ def check_positive(name: str, value: Any, what: str = "a positive number") -> No
 
 
 def check_density(value: Any) -> None:
-    """Raise ModelError if a density is given and is no number from zero on."""
-    if value is not None and (
-        not isinstance(value, Real) or isinstance(value, bool) or not 0.0 <= float(value) < math.inf
+    """Raise ModelError if a density is given and is no number from zero on; one that varies is checked with its cells."""
+    if (
+        not isinstance(value, Varying)
+        and value is not None
+        and (not isinstance(value, Real) or isinstance(value, bool) or not 0.0 <= float(value) < math.inf)
     ):
         raise ModelError(f"the density = {value} must be a number, zero or more")
 
@@ -166,10 +267,20 @@ def check_density(value: Any) -> None:
 def check_expansion(value: Any, most: int) -> None:
     """Raise ModelError if an expansion is given and is neither a finite number nor `most` of them along the axes."""
     numbers = [value] if not isinstance(value, (Sequence, np.ndarray)) else list(value)
-    fit = all(isinstance(v, Real) and not isinstance(v, bool) and math.isfinite(v) for v in numbers)
+    fit = all(
+        isinstance(v, Varying) or (isinstance(v, Real) and not isinstance(v, bool) and math.isfinite(v))
+        for v in numbers
+    )
     if value is not None and not (fit and len(numbers) in (1, most)):
         wanted = "a number" if most == 1 else "a number, or three along the material's axes"
         raise ModelError(f"the coefficient of thermal expansion = {value} must be {wanted}")
+
+
+# A number, a function of the position, or numbers for each cell or point; type checkers take what is read for a number.
+if TYPE_CHECKING:
+    Constant = Any
+else:
+    Constant = Value | Array
 
 
 @typed(ModelError)
@@ -181,34 +292,39 @@ class LinearElastic(Material):
 
     Parameters
     ----------
-    E : float
-        Young's modulus [pressure], positive.
-    nu : float
-        Poisson's ratio, -1 < nu < 0.5.
+    E : float, callable or ndarray (n,)
+        Young's modulus [pressure], positive. Where it varies, a function from positions (n, dim) [length] to numbers (n,),
+        such as `Tabulated`; or an array, with a number for each solid cell of the groups that have the material, for each of
+        the mesh, in the order of ``mesh.solids``, or for each point of the mesh. A column (n, 1) is always one for cells.
+    nu : float, callable or ndarray (n,)
+        Poisson's ratio, -1 < nu < 0.5 [-]; as E.
     volumetric : str
         How elements take the dilatation, the change of volume: ``"plain"`` as it is; ``"mean_dilatation"`` its mean in
         each quadrangle, hexahedron, wedge and pyramid (in quadratic ones a linear function), so that they do not lock
         where the material is nearly incompressible. ``"auto"``: the latter from nu = 0.49 on. Nothing changes in
         triangles and tetrahedra, and in plane stress.
-    density : float, optional
-        Mass per volume [mass / length^3], for gravity and centrifugal loads; zero or more.
-    expansion : float, optional
-        Coefficient of thermal expansion [1 / temperature].
+    density : float, callable or ndarray (n,), optional
+        Mass per volume [mass / length^3], for gravity and centrifugal loads; zero or more; as E.
+    expansion : float, callable or ndarray (n,), optional
+        Coefficient of thermal expansion [1 / temperature]; as E.
     incompatible_modes : bool
         Linear quadrangles and hexahedra get incompatible modes, so that thin parts of them bend without locking in shear;
         nothing changes in other elements and in axisymmetry. Excludes a mean dilatation.
     """
 
-    E: float
-    nu: float
+    E: Constant
+    nu: Constant
     volumetric: str = "auto"
-    density: float | None = None
-    expansion: float | None = None
+    density: Constant | None = None
+    expansion: Constant | None = None
     incompatible_modes: bool = False
 
     def __post_init__(self) -> None:
-        check_positive("Young's modulus E", self.E)
-        if not -1.0 < self.nu < 0.5:
+        for name in ("E", "nu", "density", "expansion"):
+            object.__setattr__(self, name, wrapped(getattr(self, name)))
+        if not isinstance(self.E, Varying):
+            check_positive("Young's modulus E", self.E)
+        if not isinstance(self.nu, Varying) and not -1.0 < self.nu < 0.5:
             raise ModelError(
                 f"Poisson's ratio nu = {self.nu} must lie between -1 and 0.5, both excluded "
                 "(for an incompressible material take nu = 0.4999, in quadrangles or hexahedra: they have a mean dilatation "
@@ -228,27 +344,50 @@ class LinearElastic(Material):
 
     @property
     def young(self) -> tuple[float, float]:
-        """Young's modulus, twice."""
-        return self.E, self.E
+        """Young's modulus, twice; where it varies, the smallest and the largest."""
+        return self.E.range if isinstance(self.E, Varying) else (self.E, self.E)
 
     @property
     def contact_modulus(self) -> float:
-        """E / (1 - nu^2) [pressure]."""
-        return self.E / (1 - self.nu**2)
+        """E / (1 - nu^2) [pressure]; the least where they vary."""
+        if not self.graded:
+            return self.E / (1 - self.nu**2)
+        found = [self.constants_at(*sample) for sample in self._cells().samples()]
+        return float(min(np.min(c.E / (1 - c.nu**2)) for c in found))
+
+    @property
+    def largest_nu(self) -> float:
+        """Poisson's ratio [-]; where it varies, the largest, and zero while no cells have the material."""
+        if not isinstance(self.nu, Varying):
+            return self.nu
+        return 0.0 if self.nu.cells is None else self.nu.range[1]
 
     @property
     def local_compliance(self) -> Array:
         """Compliance (6, 6) [1 / pressure]."""
-        S = np.diag([*[(1 + self.nu) / self.E] * 3, *[1 / self.shear_modulus] * 3])
-        S[:3, :3] -= self.nu / self.E
+        return np.asarray(self.compliances(self)[0])
+
+    def compliances(self, constants: Any) -> Array:
+        """Return compliances (n, 6, 6) [1 / pressure] of constants that may be arrays (n,)."""
+        E, nu = np.broadcast_arrays(np.atleast_1d(constants.E), np.atleast_1d(constants.nu))
+        S = np.zeros((len(E), 6, 6))
+        S[:, range(3), range(3)] = ((1 + nu) / E)[:, None]
+        S[:, range(3, 6), range(3, 6)] = (1 / (E / (2 * (1 + nu))))[:, None]
+        S[:, :3, :3] -= (nu / E)[:, None, None]
         return S
+
+    def admissible(self, constants: Any) -> Any:
+        """Return where (n,) E is positive and nu between -1 and 0.5."""
+        E, nu = np.asarray(constants.E), np.asarray(constants.nu)
+        return (E >= 1.0 / LARGEST) & (E <= LARGEST) & (nu > -1.0) & (nu < 0.5)
 
     @property
     def averaged(self) -> bool:  # type: ignore[override]
         """Whether elements have a mean dilatation, where they can and kinematics are not plane stress."""
         if self.incompatible_modes:  # which do not lock in volume either
             return False
-        return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and self.nu >= NEARLY_INCOMPRESSIBLE)
+        nearly = self.largest_nu >= NEARLY_INCOMPRESSIBLE
+        return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and nearly)
 
     @property
     def shear_modulus(self) -> float:
@@ -260,17 +399,36 @@ class LinearElastic(Material):
 
         Plane stress has no stress zz (Timoshenko and Goodier, 1970, section 16).
         """
-        E, nu, G = self.E, self.nu, self.shear_modulus
-        if kinematics not in KINEMATICS:
-            raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
-        if kinematics == "plane_stress":
-            D = np.zeros((4, 4))
-            D[:2, :2] = E / (1 - nu * nu) * np.array([[1.0, nu], [nu, 1.0]])
-            D[3, 3] = G
-            return D
-        size = 6 if kinematics == "3d" else 4
-        D = np.zeros((size, size))
-        D[:3, :3] = E * nu / ((1 + nu) * (1 - 2 * nu))
-        D[range(3), range(3)] += 2 * G
-        D[range(3, size), range(3, size)] = G
+        if self.graded:
+            raise ModelError(
+                "constants of the material depend on the position: ask for moduli_at(points, kinematics, ...)"
+            )
+        return np.asarray(isotropic_moduli(np.array([self.E], float), np.array([self.nu], float), kinematics)[0])
+
+    def moduli_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
+        """Return the moduli (n, 4, 4), in 3D (n, 6, 6) [pressure] at `points` (n, dim) [length]; see `Material.moduli_at`."""
+        given = self if constants is None else constants
+        E, nu = (np.broadcast_to(np.asarray(value, float), len(points)) for value in (given.E, given.nu))
+        return isotropic_moduli(E, nu, kinematics)
+
+
+def isotropic_moduli(E: Array, nu: Array, kinematics: str) -> Array:
+    """Return the moduli (n, 4, 4), in 3D (n, 6, 6) [pressure] of isotropic materials; see `LinearElastic.moduli`.
+
+    Of Young's moduli `E` (n,) [pressure] and Poisson's ratios `nu` (n,) [-].
+    """
+    if kinematics not in KINEMATICS:
+        raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
+    G = E / (2 * (1 + nu))
+    if kinematics == "plane_stress":
+        D, normal = np.zeros((len(E), 4, 4)), E / (1 - nu * nu)
+        D[:, 0, 0] = D[:, 1, 1] = normal
+        D[:, 0, 1] = D[:, 1, 0] = normal * nu
+        D[:, 3, 3] = G
         return D
+    size = 6 if kinematics == "3d" else 4
+    D = np.zeros((len(E), size, size))
+    D[:, :3, :3] = (E * nu / ((1 + nu) * (1 - 2 * nu)))[:, None, None]
+    D[:, range(3), range(3)] += 2 * G[:, None]
+    D[:, range(3, size), range(3, size)] = G[:, None]
+    return D

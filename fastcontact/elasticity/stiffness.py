@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
@@ -85,8 +86,8 @@ def stiffness(
         or ``"3d"``.
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
         From `LinearElastic.moduli` [pressure].
-    material : dict of str to ndarray of int (n_cells,)
-        By solid element: material number of each cell.
+    material : dict of str to ndarray of int (n_cells,) or (n_cells, n_q)
+        By solid element: material number of each cell, or of each quadrature point.
     pattern : Sparsity, optional
         From `sparsity`, to reuse it.
     averaged : ndarray of bool (n_materials,), optional
@@ -111,7 +112,7 @@ def stiffness(
             raise MeshError(
                 f"cell {bad} of {name} near {where} is degenerate or inside out: its Jacobian is not positive"
             )
-        _take_modes(mesh, name, moduli, material[name], averaged, pattern, data)
+        _take_modes(mesh, name, moduli, of_cells(material[name]), averaged, pattern, data)
     size = mesh.n_points * mesh.dim
     return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
 
@@ -150,6 +151,26 @@ def of_special_form(moduli: Array) -> NDArray[np.bool_]:
     return np.asarray(np.abs(moduli - isotropic).max(axis=(1, 2)) <= 1e-14 * np.abs(moduli[:, 0, 0]))
 
 
+def of_cells(material: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return one number for each cell (n_cells,) of int, where nothing varies inside the cell the only one.
+
+    Of `material` (n_cells,) or (n_cells, n_q) of int.
+    """
+    return material if material.ndim == 1 else np.ascontiguousarray(material[:, 0])
+
+
+def _passes(
+    tables: tuple[Array, Array, Array], material: NDArray[np.int32]
+) -> Iterator[tuple[tuple[Array, Array, Array], NDArray[np.int32]]]:
+    """Yield the tables of the quadrature with the material (n_cells,): once, or for each point if it varies inside cells."""
+    if material.ndim == 1:
+        yield tables, material
+        return
+    for q in range(material.shape[1]):
+        N, dN, weights = (table[q : q + 1] for table in tables)
+        yield (N, dN, weights), np.ascontiguousarray(material[:, q])
+
+
 class _Addition:
     """The cells of one element, whose stiffness threads add to `data` (n_blocks, dim, dim)."""
 
@@ -171,12 +192,14 @@ class _Addition:
         rows = slice(*self._parts[number])
         cells, material, slots = self._cells[rows], self._material[rows], self._slots[rows]
         target = self._axisymmetric, slots, self._owner, number, self._data
-        bad = element_kernels.loops(self._points.shape[1]).add_stiffness(
-            self._points, cells, *self._tables, moduli if split is None else split.moduli, special, material, *target
-        )
-        if bad >= 0:
-            return int(bad) + rows.start
+        for tables, numbers in _passes(self._tables, material):
+            bad = element_kernels.loops(self._points.shape[1]).add_stiffness(
+                self._points, cells, *tables, moduli if split is None else split.moduli, special, numbers, *target
+            )
+            if bad >= 0:
+                return int(bad) + rows.start
         if split is not None:
+            material = of_cells(material)
             polynomials = dilatation.basis(self._name, elements.get(self._name).quadrature[0])
             dilatation_kernels.add_stiffness(
                 self._points, cells, *self._tables, polynomials, split.bulk, material, *target

@@ -112,10 +112,10 @@ def symmetric(flexibility: Array) -> Array:
 
 def multipliers(columns: FlexibilityColumns, B: csr_array, wanted: Array, C: Array | None) -> Array:
     """Return the multipliers (m,) [force] with ``(B K^-1 B.T + C) multiplier = wanted`` (m,) [length]; C may be None."""
-    return balanced(columns.of_rows(B), wanted, C)
+    return solve_multipliers(columns.of_rows(B), wanted, C)
 
 
-def balanced(flexibility: Array, wanted: Array, C: Array | None) -> Array:
+def solve_multipliers(flexibility: Array, wanted: Array, C: Array | None) -> Array:
     """Return the multipliers (m,) with ``(flexibility + C) multiplier = wanted``; `flexibility` (m, m) is overwritten."""
     if C is not None:
         flexibility += C

@@ -18,6 +18,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.elasticity.materials import LinearElastic, Material
+from fastcontact.elasticity.varying_constants import Varying
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.model import Model
@@ -39,6 +40,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         "the supports": _unordered(model.supports, mesh),
         "the loads": _unordered(model.loads, mesh),
         **({"the temperatures": _unordered(model.temperatures, mesh)} if model.temperatures else {}),
+        **({"the initial states": _unordered(model.initial_states, mesh)} if model.initial_states else {}),
         "the relations": _unordered(model.relations, mesh),
         "the springs": _unordered(model.springs, mesh),
         **({"the pretension sections": _unordered(model.pretensions, mesh)} if model.pretensions else {}),
@@ -90,6 +92,8 @@ def _take(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: Array) -
     """Add a value to a digest; functions by their values at `points` (n, dim)."""
     if isinstance(value, Mesh):
         value = [value.points, value.cells, value.cell_groups, value.point_groups]
+    if isinstance(value, Varying):
+        value = value.given
     if isinstance(value, csr_array):
         value = [value.data, value.indices.astype(np.int64), value.indptr.astype(np.int64)]
     if isinstance(value, np.ndarray):

@@ -23,7 +23,8 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.constrained_system import ConstrainedMotion
-from fastcontact.elasticity.inertia_loads import Centrifugal, Gravity, InertiaLoad
+from fastcontact.elasticity.inertia_loads import Centrifugal, Densities, Gravity, InertiaLoad
+from fastcontact.elasticity.initial_states import InitialState, StressOffset, initial_state
 from fastcontact.elasticity.loads import (
     BodyForce,
     Hydrostatic,
@@ -38,16 +39,17 @@ from fastcontact.elasticity.loads import (
     check_value,
     evaluated,
 )
+from fastcontact.elasticity.material_axes import Axes
 from fastcontact.elasticity.material_field import MaterialField, material_field
-from fastcontact.elasticity.materials import KINEMATICS, Material
+from fastcontact.elasticity.materials import KINEMATICS, Constant, Material
 from fastcontact.elasticity.recovery import internal_force, stress_at_points
 from fastcontact.elasticity.relations import Relation, stacked_rows
 from fastcontact.elasticity.springs import Springs, between, grounded, stacked
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
 from fastcontact.elasticity.temperature import Temperature, checked_value
+from fastcontact.elasticity.varying_constants import Cells
 from fastcontact.errors import ContactError, ModelError, unknown
-from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import check_fields, typed
 from fastcontact.mesh.html_table import html_table
 from fastcontact.mesh.mesh import Mesh
@@ -151,6 +153,7 @@ class Model:
         self.supports: list[Support] = []
         self.loads: list[Load] = []
         self.temperatures: list[Temperature] = []
+        self.initial_states: list[InitialState] = []
         self.relations: list[Relation] = []
         self.springs: list[Springs] = []
         self.pretensions: list[Pretension] = []
@@ -187,7 +190,14 @@ class Model:
             raise ModelError(
                 f"{material!r} is no material: give LinearElastic(E=..., nu=...), Orthotropic(...) or Anisotropic(...)"
             )
-        self.materials.append((material, names))
+        self.materials.append((material.bound(self._cells_of(names)), names))
+
+    def _cells_of(self, groups: Sequence[str] | None) -> Cells:
+        """Return the solid cells of groups, or all."""
+        if groups is None:
+            return Cells(self.mesh, {name: np.arange(len(block)) for name, block in self.mesh.solids.items()})
+        found = self.mesh.split(np.unique(np.concatenate([self.mesh.cell_groups[name] for name in groups])))
+        return Cells(self.mesh, {name: found[name] for name in self.mesh.solids if name in found})
 
     @typed(ModelError)
     def fix(self, group: str, components: str) -> None:
@@ -347,6 +357,78 @@ class Model:
         found.check(self.mesh)
         self.temperatures.append(found)
 
+    @typed(ModelError)
+    def add_initial_stress(
+        self,
+        groups: Sequence[str] | str | None = None,
+        *,
+        xx: Constant | None = None,
+        yy: Constant | None = None,
+        zz: Constant | None = None,
+        xy: Constant | None = None,
+        yz: Constant | None = None,
+        xz: Constant | None = None,
+        axes: Axes = None,
+        ramp: History = None,
+    ) -> None:
+        """Give groups of solid cells, by default all, a stress that they have where nothing is displaced.
+
+        What of it is not in balance deforms the bodies. In axisymmetry x, y, z are radius, axis and circumference.
+
+        Parameters
+        ----------
+        groups : str or sequence of str, optional
+        xx, yy, zz, xy, yz, xz : float, callable or ndarray (n,), optional
+            Components, zero where not given; numbers, functions or arrays as E of `LinearElastic` [pressure].
+        axes : sequence or callable, optional
+            What they are along, as of `Orthotropic`: unit vectors in rows (3, 3) [-], or a function, taken at each place.
+        ramp : Ramp or iterable of (float, float), optional
+            History; by default the whole of it is there from the first step on.
+        """
+        given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
+        self._add_initial("stress", groups, given, axes, ramp)
+
+    @typed(ModelError)
+    def add_initial_strain(
+        self,
+        groups: Sequence[str] | str | None = None,
+        *,
+        xx: Constant | None = None,
+        yy: Constant | None = None,
+        zz: Constant | None = None,
+        xy: Constant | None = None,
+        yz: Constant | None = None,
+        xz: Constant | None = None,
+        axes: Axes = None,
+        ramp: History = None,
+    ) -> None:
+        """Give groups of solid cells, by default all, a strain that costs no stress: shrinkage, swelling, misfit.
+
+        Parameters
+        ----------
+        groups : str or sequence of str, optional
+        xx, yy, zz, xy, yz, xz : float, callable or ndarray (n,), optional
+            Components, as of `add_initial_stress`; xy, yz and xz are shears, twice those of the tensor [-].
+        axes : sequence or callable, optional
+            What they are along: unit vectors in rows (3, 3) [-], or a function.
+        ramp : Ramp or iterable of (float, float), optional
+            History; by default the whole of it is there from the first step on.
+        """
+        given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
+        self._add_initial("strain", groups, given, axes, ramp)
+
+    def _add_initial(
+        self, kind: str, groups: Sequence[str] | str | None, given: Mapping[str, Any], axes: Axes, ramp: History
+    ) -> None:
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        for name in names or ():
+            if not self.mesh.cells_of(name, dim=self.mesh.dim):
+                raise ModelError(f"group '{name}' holds no solid cells: it has no initial {kind}")
+        table = table_of(ramp, f"the ramp of the initial {kind}")
+        self.initial_states.append(
+            initial_state(kind, names, self._cells_of(names), given, axes, self.kinematics, table)
+        )
+
     def temperature_rise(self, factors: Sequence[float]) -> Array | None:
         """Return the rise of the temperature (n_points,) [temperature], None without temperatures.
 
@@ -357,15 +439,31 @@ class Model:
         rises = [factor * own.rise(self.mesh) for factor, own in zip(factors, self.temperatures, strict=True)]
         return np.asarray(np.sum(rises, axis=0))
 
+    def stress_offset(
+        self, temperature_factors: Sequence[float] = (), initial_factors: Sequence[float] = (),
+        field: MaterialField | None = None,
+    ) -> StressOffset | None:  # fmt: skip
+        """Return what stresses have beside those of the displacements, by temperatures and initial states; None without any.
+
+        The factors are those of a step result, `StepResult.iterations`; `field` is the `material_field`, where it is known.
+        """
+        rise, states = self.temperature_rise(temperature_factors), []
+        if len(initial_factors):
+            states = list(zip(initial_factors, self.initial_states, strict=True))
+        if rise is None and not states:
+            return None
+        return (field or self.material_field()).offset(rise, states, self.mesh.n_points)
+
     def thermal_forces_by_ramp(self) -> dict[Table | None, Array]:
         """Return by history the nodal forces (n_points, dim) at multiplier 1 by which temperatures load the cells [force].
 
         ModelError if a material that is heated has no expansion.
         """
         by_ramp: dict[Table | None, Array] = {}
-        field = self.material_field() if self.temperatures else None
+        if not self.temperatures:
+            return by_ramp
+        field = self.material_field()
         for own in self.temperatures:
-            assert field is not None
             rise = own.rise(self.mesh)
             missing = field.without_expansion(self.mesh, rise)
             if missing:
@@ -373,12 +471,31 @@ class Model:
                     f"{own.name} acts on {missing} solid cells whose material has no coefficient of thermal expansion: give "
                     "it expansion=..., 0.0 if it does not expand"
                 )
-            held = stress_at_points(
-                self.mesh, self.kinematics, field.moduli, field.rows, np.zeros(self.mesh.points.shape), field.treatment,
-                field.thermal(rise),
-            )  # fmt: skip
-            by_ramp[own.ramp] = by_ramp.get(own.ramp, 0.0) - internal_force(self.mesh, self.kinematics, held)
+            by_ramp[own.ramp] = by_ramp.get(own.ramp, 0.0) + self._forces_of(field, field.offset(rise))
         return by_ramp
+
+    def initial_forces_by_ramp(self) -> dict[Table | None, Array]:
+        """Return by history the nodal forces (n_points, dim) of initial stresses and strains at multiplier 1 [force]."""
+        by_ramp: dict[Table | None, Array] = {}
+        field = self.material_field() if self.initial_states else None
+        for state in self.initial_states:
+            assert field is not None
+            forces = self._forces_of(field, field.offset(None, [(1.0, state)], self.mesh.n_points))
+            by_ramp[state.ramp] = by_ramp.get(state.ramp, 0.0) + forces
+        return by_ramp
+
+    def _forces_of(self, field: MaterialField, offset: StressOffset | None) -> Array:
+        """Return the nodal forces (n_points, dim) [force] of what stresses have beside those of the displacements."""
+        held = stress_at_points(
+            self.mesh,
+            self.kinematics,
+            field.moduli,
+            field.loops,
+            np.zeros(self.mesh.points.shape),
+            field.treatment,
+            offset,
+        )
+        return -internal_force(self.mesh, self.kinematics, held)
 
     @typed(ModelError)
     def add_force(
@@ -900,8 +1017,8 @@ class Model:
         ramp : Ramp or iterable of (float, float), optional
             History of motion and force, and of a rotation without one of its own.
         formulation : str, optional
-            ``"node_to_segment"`` (then: node against obstacle), by default on linear triangles and on linear facets in
-            space, or ``"continuous"``, by default on all others.
+            ``"node_to_segment"`` (then: node against obstacle), by default on linear triangles and, in space, on
+            facets whose nodes all carry pressure (tri3, quad4, quad9), or ``"continuous"``, by default on all others.
         **options
             Fields of the formulation.
         """
@@ -922,14 +1039,14 @@ class Model:
             ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving, *turned)
         )
 
-    def _facet_kinds(self, group: str) -> tuple[bool, bool]:
-        """Return whether all facets of a group are linear, and whether triangles or tetrahedra alone have them."""
+    def _facet_kinds(self, group: str) -> tuple[list[str], bool]:
+        """Return the kinds of facets of a group, and whether linear triangles or tetrahedra alone have them."""
         facets = self.mesh.cells_of(group, self.mesh.dim - 1) if group in self.mesh.cell_groups else {}
         if not facets:  # which `check` tells
-            return False, False
+            return [], False
         simplices = [block for name, block in self.mesh.solids.items() if name in ("tri3", "tet4")]
         theirs = any(np.isin(self.mesh.points_of(group), block).all() for block in simplices)
-        return all(elements.get(name).linear == name for name in facets), theirs
+        return list(facets), theirs
 
     def _driving(self, name: str, moves: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
         """Return the force on obstacle `name` by component, None for prescribed ones; empty without any."""
@@ -994,7 +1111,6 @@ class Model:
             primary = surface(self.mesh, pair.primary)
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
         modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
-        own = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
         axisymmetric = self.kinematics == "axisymmetric"
         return kind(
             secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, supported=supported, **own
@@ -1003,7 +1119,7 @@ class Model:
     def material_numbers(self) -> tuple[Array, dict[str, NDArray[np.int32]]]:
         """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and by element every solid cell's number there.
 
-        The first are those of the materials; materials with axes that depend on the position have further ones for each cell.
+        The first are those of the materials; materials that vary have further ones, for the middle of each cell.
         """
         field = self.material_field()
         return field.moduli, field.rows
@@ -1062,8 +1178,8 @@ class Model:
     def internal_forces(self, displacement: Array) -> Array:
         """Return the nodal forces (n_points, dim) [force] that hold the solid cells deformed by `displacement`.
 
-        They are in balance with loads, contact, supports, relations, springs and thermal forces (`thermal_forces_by_ramp`);
-        axisymmetric: over the full circle.
+        They are in balance with loads, contact, supports, relations, springs and the forces of heat and initial states
+        (`thermal_forces_by_ramp`, `initial_forces_by_ramp`); axisymmetric: over the full circle.
 
         Parameters
         ----------
@@ -1075,7 +1191,7 @@ class Model:
             raise ModelError(
                 f"the displacement has the shape {np.shape(displacement)}, but the mesh {self.mesh.points.shape}"
             )
-        K = stiffness(self.mesh, self.kinematics, field.moduli, field.rows, None, field.treatment)
+        K = stiffness(self.mesh, self.kinematics, field.moduli, field.loops, None, field.treatment)
         return np.asarray(K @ np.ravel(displacement)).reshape(-1, self.mesh.dim)
 
     def prescribed(self) -> tuple[NDArray[np.bool_], Array]:
@@ -1139,8 +1255,7 @@ class Model:
         """Return the nodal forces (n_points, dim) of a load at multiplier 1 [force]."""
         density = None
         if isinstance(load, InertiaLoad):
-            known = np.array([np.nan if m.density is None else m.density for m, _ in self.materials], float)
-            density = {name: known[numbers] for name, numbers in self._material_of_cells().items()}
+            density = Densities([m for m, _ in self.materials], self._material_of_cells())
         return load.vector(self.mesh, self.kinematics, density)
 
     def _related(self) -> NDArray[np.bool_]:
@@ -1158,8 +1273,8 @@ class Model:
         forces = self.forces_by_ramp()
         self.thermal_forces_by_ramp()
         if ramp is not None:
-            items: list[Support | Load | Relation | Temperature] = [
-                *self.supports, *self.loads, *self.relations, *self.temperatures
+            items: list[Support | Load | Relation | Temperature | InitialState] = [
+                *self.supports, *self.loads, *self.relations, *self.temperatures, *self.initial_states
             ]  # fmt: skip
             named = [(item.name, item.ramp) for item in items]
             named += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]

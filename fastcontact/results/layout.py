@@ -17,6 +17,10 @@ The second holds what VTK has no place for:
     fastcontact/notes                               JSON, one text after the other: iterations, warnings, how runs ended
     fastcontact/runs                                a row for each run (RUN_ROW), with the place of its notes
     fastcontact/restart0, restart1                  packed restart data of the last two steps
+
+A new array at the nodes: an attribute of `step.StepResult`, filled in `analysis.step_result`, named in POINT_FIELDS, checked
+in `check_step`, read in `reader`. A new one of contact pairs:
+`step.ContactResult`, `analysis.contact_result`, and the row here.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from fastcontact.mesh.files.packing import unpacked
 from fastcontact.mesh.files.paths import PathLike, existing_file
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import conversions, journal, layout
-from fastcontact.results.locking import is_being_written
+from fastcontact.results.file_lock import is_being_written
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.texts import read_text

@@ -214,7 +214,8 @@ class StepResult:
         ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``, ``history`` (list of dict). If contact
         alone holds bodies, ``regularised``: their springs and the forces in them. If round-off kept the contact geometry
         from settling to the criterion, ``scatter``: by how much ``displacement`` and contact ``force`` still vary [-].
-        With temperatures, ``temperature_factors``: what each of them is multiplied with [-]. With pretension sections,
+        With temperatures, ``temperature_factors``: what each of them is multiplied with; with initial
+        stresses and strains ``initial_factors`` [-]. With pretension sections,
         ``pretension``, see the property of that name.
     warnings : tuple of str
         Warnings of the step.

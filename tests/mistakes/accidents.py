@@ -4,7 +4,7 @@ import errno
 import os
 
 from fastcontact.mesh.files import paths
-from fastcontact.results import locking
+from fastcontact.results import file_lock
 
 
 def full_disk(patch, folder):
@@ -25,7 +25,7 @@ def protected_file(patch, folder):
 
 def other_writer(patch, folder):
     # Kept by the patch until the test ends.
-    patch.setattr(locking, "held_by_a_test", locking.PathLock(folder / "busy.vtkhdf"), raising=False)
+    patch.setattr(file_lock, "held_by_a_test", file_lock.PathLock(folder / "busy.vtkhdf"), raising=False)
 
 
 def other_results(patch, folder):

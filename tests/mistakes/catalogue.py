@@ -79,7 +79,7 @@ CASES = [
         "E is a string",
         "E = 20000.0",
         'E = "20000"',
-        r"case\.toml: the value of 'material\[0\]\.E' must be of type int or float or list, not '20000'",
+        r"case\.toml: the value of 'material\[0\]\.E' must be of type int or float or list or dict, not '20000'",
     ),
     ("E is missing", "E = 20000.0", "", r"case\.toml: material\[0\] needs 'E'"),
     (

@@ -63,7 +63,7 @@ def solved(given: Drawn) -> dict[str, Any]:
     found |= {"closed": closed, "updates": last.iterations["geometry_updates"], "warnings": len(last.warnings)}
     if wrong:
         text = ", ".join(f"{name} {found[name]:.2g}" if name in found else name for name in wrong)
-        return {"outcome": "failed check", "text": text, **found}
+        return {"outcome": "told" if told(wrong, last) else "failed check", "text": text, **found}
     return {"outcome": "result", "text": "", **found}
 
 
@@ -84,6 +84,11 @@ def figures(model: fc.Model, step: fc.StepResult, settled, factor: float, tolera
         "driving": driving,
         "carried": max(mechanics.carried(step, settled, sizes, name) for name in step.contact),
     }
+
+
+def told(wrong: list[str], step: fc.StepResult) -> bool:
+    """Whether all that fails is the moment, on curved sides as accurate as facets, which a warning calls too few."""
+    return wrong == ["moment"] and any("element across its radius" in text for text in step.warnings)
 
 
 def unfit(step: fc.StepResult) -> list[str]:

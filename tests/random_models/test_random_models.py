@@ -7,7 +7,7 @@ import mechanics
 import numpy as np
 import pytest
 from drawing import drawn
-from outcome import BOUNDS, figures, outcome, unfit
+from outcome import BOUNDS, figures, outcome, told, unfit
 from stepping import watching
 
 import fastcontact as fc
@@ -18,7 +18,7 @@ SOLVED = 0.85
 
 def check(seeds):
     rows = [outcome(seed) for seed in seeds]
-    findings = [row for row in rows if row["outcome"] not in ("result", "own error")]
+    findings = [row for row in rows if row["outcome"] not in ("result", "told", "own error")]
     assert not findings
     assert sum(row["outcome"] == "result" for row in rows) >= SOLVED * len(rows)
     return rows
@@ -114,6 +114,14 @@ def test_what_breaks_an_inequality_shows(rubbing, name, change):
         values[np.argmax(state.multiplier)] = by * (1.0 if what == "gap" else state.multiplier.max())
     wrong = SimpleNamespace(solution=replace(state, **{what: values}), constraints=settled.constraints)
     assert figures(model, step, wrong, 1.0)[name] > BOUNDS[name]
+
+
+def test_only_the_moment_of_a_contact_that_is_called_too_coarse_is_told(rubbing):
+    _, step, _ = rubbing
+    coarse = replace(step, warnings=("contact 'a' has only 1 element across its radius: its pressure needs 4 or more",))
+    assert told(["moment"], coarse)
+    assert not told(["moment"], replace(step, warnings=("another",)))
+    assert not told(["moment", "cone"], coarse)
 
 
 def test_results_that_are_not_finite_show(rubbing):

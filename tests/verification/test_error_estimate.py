@@ -61,6 +61,23 @@ def test_a_uniform_stress_has_no_error_even_across_materials(element):
     assert found.relative < 1e-10
 
 
+def test_one_material_given_twice_is_one_material():
+    """Stress is continuous between cells of equal constants, however the material was given."""
+    mesh = fc.generate.block((1.0, 1.0), (4, 4), "quad4")
+    centres = mesh.points[mesh.solids["quad4"]].mean(axis=1)
+    mesh = mesh.with_groups(cells={"RIGHT HALF": mesh.offsets["quad4"] + np.flatnonzero(centres[:, 0] > 0.5)})
+    found = []
+    for groups in ((None,), (None, "RIGHT HALF")):
+        model = fc.Model(mesh, "plane_stress")
+        for group in groups:
+            model.add_material(fc.LinearElastic(E=1000.0, nu=0.3), group)
+        model.fix("BOTTOM", "xy")
+        model.add_traction("TOP", x=1.0, y=-3.0)
+        found.append(fc.estimate_error(model, fc.solve(model, 1)[-1]).relative)
+    assert found[0] > 0.05
+    assert found[1] == pytest.approx(found[0], rel=1e-12)
+
+
 def test_stress_that_jumps_between_materials_is_not_an_error():
     mesh = fc.generate.block((1.0, 1.0), (4, 4), "quad4")
     centres = mesh.points[mesh.solids["quad4"]].mean(axis=1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact.analysis import recover
+from fastcontact.analysis import step_result
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations._determined_field import DETERMINED, WholeFacets, determined
 from fastcontact.contact.integration import nodal_areas
@@ -55,14 +55,14 @@ def random_model(seed):
 
 def balanced(model, monkeypatch):
     """Run a model; check its balance, moments, signs and the integral of its pressure."""
-    kept, result = [], recover.contact_result
+    kept, result = [], step_result.contact_result
 
     def watched(name, pair, part, solution, rows, *more):
         kept[:] = [pair, part, solution.multiplier[rows], getattr(solution, "tangential", np.zeros((0, 0)))]
         return result(name, pair, part, solution, rows, *more)
 
     with monkeypatch.context() as patch, warnings.catch_warnings():
-        patch.setattr(recover, "contact_result", watched)
+        patch.setattr(step_result, "contact_result", watched)
         warnings.simplefilter("ignore", fc.FastcontactWarning)
         last = fc.solve(model, fc.linear_ramp(1))[-1]
     contact, (pair, part, forces, _) = last.contact["pair"], kept

@@ -1,7 +1,9 @@
 """The friction law: unilateral contact and Coulomb's cone, for forces and gaps in units of each constraint's own stiffness.
 
 Another law begins here. Its tangential force is also used where a sliding constraint is linearised: `dense._step`,
-`eliminated.Eliminated`, and in the fallbacks `sweep_kernels` and `dense._on_edges`.
+`eliminated.Eliminated`, and in the fallbacks `sweep_kernels` and `dense._on_edges`. Its parameters come from
+`PairOptions` by way of `Constraints`; those that are forces are scaled where `Law` is made, as forces are. That a constraint
+without friction needs no tangents is assumed by `Law.state` and by the formulations.
 """
 
 from __future__ import annotations

@@ -3,7 +3,8 @@
 With normal forces n >= 0 and tangential forces t of all constraints as unknowns, gaps and slips of the step are
 ``(g, s) = (g, s)_free + F (n, t)`` with ``F = R K^-1 R.T + C``, R the normal and tangential rows and C the compliance of
 the constraints themselves. `dense` solves that: stick holds the slip of the step at zero exactly, slip returns to the
-cone exactly.
+cone exactly. Where the linear solver eliminates constraints, `eliminated` is tried first: the same law with the stiffness in
+place of the compliance.
 """
 
 from __future__ import annotations

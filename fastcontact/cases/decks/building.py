@@ -14,11 +14,12 @@ from fastcontact.cases.decks.assembled import Assembled, assembled
 from fastcontact.cases.decks.blocks import Place, folded
 from fastcontact.cases.decks.conditions import Component, Conditions, Distributed, local_axes
 from fastcontact.cases.decks.content import Content, Material, Pair, Section, Step
+from fastcontact.cases.decks.initial_stresses import add_initial_stresses
 from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface
+from fastcontact.cases.decks.pretension import add_sections, cut_sections
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
 from fastcontact.cases.decks.temperatures import add_temperatures
-from fastcontact.cases.decks.tightening import add_sections, cut_sections
 from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.elasticity.anisotropic_materials import Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes
@@ -72,6 +73,7 @@ class Building:
         self._pressures(groups)
         self._body_forces(conditions)
         add_temperatures(self.model, conditions.temperatures)
+        add_initial_stresses(self.model, self.found)
         self._springs()
         self._contact()
         self.gap_ends = self._gaps(gaps, conditions)

@@ -12,9 +12,9 @@ from fastcontact.cases.decks.blocks import Place, Row
 from fastcontact.cases.decks.content import Axes, Given
 from fastcontact.cases.decks.histories import Histories
 from fastcontact.cases.decks.meshing import DeckMesh
+from fastcontact.cases.decks.pretension import Locks
 from fastcontact.cases.decks.temperatures import give as give_temperatures
 from fastcontact.cases.decks.temperatures import initial_temperatures
-from fastcontact.cases.decks.tightening import Locks
 
 Array = NDArray[np.float64]
 NAMED = {"XSYMM": (1,), "YSYMM": (2,), "ZSYMM": (3,), "ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3)}

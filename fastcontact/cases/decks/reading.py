@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
-from fastcontact.cases.decks import connections, geometry, properties, stepping, temperatures, tightening
+from fastcontact.cases.decks import connections, geometry, pretension, properties, stepping, temperatures
 from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Instance, Interaction, Material, Part, Step
 from fastcontact.cases.decks.keywords import OUTPUT, check
@@ -34,7 +34,7 @@ OF_MODELS: dict[str, Callable[[Content, Block], None]] = {
     "GAP": properties.gap,
     "INITIAL CONDITIONS": temperatures.initial_conditions,
     "ORIENTATION": properties.orientation,
-    "PRE-TENSION SECTION": tightening.pretension_section,
+    "PRE-TENSION SECTION": pretension.pretension_section,
     "SPRING": properties.spring,
     "CONTACT PAIR": connections.contact_pair,
     "CLEARANCE": connections.clearance,

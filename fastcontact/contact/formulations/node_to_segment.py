@@ -20,12 +20,11 @@ from scipy.sparse.linalg import SuperLU, splu
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.integration import fine_rule, mass_matrix, nodal_areas
+from fastcontact.contact.integration import all_nodes_carry, mass_matrix, nodal_areas
 from fastcontact.contact.node_pairing import at_nodes
 from fastcontact.contact.pairing import Candidates, Pairing
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
-from fastcontact.mesh import elements
 
 Array = NDArray[np.float64]
 OPPOSITE = ("facet", "node")
@@ -61,9 +60,7 @@ class NodeToSegment(Formulation):
 
     def _check_areas(self, element: str) -> None:
         """Refuse facets whose nodes do not all push under a uniform pressure."""
-        xi, weights = fine_rule(element)
-        areas = weights @ elements.get(element).shape(xi)
-        if areas.min() < 1e-6 * areas.max():
+        if not all_nodes_carry(element):
             raise ContactError(
                 f"node_to_segment cannot have facets of {element} on its secondary side '{self.secondary.group}', "
                 "whose corner nodes carry no pressure: use formulation 'continuous' or 'mortar', or swap the sides"

@@ -20,11 +20,11 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.flexibility import TooManyColumnsError
+from fastcontact.linear.lower_tolerance import tighten
 from fastcontact.linear.multigrid.solver import Multigrid, StallError
 from fastcontact.linear.protocol import FrictionTerms, LinearSolver, Loaded, Product
 from fastcontact.linear.solvers.direct import Direct
 from fastcontact.linear.springs import Springs
-from fastcontact.linear.tightening import tighten
 
 log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]

@@ -18,8 +18,8 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.flexibility import FlexibilityColumns
+from fastcontact.linear.lower_tolerance import tighten
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
-from fastcontact.linear.tightening import tighten
 
 Array = NDArray[np.float64]
 MAX_ITERATIONS = 1000

@@ -270,9 +270,9 @@ def test_a_step_without_its_state_is_refused():
 
 def test_all_that_a_step_changes_is_kept_or_set_anew():
     """A field that the state learns must be looked at here."""
-    anew = {"rigid", "unsettled"}  # as a step begins
+    anew = {"rigid", "last_change"}  # as a step begins
     learnt = {"solver"}  # from what the solver remembers
-    names = {"u": "obstacles", "gap_round_off": "numbers", "largest_force": "numbers", "largest_work": "numbers"}
+    names = {"u": "obstacles", "gap_round_off": "numbers", "largest_force": "numbers", "largest_rigid_force": "numbers"}
     of_pairs = {"traction": "traction", "obstacles": "now", "angles": "angle", "never_opening": "closed"}
     of_pairs |= {"first_contact": "first_contact", "worn": "worn"}
     (step,) = fc.solve(spheres(), fc.linear_ramp(1), linear_solver="amg")

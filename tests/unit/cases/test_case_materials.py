@@ -48,6 +48,17 @@ def test_materials_of_all_kinds_reach_the_model(tmp_path):
     assert found == fc.LinearElastic(210e3, 0.3, density=7.85e-9, expansion=12e-6)
 
 
+def test_constants_that_vary_reach_the_model(tmp_path):
+    found = material(tmp_path, "E = {along = 'y', table = [[0.0, 100.0], [1.0, 300.0]]}\nnu = 0.3")
+    assert found.E.given == fc.Tabulated("y", [(0.0, 100.0), (1.0, 300.0)])
+    found = material(tmp_path, WOOD.replace("10800", "{along = 'radius', table = [[0.5, 9000], [1, 12000]]}"))
+    assert found.E[0].range == pytest.approx((9000.0, 12000.0), rel=0.3)
+    assert found.E[1:] == (700.0, 430.0)
+    found = material(tmp_path, "E = 1.0\nnu = 0.3\ndensity = {along = 'x', table = [[0, 1], [1, 2]]}")
+    assert found.E == 1.0
+    assert found.density.range[1] < 2.0
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -57,6 +68,23 @@ def test_materials_of_all_kinds_reach_the_model(tmp_path):
         (WOOD.replace("0.45", "4.5"), r"material\[0\]: Poisson's ratio nu12 = 4.5 must be less than"),
         (WOOD + "volumetric = 'plain'", r"the key 'material.volumetric' is none of a material that is orthotropic"),
         ("E = 1.0\nnu = 0.3\naxes = [[1, 0, 0], [0, 1, 0]]", r"the key 'material.axes' is none of .* isotropic"),
+        (
+            "E = {along = 'r', table = [[0, 1]]}\nnu = 0.3",
+            r"'material\[0\].E': a table is along x, y, z or radius, not",
+        ),
+        ("E = {along = 'x'}\nnu = 0.3", r"'material\[0\].E' needs 'table'"),
+        (
+            "E = {alon = 'x', table = [[0, 1]]}\nnu = 0.3",
+            r"'material\[0\].E.alon': did you mean 'material\[0\].E.along'",
+        ),
+        (
+            "E = {along = 'x', table = [[0, -1]]}\nnu = 0.3",
+            r"material\[0\]: in cell 0 of quad4 .*Young's modulus E = -1",
+        ),
+        (
+            WOOD.replace("0.45", "{along = 'x', table = [[0, 4.5]]}"),
+            r"material\[0\]: in cell 0 .* nu12 = 4.5 must be less",
+        ),
         ("D = [[1, 2], [2, 1]]", r"material\[0\]: the moduli D must be a matrix of 6 x 6"),
         (WOOD + "axes = {orgin = [0, 0, 0]}", r"'material.axes.orgin': did you mean 'material.axes.origin'"),
         (WOOD + "axes = [[1, 0, 0], [1, 1, 0]]", r"material\[0\]: .* not at right angles"),

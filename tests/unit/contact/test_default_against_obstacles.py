@@ -9,6 +9,7 @@ from fastcontact.mesh import elements
 CHOICES = {
     "tri3": "node_to_segment", "tri6": "continuous", "quad4": "continuous", "quad8": "continuous", "tet4": "node_to_segment",
     "hex8": "node_to_segment", "wedge6": "node_to_segment", "tet10": "continuous", "hex20": "continuous",
+    "hex27": "node_to_segment",
 }  # fmt: skip
 
 

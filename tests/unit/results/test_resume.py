@@ -19,7 +19,7 @@ from test_result_files import MESH, assert_same, nth_step, step_result
 import fastcontact as fc
 from fastcontact import ConvergenceError, FileError, ModelError, ResultWriter, open_results
 from fastcontact.mesh.files.packing import packed, unpacked
-from fastcontact.results import committed_file, contents
+from fastcontact.results import committed_file, write_arrays
 
 
 @pytest.fixture
@@ -185,7 +185,7 @@ def test_what_a_dead_writer_left_of_a_step_is_written_over(path: Path, monkeypat
         steps = [_with_error(step_result(number)) for number in range(3)]
         out.write(steps[0])
         with monkeypatch.context() as patch:
-            patch.setattr(contents, "append_rows", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+            patch.setattr(write_arrays, "append_rows", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
             with pytest.raises(KeyboardInterrupt):
                 out.write(steps[2])
     with ResultWriter(path, MESH, cell_fields=("error",), resume=True) as out:

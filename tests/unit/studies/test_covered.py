@@ -48,7 +48,7 @@ def test_the_list_is_of_lines_that_are_there(covered, root):
         assert entry["reason"].strip(), entry
         assert entry.get("function", "").split(".")[-1] in text, entry
         assert all(line.removeprefix("branch: ") in text for line in entry.get("lines", ())), entry
-    for test in (*listed["tests"]["files"], *listed["tests"]["left_out"]):
+    for test in (*listed["tests"]["compiled"], *listed["tests"]["interpreted"]):
         path, _, name = test.partition("::")
         assert (root / path).exists(), path
         assert not name or f"def {name.partition('[')[0]}(" in (root / path).read_text(encoding="utf-8"), test

@@ -50,12 +50,14 @@ class Comparison:
     """
 
     def __init__(self, model: Model) -> None:
-        self._model, (self._moduli, self._material) = model, model.material_numbers()
-        self._averaged = model.averaged_materials()
+        self._model = model
+        field = model.material_field()
+        self._moduli, self._material = field.moduli, field.rows
+        self._averaged, self._owner = field.averaged, field.owner
         nu = np.full(len(self._moduli), -1.0)  # only isotropic materials have a mean dilatation; modes do not lock
         for number, (material, _) in enumerate(model.materials):
             if isinstance(material, LinearElastic) and not material.incompatible_modes:
-                nu[number] = material.nu
+                nu[field.owner == number] = material.largest_nu
         self._suspicious = (nu >= SUSPICIOUS) & (model.kinematics != "plane_stress")
         self._cells = {name: rows for name in model.mesh.solids if (rows := self._may_lock(name)).any()}
         self.elements = list(self._cells)
@@ -89,9 +91,9 @@ class Comparison:
             volume[name] = part.sum(axis=1)
             at_points = reference[name][..., :3].mean(axis=2)
             pressure[name] = (at_points * part).sum(axis=1) / volume[name]
-        for number in np.flatnonzero(self._suspicious):
+        for number in np.unique(self._owner[self._suspicious]):
             whole, work = np.zeros((2, mesh.n_points))
-            rows = {name: np.flatnonzero(self._material[name] == number) for name in names}
+            rows = {name: np.flatnonzero(self._owner[self._material[name]] == number) for name in names}
             for name in names:
                 cells = mesh.cells[name][rows[name]]
                 for node in cells.T:

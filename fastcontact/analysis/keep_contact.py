@@ -1,0 +1,96 @@
+"""Keep of the contact of a load step what later steps start from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.analysis.geometry_loop import SettledContact
+from fastcontact.analysis.iterate import gaps_and_forces
+from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.solution import FrictionalEquilibrium
+from fastcontact.analysis.state import State
+from fastcontact.analysis.wear import Worn
+from fastcontact.results.step import ContactResult
+
+Array = NDArray[np.float64]
+
+
+def keep_contact(problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State) -> State:
+    """Return the state at the end of a step with its contact.
+
+    Parameters
+    ----------
+    problem : Problem
+    start : State
+        At the beginning of the step.
+    load : StepLoad
+    settled : SettledContact
+    end : State
+        At the end of the step, its displacements known.
+    """
+    return replace(
+        end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
+        last_change=settled.last_change, first_contact=first_contacts(problem, start, load, end.u),
+        extrapolation=start.extrapolation.converged(end.u, gaps_and_forces(settled.constraints, settled.solution)),
+        never_opening=never_opening(problem, start, settled), traction=tractions(problem, settled),
+    )  # fmt: skip
+
+
+def keep_wear(
+    problem: Problem, start: State, load: StepLoad, end: State, results: dict[str, ContactResult]
+) -> tuple[State, dict[str, ContactResult]]:
+    """Return the state at the end of a step with what has been worn off, and the results of contact pairs with it."""
+    worn, told, displacement = dict(start.worn), dict(results), problem.displacement(end.u)
+    for name, contact in results.items():
+        pair = problem.pairs[name]
+        if pair.options.wear is None:
+            continue
+        before = start.worn.get(name, Worn.nothing(len(contact.points)))
+        at = problem.configuration(name, start, load, displacement, end.u)
+        worn[name] = before.after(pair, at, contact, pair.options.wear)
+        told[name] = replace(contact, wear=worn[name].depth)
+    return replace(end, worn=worn), told
+
+
+def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> dict[str, tuple[Array, Array]]:
+    """Return by contact pair in space where the bodies meet first [length], and the normal there.
+
+    Once they have met it stays; until then it is where they would meet now, with obstacles and clearances as they are.
+    """
+    if problem.model.mesh.dim == 2:
+        return {}
+    return {
+        name: start.first_contact[name]
+        if name in start.first_contact
+        else pair.first_contact(problem.configuration(name, start, load, problem.displacement(u), u))
+        for name, pair in problem.pairs.items()
+    }
+
+
+def never_opening(
+    problem: Problem, start: State, settled: SettledContact
+) -> dict[str, tuple[Array, NDArray[np.bool_]]]:
+    """Return by contact pair that is bilateral once closed the places of its constraints, and which are closed for good."""
+    found = dict(start.never_opening)
+    for name, rows in settled.constraints.rows().items():
+        if problem.pairs[name].options.kind == "bilateral_once_closed":
+            part, closed = settled.constraints.parts[name], settled.solution.active[rows].copy()
+            if part.equality is not None:  # what stands beside the other side now may come back to it
+                closed |= part.equality
+            found[name] = part.positions, closed
+    return found
+
+
+def tractions(problem: Problem, settled: SettledContact) -> dict[str, tuple[Array, Array]]:
+    """Return by contact pair with a tangential penalty the places of its constraints, and the tangential tractions there."""
+    found = {}
+    for name, rows in settled.constraints.rows().items():
+        part, solution = settled.constraints.parts[name], settled.solution
+        if problem.pairs[name].options.tangential_penalty is not None and isinstance(solution, FrictionalEquilibrium):
+            assert part.areas is not None
+            forces = np.einsum("nk,ndk->nd", solution.tangential[rows], np.stack(part.directions, axis=2))
+            found[name] = part.positions, forces / part.areas[:, None]
+    return found

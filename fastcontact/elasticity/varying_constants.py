@@ -1,0 +1,218 @@
+"""Constants of materials that vary: functions of the position, and numbers for each cell or each point of a mesh."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.elasticity.loads import check_number, evaluated
+from fastcontact.errors import ModelError
+from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+Rows = Mapping[str, NDArray[np.intp]]
+AXES = ("x", "y", "z", "radius")
+
+
+@dataclass(frozen=True)
+class Tabulated:
+    """A function of one coordinate, by a table: straight between its places, constant before the first and after the last.
+
+    For material constants, temperatures, pressures and other values that may be functions of the position.
+    ModelError unless places and values are finite numbers, and places ascend.
+
+    Parameters
+    ----------
+    along : str
+        ``"x"``, ``"y"``, ``"z"``, or ``"radius"``: the distance from the axis z, in the plane from the origin.
+    table : sequence of (float, float)
+        Place [length] and value [unit of the quantity] in each row.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> coating = fc.Tabulated("y", [(-0.2, 210e3), (0.0, 400e3)])
+    >>> material = fc.LinearElastic(E=coating, nu=0.3)
+    """
+
+    along: str
+    table: Sequence[Sequence[float]]
+
+    def __post_init__(self) -> None:
+        if self.along not in AXES:
+            raise ModelError(f"a table is along {', '.join(AXES[:3])} or {AXES[3]}, not along {self.along!r}")
+        try:
+            rows = tuple((float(place), float(value)) for place, value in self.table)
+        except (TypeError, ValueError):
+            raise ModelError(f"the table along {self.along} must be pairs [place, value] of numbers") from None
+        for number in (number for row in rows for number in row):
+            check_number(f"a number of the table along {self.along}", number)
+        if not rows or any(b[0] <= a[0] for a, b in itertools.pairwise(rows)):
+            raise ModelError(f"the places of the table along {self.along} must ascend, at least one of them")
+        object.__setattr__(self, "table", rows)
+
+    def __call__(self, points: Array) -> Array:
+        """Return the values (n,) [unit of the quantity] at `points` (n, dim) [length]."""
+        if self.along == "radius":
+            at = np.hypot(points[:, 0], points[:, 1])
+        elif AXES.index(self.along) < points.shape[1]:
+            at = points[:, AXES.index(self.along)]
+        else:
+            raise ModelError("a table is along z, but the mesh is plane: take x, y or radius")
+        places, values = np.array(self.table).T
+        return np.interp(at, places, values)
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Cells of a mesh, `rows` (m,) of int by solid element."""
+
+    mesh: Mesh
+    rows: Rows
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return sum(map(len, self.rows.values()))
+
+    def samples(self) -> Iterator[tuple[str, NDArray[np.intp], Array]]:
+        """Yield element, cells and shape values (n, n_nodes) [-] of their middles, then of their quadrature points."""
+        for name, rows in self.rows.items():
+            yield name, rows, middle(name)
+        for name, rows in self.rows.items():
+            yield name, rows, elements.get(name).tables[0]
+
+
+def middle(name: str) -> Array:
+    """Return the weights (1, n_nodes) [-] of the nodes in the middle of a cell, where axes of materials are taken too."""
+    n = elements.get(name).n_nodes
+    return np.full((1, n), 1.0 / n)
+
+
+class Varying:
+    """A constant of a material that varies; constants are equal if they come from the same function or array.
+
+    Parameters
+    ----------
+    given : callable or ndarray
+        A function from positions (n, dim) [length] to numbers (n,), or numbers for each cell or each point.
+    cells : Cells, optional
+        Those that have the material, once they are known.
+    name : str
+        For messages.
+    """
+
+    def __init__(self, given: Any, cells: Cells | None = None, name: str = "the constant") -> None:
+        self.given, self.cells, self._name = given, cells, name
+        self._nodal: Array | None = None
+        self._by_cell: dict[str, Array] | None = None
+        if cells is not None and not callable(given):
+            self._place(np.asarray(given), cells)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Varying) and self.given is other.given
+
+    def __hash__(self) -> int:
+        return id(self.given)
+
+    def __repr__(self) -> str:
+        return "a function of the position" if callable(self.given) else f"an array of {len(self.given)} numbers"
+
+    def __format__(self, spec: str) -> str:
+        if self.cells is None:
+            return repr(self)
+        low, high = self.range
+        return f"{low:{spec}} to {high:{spec}}"
+
+    def _place(self, given: Array, cells: Cells) -> None:
+        """Find out from its length what an array has a number for."""
+        mesh = cells.mesh
+        total = sum(map(len, mesh.solids.values()))
+        lengths = {"cells": cells.count, "solid cells of the mesh": total, "points of the mesh": mesh.n_points}
+        counts = ", ".join(f"{count} {what}" for what, count in lengths.items())
+        column = given.ndim == 2 and given.shape[1] == 1
+        if column:
+            given = given[:, 0]
+            del lengths["points of the mesh"]
+        if given.ndim != 1 or given.dtype.kind not in "fiu" or len(given) not in lengths.values():
+            raise ModelError(
+                f"{self._name} is an array of {given.dtype} of shape {given.shape}: it must have a number for each cell of "
+                f"the material or of the mesh, or for each point ({counts})"
+            )
+        if not column and len(given) == mesh.n_points and len(given) in (cells.count, total):
+            raise ModelError(
+                f"{self._name} has {len(given)} numbers, and there are as many cells as points: give those of cells as a "
+                "column, shape (n, 1), those of points as a function"
+            )
+        if not np.isfinite(given).all():
+            raise ModelError(f"{self._name} is not finite at row {int(np.flatnonzero(~np.isfinite(given))[0])}")
+        if len(given) == mesh.n_points and not column:
+            self._nodal = given.astype(float)
+            return
+        found, first = {}, 0
+        for name, block in mesh.solids.items():
+            found[name] = np.full(len(block), np.nan)
+            rows = np.arange(len(block)) if len(given) != cells.count else cells.rows.get(name, np.empty(0, np.intp))
+            found[name][rows] = given[first : first + len(rows)]
+            first += len(rows)
+        self._by_cell = found
+
+    @property
+    def inside(self) -> bool:
+        """Whether it varies inside cells."""
+        return self._by_cell is None
+
+    @cached_property
+    def range(self) -> tuple[float, float]:
+        """The smallest and the largest number in its cells."""
+        assert self.cells is not None
+        found = [self.at(*sample) for sample in self.cells.samples()]
+        return float(min(values.min() for values in found)), float(max(values.max() for values in found))
+
+    def at(self, name: str, rows: NDArray[np.intp], N: Array) -> Array:
+        """Return the numbers (n_rows * n,) [unit of the constant] at points of cells of an element, cell by cell.
+
+        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.
+        """
+        assert self.cells is not None
+        mesh = self.cells.mesh
+        if self._by_cell is not None:
+            return np.repeat(self._by_cell[name][rows], len(N))
+        nodes = mesh.cells[name][rows]
+        if self._nodal is not None:
+            return (self._nodal[nodes] @ N.T).ravel()
+        return evaluated(self.given, positions(mesh, nodes, N), self._name).ravel()
+
+
+def positions(mesh: Mesh, nodes: NDArray[np.int32], N: Array) -> Array:
+    """Return places (n_cells * n, dim) [length] in cells with `nodes` (n_cells, n_nodes) of int, by shape values `N`.
+
+    `N` is (n, n_nodes) [-].
+    """
+    return np.einsum("qa,cad->cqd", N, mesh.points[nodes]).reshape(-1, mesh.dim)
+
+
+def wrapped(value: Any, vector: bool = False) -> Any:
+    """Return a constant as it is if it is a number, else as `Varying`; with `vector`, each of a sequence."""
+    if vector and isinstance(value, Sequence) and not isinstance(value, str):
+        return tuple(wrapped(v) for v in value)
+    if isinstance(value, Varying) or not (callable(value) or (isinstance(value, np.ndarray) and value.ndim > 0)):
+        return value
+    return Varying(value)
+
+
+def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
+    """Return a constant, or each of a tuple of them, after `change`."""
+    return tuple(change(v) for v in value) if isinstance(value, tuple) else change(value)
+
+
+def varying(value: Any) -> list[Varying]:
+    """Return the constants that vary of a constant, or of a tuple of them."""
+    return [v for v in (value if isinstance(value, tuple) else (value,)) if isinstance(v, Varying)]
