@@ -56,6 +56,8 @@ def contact_result(
     forces = _forces(pair, part, multiplier, along)
     faced = np.where(np.isfinite(normal), normal, 0.0)
     middle = contact_middle(pair, faced, np.einsum("nd,nd->n", forces.secondary, faced), closed, gap)
+    turns = isinstance(pair.primary, RigidSide) and pair.primary.rotation is not None
+    deformed = coordinates + at.displacement[points]
     return ContactResult(
         name=name,
         formulation=pair.name,
@@ -79,16 +81,11 @@ def contact_result(
         tangent=middle.tangent,
         primary_points=forces.primary_points,
         primary_force_vectors=forces.primary,
-        **_turned(pair, points, forces.secondary, at),
+        obstacle_angle=at.angle if turns else None,
+        torque=pair.primary.torque(deformed, forces.secondary, at.stance)
+        if isinstance(pair.primary, RigidSide)
+        else None,
     )
-
-
-def _turned(pair: Formulation, points: NDArray[np.int32], forces: Array, at: Configuration) -> dict[str, float | None]:
-    """Return the angle and the torque of a rigid obstacle that turns, nothing of others."""
-    if not isinstance(pair.primary, RigidSide) or pair.primary.rotation is None:
-        return {}
-    deformed = pair.points[points] + at.displacement[points]
-    return {"obstacle_angle": at.angle, "torque": pair.primary.torque(deformed, forces, at.stance)}
 
 
 @dataclass(frozen=True, eq=False)

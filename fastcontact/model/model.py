@@ -1043,6 +1043,8 @@ class Model:
               or a function of the secondary position [pressure / length].
             - ``slip``: ``"symmetric"`` (default): closing a gap along the mean of both sides' normals is no slip;
               ``"primary"``: all relative motion along the tangents to the primary side is, as in code_aster.
+            - ``wear``: Archard's coefficient by hardness: ``coefficient * pressure * slip`` is worn off the secondary side in
+              each load step, and the next one begins with it; depths are in the results [1 / pressure].
             - ``search_distance``: what is farther off than this, or deeper inside, now and as the load step begins, is not
               faced [length].
             - ``normals``: ``"facet"`` or ``"averaged"`` between the facets that meet at a node at less than 45 degrees, which

@@ -191,7 +191,7 @@ class Formulation(ABC):
     ) -> Constraints:
         """Return the constraints of paired candidates, with tangential rows where there is friction."""
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
-        gap0 += self.options.added_gap(candidates, pairing, self.primary, self.points, at.clearance_factor)
+        gap0 += self.added_gap(candidates, pairing, at)
         positions = candidates.positions(self.points)
         if not (self.friction or self.options.tied):
             return Constraints(B, gap0, positions, compliance)
@@ -207,6 +207,13 @@ class Formulation(ABC):
             drift = self._closing_slip(candidates, pairing, directions, at)
         friction = self.options.coefficients(self.friction, candidates)
         return Constraints(B, gap0, positions, compliance, along, directions, friction, drift)
+
+    def added_gap(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Array:
+        """Return what clearances and wear add to the gaps (n,) of candidates, zero where nothing is faced [length]."""
+        added = self.options.added_gap(candidates, pairing, self.primary, self.points, at.clearance_factor)
+        if at.worn is None:
+            return added
+        return added + np.where(pairing.paired, np.einsum("nk,nk->n", candidates.shape, at.worn[candidates.nodes]), 0.0)
 
     def turning(self, candidates: Candidates, at: Configuration) -> Array | None:
         """Return how far the rotation of an obstacle carries what candidates face (n, dim) [length]; None without any."""
@@ -286,7 +293,7 @@ class Formulation(ABC):
         pairing = self.facing(nodes, at, max(self.projection_tolerance or 0.0, ON_SYMMETRY))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
         if with_clearance:
-            gap0 += self.options.added_gap(nodes, pairing, self.primary, self.points, at.clearance_factor)
+            gap0 += self.added_gap(nodes, pairing, at)
         u = at.displacement if displacement is None else displacement
         return np.where(pairing.paired, gap0 + G @ u.ravel(), np.inf), pairing.normal
 
