@@ -158,6 +158,8 @@ def _pivots_in_groups(B: csr_array, group: Indices, is_own: Mask) -> Indices:
     failed = np.zeros(len(count), bool)
     for made in range(table.shape[1]):
         left = np.flatnonzero((count > made) & ~failed)
+        if not len(left):
+            break
         r, c = np.divmod(np.abs(table[left]).reshape(len(left), -1).argmax(axis=1), table.shape[2])
         i, pivot = equation[left, r], table[left, r, c]
         good = (np.abs(pivot) >= SMALLEST * largest[i]) & (pivot != 0.0)
