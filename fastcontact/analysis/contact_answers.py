@@ -210,8 +210,10 @@ def _slip(pair: Formulation, before: StepResult | None, step: StepResult, name: 
         else np.asarray(own.contact[name].obstacle_displacement)
         for own in (step, before)
     )  # fmt: skip
+    angles = [0.0 if own is None else own.contact[name].obstacle_angle or 0.0 for own in (step, before)]
+    at = Configuration(step.displacement, start, now, then, angle=angles[0], angle_start=angles[1])
     nodes = Candidates(pair.secondary.points[:, None], np.ones((len(pair.secondary.points), 1)))
-    pairing = pair.facing(nodes, Configuration(step.displacement, start, now, then), pair.projection_tolerance or 0.0)
+    pairing = pair.facing(nodes, at, pair.projection_tolerance or 0.0)
     moved = (step.displacement - start).ravel()
     slip = np.zeros((len(nodes.nodes), dim))
     for axis, unit in enumerate(np.eye(dim)):
@@ -219,6 +221,8 @@ def _slip(pair: Formulation, before: StepResult | None, step: StepResult, name: 
         slip[:, axis] = rows_along(along, nodes, pairing, pair.primary, moved.size) @ moved
     if isinstance(pair.primary, RigidSide):
         slip -= now - then
+        turning = pair.turning(nodes, at)
+        slip -= 0.0 if turning is None else turning
     slip -= np.einsum("nd,nd->n", slip, pairing.normal)[:, None] * pairing.normal
     return np.where(pairing.paired[:, None], slip, 0.0)
 

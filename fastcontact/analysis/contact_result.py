@@ -79,7 +79,16 @@ def contact_result(
         tangent=middle.tangent,
         primary_points=forces.primary_points,
         primary_force_vectors=forces.primary,
+        **_turned(pair, points, forces.secondary, at),
     )
+
+
+def _turned(pair: Formulation, points: NDArray[np.int32], forces: Array, at: Configuration) -> dict[str, float | None]:
+    """Return the angle and the torque of a rigid obstacle that turns, nothing of others."""
+    if not isinstance(pair.primary, RigidSide) or pair.primary.rotation is None:
+        return {}
+    deformed = pair.points[points] + at.displacement[points]
+    return {"obstacle_angle": at.angle, "torque": pair.primary.torque(deformed, forces, at.stance)}
 
 
 @dataclass(frozen=True, eq=False)

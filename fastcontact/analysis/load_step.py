@@ -60,7 +60,9 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
         settled, u, balanced = equilibrium(problem, start, load, with_loads(problem, load), expected, settled)
     balanced.check(index, problem, settled.iterate.history if settled is not None else ())
     iterations = counted(settled, problem.solver.counters.iterations - solved_before)
-    end = replace(start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u))
+    end = replace(
+        start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles
+    )
     contact: dict[str, ContactResult] = {}
     if settled is not None:
         end = keep_contact(problem, start, load, settled, end)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -19,14 +19,17 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.elasticity.constrained_system import System
+from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.material_sides import MaterialSides, material_sides
 from fastcontact.elasticity.springs import stiffened
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
+from fastcontact.elasticity.temperature import Temperature
 from fastcontact.linear import choice
 from fastcontact.linear.protocol import LinearSolver
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.model import Model
+from fastcontact.model.obstacle_rotation import angle_at
 from fastcontact.model.ramp import Ramp, Table, combined, multiplier
 from fastcontact.model.rigid_motions import free_motions
 
@@ -48,12 +51,15 @@ class StepLoad:
         By contact pair, the prescribed displacement of its rigid obstacle [length].
     clearance_factors : dict of str to float
         By contact pair, what its clearances are multiplied with.
+    angles : dict of str to float
+        By contact pair, by how much its rigid obstacle has turned, where one does [radian].
     """
 
     lift: Array
     force: Array
     obstacles: Mapping[str, Array]
     clearance_factors: Mapping[str, float]
+    angles: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,19 +123,21 @@ class Problem:
         prescribed = combined(self.prescribed, self.ramp, instant, self.shape)
         factors = [multiplier(relation.ramp, self.ramp, instant) for relation in self.model.relations]
         lift = self.system.lift(prescribed.ravel(), self.system.values(factors))
-        obstacles, clearances = {}, {}
+        obstacles, clearances, angles = {}, {}, {}
         for pair in self.model.contact:
             side = self.pairs[pair.name].primary
             if isinstance(side, RigidSide):
                 obstacles[pair.name] = multiplier(pair.ramp, self.ramp, instant) * side.motion
+            if pair.rotation is not None:
+                angles[pair.name] = angle_at(pair, self.ramp, instant)
             if pair.clearance_ramp is not None:
                 clearances[pair.name] = multiplier(pair.clearance_ramp, self.ramp, instant)
         force = combined(self.forces, self.ramp, instant, self.shape).ravel()
-        return StepLoad(lift, force, obstacles, clearances)
+        return StepLoad(lift, force, obstacles, clearances, angles)
 
-    def temperature_factors(self, instant: float) -> list[float]:
-        """Return what each temperature of the model is multiplied with at an instant of the ramp [-]."""
-        return [multiplier(own.ramp, self.ramp, instant) for own in self.model.temperatures]
+    def factors(self, histories: Iterable[Temperature | InitialState], instant: float) -> list[float]:
+        """Return what temperatures or initial states of the model are multiplied with at an instant of the ramp [-]."""
+        return [multiplier(own.ramp, self.ramp, instant) for own in histories]
 
     def displacement(self, u: Array) -> Array:
         """Return the displacements (n_points, dim) of the mesh of all displacements u (n_dofs,) [length]."""
@@ -163,6 +171,8 @@ class Problem:
             load.clearance_factors.get(name, 1.0),
             state.never_opening.get(name),
             state.traction.get(name),
+            load.angles.get(name, 0.0),
+            state.angles.get(name, 0.0),
         )
 
     def initial_state(self) -> State:
@@ -215,9 +225,9 @@ def prepare(
 
 
 def _forces(model: Model) -> dict[Table | None, Array]:
-    """Return by history the nodal forces (n_points, dim) of loads and temperatures at multiplier 1 [force]."""
+    """Return by history the nodal forces (n_points, dim) of loads, heat and initial states at multiplier 1 [force]."""
     forces = model.forces_by_ramp()
-    for own, values in model.thermal_forces_by_ramp().items():
+    for own, values in (*model.thermal_forces_by_ramp().items(), *model.initial_forces_by_ramp().items()):
         forces[own] = forces[own] + values if own in forces else values
     return forces
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.seam_warnings import seam_warnings
 from fastcontact.analysis.state import State
 from fastcontact.analysis.volumetric_locking import locking_warning
 from fastcontact.contact.formulations import Formulation
@@ -49,7 +50,7 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
             continue
         found += _deep(pair, contact, state.u) + _lost(pair, contact, name in state.touched, loaded)
         found += _unresolved(name, pair, contact)
-    return found + _unsettled(state) + _loose(problem, last)
+    return found + seam_warnings(problem, last) + _unsettled(state) + _loose(problem, last)
 
 
 def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> list[str]:

@@ -41,9 +41,11 @@ def recover(
         Number of the step, and its pseudo-time.
     """
     mesh, u = problem.model.mesh, problem.displacement(end.u)
-    factors = problem.temperature_factors(place[1])
-    if factors:
-        iterations = {**iterations, "temperature_factors": factors}
+    temperature, initial = (
+        problem.factors(own, place[1]) for own in (problem.model.temperatures, problem.model.initial_states)
+    )
+    factors = {"temperature_factors": temperature, "initial_factors": initial}
+    iterations = {**iterations, **{key: found for key, found in factors.items() if found}}
     sections = problem.model.pretensions
     if sections:
         pulls = [multiplier(own.ramp, problem.ramp, place[1]) for own in sections]
@@ -57,7 +59,7 @@ def recover(
         u,
         problem.field.treatment,
         problem.sides,
-        problem.field.thermal(problem.model.temperature_rise(factors)),
+        problem.model.stress_offset(temperature, initial, problem.field),
     )
     stress, by_material = by_largest_von_mises(problem.sides, problem.material_of_cells, at_places, mesh.n_points)
     von_mises = recovery.von_mises(stress)

@@ -50,6 +50,18 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         {"value": PLACE, "groups": (list, str), "reference": NUMBER, "ramp": list},
         ("value",),
     ),
+    **dict.fromkeys(
+        ("initial_stress", "initial_strain"),
+        (
+            {
+                "groups": (list, str),
+                **dict.fromkeys(("xx", "yy", "zz", "xy", "yz", "xz"), PLACE),
+                "axes": (list, dict),
+                "ramp": list,
+            },
+            (),
+        ),
+    ),
     "force": ({"group": str, **AXES, "distribute": bool, "ramp": list}, ("group",)),
     "moment": ({"group": str, **AXES, "ramp": list}, ("group",)),
     "hydrostatic_pressure": (
@@ -69,6 +81,14 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         },
         ("first", "second", "component"),
     ),
+    "periodicity": (
+        {"first": str, "second": str, **AXES, "free": str, "translation": list, "ramp": list},
+        ("first", "second"),
+    ),
+    "cyclic_symmetry": (
+        {"first": str, "second": str, "sectors": int, "origin": list, "direction": list},
+        ("first", "second", "sectors"),
+    ),
     "relation": ({"terms": list, "value": NUMBER, "ramp": list}, ("terms",)),
     "pretension": (
         {
@@ -85,6 +105,8 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
 }
 # A rigid surface: the facets of a group of a file, or of the mesh of the model.
 SURFACE = {"file": str, "group": str, "flip": bool, "crease": NUMBER}
+# How a rigid obstacle turns.
+ROTATION: dict[str, Any] = {"angle": NUMBER, "centre": list, "axis": list, "ramp": list}
 # Studies of this case; `fastcontact.studies.settings` reads them.
 STUDY: dict[str, Any] = {
     "generator": str,

@@ -8,9 +8,10 @@ from pathlib import Path
 from reprlib import repr
 from typing import Any
 
-from fastcontact.cases.keys import AXES, LISTS, NUMBER, SURFACE, at, called, check_keys, tables
+from fastcontact.cases.keys import AXES, LISTS, NUMBER, ROTATION, SURFACE, at, called, check_keys, tables
 from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
+from fastcontact.elasticity.initial_states import COMPONENTS
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.elasticity.varying_constants import Tabulated
@@ -23,14 +24,14 @@ from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
 # Keys whose values may depend on the position.
-VALUES = ("E", "nu", "G", "density", "expansion", "value")
+VALUES = ("E", "nu", "G", "density", "expansion", "value", *COMPONENTS)
 
 
 def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
     """Add the material whose constants are given: isotropic, orthotropic where E, nu or G are lists, anisotropic with D."""
     kind = _material_law(constants)
-    if isinstance(constants.get("axes"), dict):
-        constants["axes"] = called("material.axes", CylindricalAxes, constants["axes"])
+    if "axes" in constants:
+        constants["axes"] = _axes("material", constants["axes"])
     if kind is LinearElastic:
         for key in constants:
             if (
@@ -44,6 +45,19 @@ def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
         if key not in inspect.signature(kind).parameters:
             raise CaseError(f"the key 'material.{key}' is none of a material that is {_LAWS[kind]}")
     model.add_material(kind(**constants), groups)
+
+
+def _add_initial_stress(model: Model, axes: Any = None, **given: Any) -> None:
+    model.add_initial_stress(axes=_axes("initial_stress", axes), **given)
+
+
+def _add_initial_strain(model: Model, axes: Any = None, **given: Any) -> None:
+    model.add_initial_strain(axes=_axes("initial_strain", axes), **given)
+
+
+def _axes(where: str, axes: Any) -> Any:
+    """Return axes given as vectors, or by the keys of a cylinder."""
+    return called(f"{where}.axes", CylindricalAxes, axes) if isinstance(axes, dict) else axes
 
 
 def _add_coupling(model: Model, reference: str, group: str, place: Any = None, **options: Any) -> None:
@@ -82,6 +96,8 @@ _ADD: dict[str, Callable[..., None]] = {
     "gravity": Model.add_gravity,
     "centrifugal": Model.add_centrifugal,
     "temperature": Model.add_temperature,
+    "initial_stress": _add_initial_stress,
+    "initial_strain": _add_initial_strain,
     "force": Model.add_force,
     "moment": Model.add_moment,
     "hydrostatic_pressure": Model.add_hydrostatic_pressure,
@@ -89,6 +105,8 @@ _ADD: dict[str, Callable[..., None]] = {
     "couple": Model.couple,
     "relation": Model.relate,
     "group_relation": Model.relate_groups,
+    "periodicity": Model.add_periodicity,
+    "cyclic_symmetry": Model.add_cyclic_symmetry,
     "spring": Model.add_spring,
     "pretension": Model.add_pretension,
 }
@@ -171,6 +189,9 @@ def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
     for key in ("motion", "force"):
         if key in rest:
             check_keys(f"{where}.{key}", rest[key], AXES)
+    if "rotation" in rest:
+        check_keys(f"{where}.rotation", rest["rotation"], ROTATION)
+        rest["rotation"] = _arguments(f"{where}.rotation", rest["rotation"])
     with at(where):
         model.add_obstacle(name, obstacle=obstacle, **_arguments(where, rest))
 

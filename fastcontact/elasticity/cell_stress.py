@@ -7,12 +7,13 @@ from numpy.typing import NDArray
 
 from fastcontact._jit import parallel
 from fastcontact.elasticity import dilatation, dilatation_kernels, element_kernels, incompatible_modes
+from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.stiffness import of_cells
-from fastcontact.elasticity.temperature import ThermalStress
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
+Numbers = NDArray[np.intp]
 
 
 # Cells at a time where moduli vary inside them.
@@ -42,8 +43,8 @@ class CellStress:
     averaged : ndarray of bool (n_materials,), optional
         Which materials have a mean dilatation, see `dilatation`, or incompatible modes (`MaterialField.treatment`); none by
         default.
-    thermal : ThermalStress, optional
-        What stresses lose by the temperature.
+    offset : StressOffset, optional
+        What stresses have by temperature and initial states.
     """
 
     def __init__(
@@ -53,27 +54,32 @@ class CellStress:
         moduli: Array,
         displacement: Array,
         averaged: dilatation.Mask | None = None,
-        thermal: ThermalStress | None = None,
+        offset: StressOffset | None = None,
     ) -> None:
         self._mesh, self._axisymmetric, self._moduli = mesh, kinematics == "axisymmetric", moduli
         self._displacement, self._averaged = np.ascontiguousarray(displacement), averaged
-        self._thermal = thermal
+        self._offset = offset
 
-    def at(self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32]) -> Array:
+    def at(
+        self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32], rows: Numbers | None = None
+    ) -> Array:
         """Return the stresses (n_cells, n, n_components) [pressure] at points `xi` (n, dim) [-] of cells of an element.
 
         `cells` (n_cells, n_nodes) of int; `material` (n_cells,) of int, the material number of each, or (n_cells, n_q), that
-        of each quadrature point.
+        of each quadrature point; `rows` (n_cells,) of int, the numbers of the cells, which only initial states need.
         """
         out = np.empty((len(cells), len(xi), self._moduli.shape[1]))
-        self.fill(name, xi, cells, material, out)
+        self.fill(name, xi, cells, material, out, rows)
         return out
 
-    def fill(self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32], out: Array) -> None:
+    def fill(
+        self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32], out: Array,
+        rows: Numbers | None = None,
+    ) -> None:  # fmt: skip
         """Fill `out` (n_cells, n, n_components) [pressure] in place, shared by threads.
 
         At points `xi` (n, dim) [-] of `cells` (n_cells, n_nodes) of int of an element; `material` (n_cells,) or
-        (n_cells, n_q) of int, as for `at`.
+        (n_cells, n_q) and `rows` (n_cells,) of int, as for `at`.
         """
         element, split = elements.get(name), dilatation.split(name, self._moduli, self._averaged)
         moduli = self._moduli if split is None else split.moduli
@@ -100,9 +106,12 @@ class CellStress:
                 )  # fmt: skip
 
         parallel.shared(part, parallel.portions(len(out), cells.shape[1]))
-        if self._thermal is not None:
-            self._subtract_thermal(self._thermal, name, xi, cells, material, out)
-        self._add_modes(name, xi, cells, of_cells(material), out)
+        if self._offset is not None:
+            self._subtract_thermal(self._offset, name, xi, cells, material, out)
+            if self._offset.states:
+                assert rows is not None
+                self._add_initial(self._offset, (name, xi, rows), cells, material, out)
+        self._add_modes(name, xi, cells, of_cells(material), out, rows)
 
     def _fill_varying(
         self, at: tuple[str, Array, Array, Array], cells: NDArray[np.int32], material: NDArray[np.int32], moduli: Array,
@@ -123,24 +132,64 @@ class CellStress:
             out[own] = np.einsum("cnij,cnj->cni", local, strain[own])
 
     def _add_modes(
-        self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32], out: Array
-    ) -> None:
+        self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32], out: Array,
+        numbers: Numbers | None,
+    ) -> None:  # fmt: skip
         """Add the stresses of incompatible modes."""
         for rows in incompatible_modes.batches(incompatible_modes.asked(name, self._averaged, material)):
             own, corners = cells[rows], self._mesh.points[cells[rows]]
-            moduli, thermal = self._moduli[material[rows]], None
-            if self._thermal is not None:
-                rise = self._thermal.rise[own] @ elements.get(name).tables[0].T
-                thermal = rise[:, :, None] * self._thermal.per_degree[material[rows]][:, None, :]
+            moduli, lost = self._moduli[material[rows]], None
+            if self._offset is not None:
+                N = elements.get(name).tables[0]
+                rise = self._offset.rise[own] @ N.T
+                lost = rise[:, :, None] * self._offset.per_degree[material[rows]][:, None, :]
+                if numbers is not None:
+                    lost += self._lost_by_initial(self._offset, name, numbers[rows], N, moduli)
             found = incompatible_modes.operators(name, corners, moduli.shape[1])
             displacement = self._displacement[own].reshape(len(rows), -1)
-            amounts = incompatible_modes.amplitudes(found, moduli, displacement, thermal)
+            amounts = incompatible_modes.amplitudes(found, moduli, displacement, lost)
             strains = incompatible_modes.mode_strains(name, corners, xi, moduli.shape[1])
             out[rows] += np.einsum("cij,cqja,ca->cqi", moduli, strains, amounts, optimize=True)
 
+    @staticmethod
+    def _lost_by_initial(offset: StressOffset, name: str, rows: Numbers, N: Array, moduli: Array) -> Array | float:
+        """Return what stresses (n_cells, n, n_components) [pressure] lose by initial strains, less initial stresses."""
+        strain, stress = (offset.initial(kind, name, rows, N) for kind in ("strain", "stress"))
+        lost = 0.0 if strain is None else np.einsum("cij,cnj->cni", moduli, strain)
+        return lost if stress is None else lost - stress
+
+    def _add_initial(
+        self, offset: StressOffset, at: tuple[str, Array, Numbers], cells: NDArray[np.int32], material: NDArray[np.int32],
+        out: Array,
+    ) -> None:  # fmt: skip
+        """Add initial stresses, subtract those of initial strains, whose dilatation is projected where that of others is."""
+        name, xi, rows = at
+        N = elements.get(name).shape(xi)
+        stress, strain = (offset.initial(kind, name, rows, N) for kind in ("stress", "strain"))
+        if stress is not None:
+            out += stress
+        if strain is None:
+            return
+        split = dilatation.split(name, self._moduli, self._averaged)
+        moduli = self._moduli if split is None else split.moduli
+        if material.ndim == 1:
+            out -= np.einsum("cij,cnj->cni", moduli[material], strain)
+        else:
+            local = np.einsum("nq,cqij->cnij", _beside(name, xi), moduli[material], optimize=True)
+            out -= np.einsum("cnij,cnj->cni", local, strain)
+        if split is None:
+            return
+        bulk = split.bulk[of_cells(material)]
+        own = bulk[:, 0] != 0.0
+        at_points = offset.initial("strain", name, rows[own], elements.get(name).tables[0])
+        assert at_points is not None
+        dilatations = at_points[:, :, :3].sum(axis=2)
+        parts = dilatation.projected(name, self._mesh.points[cells[own]], dilatations, xi, self._axisymmetric)
+        out[own, :, :3] -= (bulk[own][:, :, None] * parts).sum(axis=1)[:, :, None]
+
     def _subtract_thermal(
         self,
-        thermal: ThermalStress,
+        thermal: StressOffset,
         name: str,
         xi: Array,
         cells: NDArray[np.int32],
@@ -159,6 +208,7 @@ class CellStress:
         out -= np.where(projected[:, None], 0.0, rise)[:, :, None] * per_degree
         if split is not None and projected.any():
             own, numbers = cells[projected], material[projected]
-            parts = dilatation.projected(name, self._mesh.points[own], thermal.rise[own], xi, self._axisymmetric)
+            heat = thermal.rise[own] @ element.tables[0].T
+            parts = dilatation.projected(name, self._mesh.points[own], heat, xi, self._axisymmetric)
             pressure = (split.bulk[numbers] * 3.0 * thermal.expansion[numbers, None])[:, :, None] * parts
             out[projected, :, :3] -= pressure.sum(axis=1)[:, :, None]

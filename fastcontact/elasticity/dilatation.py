@@ -65,7 +65,7 @@ def split(name: str, moduli: Array, averaged: Mask | None) -> Split | None:
     return Split(deviatoric, np.column_stack([bulk, rest]))
 
 
-def projected(name: str, corners: Array, nodal: Array, xi: Array, axisymmetric: bool) -> Array:
+def projected(name: str, corners: Array, values: Array, xi: Array, axisymmetric: bool) -> Array:
     """Return mean and remainder (n_cells, 2, n) of a field, projected as the dilatation is [unit of the field].
 
     Parameters
@@ -74,15 +74,15 @@ def projected(name: str, corners: Array, nodal: Array, xi: Array, axisymmetric: 
         The element.
     corners : ndarray (n_cells, n_nodes, dim)
         Nodes of the cells [length].
-    nodal : ndarray (n_cells, n_nodes)
-        The field at them [unit of the field].
+    values : ndarray (n_cells, n_q)
+        The field at the quadrature points [unit of the field].
     xi : ndarray (n, dim)
         Points of the reference cell where it is wanted [-].
     axisymmetric : bool
     """
     N, dN, weights = elements.get(name).tables
     volume = cell_volumes(corners, N, dN, axisymmetric) * weights
-    at, values = basis(name, elements.get(name).quadrature[0]), nodal @ N.T
+    at = basis(name, elements.get(name).quadrature[0])
     mass = np.einsum("cq,qm,qn->cmn", volume, at, at)
     found = (
         np.linalg.solve(mass, np.einsum("cq,qm,cq->cm", volume, at, values)[:, :, None])[:, :, 0] @ basis(name, xi).T

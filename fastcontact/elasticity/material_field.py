@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.elasticity.incompatible_modes import MODES
+from fastcontact.elasticity.initial_states import InitialState, StressOffset
 from fastcontact.elasticity.materials import MODULI, Material
-from fastcontact.elasticity.temperature import ThermalStress
 from fastcontact.elasticity.varying_constants import middle
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
@@ -131,14 +131,26 @@ class MaterialField:
     def _anywhere(self) -> Array:
         return np.zeros((1, 3 if self.kinematics == "3d" else 2))
 
-    def thermal(self, rise: Array | None) -> ThermalStress | None:
-        """Return what stresses lose by a rise of the temperature (n_points,) [temperature]; None where there is none."""
-        if rise is None:
+    def offset(
+        self, rise: Array | None, states: Sequence[tuple[float, InitialState]] = (), n_points: int = 0
+    ) -> StressOffset | None:
+        """Return what stresses have beside those of the displacements; None where there is nothing.
+
+        Parameters
+        ----------
+        rise : ndarray (n_points,), optional
+            Of the temperature [temperature].
+        states : sequence of (float, InitialState)
+            Initial stresses and strains, and what they are multiplied with.
+        n_points : int
+            Of the mesh, for initial states without temperatures.
+        """
+        if rise is None and not states:
             return None
         strain = np.nan_to_num(self.expansion)
-        averaged = self.averaged
         per_degree = np.einsum("mij,mj->mi", self.moduli, strain)
-        return ThermalStress(rise, per_degree, np.where(averaged, strain[:, 0], 0.0))
+        expansion = np.where(self.averaged, strain[:, 0], 0.0)
+        return StressOffset(np.zeros(n_points) if rise is None else rise, per_degree, expansion, tuple(states))
 
     def without_expansion(self, mesh: Mesh, rise: Array) -> int:
         """Return how many cells have a rise of the temperature (n_points,) [temperature] and a material without expansion."""

@@ -295,7 +295,7 @@ class LinearElastic(Material):
     E : float, callable or ndarray (n,)
         Young's modulus [pressure], positive. Where it varies, a function from positions (n, dim) [length] to numbers (n,),
         such as `Tabulated`; or an array, with a number for each solid cell of the groups that have the material, for each of
-        the mesh, in the order of ``mesh.solids``, or for each point of the mesh.
+        the mesh, in the order of ``mesh.solids``, or for each point of the mesh. A column (n, 1) is always one for cells.
     nu : float, callable or ndarray (n,)
         Poisson's ratio, -1 < nu < 0.5 [-]; as E.
     volumetric : str

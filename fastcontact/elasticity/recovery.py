@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from fastcontact.elasticity import dilatation, element_2d_kernels, element_kernels
 from fastcontact.elasticity.cell_stress import CellStress
+from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.material_sides import MaterialSides
-from fastcontact.elasticity.temperature import ThermalStress
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
@@ -25,7 +25,7 @@ def stress_at_points(
     material: Materials,
     displacement: Array,
     averaged: dilatation.Mask | None = None,
-    thermal: ThermalStress | None = None,
+    offset: StressOffset | None = None,
 ) -> dict[str, Array]:
     """Return by solid element the stress (n_cells, n_q, n_components) [pressure] at the default quadrature points.
 
@@ -45,12 +45,12 @@ def stress_at_points(
     averaged : ndarray of bool (n_materials,), optional
         Which materials have a mean dilatation, see `dilatation`, or incompatible modes (`MaterialField.treatment`); none by
         default.
-    thermal : ThermalStress, optional
-        What stresses lose by the temperature.
+    offset : StressOffset, optional
+        What stresses have by temperature and initial states.
     """
-    stress = CellStress(mesh, kinematics, moduli, displacement, averaged, thermal)
+    stress = CellStress(mesh, kinematics, moduli, displacement, averaged, offset)
     return {
-        name: stress.at(name, elements.get(name).quadrature[0], block, material[name])
+        name: stress.at(name, elements.get(name).quadrature[0], block, material[name], np.arange(len(block)))
         for name, block in mesh.solids.items()
     }
 
@@ -63,14 +63,14 @@ def nodal_stress(
     displacement: Array,
     averaged: dilatation.Mask | None = None,
     sides: MaterialSides | None = None,
-    thermal: ThermalStress | None = None,
+    offset: StressOffset | None = None,
 ) -> Array:
     """Return the stress (n_points, n_components) [pressure] at the nodes: `nodal_average` of `stress_at_points`.
 
     The stresses at points are formed for few cells at a time, which takes less memory. Arguments as for `stress_at_points`.
     With `sides` the average is over the cells of one material, (n_places, n_components) in their order.
     """
-    stress = CellStress(mesh, kinematics, moduli, displacement, averaged, thermal)
+    stress = CellStress(mesh, kinematics, moduli, displacement, averaged, offset)
     places = mesh.cells if sides is None else sides.cells
     average = NodalAverage(mesh.n_points if sides is None else len(sides.node), moduli.shape[1])
     for name, block in mesh.solids.items():
@@ -81,7 +81,7 @@ def nodal_stress(
         for first in range(0, len(block), len(room)):
             rows = slice(first, first + len(room))
             values = room[: len(block) - first]
-            stress.fill(name, xi, block[rows], material[name][rows], values)
+            stress.fill(name, xi, block[rows], material[name][rows], values, np.arange(first, first + len(values)))
             average.add(places[name][rows], element.extrapolation, values)
     return average.result()
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.cell_stress import CellStress
+from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
@@ -29,7 +30,7 @@ def smoothed_stress(
     kinematics: str,
     field: MaterialField,
     displacement: Array,
-    rise: Array | None = None,
+    offset: StressOffset | None = None,
 ) -> dict[str, Array]:
     """Return by solid element the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each cell.
 
@@ -43,11 +44,11 @@ def smoothed_stress(
         Materials of all cells.
     displacement : ndarray (n_points, dim)
         Of all points [length].
-    rise : ndarray (n_points,), optional
-        Of the temperature [temperature].
+    offset : StressOffset, optional
+        What stresses have by temperature and initial states.
     """
     components = field.moduli.shape[1]
-    stress = CellStress(mesh, kinematics, field.moduli, displacement, field.averaged, field.thermal(rise))
+    stress = CellStress(mesh, kinematics, field.moduli, displacement, field.averaged, offset)
     found = {name: np.empty((*block.shape, components)) for name, block in mesh.solids.items()}
     material = field.distinct
     for number in np.unique(np.concatenate([*material.values()])):
@@ -56,7 +57,7 @@ def smoothed_stress(
         for name, chosen in rows.items():
             xi, outward = sampling(name)
             cells = mesh.cells[name][chosen]
-            average.add(cells, outward, stress.at(name, xi, cells, field.loops[name][chosen]))
+            average.add(cells, outward, stress.at(name, xi, cells, field.loops[name][chosen], chosen))
         nodal = average.result()
         for name, chosen in rows.items():
             found[name][chosen] = nodal[mesh.cells[name][chosen]]

@@ -1,4 +1,4 @@
-"""Temperatures, and the stresses that they would cause in cells held as they are."""
+"""Temperatures of the nodes of solid cells."""
 
 from __future__ import annotations
 
@@ -71,25 +71,6 @@ class Temperature:
         else:
             found[points] = evaluated(self.value, mesh.points[points], self.name) - self.reference
         return found
-
-
-@dataclass(frozen=True, eq=False)
-class ThermalStress:
-    """What stress in cells loses by their temperature.
-
-    Attributes
-    ----------
-    rise : ndarray (n_points,)
-        Rise of the temperature [temperature].
-    per_degree : ndarray (n_moduli, n_components)
-        Moduli times the coefficients of expansion [pressure / temperature].
-    expansion : ndarray (n_moduli,)
-        Coefficients of expansion of the materials with a mean dilatation, zero of others [1 / temperature].
-    """
-
-    rise: Array
-    per_degree: Array
-    expansion: Array
 
 
 def checked_value(value: Any) -> Any:

@@ -137,18 +137,23 @@ class Varying:
         total = sum(map(len, mesh.solids.values()))
         lengths = {"cells": cells.count, "solid cells of the mesh": total, "points of the mesh": mesh.n_points}
         counts = ", ".join(f"{count} {what}" for what, count in lengths.items())
+        column = given.ndim == 2 and given.shape[1] == 1
+        if column:
+            given = given[:, 0]
+            del lengths["points of the mesh"]
         if given.ndim != 1 or given.dtype.kind not in "fiu" or len(given) not in lengths.values():
             raise ModelError(
                 f"{self._name} is an array of {given.dtype} of shape {given.shape}: it must have a number for each cell of "
                 f"the material or of the mesh, or for each point ({counts})"
             )
-        if len(given) == mesh.n_points and len(given) in (cells.count, total):
+        if not column and len(given) == mesh.n_points and len(given) in (cells.count, total):
             raise ModelError(
-                f"{self._name} has {len(given)} numbers, and there are as many cells as points: give it as a function"
+                f"{self._name} has {len(given)} numbers, and there are as many cells as points: give those of cells as a "
+                "column, shape (n, 1), those of points as a function"
             )
         if not np.isfinite(given).all():
             raise ModelError(f"{self._name} is not finite at row {int(np.flatnonzero(~np.isfinite(given))[0])}")
-        if len(given) == mesh.n_points:
+        if len(given) == mesh.n_points and not column:
             self._nodal = given.astype(float)
             return
         found, first = {}, 0

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact.elasticity.initial_states import ALWAYS, COMPONENTS
 from fastcontact.model.contact_pair import ContactPair
 
 KINDS = {
@@ -37,6 +38,10 @@ def sentences(model: Any) -> Iterator[str]:
         value = "a number for each point" if isinstance(own.value, np.ndarray) else _value(own.value)
         where = own.name.removeprefix("the temperature of ")
         yield f"Temperature: {value} over {own.reference:g} in {where}{_history(own.ramp)}."
+    for state in model.initial_states:
+        parts = [f"{COMPONENTS[number]} = {value:g}" for number, value in state.components.items()]
+        kind, where = state.name.removeprefix("the initial ").split(" of ", 1)
+        yield f"Initial {kind}: {', '.join(parts)} in {where}{_history(None if state.ramp == ALWAYS else state.ramp)}."
     for relation in model.relations:
         yield f"Relation: {relation.name}{_history(relation.ramp)}."
     for spring in model.springs:

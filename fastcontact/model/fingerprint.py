@@ -40,6 +40,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         "the supports": _unordered(model.supports, mesh),
         "the loads": _unordered(model.loads, mesh),
         **({"the temperatures": _unordered(model.temperatures, mesh)} if model.temperatures else {}),
+        **({"the initial states": _unordered(model.initial_states, mesh)} if model.initial_states else {}),
         "the relations": _unordered(model.relations, mesh),
         "the springs": _unordered(model.springs, mesh),
         **({"the pretension sections": _unordered(model.pretensions, mesh)} if model.pretensions else {}),
@@ -126,6 +127,8 @@ def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: A
         _take(_called(value, points), add, mesh, points)
     if isinstance(value, Material):  # a density or expansion that is not given counts as little as in older files
         fields = [field for field in fields if getattr(value, field.name) not in (None, False)]
+    if isinstance(value, ContactPair) and value.rotation is None:  # likewise
+        fields = [field for field in fields if not field.name.startswith("rotation")]
     if isinstance(value, LinearElastic):  # what the choice comes to, and nothing where it is plain, as in older files
         fields = [field for field in fields if field.name != "volumetric"]
         add(b"mean dilatation" if value.averaged else b"")

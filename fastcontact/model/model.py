@@ -24,6 +24,7 @@ from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.constrained_system import ConstrainedMotion
 from fastcontact.elasticity.inertia_loads import Centrifugal, Densities, Gravity, InertiaLoad
+from fastcontact.elasticity.initial_states import InitialState, StressOffset, initial_state
 from fastcontact.elasticity.loads import (
     BodyForce,
     Hydrostatic,
@@ -38,8 +39,9 @@ from fastcontact.elasticity.loads import (
     check_value,
     evaluated,
 )
+from fastcontact.elasticity.material_axes import Axes
 from fastcontact.elasticity.material_field import MaterialField, material_field
-from fastcontact.elasticity.materials import KINEMATICS, Material
+from fastcontact.elasticity.materials import KINEMATICS, Constant, Material
 from fastcontact.elasticity.recovery import internal_force, stress_at_points
 from fastcontact.elasticity.relations import Relation, stacked_rows
 from fastcontact.elasticity.springs import Springs, between, grounded, stacked
@@ -64,7 +66,9 @@ from fastcontact.model.contact_pair import ContactPair, Driving, method
 from fastcontact.model.couplings import Moment, coupling
 from fastcontact.model.description import sentences
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
+from fastcontact.model.obstacle_rotation import check_turns, rotation_of
 from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
+from fastcontact.model.periodicity import Seam, cyclic, periodic
 from fastcontact.model.prescribed_overlap import Supports, check_prescribed
 from fastcontact.model.pretension import Pretension, PretensionForce, check_locks, pretension
 from fastcontact.model.ramp import History, Ramp, Table, combined, multiplier, table_of
@@ -149,9 +153,11 @@ class Model:
         self.supports: list[Support] = []
         self.loads: list[Load] = []
         self.temperatures: list[Temperature] = []
+        self.initial_states: list[InitialState] = []
         self.relations: list[Relation] = []
         self.springs: list[Springs] = []
         self.pretensions: list[Pretension] = []
+        self.seams: list[Seam] = []  # nodes that are one place of a part that repeats itself
         self.contact: list[ContactPair] = []
 
     def __repr__(self) -> str:
@@ -351,6 +357,78 @@ class Model:
         found.check(self.mesh)
         self.temperatures.append(found)
 
+    @typed(ModelError)
+    def add_initial_stress(
+        self,
+        groups: Sequence[str] | str | None = None,
+        *,
+        xx: Constant | None = None,
+        yy: Constant | None = None,
+        zz: Constant | None = None,
+        xy: Constant | None = None,
+        yz: Constant | None = None,
+        xz: Constant | None = None,
+        axes: Axes = None,
+        ramp: History = None,
+    ) -> None:
+        """Give groups of solid cells, by default all, a stress that they have where nothing is displaced.
+
+        What of it is not in balance deforms the bodies. In axisymmetry x, y, z are radius, axis and circumference.
+
+        Parameters
+        ----------
+        groups : str or sequence of str, optional
+        xx, yy, zz, xy, yz, xz : float, callable or ndarray (n,), optional
+            Components, zero where not given; numbers, functions or arrays as E of `LinearElastic` [pressure].
+        axes : sequence or callable, optional
+            What they are along, as of `Orthotropic`: unit vectors in rows (3, 3) [-], or a function, taken at each place.
+        ramp : Ramp or iterable of (float, float), optional
+            History; by default the whole of it is there from the first step on.
+        """
+        given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
+        self._add_initial("stress", groups, given, axes, ramp)
+
+    @typed(ModelError)
+    def add_initial_strain(
+        self,
+        groups: Sequence[str] | str | None = None,
+        *,
+        xx: Constant | None = None,
+        yy: Constant | None = None,
+        zz: Constant | None = None,
+        xy: Constant | None = None,
+        yz: Constant | None = None,
+        xz: Constant | None = None,
+        axes: Axes = None,
+        ramp: History = None,
+    ) -> None:
+        """Give groups of solid cells, by default all, a strain that costs no stress: shrinkage, swelling, misfit.
+
+        Parameters
+        ----------
+        groups : str or sequence of str, optional
+        xx, yy, zz, xy, yz, xz : float, callable or ndarray (n,), optional
+            Components, as of `add_initial_stress`; xy, yz and xz are shears, twice those of the tensor [-].
+        axes : sequence or callable, optional
+            What they are along: unit vectors in rows (3, 3) [-], or a function.
+        ramp : Ramp or iterable of (float, float), optional
+            History; by default the whole of it is there from the first step on.
+        """
+        given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
+        self._add_initial("strain", groups, given, axes, ramp)
+
+    def _add_initial(
+        self, kind: str, groups: Sequence[str] | str | None, given: Mapping[str, Any], axes: Axes, ramp: History
+    ) -> None:
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        for name in names or ():
+            if not self.mesh.cells_of(name, dim=self.mesh.dim):
+                raise ModelError(f"group '{name}' holds no solid cells: it has no initial {kind}")
+        table = table_of(ramp, f"the ramp of the initial {kind}")
+        self.initial_states.append(
+            initial_state(kind, names, self._cells_of(names), given, axes, self.kinematics, table)
+        )
+
     def temperature_rise(self, factors: Sequence[float]) -> Array | None:
         """Return the rise of the temperature (n_points,) [temperature], None without temperatures.
 
@@ -361,15 +439,31 @@ class Model:
         rises = [factor * own.rise(self.mesh) for factor, own in zip(factors, self.temperatures, strict=True)]
         return np.asarray(np.sum(rises, axis=0))
 
+    def stress_offset(
+        self, temperature_factors: Sequence[float] = (), initial_factors: Sequence[float] = (),
+        field: MaterialField | None = None,
+    ) -> StressOffset | None:  # fmt: skip
+        """Return what stresses have beside those of the displacements, by temperatures and initial states; None without any.
+
+        The factors are those of a step result, `StepResult.iterations`; `field` is the `material_field`, where it is known.
+        """
+        rise, states = self.temperature_rise(temperature_factors), []
+        if len(initial_factors):
+            states = list(zip(initial_factors, self.initial_states, strict=True))
+        if rise is None and not states:
+            return None
+        return (field or self.material_field()).offset(rise, states, self.mesh.n_points)
+
     def thermal_forces_by_ramp(self) -> dict[Table | None, Array]:
         """Return by history the nodal forces (n_points, dim) at multiplier 1 by which temperatures load the cells [force].
 
         ModelError if a material that is heated has no expansion.
         """
         by_ramp: dict[Table | None, Array] = {}
-        field = self.material_field() if self.temperatures else None
+        if not self.temperatures:
+            return by_ramp
+        field = self.material_field()
         for own in self.temperatures:
-            assert field is not None
             rise = own.rise(self.mesh)
             missing = field.without_expansion(self.mesh, rise)
             if missing:
@@ -377,12 +471,31 @@ class Model:
                     f"{own.name} acts on {missing} solid cells whose material has no coefficient of thermal expansion: give "
                     "it expansion=..., 0.0 if it does not expand"
                 )
-            held = stress_at_points(
-                self.mesh, self.kinematics, field.moduli, field.loops, np.zeros(self.mesh.points.shape), field.treatment,
-                field.thermal(rise),
-            )  # fmt: skip
-            by_ramp[own.ramp] = by_ramp.get(own.ramp, 0.0) - internal_force(self.mesh, self.kinematics, held)
+            by_ramp[own.ramp] = by_ramp.get(own.ramp, 0.0) + self._forces_of(field, field.offset(rise))
         return by_ramp
+
+    def initial_forces_by_ramp(self) -> dict[Table | None, Array]:
+        """Return by history the nodal forces (n_points, dim) of initial stresses and strains at multiplier 1 [force]."""
+        by_ramp: dict[Table | None, Array] = {}
+        field = self.material_field() if self.initial_states else None
+        for state in self.initial_states:
+            assert field is not None
+            forces = self._forces_of(field, field.offset(None, [(1.0, state)], self.mesh.n_points))
+            by_ramp[state.ramp] = by_ramp.get(state.ramp, 0.0) + forces
+        return by_ramp
+
+    def _forces_of(self, field: MaterialField, offset: StressOffset | None) -> Array:
+        """Return the nodal forces (n_points, dim) [force] of what stresses have beside those of the displacements."""
+        held = stress_at_points(
+            self.mesh,
+            self.kinematics,
+            field.moduli,
+            field.loops,
+            np.zeros(self.mesh.points.shape),
+            field.treatment,
+            offset,
+        )
+        return -internal_force(self.mesh, self.kinematics, held)
 
     @typed(ModelError)
     def add_force(
@@ -532,6 +645,103 @@ class Model:
             self.relations.append(
                 Relation(name, rows[np.diff(rows.indptr) > 0], float(value), table_of(ramp, f"the ramp of {name}"))
             )
+
+    @typed(ModelError)
+    def add_periodicity(
+        self,
+        first: str,
+        second: str,
+        *,
+        x: float = 0.0,
+        y: float = 0.0,
+        z: float = 0.0,
+        free: str = "",
+        translation: Sequence[float] | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Let the model be one period of a part that repeats itself: its two ends deform alike.
+
+        Rigid translations stay free and need supports. Contact should be open at the ends: their nodes have a pressure each,
+        and only both together follow from the gap.
+
+        Parameters
+        ----------
+        first, second : str
+            The ends: groups whose nodes lie upon each other after a translation.
+        x, y, z : float
+            How much farther the second end moves than the first, at multiplier 1: the mean strain times the period [length].
+        free : str
+            Components (``"x"``, ``"xy"``, ...) in which that is the same everywhere, but follows from the loads.
+        translation : sequence of float (dim,), optional
+            From the first end to the second one; by default from middle to middle [length].
+        ramp : Ramp or iterable of (float, float), optional
+            History of x, y, z.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If there are no such groups, or their nodes do not lie upon each other; the largest distance is told.
+        """
+        name = f"the periodicity of '{first}' and '{second}'"
+        given = {key: value for key, value in {"x": x, "y": y, "z": z}.items() if value != 0.0}
+        for key, value in given.items():
+            check_number(f"{key} of {name}", value)
+        jump: Any = axes_of(name, given, self.mesh.dim) if given else {}
+        loose = sorted(axes_of(name, dict.fromkeys(free, 1.0), self.mesh.dim)) if free else []
+        if any(axis in jump for axis in loose):
+            raise ModelError(f"{name}: '{free}' is free, so no displacement can be given there")
+        relations, seam = periodic(
+            self.mesh, (first, second), jump, loose, translation, table_of(ramp, f"the ramp of {name}")
+        )
+        self.relations.extend(relations)
+        self.seams.append(seam)
+
+    @typed(ModelError)
+    def add_cyclic_symmetry(
+        self,
+        first: str,
+        second: str,
+        *,
+        sectors: int,
+        origin: Sequence[float] | None = None,
+        direction: Sequence[float] = (0.0, 0.0, 1.0),
+    ) -> None:
+        """Let the model be one of equal sectors round an axis: its two ends deform alike, turned by the angle of a sector.
+
+        Loads repeat themselves, too; forces are those of one sector. The rotation about the axis, and in space the way along
+        it, stay free and need supports. Ends may be curved, and may meet on the axis. Contact at the ends: as in
+        `add_periodicity`.
+
+        Parameters
+        ----------
+        first, second : str
+            The ends: groups whose nodes lie upon each other after the turn, either way.
+        sectors : int
+            How many make the whole.
+        origin : sequence of float (dim,), optional
+            A point of the axis, by default the origin [length].
+        direction : sequence of float (3,)
+            Along the axis [-]; in the plane always z.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If there are no such groups, their nodes do not lie upon each other (the largest distance is told), or
+            kinematics are axisymmetric.
+        """
+        name = f"the cyclic symmetry of '{first}' and '{second}'"
+        if self.kinematics == "axisymmetric":
+            raise ModelError(f"{name}: an axisymmetric model is the whole ring already")
+        place = (0.0,) * self.mesh.dim if origin is None else tuple(origin)
+        along = (0.0, 0.0, 1.0) if self.mesh.dim == 2 else tuple(direction)
+        if sectors < 2 or len(place) != self.mesh.dim or len(along) != 3 or not any(along):
+            raise ModelError(
+                f"{name} needs two sectors at least, an origin of {self.mesh.dim} numbers and a direction of three, not "
+                f"{sectors}, {place} and {along}"
+            )
+        relations, seam = cyclic(self.mesh, (first, second), sectors, place, along)
+        self.relations.extend(relations)
+        self.seams.append(seam)
 
     @typed(ModelError)
     def relate(
@@ -779,6 +989,7 @@ class Model:
         obstacle: Obstacle,
         motion: Mapping[str, float] | None = None,
         force: Mapping[str, float] | None = None,
+        rotation: Mapping[str, Any] | None = None,
         ramp: History = None,
         formulation: str | None = None,
         **options: Any,
@@ -797,8 +1008,12 @@ class Model:
             The force on it at multiplier 1, e.g. ``{"y": -100.0}`` [force], in axisymmetry over the full circle. In
             these components the obstacle is a rigid body that moves freely until contact holds it; in the others it
             follows `motion`. Results tell where it is.
+        rotation : mapping, optional
+            How it turns: ``angle`` at multiplier 1 [radian]; ``centre``, a point of the axis (dim,) before any motion, with
+            which it moves [length]; in space ``axis``, the direction; ``ramp``, a history of its own. Results tell the torque
+            on the obstacle's axis. Not in axisymmetry.
         ramp : Ramp or iterable of (float, float), optional
-            History of motion and force.
+            History of motion and force, and of a rotation without one of its own.
         formulation : str, optional
             ``"node_to_segment"`` (then: node against obstacle), by default on linear triangles and, in space, on
             facets whose nodes all carry pressure (tri3, quad4, quad9), or ``"continuous"``, by default on all others.
@@ -817,7 +1032,10 @@ class Model:
             formulation, reason = against_obstacle(self.mesh.dim, *self._facet_kinds(secondary), options)
             log.info("contact '%s': %s, since %s", name, method(formulation, options), reason)
         driving = self._driving(name, moves, force)
-        self._add_pair(ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving))
+        turned = (None, None) if rotation is None else rotation_of(name, rotation, self.kinematics)
+        self._add_pair(
+            ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving, *turned)
+        )
 
     def _facet_kinds(self, group: str) -> tuple[list[str], bool]:
         """Return the kinds of facets of a group, and whether linear triangles or tetrahedra alone have them."""
@@ -886,7 +1104,7 @@ class Model:
                 raise ContactError(
                     unknown("contact formulation for a rigid obstacle", pair.formulation, AGAINST_OBSTACLES)
                 )
-            primary = RigidSide(pair.obstacle, np.array(pair.motion))
+            primary = RigidSide(pair.obstacle, np.array(pair.motion), pair.rotation)
         else:
             primary = surface(self.mesh, pair.primary)
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
@@ -958,8 +1176,8 @@ class Model:
     def internal_forces(self, displacement: Array) -> Array:
         """Return the nodal forces (n_points, dim) [force] that hold the solid cells deformed by `displacement`.
 
-        They are in balance with loads, contact, supports, relations, springs and thermal forces (`thermal_forces_by_ramp`);
-        axisymmetric: over the full circle.
+        They are in balance with loads, contact, supports, relations, springs and the forces of heat and initial states
+        (`thermal_forces_by_ramp`, `initial_forces_by_ramp`); axisymmetric: over the full circle.
 
         Parameters
         ----------
@@ -1053,13 +1271,15 @@ class Model:
         forces = self.forces_by_ramp()
         self.thermal_forces_by_ramp()
         if ramp is not None:
-            items: list[Support | Load | Relation | Temperature] = [
-                *self.supports, *self.loads, *self.relations, *self.temperatures
+            items: list[Support | Load | Relation | Temperature | InitialState] = [
+                *self.supports, *self.loads, *self.relations, *self.temperatures, *self.initial_states
             ]  # fmt: skip
             named = [(item.name, item.ramp) for item in items]
             named += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]
             named += [(f"the clearance of contact '{p.name}'", p.clearance_ramp) for p in self.contact]
+            named += [(f"the rotation of obstacle '{p.name}'", p.rotation_ramp) for p in self.contact]
             check_ramps(named, ramp.instants)
+            check_turns(self.contact, ramp)
             check_locks(self.pretensions, ramp.instants)
         self._check_relations(fixed, prescribed, ramp or Ramp((1.0,)))
         check_supports(self.mesh, [(s.name, s.group) for s in self.supports], self._related())

@@ -103,6 +103,7 @@ def contact_step(dim: int) -> np.dtype[Any]:
     """
     sums = [("force", "<f8", (dim,)), ("radius", "<f8", (2,)), ("dissipation", "<f8")]
     sums.append(("obstacle_displacement", "<f8", (dim,)))  # NaN between bodies
+    sums += [("obstacle_angle", "<f8"), ("torque", "<f8")]  # NaN where nothing turns
     sums += [("middle", "<f8", (dim,)), ("tangent", "<f8", (dim,))]  # NaN without a tangent
     places = [(name, "<i8") for name in ("first", "count", "primary_first", "primary_count")]
     return np.dtype([*places, *sums])

@@ -78,6 +78,11 @@ class ContactResult:
         Work of friction in this step [energy].
     obstacle_displacement : ndarray (dim,), optional
         Displacement of a rigid obstacle [length]; None for contact between bodies.
+    obstacle_angle : float, optional
+        By which a rigid obstacle has turned [radian]; None where none turns.
+    torque : float, optional
+        On a rigid obstacle that turns, about its axis, to hold it against the contact: the moment of the contact forces on
+        the body, on the deformed shape [force times length]; None where none turns.
     middle : ndarray (dim,)
         Middle of the contact on the reference surface: in axisymmetry on the axis; otherwise the centre of pressure, on the
         planes of symmetry that the contact reaches, those on which supports hold an end of the surface [length].
@@ -116,6 +121,8 @@ class ContactResult:
     tangent: Array | None = None
     primary_points: NDArray[np.int32] = None  # type: ignore[assignment]
     primary_force_vectors: Array = None  # type: ignore[assignment]
+    obstacle_angle: float | None = None
+    torque: float | None = None
 
     def __post_init__(self) -> None:
         if self.middle is None:
@@ -204,7 +211,8 @@ class StepResult:
         ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``, ``history`` (list of dict). If contact
         alone holds bodies, ``regularised``: their springs and the forces in them. If round-off kept the contact geometry
         from settling to the criterion, ``scatter``: by how much ``displacement`` and contact ``force`` still vary [-].
-        With temperatures, ``temperature_factors``: what each of them is multiplied with [-]. With pretension sections,
+        With temperatures, ``temperature_factors``: what each of them is multiplied with; with initial
+        stresses and strains ``initial_factors`` [-]. With pretension sections,
         ``pretension``, see the property of that name.
     warnings : tuple of str
         Warnings of the step.

@@ -281,6 +281,9 @@ def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> No
         row["dissipation"] = contact.dissipation
         moved = contact.obstacle_displacement
         row["obstacle_displacement"] = np.nan if moved is None else moved
+        for name in {"obstacle_angle", "torque"} & set(row.dtype.names or ()):  # likewise in newer files alone
+            value = getattr(contact, name)
+            row[name] = np.nan if value is None else value
         if "tangent" in (row.dtype.names or ()):  # not in a file of an earlier schema that is resumed
             row["middle"], row["tangent"] = contact.middle, np.nan if contact.tangent is None else contact.tangent
         _extend(pair["rows"], table)

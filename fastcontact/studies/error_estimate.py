@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.surface import surface
 from fastcontact.elasticity.energy import elastic_energy
+from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.smoothed_stress import smoothed_stress
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
@@ -82,11 +83,11 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     >>> fc.estimate_error(model, step).relative < 1e-9  # the stress is uniform
     True
     """
-    rise = model.temperature_rise(step.iterations.get("temperature_factors", ()))
-    smooth = smoothed_stress(model.mesh, model.kinematics, model.material_field(), step.displacement, rise)
+    offset = model.stress_offset(*(step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors")))
+    smooth = smoothed_stress(model.mesh, model.kinematics, model.material_field(), step.displacement, offset)
     squares, energy = [], 0.0
     for name in model.mesh.solids:
-        own, whole = _differences(model, step.displacement, name, smooth[name], rise)
+        own, whole = _differences(model, step.displacement, name, smooth[name], offset)
         squares.append(own)
         energy += whole
     contact = np.zeros(sum(map(len, squares)))
@@ -96,11 +97,11 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
 
 
 def _differences(
-    model: Model, displacement: Array, name: str, smooth: Array, rise: Array | None
+    model: Model, displacement: Array, name: str, smooth: Array, offset: StressOffset | None
 ) -> tuple[Array, float]:
     """Return the squared energy norms (n_cells,) of smoothed minus own stress, and that of the own stress in all."""
     N, stress, volume, elastic = stress_in_cells(
-        model, name, slice(None), displacement, elements.get(name).order + 1, rise
+        model, name, slice(None), displacement, elements.get(name).order + 1, offset
     )
     off = np.einsum("qa,cai->cqi", N, smooth) - stress
     squares = (elastic_energy(off, elastic) * volume).sum(axis=1)

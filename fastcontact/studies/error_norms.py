@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
+from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
@@ -100,7 +101,8 @@ def error_against(
         Points along each direction of a cell, three more than the order of the element by default: more than
         the stiffness needs, so that the error is that of the solution.
     rise : ndarray (n_points,), optional
-        Of the temperature at every point of the mesh, see `Model.temperature_rise` [temperature].
+        Of the temperature at every point of the mesh, see `Model.temperature_rise` [temperature]. Initial stresses and
+        strains of the model count in full.
 
     Raises
     ------
@@ -125,10 +127,11 @@ def error_against(
     if n_points is not None and n_points < 1:
         raise ModelError(f"n_points = {n_points} points along each direction of a cell must be at least 1")
     chosen = _rows(model, (groups,) if isinstance(groups, str) else groups)
+    offset = model.material_field().offset(rise, [(1.0, own) for own in model.initial_states], model.mesh.n_points)
     total = np.zeros(4)
     for name, rows in chosen.items():
         for part in _portions(rows, elements.get(name), n_points):
-            total += _squares(theory, model, u, name, part, n_points, rise)
+            total += _squares(theory, model, u, name, part, n_points, offset)
     return ErrorNorms(*(math.sqrt(square) for square in total))
 
 
@@ -155,21 +158,21 @@ def stress_in_cells(
     rows: NDArray[np.intp] | slice,
     displacement: Array,
     n_points: int | None,
-    rise: Array | None = None,
+    offset: StressOffset | None = None,
 ) -> tuple[Array, Array, Array, Array]:
     """Return shape functions, stresses, volumes and elastic constants at the quadrature points of some cells of a kind.
 
     Shape functions (n_q, n_nodes) [-]; stresses (n_cells, n_q, n_components) [pressure]; volumes (n_cells, n_q) [length^dim];
     compliances (n_cells, n_components, n_components), where they vary those of the middle [1 / pressure]. `displacement` is
-    (n_points, dim) [length], `rise` (n_points,) that of the temperature [temperature].
+    (n_points, dim) [length].
     """
     mesh, element, axisymmetric = model.mesh, elements.get(name), model.kinematics == "axisymmetric"
     xi, weights = integration_rule(element, n_points)
     N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
     cells, field = mesh.cells[name][rows], model.material_field()
     numbers = field.rows[name][rows]
-    found = CellStress(mesh, model.kinematics, field.moduli, displacement, field.treatment, field.thermal(rise))
-    stress = found.at(name, xi, cells, field.loops[name][rows])
+    found = CellStress(mesh, model.kinematics, field.moduli, displacement, field.treatment, offset)
+    stress = found.at(name, xi, cells, field.loops[name][rows], np.arange(len(mesh.cells[name]))[rows])
     elastic = field.compliance[numbers]
     return N, stress, cell_volumes(mesh.points[cells], N, dN, axisymmetric) * weights, elastic
 
@@ -181,10 +184,10 @@ def _squares(
     name: str,
     rows: NDArray[np.intp],
     n_points: int | None,
-    rise: Array | None,
+    offset: StressOffset | None,
 ) -> Array:
     """Return the squares (4,) of the norms over some cells, in the order of `ErrorNorms`."""
-    N, stress, volume, elastic = stress_in_cells(model, name, rows, u, n_points, rise)
+    N, stress, volume, elastic = stress_in_cells(model, name, rows, u, n_points, offset)
     cells = model.mesh.cells[name][rows]
     places = np.einsum("qa,cad->cqd", N, model.mesh.points[cells])
     exact_u, exact = _exact(theory, places, stress.shape[2])

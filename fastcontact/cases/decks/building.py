@@ -14,6 +14,7 @@ from fastcontact.cases.decks.assembled import Assembled, assembled
 from fastcontact.cases.decks.blocks import Place, folded
 from fastcontact.cases.decks.conditions import Component, Conditions, Distributed, local_axes
 from fastcontact.cases.decks.content import Content, Material, Pair, Section, Step
+from fastcontact.cases.decks.initial_stresses import add_initial_stresses
 from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface
 from fastcontact.cases.decks.pretension import add_sections, cut_sections
 from fastcontact.cases.decks.relating import make_rotations, relations_of
@@ -72,6 +73,7 @@ class Building:
         self._pressures(groups)
         self._body_forces(conditions)
         add_temperatures(self.model, conditions.temperatures)
+        add_initial_stresses(self.model, self.found)
         self._springs()
         self._contact()
         self.gap_ends = self._gaps(gaps, conditions)

@@ -228,6 +228,7 @@ class Content:
     springs: dict[str, tuple[Place, float]] = field(default_factory=dict)
     supports: list[Given] = field(default_factory=list)
     initial: list[Block] = field(default_factory=list)
+    stresses: list[Block] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     outputs: list[Place] = field(default_factory=list)

@@ -46,11 +46,11 @@ def without_effect(content: Content, current: Material, block: Block) -> None:
 
 
 def initial_conditions(content: Content, block: Block) -> None:
-    """*INITIAL CONDITIONS: temperatures of nodes before the first step."""
+    """*INITIAL CONDITIONS: temperatures of nodes, or stresses of elements, before the first step."""
     kind = " ".join(block.required("TYPE").upper().split())
-    if kind != "TEMPERATURE":
-        raise block.place.refuse(f"TYPE={kind[:40]} is not supported, only TEMPERATURE")
-    content.initial.append(block)
+    if kind not in ("TEMPERATURE", "STRESS"):
+        raise block.place.refuse(f"TYPE={kind[:40]} is not supported, only TEMPERATURE and STRESS")
+    (content.initial if kind == "TEMPERATURE" else content.stresses).append(block)
 
 
 def initial_temperatures(made: Assembled, blocks: Iterable[Block]) -> dict[int, float]:

@@ -172,7 +172,7 @@ class Formulation(ABC):
         beyond = self.projection_tolerance if tolerance is None else tolerance
         assert self.normals is not None
         assert beyond is not None
-        pairing = pair(candidates.positions(deformed), self.primary, deformed, beyond, self.normals, at.obstacle)
+        pairing = pair(candidates.positions(deformed), self.primary, deformed, beyond, self.normals, at.stance)
         if self.normals != "secondary":
             return pairing
         return opposed(pairing, self._secondary_normals(candidates, deformed))
@@ -200,10 +200,19 @@ class Formulation(ABC):
         drift: Array | None = None
         if isinstance(self.primary, RigidSide):
             drift = -np.stack([t @ (at.obstacle - at.obstacle_start) for t in directions])
+            turning = self.turning(candidates, at)
+            if turning is not None:
+                drift -= np.stack([np.einsum("nd,nd->n", t, turning) for t in directions])
         elif self.slip == "symmetric":
             drift = self._closing_slip(candidates, pairing, directions, at)
         friction = self.options.coefficients(self.friction, candidates)
         return Constraints(B, gap0, positions, compliance, along, directions, friction, drift)
+
+    def turning(self, candidates: Candidates, at: Configuration) -> Array | None:
+        """Return how far the rotation of an obstacle carries what candidates face (n, dim) [length]; None without any."""
+        assert isinstance(self.primary, RigidSide)
+        now, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
+        return self.primary.turning(now, before, at.stance, at.stance_start)
 
     def supported_along(self, axis: int, candidates: Candidates, pairing: Pairing) -> NDArray[np.bool_]:
         """Return which secondary nodes (n_nodes,) supports keep from slipping along an axis; see `Projection.compliant`."""

@@ -313,7 +313,8 @@ def block_model(**constants):
         ({"nu": lambda x: x}, "constant nu of the material is a function that returned .* shape"),
         ({"expansion": lambda x: x[:, 0] / 0.0}, "constant expansion of the material is .* finite everywhere"),
         ({"E": lambda x: np.full(len(x), 1e80)}, "out of range"),
-        ({"E": np.ones((8, 1))}, r"shape \(8, 1\)"),
+        ({"E": np.ones((8, 2))}, r"shape \(8, 2\)"),
+        ({"E": np.ones((15, 1))}, r"shape \(15,\): it must have a number for each cell"),
     ],
 )
 @pytest.mark.filterwarnings("ignore:divide by zero")
@@ -349,8 +350,12 @@ def test_as_many_cells_as_points_is_no_array():
         assert model.materials[0][0].E.inside == (n == 9)
     lone = fc.Mesh([*ring, [0, 0], [5.0, 0.0]], {"tri3": [*cells, [0, 9, 1], [0, 7, 9]]})
     model = fc.Model(lone, "plane_strain")
-    with pytest.raises(fc.ModelError, match="10 numbers, and there are as many cells as points: give it as a function"):
+    with pytest.raises(
+        fc.ModelError, match="10 numbers, and there are as many cells as points: give those of cells as a column"
+    ):
         model.add_material(fc.LinearElastic(np.ones(10), 0.3))
+    model.add_material(fc.LinearElastic(np.ones((10, 1)), 0.3))
+    assert not model.materials[0][0].E.inside
 
 
 def test_a_model_in_words_tells_the_range():

@@ -1,0 +1,149 @@
+"""Initial stresses and strains of solid cells, and what they and temperatures add to the stress of the displacements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.elasticity.loads import LARGEST, Table, check_number
+from fastcontact.elasticity.material_axes import Axes, checked_axes, frames, rotations
+from fastcontact.elasticity.varying_constants import Cells, Varying, positions, wrapped
+from fastcontact.errors import ModelError
+
+Array = NDArray[np.float64]
+COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
+# The history of what is there from the first step on.
+ALWAYS: Table = ((-LARGEST, 1.0), (LARGEST, 1.0))
+# Components out of the plane, relative to the largest, that are round-off of a rotation.
+ROUND_OFF = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class InitialState:
+    """An initial stress, or strain, of groups of solid cells, or of all.
+
+    Attributes
+    ----------
+    kind : str
+        ``"stress"`` or ``"strain"``.
+    groups : tuple of str or None
+        Groups of solid cells; None: all.
+    cells : Cells
+        The same cells.
+    components : mapping of int to float or Varying
+        By the number of the component in `COMPONENTS`: stresses [pressure], or strains, shears twice those of the tensor [-].
+    axes : Axes
+        Which the components are along, as of materials.
+    kinematics : str
+    ramp : tuple
+        History.
+    """
+
+    kind: str
+    groups: tuple[str, ...] | None
+    cells: Cells
+    components: Mapping[int, Any]
+    axes: Axes
+    kinematics: str
+    ramp: Table = ALWAYS
+
+    @property
+    def name(self) -> str:
+        """What it is and where, for messages."""
+        where = ", ".join(f"'{group}'" for group in self.groups) if self.groups is not None else "all solid cells"
+        return f"the initial {self.kind} of {where}"
+
+    def values(self, name: str, rows: NDArray[np.intp], N: Array) -> Array:
+        """Return components (n_rows, n, n_components) [pressure] or [-] along the axes of the mesh, in cells of an element.
+
+        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points. Zero elsewhere.
+        """
+        size = 6 if self.kinematics == "3d" else 4
+        inside = np.isin(rows, self.cells.rows.get(name, ()))
+        own = rows[inside]
+        local = np.zeros((len(own) * len(N), 6))
+        for component, value in self.components.items():
+            local[:, component] = value.at(name, own, N) if isinstance(value, Varying) else value
+        if self.axes is not None:
+            places = positions(self.cells.mesh, self.cells.mesh.cells[name][own], N)
+            turn = rotations(frames(self.axes, places, self.kinematics))
+            if self.kind == "strain":  # the work of a stress is that of its turned one
+                turn = np.asarray(np.linalg.inv(turn).transpose(0, 2, 1))
+            local = np.einsum("nij,nj->ni", turn, local)
+        out = np.abs(local[:, size:]).max(initial=0.0)
+        if out > ROUND_OFF * np.abs(local).max(initial=0.0) or self._across(local):
+            raise ModelError(f"{self.name} has components along z that {self.kinematics} does not have: turn its axes")
+        found = np.zeros((len(rows), len(N), size))
+        found[inside] = local[:, :size].reshape(len(own), len(N), size)
+        return found
+
+    def _across(self, values: Array) -> bool:
+        """Return whether a stress (n, 6) [pressure] acts across the plane of plane stress."""
+        largest = np.abs(values).max(initial=0.0)
+        plane = self.kind == "stress" and self.kinematics == "plane_stress"
+        return bool(plane and np.abs(values[:, 2]).max(initial=0.0) > ROUND_OFF * largest)
+
+    def check(self) -> None:
+        """Raise ModelError if a component cannot be."""
+        for element, rows, N in self.cells.samples():
+            self.values(element, rows, N)
+
+
+def initial_state(
+    kind: str, groups: tuple[str, ...] | None, cells: Cells, given: Mapping[str, Any], axes: Axes, kinematics: str,
+    ramp: Table | None,
+) -> InitialState:  # fmt: skip
+    """Return the initial state of `kind` that is given by the names of its components; ModelError if it cannot be."""
+    where = ", ".join(f"'{group}'" for group in groups) if groups is not None else "all solid cells"
+    label = f"the initial {kind} of {where}"
+    components: dict[int, Any] = {}
+    for number, component in enumerate(COMPONENTS):
+        value = wrapped(given.get(component))
+        if value is None:
+            continue
+        if number > 3 and kinematics != "3d":
+            raise ModelError(f"{label} has the component {component}, which {kinematics} does not have")
+        if isinstance(value, Varying):
+            value = Varying(value.given, cells, f"the component {component} of {label}")
+        else:
+            check_number(f"the component {component} of {label}", value)
+        components[number] = value
+    if not components:
+        raise ModelError(f"{label} names no component: give for example xx=...")
+    found = InitialState(kind, groups, cells, components, checked_axes(axes), kinematics, ramp or ALWAYS)
+    found.check()
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class StressOffset:
+    """What the stress in cells has beside that of the displacements: by temperature, initial strains and initial stresses.
+
+    Attributes
+    ----------
+    rise : ndarray (n_points,)
+        Rise of the temperature [temperature].
+    per_degree : ndarray (n_moduli, n_components)
+        Moduli times the coefficients of expansion, which stresses lose [pressure / temperature].
+    expansion : ndarray (n_moduli,)
+        Coefficients of expansion of the materials with a mean dilatation, zero of others [1 / temperature].
+    states : sequence of (float, InitialState)
+        Initial stresses and strains, and what they are multiplied with.
+    """
+
+    rise: Array
+    per_degree: Array
+    expansion: Array
+    states: Sequence[tuple[float, InitialState]] = ()
+
+    def initial(self, kind: str, name: str, rows: NDArray[np.intp], N: Array) -> Array | None:
+        """Return the sum of initial stresses or strains (n_rows, n, n_components) [pressure] or [-]; None without any.
+
+        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.
+        """
+        found = [factor * state.values(name, rows, N) for factor, state in self.states if state.kind == kind]
+        return np.asarray(np.sum(found, axis=0)) if found else None
