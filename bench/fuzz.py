@@ -1,6 +1,7 @@
 """Read thousands of damaged files: does each give a right result or one clear error?
 
-    python bench/fuzz.py [--count 10000] [--seed 1] [--workers 2] [--failures FOLDER] [--only NUMBER ...]
+    python bench/fuzz.py [--count 10000] [--seed 1] [--workers 2] [--failures FOLDER]
+        [--formats .deck .msh ...] [--only NUMBER ...]
 
 Starts from small valid files of every format (tests/fuzz/fuzz_seeds.py), damages them byte by byte or inside (HDF5,
 TOML), and reads them in processes that may take 1 GiB more memory and 10 s of CPU time. The same seed gives the same
@@ -28,12 +29,13 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--failures", type=Path, default=Path("fuzz-failures"))
+    parser.add_argument("--formats", nargs="+", metavar="SUFFIX", help="make and read only files of these formats")
     parser.add_argument("--only", type=int, nargs="+", help="make and read only the files of these numbers")
     given = parser.parse_args()
     started = time.perf_counter()
     with tempfile.TemporaryDirectory() as name:
         fuzz_run.prepare(Path(name))
-        numbers = given.only or list(range(given.count))
+        numbers = given.only or fuzz_run.numbers(Path(name), given.seed, given.count, given.formats)
         found = fuzz_run.run(numbers, given.seed, Path(name), given.failures, given.workers)
     print(found.table())
     for entry in sorted(found.failures, key=lambda entry: (entry["kind"], entry["name"])):

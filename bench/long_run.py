@@ -1,11 +1,18 @@
-"""A run of many small steps, killed and resumed at random: the same bits, flat memory, steps that stay as cheap?
+"""A run of many steps, killed and resumed at random: the same bits, flat memory, steps that stay as cheap?
 
     python bench/long_run.py [--steps 10000] [--kills 12] [--seed 1]
+    python bench/long_run.py --unknowns 1e6 --hours 2 [--folder FOLDER]
 
-The run is made once undisturbed, in a process that notes every hundred steps what it has used; and once more by
-`fastcontact run --resume`, which is killed at random instants and started again until it is done. Both files are read
-step by step and compared bit by bit. Of the undisturbed run the second tenth and the last are compared: CPU time, bytes and
-calls of writing for a step, objects and memory. Prints one line a bar; exit code 1 if a bar is missed.
+Two small blocks, or a quarter of a sphere on a block of about as many unknowns as are asked for, are pressed together and
+half released again, over and over: 20 steps a cycle, so that every part of the run has the same work. The run is made once
+undisturbed, in a process that notes every hundred steps (of the sphere, every cycle) what it has used; and once more by
+`fastcontact run --resume`, which is killed at random instants and started again until it is done. With `--hours` the first
+half of the time is for the undisturbed run, which then does as many steps as it can.
+
+Both files are read step by step and compared bit by bit. Of the undisturbed run the second tenth and the last are compared:
+CPU time, bytes and calls of writing for a step, objects and memory. Every step is on the disk before the next one begins.
+Prints one line a bar; exit code 1 if a bar is missed. The files of a million unknowns take tens of gigabytes: the run stops
+at once where the folder has no room for them.
 """
 
 from __future__ import annotations
@@ -14,12 +21,15 @@ import argparse
 import gc
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +42,7 @@ sys.path.insert(0, str(ROOT / "tests" / "kills"))
 import kill_cases  # noqa: E402
 import killing  # noqa: E402
 
-CASE = """
+BLOCKS = """
 title = "two blocks"
 kinematics = "plane_strain"
 [mesh]
@@ -54,12 +64,82 @@ y = -0.001
 [contact.pair]
 secondary = "CONT_UPPER"
 primary = "CONT_LOWER"
-[ramp]
-steps = {steps}
 """
-EVERY = 100
+SPHERE = """
+title = "sphere on a block"
+kinematics = "3d"
+[mesh]
+generator = "sphere-on-block"
+element = "hex8"
+R = 1.0
+size = {size!r}
+contact_size = {contact_size!r}
+contact_radius = 0.2
+[[material]]
+E = 20000.0
+nu = 0.3
+[[support]]
+group = "SYMMETRY_X"
+x = 0.0
+[[support]]
+group = "SYMMETRY_Z"
+z = 0.0
+[[support]]
+group = "BLOCK_BOTTOM"
+y = 0.0
+[[support]]
+group = "SPHERE_TOP"
+y = -0.01
+[contact.pair]
+secondary = "CONT_SPHERE"
+primary = "CONT_BLOCK"
+"""
+CYCLE = 20  # steps
+FEWEST = 4 * CYCLE  # steps of a run that is judged
+FASTEST = {False: 100, True: 20}  # steps that a small and a large model can make in a second
 MOST = {"cpu": 1.15, "bytes": 1.05, "calls": 1.05}  # the last tenth of the steps against the second
-MOST_GROWTH = 1000.0  # of the memory, a thousand steps [kB]: HDF5 keeps where each step stands
+MOST_GROWTH = 1000.0  # of the memory, a thousand steps [kB], or
+MOST_SHARE = 0.01  # of the memory, in the whole run
+
+
+@dataclass
+class Asked:
+    """How large a model, how many steps or for how long [s], and how often what is used is noted."""
+
+    unknowns: float | None
+    steps: int
+    seconds: float | None
+    every: int
+
+    @classmethod
+    def of(cls, given: argparse.Namespace) -> Asked:
+        large = given.unknowns is not None
+        seconds = None if given.hours is None else 3600 * given.hours
+        steps = given.steps if seconds is None else max(int(seconds / 2 * FASTEST[large]), FEWEST)
+        every = CYCLE if large or steps < 2000 else 5 * CYCLE
+        if steps < FEWEST:
+            raise SystemExit(f"{steps} steps are too few to judge: ask for {FEWEST} or more")
+        return cls(given.unknowns, steps, seconds, every)
+
+
+def case_text(asked: Asked, steps: int) -> str:
+    """Return a case file of so many steps; the first ones of two of them are the same."""
+    model = BLOCKS if asked.unknowns is None else SPHERE.format(**sizes(asked.unknowns))
+    instants = [round(float(n), 1) for n in range(1, steps + 1)]
+    turns = range(0, steps + CYCLE, CYCLE // 2)
+    table = [[float(turn), 0.0 if not turn else 1.0 if turn % CYCLE else 0.5] for turn in turns]
+    return f"{model}[ramp]\ninstants = {instants}\ntable = {table}\n"
+
+
+def sizes(unknowns: float) -> dict[str, float]:
+    """Return edges far from the contact and at it of a sphere on a block with about so many unknowns."""
+    edge = 0.06 * (114_036 / unknowns) ** (1 / 3)
+    while True:
+        mesh = fc.generate.sphere_on_block("hex8", R=1.0, size=edge, contact_size=edge / 3, contact_radius=0.2)
+        found = 3 * mesh.n_points / unknowns
+        if 0.9 < found < 1.1:
+            return {"size": edge, "contact_size": edge / 3}
+        edge *= found ** (1 / 3)
 
 
 def used() -> dict[str, float]:
@@ -76,16 +156,34 @@ def used() -> dict[str, float]:
     }
 
 
-def measured(case_file: Path, path: Path) -> None:
-    """Run undisturbed, and print what was used every hundred steps as JSON."""
+def measured(case_file: Path, path: Path, every: int, seconds: float | None) -> None:
+    """Run undisturbed, to the end or for so long, and print as JSON the steps and what was used at every so many of them."""
     case = read_case(case_file)
-    notes = []
-    with fc.ResultWriter(path, case.model, case_text=case.text) as out:
+    notes: list[dict[str, float]] = []
+    begin = time.monotonic()
+    with fc.ResultWriter(path, case.model, case_text=case.text, synchronise=True) as out:
         for step in fc.solve_steps(case.model, case.ramp):
             out.write(step)
-            if step.index % EVERY == 0:
-                notes.append(used())
-    print(json.dumps(notes))
+            if step.index % every:
+                continue
+            notes.append(used())
+            passed = time.monotonic() - begin
+            if len(notes) == 1:
+                expected = len(case.ramp.instants) if seconds is None else seconds / passed * every
+                check_room(path, min(expected, len(case.ramp.instants)) / every)
+            if seconds is not None and passed > seconds and step.index >= FEWEST:
+                break
+    print(json.dumps({"steps": out.n_steps, "unknowns": case.model.n_dofs, "notes": notes}))
+
+
+def check_room(path: Path, times: float) -> None:
+    """Stop if the disk has no room for two files so many times as large as this one."""
+    needed, free = 2 * times * path.stat().st_size, shutil.disk_usage(path.parent).free
+    if needed > 0.9 * free:
+        raise SystemExit(
+            f"two files of {needed / 2e9:.1f} GB each are expected and {free / 1e9:.1f} GB are free in '{path.parent}': "
+            "name another folder with --folder, or ask for less"
+        )
 
 
 def killed(case: kill_cases.KilledCase, path: Path, kills: int, seconds: float, seed: int) -> tuple[int, list[int]]:
@@ -119,49 +217,66 @@ def different(one: Path, other: Path) -> list[int]:
         return [step.index for step, expected in pairs if killing.difference(step, expected) != 0.0]
 
 
-def main() -> int:
-    """Run and judge."""
+def arguments() -> argparse.Namespace:
+    """Return what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--steps", type=int, default=10_000)
+    parser.add_argument(
+        "--hours", type=float, help="instead of a number of steps, how long both runs may take together"
+    )
+    parser.add_argument(
+        "--unknowns", type=float, help="a sphere on a block of about so many, instead of two small blocks"
+    )
     parser.add_argument("--kills", type=int, default=12)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--folder", type=Path, help="where the result files are for the time being")
     parser.add_argument("--measure", nargs=2, type=Path, metavar=("CASE", "FILE"), help=argparse.SUPPRESS)
-    given = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> int:
+    """Run and judge."""
+    given = arguments()
+    asked = Asked.of(given)
     if given.measure:
-        measured(*given.measure)
+        measured(*given.measure, asked.every, asked.seconds and asked.seconds / 2)
         return 0
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory(dir=given.folder) as name:
         folder = Path(name)
-        case = kill_cases.KilledCase(folder / "blocks.toml", 0.0)
-        case.path.write_text(CASE.format(steps=given.steps), encoding="utf-8")
+        case = kill_cases.KilledCase(folder / "case.toml", 0.0)
+        case.path.write_text(case_text(asked, asked.steps), encoding="utf-8")
         whole, path = folder / "whole.vtkhdf", folder / "killed.vtkhdf"
         begin = time.monotonic()
-        command = [sys.executable, __file__, "--measure", str(case.path), str(whole)]
-        done = subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True)
+        command = [sys.executable, *sys.argv, "--measure", str(case.path), str(whole)]
+        done = subprocess.run(command, stdout=subprocess.PIPE, check=False, text=True)
+        if done.returncode:
+            return done.returncode
         seconds = time.monotonic() - begin
+        found = json.loads(done.stdout)
+        print(f"{found['steps']} steps of {found['unknowns']} unknowns in {seconds:.0f} s", flush=True)
+        case.path.write_text(case_text(asked, found["steps"]), encoding="utf-8")
         times, left = killed(case, path, given.kills, seconds, given.seed)
-        unlike = different(path, whole)
-    notes = json.loads(done.stdout)
-    return judged(notes, given.steps, times, left, unlike)
+        kills = f"{times} kills, with {min(left, default=0)} to {max(left, default=0)} steps there: "
+        return judged(found, asked.every, kills, different(path, whole))
 
 
-def judged(notes: list[dict[str, float]], steps: int, times: int, left: list[int], unlike: list[int]) -> int:
+def judged(found: dict[str, Any], every: int, kills: str, unlike: list[int]) -> int:
     """Print the bars; return the exit code."""
+    notes, steps = found["notes"], found["steps"]
     tenth = max(len(notes) // 10, 1)
-    bars = {
-        f"{times} kills, with {min(left, default=0)} to {max(left, default=0)} steps there: {len(unlike)} of {steps} steps "
-        "differ in any bit (0)": not unlike,
-    }
+    bars = {f"{kills}{len(unlike)} of {steps} steps differ in any bit (0)": not unlike}
     for what, most in MOST.items():
         early = notes[2 * tenth - 1][what] - notes[tenth - 1][what]
         late = notes[-1][what] - notes[-1 - tenth][what]
-        bars[f"{what} for a step: {late / tenth / EVERY:.4g}, drift {late / early:.3f} (at most {most})"] = (
+        bars[f"{what} for a step: {late / tenth / every:.4g}, drift {late / early:.3f} (at most {most})"] = (
             late <= most * early
         )
-    growth = (notes[-1]["memory"] - notes[2 * tenth - 1]["memory"]) / ((len(notes) - 2 * tenth) * EVERY / 1000)
+    grown, thousands = notes[-1]["memory"] - notes[2 * tenth - 1]["memory"], (len(notes) - 2 * tenth) * every / 1000
+    allowed = max(MOST_GROWTH * thousands, MOST_SHARE * notes[-1]["memory"])
     bars[
-        f"memory: {notes[-1]['memory']:.0f} kB, grows by {growth:.0f} kB in 1000 steps (at most {MOST_GROWTH:.0f})"
-    ] = growth <= MOST_GROWTH
+        f"memory: {notes[-1]['memory']:.0f} kB, grows by {grown / thousands:.0f} kB in 1000 steps (at most "
+        f"{allowed / thousands:.0f})"
+    ] = grown <= allowed
     print(f"objects: {notes[-1]['objects'] - notes[2 * tenth - 1]['objects']:+.0f} from the second tenth on")
     for text, kept in bars.items():
         print(("kept:   " if kept else "MISSED: ") + text)

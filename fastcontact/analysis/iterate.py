@@ -15,6 +15,7 @@ from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
 from fastcontact.analysis.state import State
 from fastcontact.analysis.unsupported_bodies import RigidPosition
 from fastcontact.contact.constraints import Constraints, StackedConstraints, stacked
+from fastcontact.contact.obstacles.rigid_side import RigidSide
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -73,8 +74,11 @@ def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Itera
     positions, parts = problem.force_driven.positions(u), {}
     still = np.zeros(problem.model.mesh.dim)
     for name, pair in problem.pairs.items():
-        part = pair.constraints(problem.configuration(name, state, load, paired_at, u))
-        parts[name] = problem.force_driven.constraints(name, part, positions.get(name, still))
+        at = problem.configuration(name, state, load, paired_at, u)
+        turns = isinstance(pair.primary, RigidSide) and pair.primary.rotation is not None
+        moved = at.obstacle - at.obstacle_start if turns else None
+        part = pair.constraints(at)
+        parts[name] = problem.force_driven.constraints(name, part, positions.get(name, still), moved)
     return stacked(parts)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -29,6 +29,7 @@ from fastcontact.linear import choice
 from fastcontact.linear.protocol import LinearSolver
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.model import Model
+from fastcontact.model.obstacle_rotation import angle_at
 from fastcontact.model.ramp import Ramp, Table, combined, multiplier
 from fastcontact.model.rigid_motions import free_motions
 
@@ -50,12 +51,15 @@ class StepLoad:
         By contact pair, the prescribed displacement of its rigid obstacle [length].
     clearance_factors : dict of str to float
         By contact pair, what its clearances are multiplied with.
+    angles : dict of str to float
+        By contact pair, by how much its rigid obstacle has turned, where one does [radian].
     """
 
     lift: Array
     force: Array
     obstacles: Mapping[str, Array]
     clearance_factors: Mapping[str, float]
+    angles: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,15 +123,17 @@ class Problem:
         prescribed = combined(self.prescribed, self.ramp, instant, self.shape)
         factors = [multiplier(relation.ramp, self.ramp, instant) for relation in self.model.relations]
         lift = self.system.lift(prescribed.ravel(), self.system.values(factors))
-        obstacles, clearances = {}, {}
+        obstacles, clearances, angles = {}, {}, {}
         for pair in self.model.contact:
             side = self.pairs[pair.name].primary
             if isinstance(side, RigidSide):
                 obstacles[pair.name] = multiplier(pair.ramp, self.ramp, instant) * side.motion
+            if pair.rotation is not None:
+                angles[pair.name] = angle_at(pair, self.ramp, instant)
             if pair.clearance_ramp is not None:
                 clearances[pair.name] = multiplier(pair.clearance_ramp, self.ramp, instant)
         force = combined(self.forces, self.ramp, instant, self.shape).ravel()
-        return StepLoad(lift, force, obstacles, clearances)
+        return StepLoad(lift, force, obstacles, clearances, angles)
 
     def factors(self, histories: Iterable[Temperature | InitialState], instant: float) -> list[float]:
         """Return what temperatures or initial states of the model are multiplied with at an instant of the ramp [-]."""
@@ -165,7 +171,18 @@ class Problem:
             load.clearance_factors.get(name, 1.0),
             state.never_opening.get(name),
             state.traction.get(name),
+            load.angles.get(name, 0.0),
+            state.angles.get(name, 0.0),
+            self._worn(name, state),
         )
+
+    def _worn(self, name: str, state: State) -> Array | None:
+        """Return what has been worn off a contact pair at all points (n_points,) [length], None for nothing."""
+        if name not in state.worn:
+            return None
+        depth = np.zeros(self.model.mesh.n_points)
+        depth[self.pairs[name].secondary.points] = state.worn[name].depth
+        return depth
 
     def initial_state(self) -> State:
         """Return the state before the first load step."""

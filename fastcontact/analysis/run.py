@@ -143,8 +143,18 @@ def solve_steps(
         prepare, ramp=ramp, criteria=criteria, linear_solver=linear_solver, linear_tolerance=linear_tolerance,
         linear_precision=linear_precision,
     )  # fmt: skip
-    touched = frozenset(name for step in resume for name, found in step.contact.items() if found.active.any())
+    touched = _touched(resume)
     return _marched(model, ramp, prepared, instants, case, last, touched)
+
+
+def _touched(steps: Sequence[StepResult]) -> frozenset[str]:
+    """Return the names of the contact pairs that were closed in any of the steps: mostly the last one tells all."""
+    touched: set[str] = set()
+    for step in reversed(steps):
+        touched |= {name for name, found in step.contact.items() if found.active.any()}
+        if len(touched) == len(step.contact):
+            break
+    return frozenset(touched)
 
 
 def _marched(

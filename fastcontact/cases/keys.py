@@ -95,6 +95,14 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         },
         ("first", "second", "component"),
     ),
+    "periodicity": (
+        {"first": str, "second": str, **AXES, "free": str, "translation": list, "ramp": list},
+        ("first", "second"),
+    ),
+    "cyclic_symmetry": (
+        {"first": str, "second": str, "sectors": int, "origin": list, "direction": list},
+        ("first", "second", "sectors"),
+    ),
     "relation": ({"terms": list, "value": NUMBER, "ramp": list}, ("terms",)),
     "pretension": (
         {
@@ -119,6 +127,8 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
 }
 # A rigid surface: the facets of a group of a file, or of the mesh of the model.
 SURFACE = {"file": str, "group": str, "flip": bool, "crease": NUMBER}
+# How a rigid obstacle turns.
+ROTATION: dict[str, Any] = {"angle": NUMBER, "centre": list, "axis": list, "ramp": list}
 # Studies of this case; `fastcontact.studies.settings` reads them.
 STUDY: dict[str, Any] = {
     "generator": str,

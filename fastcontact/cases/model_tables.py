@@ -8,7 +8,7 @@ from pathlib import Path
 from reprlib import repr
 from typing import Any
 
-from fastcontact.cases.keys import AXES, LISTS, NUMBER, SURFACE, at, called, check_keys, tables
+from fastcontact.cases.keys import AXES, LISTS, NUMBER, ROTATION, SURFACE, at, called, check_keys, tables
 from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.initial_states import COMPONENTS
@@ -120,6 +120,8 @@ _ADD: dict[str, Callable[..., None]] = {
     "couple": Model.couple,
     "relation": Model.relate,
     "group_relation": Model.relate_groups,
+    "periodicity": Model.add_periodicity,
+    "cyclic_symmetry": Model.add_cyclic_symmetry,
     "spring": Model.add_spring,
     "pretension": Model.add_pretension,
 }
@@ -214,6 +216,9 @@ def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
     for key in ("motion", "force"):
         if key in rest:
             check_keys(f"{where}.{key}", rest[key], AXES)
+    if "rotation" in rest:
+        check_keys(f"{where}.rotation", rest["rotation"], ROTATION)
+        rest["rotation"] = _arguments(f"{where}.rotation", rest["rotation"])
     with at(where):
         model.add_obstacle(name, obstacle=obstacle, **_arguments(where, rest))
 

@@ -89,6 +89,7 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
         "middle": contact.middle.tolist(),
         "closed_nodes": int(contact.active.sum()),
         "obstacle_displacement": None if moved is None else moved.tolist(),
+        **({} if contact.torque is None else {"obstacle_angle": contact.obstacle_angle, "torque": contact.torque}),
         "penetration": contact.penetration,
         "penalty": penalty,
     }
@@ -190,6 +191,11 @@ def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str
     if any(contact["obstacle_displacement"] or ()):
         moved = ", ".join(f"{value:.6g}" for value in contact["obstacle_displacement"])
         found.append(f"  obstacle '{name}' stands ({moved}) {unit['length']} from its place at rest")
+    if "torque" in contact:
+        found.append(
+            f"  obstacle '{name}' has turned by {contact['obstacle_angle']:.6g} radian, with a torque of "
+            f"{contact['torque']:.6g} {unit['force']} {unit['length']}"
+        )
     if contact["penalty"] is not None:
         found.append(
             f"  contact '{name}' penetrates by up to {contact['penetration']:.4g} {unit['length']}, with a penalty of "

@@ -10,9 +10,9 @@ import os
 import sys
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
 from fastcontact.cli._terminal import say
@@ -20,6 +20,7 @@ from fastcontact.errors import CaseError, ConvergenceError, FastcontactWarning, 
 
 if TYPE_CHECKING:
     from fastcontact.cases.case import Case
+    from fastcontact.results.step import StepResult
 
 HELP = "solve a case file or an input deck (.inp) and write the results of all steps"
 log = logging.getLogger("fastcontact")
@@ -63,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
     with _warnings_shown() as caught:
         caught += early
         done, last, steps = _solved(options, case, output)
-    texts = list(dict.fromkeys([*(text for step in done for text in step.warnings), *caught]))
+    texts = list(dict.fromkeys([*done.warnings, *caught]))
     timings = {"read": read - started, "solve": time.perf_counter() - read, "cpu": time.process_time()}
     numbers = summary.summarise(case, last, steps, timings, texts)
     if options.json:
@@ -75,7 +76,10 @@ def run(options: argparse.Namespace) -> int:
             say(f"warning: {text}", error=True)
     if not options.quiet:
         say("\n".join(summary.lines(numbers)))
-        say("  " + _written(output, len(done), len(steps), [path for path in (options.json, options.plot) if path]))
+        say(
+            "  "
+            + _written(output, len(done.summaries), len(steps), [path for path in (options.json, options.plot) if path])
+        )
     failed = [check["name"] for check in numbers["checks"] if not check["passed"]]
     if options.strict and failed:
         say(f"{len(failed)} of {len(numbers['checks'])} checks of the case failed: {', '.join(failed)}", error=True)
@@ -102,8 +106,26 @@ def _warnings_shown() -> Iterator[list[str]]:
         yield texts
 
 
-def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[list[Any], Any, list[dict[str, Any]]]:
-    """Write all steps; return those that were there before, the last one, and the summaries of all."""
+class _Done(NamedTuple):
+    """What is kept of the steps that were there before: a summary of each, and their warnings."""
+
+    summaries: list[dict[str, Any]]
+    warnings: list[str]
+
+
+def _done(steps: Sequence[StepResult]) -> _Done:
+    """Read each step once: they may be many and large."""
+    from fastcontact.cases.summary import of_step
+
+    done = _Done([], [])
+    for step in steps:
+        done.summaries.append(of_step(step))
+        done.warnings.extend(text for text in step.warnings if text not in done.warnings)
+    return done
+
+
+def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[_Done, Any, list[dict[str, Any]]]:
+    """Write all steps; return what is kept of those that were there before, the last one, and the summaries of all."""
     from fastcontact.analysis.progress import Progress
     from fastcontact.analysis.restart import remaining
     from fastcontact.analysis.run import solve_steps
@@ -112,11 +134,11 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[list
 
     fields = (ERROR,) if options.estimate_error else ()
     with ResultWriter(output, case.model, case_text=case.text, cell_fields=fields, resume=options.resume) as writer:
-        done = writer.done
-        _check_same(case, done, output)
-        last, steps = done[-1] if done else None, [of_step(step) for step in done]
-        total = len(done) + len(remaining(case.ramp, last))
-        progress = Progress(total, show=sys.stderr.isatty() and not options.quiet, done=len(done))
+        _check_same(case, writer.done, output)
+        last, done = writer.done[-1] if writer.done else None, _done(writer.done)
+        steps = list(done.summaries)
+        total = len(steps) + len(remaining(case.ramp, last))
+        progress = Progress(total, show=sys.stderr.isatty() and not options.quiet, done=len(steps))
         try:
             for last in solve_steps(
                 case.model,
@@ -124,7 +146,7 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[list
                 linear_solver=options.linear or case.linear_solver,
                 linear_tolerance=case.linear_tolerance,
                 criteria=case.criteria,
-                resume=done,
+                resume=writer.done,
             ):
                 last = case.finished(last)
                 writer.write(_estimated(case.model, last) if fields else last)
@@ -141,7 +163,7 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[list
     return done, last, steps
 
 
-def _check_same(case: Any, done: list[Any], output: Path) -> None:
+def _check_same(case: Any, done: Sequence[Any], output: Path) -> None:
     """Refuse to go on with the steps of another case."""
     from fastcontact.analysis import restart
 

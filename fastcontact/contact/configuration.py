@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.contact.obstacles.rigid_side import Stance
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -31,6 +33,10 @@ class Configuration:
     traction : (ndarray (k, dim), ndarray (k, dim)), optional
         Reference places of constraints at the end of the load step before [length], and the tangential tractions there
         [pressure]; None where nothing depends on them.
+    angle, angle_start : float
+        By which a rigid obstacle has turned, likewise [radian].
+    worn : ndarray (n_points,), optional
+        Depth worn off at the secondary nodes before the load step [length]; None for nothing.
     """
 
     displacement: Array
@@ -40,6 +46,19 @@ class Configuration:
     clearance_factor: float = 1.0
     never_opening: tuple[Array, Mask] | None = None
     traction: tuple[Array, Array] | None = None
+    angle: float = 0.0
+    angle_start: float = 0.0
+    worn: Array | None = None
+
+    @property
+    def stance(self) -> Stance:
+        """Where a rigid obstacle stands now."""
+        return Stance(self.obstacle, self.angle)
+
+    @property
+    def stance_start(self) -> Stance:
+        """Where a rigid obstacle stood as the load step began."""
+        return Stance(self.obstacle_start, self.angle_start)
 
     @classmethod
     def displaced(cls, displacement: Array) -> Configuration:

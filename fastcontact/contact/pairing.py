@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact.contact.line_projection import along_line_normals, smooth_ends
-from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
 from fastcontact.contact.projection import (
     Places,
     along_normals,
@@ -100,7 +100,7 @@ def pair(
     coordinates: Array,
     projection_tolerance: float,
     normals: str | Sequence[float] = "facet",
-    obstacle: Array | None = None,
+    obstacle: Stance | None = None,
 ) -> Pairing:
     """Project candidate positions (n, dim) on the closest facet of `primary` at nodal `coordinates` [length].
 
@@ -108,8 +108,8 @@ def pair(
     (TOLE_PROJ_EXT of code_aster). One that is paired there faces the facet gone on straight, so that the forces on both
     sides have one line of action; they balance in moment. Unless `normals` is ``"facet"``, the normal is interpolated
     between nodal means of the facets' normals, so that it does not jump where facets meet but for corners, and the
-    candidates are projected along it; a unit vector (dim,) is the normal everywhere. A rigid obstacle is displaced by
-    `obstacle` (dim,) [length].
+    candidates are projected along it; a unit vector (dim,) is the normal everywhere. A rigid obstacle stands
+    as `obstacle` says.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def pair(
         If a projection does not converge; see `search.closest`.
     """
     if isinstance(primary, RigidSide):
-        at = np.zeros(candidates.shape[1]) if obstacle is None else obstacle
+        at = Stance(np.zeros(candidates.shape[1])) if obstacle is None else obstacle
         _, normal, paired, offset = primary.facing(candidates, at)
         nowhere = np.zeros(len(candidates), np.intp)
         return Pairing(nowhere, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)

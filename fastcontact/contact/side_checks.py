@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
@@ -54,7 +54,7 @@ def check_sides(
 def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSide) -> None:
     """Raise ContactError for an obstacle of contact `name` that no facet of the secondary side faces."""
     centres, outward, _ = _facet_frames(mesh, secondary)
-    _, normal, paired, _ = obstacle.facing(centres, np.zeros(mesh.dim))
+    _, normal, paired, _ = obstacle.facing(centres, Stance(np.zeros(mesh.dim)))
     along = np.einsum("id,id->i", outward, normal)[paired]
     if len(along) and (along >= 0).all():
         raise ContactError(

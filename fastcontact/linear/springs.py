@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import csr_array
 
 from fastcontact.linear import springs_kernels
+from fastcontact.linear.sparse_rows import scaled
 
 Array = NDArray[np.float64]
 # Springs that differ by less than this part of their size are alike.
@@ -68,5 +69,5 @@ class Springs:
         """Return whether others act on the same unknowns with nearly the same stiffness."""
         if other is None or self.rows.shape != other.rows.shape:
             return False
-        mine, theirs = (csr_array(diags_array(np.sqrt(one.stiffness)) @ one.rows) for one in (self, other))
+        mine, theirs = (scaled(one.rows, np.sqrt(one.stiffness)) for one in (self, other))
         return bool(abs(mine - theirs).sum() <= ALIKE * abs(theirs).sum())

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fastcontact.contact.obstacles import Obstacle
+from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.model.pair_options import clearance_ramp
 from fastcontact.model.ramp import Table
 
@@ -19,7 +20,8 @@ class ContactPair:
     """Two groups of facets that may touch, or one and a rigid obstacle, with a formulation and its options.
 
     With an `obstacle`, `primary` is empty; `motion` is the obstacle's displacement at multiplier 1 [length], and `ramp`
-    a history of its own or None. Components of `force` that are not None drive the obstacle at multiplier 1 [force].
+    a history of its own or None. Components of `force` that are not None drive the obstacle at multiplier 1 [force]. It turns
+    by `rotation`, with the history `rotation_ramp`, by default `ramp`.
     """
 
     name: str
@@ -31,6 +33,8 @@ class ContactPair:
     motion: tuple[float, ...] = ()
     ramp: Table | None = None
     force: Driving = ()
+    rotation: Rotation | None = None
+    rotation_ramp: Table | None = None
 
     @property
     def method(self) -> str:

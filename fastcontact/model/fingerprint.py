@@ -127,6 +127,8 @@ def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: A
         _take(_called(value, points), add, mesh, points)
     if isinstance(value, Material):  # a density or expansion that is not given counts as little as in older files
         fields = [field for field in fields if getattr(value, field.name) not in (None, False)]
+    if isinstance(value, ContactPair) and value.rotation is None:  # likewise
+        fields = [field for field in fields if not field.name.startswith("rotation")]
     if isinstance(value, LinearElastic):  # what the choice comes to, and nothing where it is plain, as in older files
         fields = [field for field in fields if field.name != "volumetric"]
         add(b"mean dilatation" if value.averaged else b"")

@@ -130,10 +130,11 @@ class ForceDrivenObstacles:
         """Return displacements (n_dofs, k) that cost little energy: `modes`, translations first, and obstacles with them."""
         return np.vstack([modes, np.tile(np.eye(self.shape[1], modes.shape[1]), (len(self), 1))])
 
-    def constraints(self, name: str, part: Constraints, position: Array) -> Constraints:
+    def constraints(self, name: str, part: Constraints, position: Array, moved: Array | None = None) -> Constraints:
         """Return the constraints of pair `name`, set up with its obstacle at `position` (dim,), with the obstacle free.
 
-        Rows then have columns for all obstacles, and slip counts the motion of the obstacle.
+        Rows then have columns for all obstacles, and slip counts the motion of the obstacle. Where it turns, too, `moved`
+        (dim,) is what it has moved in the step as far as `part` counts that as slip [length].
         """
         if not self.pairs:
             return part
@@ -143,7 +144,10 @@ class ForceDrivenObstacles:
             return dataclasses.replace(part, B=self._wider(part.B), tangents=wider)
         B, normal = self._free(part.B, number)
         tangents = tuple(self._free(tangent, number)[0] for tangent in part.tangents)
-        return dataclasses.replace(part, B=B, gap0=part.gap0 + normal @ position, tangents=tangents, drift=None)
+        drift = None
+        if moved is not None and part.drift is not None:
+            drift = part.drift + np.stack([t @ moved for t in part.directions])
+        return dataclasses.replace(part, B=B, gap0=part.gap0 + normal @ position, tangents=tangents, drift=drift)
 
     def _free(self, rows: csr_array, number: int) -> tuple[csr_array, Array]:
         """Return rows with those of the obstacle that they act against, and their direction (m, dim)."""

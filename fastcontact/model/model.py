@@ -67,7 +67,9 @@ from fastcontact.model.contact_pair import ContactPair, Driving, method
 from fastcontact.model.couplings import Moment, coupling
 from fastcontact.model.description import sentences
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
+from fastcontact.model.obstacle_rotation import check_turns, rotation_of
 from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
+from fastcontact.model.periodicity import Seam, cyclic, periodic
 from fastcontact.model.prescribed_overlap import Supports, check_prescribed
 from fastcontact.model.pretension import Pretension, PretensionForce, check_locks, pretension
 from fastcontact.model.ramp import History, Ramp, Table, combined, multiplier, table_of
@@ -158,6 +160,7 @@ class Model:
         self.relations: list[Relation] = []
         self.springs: list[Springs] = []
         self.pretensions: list[Pretension] = []
+        self.seams: list[Seam] = []  # nodes that are one place of a part that repeats itself
         self.contact: list[ContactPair] = []
 
     def __repr__(self) -> str:
@@ -741,6 +744,103 @@ class Model:
             )
 
     @typed(ModelError)
+    def add_periodicity(
+        self,
+        first: str,
+        second: str,
+        *,
+        x: float = 0.0,
+        y: float = 0.0,
+        z: float = 0.0,
+        free: str = "",
+        translation: Sequence[float] | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Let the model be one period of a part that repeats itself: its two ends deform alike.
+
+        Rigid translations stay free and need supports. Contact should be open at the ends: their nodes have a pressure each,
+        and only both together follow from the gap.
+
+        Parameters
+        ----------
+        first, second : str
+            The ends: groups whose nodes lie upon each other after a translation.
+        x, y, z : float
+            How much farther the second end moves than the first, at multiplier 1: the mean strain times the period [length].
+        free : str
+            Components (``"x"``, ``"xy"``, ...) in which that is the same everywhere, but follows from the loads.
+        translation : sequence of float (dim,), optional
+            From the first end to the second one; by default from middle to middle [length].
+        ramp : Ramp or iterable of (float, float), optional
+            History of x, y, z.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If there are no such groups, or their nodes do not lie upon each other; the largest distance is told.
+        """
+        name = f"the periodicity of '{first}' and '{second}'"
+        given = {key: value for key, value in {"x": x, "y": y, "z": z}.items() if value != 0.0}
+        for key, value in given.items():
+            check_number(f"{key} of {name}", value)
+        jump: Any = axes_of(name, given, self.mesh.dim) if given else {}
+        loose = sorted(axes_of(name, dict.fromkeys(free, 1.0), self.mesh.dim)) if free else []
+        if any(axis in jump for axis in loose):
+            raise ModelError(f"{name}: '{free}' is free, so no displacement can be given there")
+        relations, seam = periodic(
+            self.mesh, (first, second), jump, loose, translation, table_of(ramp, f"the ramp of {name}")
+        )
+        self.relations.extend(relations)
+        self.seams.append(seam)
+
+    @typed(ModelError)
+    def add_cyclic_symmetry(
+        self,
+        first: str,
+        second: str,
+        *,
+        sectors: int,
+        origin: Sequence[float] | None = None,
+        direction: Sequence[float] = (0.0, 0.0, 1.0),
+    ) -> None:
+        """Let the model be one of equal sectors round an axis: its two ends deform alike, turned by the angle of a sector.
+
+        Loads repeat themselves, too; forces are those of one sector. The rotation about the axis, and in space the way along
+        it, stay free and need supports. Ends may be curved, and may meet on the axis. Contact at the ends: as in
+        `add_periodicity`.
+
+        Parameters
+        ----------
+        first, second : str
+            The ends: groups whose nodes lie upon each other after the turn, either way.
+        sectors : int
+            How many make the whole.
+        origin : sequence of float (dim,), optional
+            A point of the axis, by default the origin [length].
+        direction : sequence of float (3,)
+            Along the axis [-]; in the plane always z.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If there are no such groups, their nodes do not lie upon each other (the largest distance is told), or
+            kinematics are axisymmetric.
+        """
+        name = f"the cyclic symmetry of '{first}' and '{second}'"
+        if self.kinematics == "axisymmetric":
+            raise ModelError(f"{name}: an axisymmetric model is the whole ring already")
+        place = (0.0,) * self.mesh.dim if origin is None else tuple(origin)
+        along = (0.0, 0.0, 1.0) if self.mesh.dim == 2 else tuple(direction)
+        if sectors < 2 or len(place) != self.mesh.dim or len(along) != 3 or not any(along):
+            raise ModelError(
+                f"{name} needs two sectors at least, an origin of {self.mesh.dim} numbers and a direction of three, not "
+                f"{sectors}, {place} and {along}"
+            )
+        relations, seam = cyclic(self.mesh, (first, second), sectors, place, along)
+        self.relations.extend(relations)
+        self.seams.append(seam)
+
+    @typed(ModelError)
     def relate(
         self, terms: Iterable[tuple[str | int, str, float]], value: float = 0.0, *, ramp: History = None
     ) -> None:
@@ -990,6 +1090,8 @@ class Model:
               or a function of the secondary position [pressure / length].
             - ``slip``: ``"symmetric"`` (default): closing a gap along the mean of both sides' normals is no slip;
               ``"primary"``: all relative motion along the tangents to the primary side is, as in code_aster.
+            - ``wear``: Archard's coefficient by hardness: ``coefficient * pressure * slip`` is worn off the secondary side in
+              each load step, and the next one begins with it; depths are in the results [1 / pressure].
             - ``search_distance``: what is farther off than this, or deeper inside, now and as the load step begins, is not
               faced [length].
             - ``normals``: ``"facet"`` or ``"averaged"`` between the facets that meet at a node at less than 45 degrees, which
@@ -1011,6 +1113,7 @@ class Model:
         obstacle: Obstacle,
         motion: Mapping[str, float] | None = None,
         force: Mapping[str, float] | None = None,
+        rotation: Mapping[str, Any] | None = None,
         ramp: History = None,
         formulation: str | None = None,
         **options: Any,
@@ -1029,8 +1132,12 @@ class Model:
             The force on it at multiplier 1, e.g. ``{"y": -100.0}`` [force], in axisymmetry over the full circle. In
             these components the obstacle is a rigid body that moves freely until contact holds it; in the others it
             follows `motion`. Results tell where it is.
+        rotation : mapping, optional
+            How it turns: ``angle`` at multiplier 1 [radian]; ``centre``, a point of the axis (dim,) before any motion, with
+            which it moves [length]; in space ``axis``, the direction; ``ramp``, a history of its own. Results tell the torque
+            on the obstacle's axis. Not in axisymmetry.
         ramp : Ramp or iterable of (float, float), optional
-            History of motion and force.
+            History of motion and force, and of a rotation without one of its own.
         formulation : str, optional
             ``"node_to_segment"`` (then: node against obstacle), by default on linear triangles and, in space, on
             facets whose nodes all carry pressure (tri3, quad4, quad9), or ``"continuous"``, by default on all others.
@@ -1049,7 +1156,10 @@ class Model:
             formulation, reason = against_obstacle(self.mesh.dim, *self._facet_kinds(secondary), options)
             log.info("contact '%s': %s, since %s", name, method(formulation, options), reason)
         driving = self._driving(name, moves, force)
-        self._add_pair(ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving))
+        turned = (None, None) if rotation is None else rotation_of(name, rotation, self.kinematics)
+        self._add_pair(
+            ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving, *turned)
+        )
 
     def _facet_kinds(self, group: str) -> tuple[list[str], bool]:
         """Return the kinds of facets of a group, and whether linear triangles or tetrahedra alone have them."""
@@ -1118,7 +1228,7 @@ class Model:
                 raise ContactError(
                     unknown("contact formulation for a rigid obstacle", pair.formulation, AGAINST_OBSTACLES)
                 )
-            primary = RigidSide(pair.obstacle, np.array(pair.motion))
+            primary = RigidSide(pair.obstacle, np.array(pair.motion), pair.rotation)
         else:
             primary = surface(self.mesh, pair.primary)
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
@@ -1291,7 +1401,9 @@ class Model:
             named = [(item.name, item.ramp) for item in items]
             named += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]
             named += [(f"the clearance of contact '{p.name}'", p.clearance_ramp) for p in self.contact]
+            named += [(f"the rotation of obstacle '{p.name}'", p.rotation_ramp) for p in self.contact]
             check_ramps(named, ramp.instants)
+            check_turns(self.contact, ramp)
             check_locks(self.pretensions, ramp.instants)
         self._check_relations(fixed, prescribed, ramp or Ramp((1.0,)))
         check_supports(self.mesh, [(s.name, s.group) for s in self.supports], self._related())

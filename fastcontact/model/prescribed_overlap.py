@@ -14,6 +14,7 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.pairing import Candidates, gap_rows, rows_along
 from fastcontact.errors import ModelError
 from fastcontact.model.contact_pair import ContactPair
+from fastcontact.model.obstacle_rotation import angle_at
 from fastcontact.model.ramp import Ramp, Table, combined, multiplier
 
 Array = NDArray[np.float64]
@@ -118,7 +119,8 @@ def _at(
     if contact.obstacle is not None:
         obstacle = multiplier(contact.ramp, ramp, instant) * np.array(contact.motion)
     factor = 1.0 if contact.clearance_ramp is None else multiplier(contact.clearance_ramp, ramp, instant)
-    at = Configuration(displacement, np.zeros_like(displacement), obstacle, still, factor)
+    angle = angle_at(contact, ramp, instant)
+    at = Configuration(displacement, np.zeros_like(displacement), obstacle, still, factor, angle=angle)
     candidates = Candidates(nodes[:, None], np.ones((len(nodes), 1)))
     if formulation.options.tied:
         depth, paired = _torn(formulation, candidates, displacement, supports.fixed)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +53,7 @@ def _check_sides(mesh: Mesh, pair: ContactPair, other: ContactPair, ours: str, t
 
 def _check_obstacles(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
     """Compare the obstacles where the two sides share facets; at a corner between two obstacles they differ."""
-    if pair.obstacle is None or other.obstacle is None or (pair.motion, pair.ramp) != (other.motion, other.ramp):
+    if pair.obstacle is None or other.obstacle is None or _moved(pair) != _moved(other):
         return
     nodes = shared_facets(mesh, pair.secondary, other.secondary)
     if not len(nodes):
@@ -66,6 +67,10 @@ def _check_obstacles(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
             f"'{other.name}' presses them already, with {len(nodes)} nodes (first: point {nodes[0]}): leave out one of the "
             "two"
         )
+
+
+def _moved(pair: ContactPair) -> tuple[Any, ...]:
+    return pair.motion, pair.ramp, pair.rotation, pair.rotation_ramp
 
 
 def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> list[str]:

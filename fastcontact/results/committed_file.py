@@ -6,6 +6,9 @@ memory until HDF5 flushes, and then done in an order in which each is harmless: 
 the superblock with the end of the file; nodes of indices from the root down, so that entries are in their new node before
 they leave the old one; all else; tables of names last (HDF5 File Format Specification 3.0, sections II.A and III.A).
 
+HDF5 writes a node of an index or a part of a table as a whole, of which a step changes a few bytes: only what differs from
+the file is written, from the first such byte to the last.
+
 That helps when a process ends, not when the power does: a disk keeps no order. `synchronised` writes are kept in a journal
 until they are done.
 """
@@ -21,11 +24,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
 
+import numpy as np
+
 from fastcontact.mesh.files.hdf5_driver import DriverFile
 from fastcontact.results import journal
 
 # Where HDF5 begins its superblock, the nodes of its indices and its tables of names.
 SUPERBLOCK, NODE, NAMES = b"\x89HDF\r\n\x1a\n", b"TREE", b"SNOD"
+# Longest write that is compared with the file [bytes]: longer ones are data that change throughout.
+COMPARED = 1 << 16
 
 
 class CommittedFile(DriverFile):
@@ -105,12 +112,19 @@ class CommittedFile(DriverFile):
                 self._commit()
         except BaseException as error:
             self._fail(error)
+            with contextlib.suppress(OSError):
+                self._head = self._read_head()  # it may be among what was written
 
     def _commit(self) -> None:
         waiting = sorted(self._pending.items(), key=lambda entry: self._turn(*entry))
+        n_new = sum(not self._overlaps(place, place + len(data)) for place, data in waiting)
+        new = waiting[:n_new]
+        changes = [change for write in waiting[n_new:] if (change := self._changed(*write))[1]]
+        for place, data in new:
+            self._put(place, data)
         if self.synchronised:
-            self._synchronise(waiting)
-        for place, data in waiting:
+            self._synchronise(new, changes)
+        for place, data in changes:
             self._put(place, data)
         if self.synchronised:
             os.fsync(self.fileno())
@@ -119,13 +133,21 @@ class CommittedFile(DriverFile):
             self._note(place, place + len(data))
         self._pending.clear()
 
-    def _synchronise(self, waiting: list[journal.Write]) -> None:
+    def _changed(self, place: int, data: bytes) -> journal.Write:
+        """Return the part of a write that changes the file, from its first byte to its last."""
+        if len(data) > COMPARED:
+            return place, data
+        there = bytearray(len(data))
+        super()._get(place, there)
+        differs = np.flatnonzero(np.frombuffer(data, np.uint8) != np.frombuffer(there, np.uint8))
+        if not len(differs):
+            return place, b""
+        return place + int(differs[0]), data[differs[0] : differs[-1] + 1]
+
+    def _synchronise(self, new: list[journal.Write], changes: list[journal.Write]) -> None:
         """Have new places on the disk, and a journal of what changes old ones."""
-        new = [(place, data) for place, data in waiting if self._turn(place, data)[0] == 0]
-        for place, data in new:
-            self._put(place, data)
         end = max([self.end, self._ends[-1], *(place + len(data) for place, data in new)])
-        log = journal.packed(new, waiting[len(new) :])
+        log = journal.packed(new, changes)
         self._put(end, log)
         self._cut(end + len(log))
         os.fsync(self.fileno())

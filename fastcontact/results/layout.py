@@ -84,9 +84,10 @@ def restart_table(number: int) -> str:
     return f"restart{number % 2}"
 
 
-def contact_row(dim: int) -> np.dtype[Any]:
-    """Return the type of one row of a contact table: one secondary node in one step."""
-    scalars = [(name, "<f8") for name in ("abscissa", "place", "gap", "pressure", "multiplier")]
+def contact_row(dim: int, wears: bool = False) -> np.dtype[Any]:
+    """Return the type of one row of a contact table: one secondary node in one step; with depth where the pair `wears`."""
+    names = ("abscissa", "place", "gap", "pressure", "multiplier", *(("wear",) if wears else ()))
+    scalars = [(name, "<f8") for name in names]
     vectors = [(name, "<f8", (dim,)) for name in ("coordinates", "force_vectors", "normal", "shear")]
     return np.dtype([("points", "<i4"), ("active", "i1"), ("sticking", "i1"), *scalars, *vectors])
 
@@ -103,6 +104,7 @@ def contact_step(dim: int) -> np.dtype[Any]:
     """
     sums = [("force", "<f8", (dim,)), ("radius", "<f8", (2,)), ("dissipation", "<f8")]
     sums.append(("obstacle_displacement", "<f8", (dim,)))  # NaN between bodies
+    sums += [("obstacle_angle", "<f8"), ("torque", "<f8")]  # NaN where nothing turns
     sums += [("middle", "<f8", (dim,)), ("tangent", "<f8", (dim,))]  # NaN without a tangent
     places = [(name, "<i8") for name in ("first", "count", "primary_first", "primary_count")]
     return np.dtype([*places, *sums])
@@ -241,7 +243,7 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
 
 def check_contact(where: str, contact: ContactResult, mesh: Mesh) -> None:
     """Refuse the state of a pair whose arrays do not fit one another or name points that are not in the mesh."""
-    row = contact_row(mesh.dim)
+    row = contact_row(mesh.dim, contact.wear is not None)
     for name in row.names or ():
         found, shape = np.shape(getattr(contact, name)), (len(contact.points), *row[name].shape)
         if found != shape:

@@ -389,11 +389,14 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
         if len(table) != count or first < 0:
             raise ValueError(f"the table of primary forces of '{name}' is cut off")
         faced = {f"primary_{column}": np.ascontiguousarray(table[column]) for column in ("points", "force_vectors")}
+    turned = [float(step[n]) if n in known and np.isfinite(step[n]) else None for n in ("obstacle_angle", "torque")]
     return ContactResult(
         name=name,
         formulation=formulation,
         force=step["force"].copy(),
         radius=(inner, outer),
+        obstacle_angle=turned[0],
+        torque=turned[1],
         dissipation=float(step["dissipation"]) if "dissipation" in known else 0.0,
         obstacle_displacement=moved if np.isfinite(moved).all() else None,
         middle=step["middle"].copy() if "middle" in known else None,  # type: ignore[arg-type]

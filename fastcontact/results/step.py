@@ -78,6 +78,11 @@ class ContactResult:
         Work of friction in this step [energy].
     obstacle_displacement : ndarray (dim,), optional
         Displacement of a rigid obstacle [length]; None for contact between bodies.
+    obstacle_angle : float, optional
+        By which a rigid obstacle has turned [radian]; None where none turns.
+    torque : float, optional
+        On a rigid obstacle that turns, about its axis, to hold it against the contact: the moment of the contact forces on
+        the body, on the deformed shape [force times length]; None where none turns.
     middle : ndarray (dim,)
         Middle of the contact on the reference surface: in axisymmetry on the axis; otherwise the centre of pressure, on the
         planes of symmetry that the contact reaches, those on which supports hold an end of the surface [length].
@@ -88,6 +93,8 @@ class ContactResult:
     tangent : ndarray (dim,), optional
         In plane problems the direction along which half-widths are measured, either way [-]; None where `place` counts: in
         axisymmetry, in 3D, and on a ring that is pressed all round.
+    wear : ndarray (m,), optional
+        Depth worn off so far, with the option ``wear`` [length]; the next load step begins with it. None without.
     primary_points : ndarray of int (k,)
         Point numbers of the primary side; none for a rigid obstacle.
     primary_force_vectors : ndarray (k, dim)
@@ -116,6 +123,9 @@ class ContactResult:
     tangent: Array | None = None
     primary_points: NDArray[np.int32] = None  # type: ignore[assignment]
     primary_force_vectors: Array = None  # type: ignore[assignment]
+    obstacle_angle: float | None = None
+    torque: float | None = None
+    wear: Array | None = None
 
     def __post_init__(self) -> None:
         if self.middle is None:

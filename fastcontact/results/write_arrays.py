@@ -21,8 +21,10 @@ from fastcontact.results import layout
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.step import ContactResult, StepResult
 
-# Rows of a growing table that are allocated together.
+# Rows of a growing table, and bytes of a growing text, that are allocated together.
 ROWS, BYTES = 64, 4096
+# Small fields of several steps are allocated together, up to this size [bytes].
+SHARED = 4096
 
 
 def write_geometry(file: Any, mesh: Mesh, growing: Sequence[str] = (), material: NDArray[Any] | None = None) -> None:
@@ -139,10 +141,15 @@ def _packed(parent: Any, name: str, values: NDArray[Any]) -> None:
 
 
 def _growing_field(parent: Any, name: str, length: int, width: int) -> None:
-    tail = () if width == 1 else (width,)
+    """Create an empty field; small ones of several steps share a chunk, so that the index of chunks does not outweigh them.
+
+    Only a chunk of a single step is compressed: a compressed chunk moves when more is written to it.
+    """
+    tail, rows = () if width == 1 else (width,), max(length, 1)
+    steps = SHARED // (8 * rows * width)
     parent.create_dataset(
-        name, shape=(0, *tail), maxshape=(None, *tail), chunks=(max(length, 1), *tail), dtype=np.float64,
-        compression="gzip", compression_opts=1,
+        name, shape=(0, *tail), maxshape=(None, *tail), chunks=(max(steps, 1) * rows, *tail), dtype=np.float64,
+        **({} if steps > 1 else {"compression": "gzip", "compression_opts": 1}),
     )  # fmt: skip
 
 
@@ -188,7 +195,7 @@ def append_tables(
     own = file["fastcontact"]
     for name in step.contact:
         if name not in pairs:
-            pairs[name] = _new_pair(own["contact"], name, mesh.dim)
+            pairs[name] = _new_pair(own["contact"], name, mesh.dim, step.contact[name].wear is not None)
     for name, pair in pairs.items():
         _append_contact(pair, number, step.contact.get(name))
     if step.material_stress is not None:
@@ -239,7 +246,7 @@ def header_size(mesh: Mesh) -> int:
 def step_size(mesh: Mesh, step: StepResult) -> int:
     """Return an upper bound for what a step takes in the file, but for its restart state [bytes]."""
     fields = 8 * (sum(layout.POINT_FIELDS.values()) * mesh.n_points + sum(map(np.size, step.cell_fields.values())))
-    row = layout.contact_row(mesh.dim).itemsize
+    row = layout.contact_row(mesh.dim, True).itemsize
     faced = layout.primary_row(mesh.dim).itemsize
     contact = sum(
         (len(pair.points) + 2 * ROWS) * row + (len(pair.primary_points) + 2 * ROWS) * faced + BYTES
@@ -252,10 +259,10 @@ def step_size(mesh: Mesh, step: StepResult) -> int:
     return int(1.01 * fields) + contact + len(as_json([step.iterations, step.warnings]))
 
 
-def _new_pair(parent: Any, name: str, dim: int) -> Any:
+def _new_pair(parent: Any, name: str, dim: int, wears: bool) -> Any:
     pair = parent.create_group(None)  # without a name until it is whole: the program may be interrupted
     pair["name"] = as_json(name)
-    growing_table(pair, "rows", layout.contact_row(dim))
+    growing_table(pair, "rows", layout.contact_row(dim, wears))
     growing_table(pair, "primary", layout.primary_row(dim))
     growing_table(pair, "steps", layout.contact_step(dim))
     parent[str(len(parent))] = pair
@@ -274,6 +281,9 @@ def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> No
         row["dissipation"] = contact.dissipation
         moved = contact.obstacle_displacement
         row["obstacle_displacement"] = np.nan if moved is None else moved
+        for name in {"obstacle_angle", "torque"} & set(row.dtype.names or ()):  # likewise in newer files alone
+            value = getattr(contact, name)
+            row[name] = np.nan if value is None else value
         if "tangent" in (row.dtype.names or ()):  # not in a file of an earlier schema that is resumed
             row["middle"], row["tangent"] = contact.middle, np.nan if contact.tangent is None else contact.tangent
         _extend(pair["rows"], table)

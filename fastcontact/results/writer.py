@@ -1,8 +1,8 @@
 """Write the steps of an analysis to one result file, step by step, so that a crash costs no finished step.
 
-Data are written first, then the rows of the step, the number of steps last, with a flush after each. Uncompressed tables grow
-in place and the fields of each step are chunks of their own, so that nothing of a finished step moves. Room on the disk is
-reserved before, because HDF5 loses the whole file when one of its writes fails.
+Data are written first, then the rows of the step, the number of steps last, with a flush after each. Uncompressed tables and
+small fields grow in place, larger fields are a chunk of their own for each step, so that nothing of a finished step moves.
+Room on the disk is reserved before, because HDF5 loses the whole file when one of its writes fails.
 """
 
 from __future__ import annotations
@@ -30,12 +30,15 @@ from fastcontact.results.committed_file import CommittedFile, uninterrupted
 from fastcontact.results.file_lock import PathLock, left_at, reserve
 from fastcontact.results.reader import Results
 from fastcontact.results.step import StepResult
+from fastcontact.results.stored_steps import StoredSteps
 from fastcontact.results.texts import read_text
 
 # A run that is shorter loses little with the power [s].
 SHORT = 10.0
 # Room for HDF5's own records [bytes].
 MARGIN = 1 << 19
+# Size in the file of the indices that HDF5 keeps in memory [bytes].
+INDICES = 1 << 18
 
 
 class ResultWriter:
@@ -71,8 +74,9 @@ class ResultWriter:
         The file, absolute.
     n_steps : int
         Number of steps in the file.
-    done : list of StepResult
-        The steps that the file held at first, for ``solve(..., resume=out.done)``; none without `resume`.
+    done : sequence of StepResult
+        The steps that the file held at first, each read when it is used, for ``solve(..., resume=out.done)``; none without
+        `resume`.
 
     Raises
     ------
@@ -110,7 +114,7 @@ class ResultWriter:
             mesh = mesh.mesh
         self.path = checked_target(path)
         self.n_steps = 0
-        self.done: list[StepResult] = []
+        self.done: Sequence[StepResult] = []
         self._synchronise, self._started = synchronise, time.monotonic()
         self._cell_fields = _checked_names(cell_fields, mesh)
         self._mesh: Mesh = mesh
@@ -173,6 +177,7 @@ class ResultWriter:
             raise FileError(f"'{self.path}' is closed: write steps before close, or inside the with block")
         layout.check_step(self._mesh, step, self._cell_fields)
         self._check_next(step)
+        self._release_done()
         with self._explained(f"written at step {step.index}"):
             self._open()
             self._check_in_place()
@@ -224,6 +229,7 @@ class ResultWriter:
         if self._file is None and self._ended and "error" not in run:
             self._give_up()  # a complete file stays as it is
             return
+        self._release_done()
         try:
             with self._explained("closed"):
                 self._open()
@@ -243,7 +249,13 @@ class ResultWriter:
 
     def _give_up(self) -> None:
         self._closed = True
+        self._release_done()
         self._lock.release()
+
+    def _release_done(self) -> None:
+        """Close the file for reading, before it changes."""
+        if isinstance(self.done, StoredSteps):
+            self.done.release()
 
     def _open(self) -> None:
         """Open a file that is resumed, once there is something to add to it."""
@@ -255,6 +267,7 @@ class ResultWriter:
             self._committed = CommittedFile(self.path)
             try:
                 self._file = h5py.File(self._committed, "r+")
+                _limit_index_memory(self._file)
             except BaseException:
                 self._committed.close()
                 raise
@@ -333,6 +346,14 @@ class ResultWriter:
         self._open()
 
 
+def _limit_index_memory(file: Any) -> None:
+    """Let HDF5 forget nodes of indices: in memory they take ten times their size in the file, and grow with the steps."""
+    settings = file.id.get_mdc_config()
+    settings.set_initial_size = True
+    settings.initial_size = settings.min_size = settings.max_size = INDICES
+    file.id.set_mdc_config(settings)
+
+
 def _materials_that_meet(model: Any) -> Any:
     """Return the materials of all solid cells (n_solids,) of a model where some meet; None where none do."""
     if not getattr(model, "materials", None) or not hasattr(model, "material_numbers"):
@@ -345,14 +366,15 @@ def _materials_that_meet(model: Any) -> Any:
 
 def _steps_to_resume(
     path: Path, mesh: Mesh, kinematics: str, cell_fields: Sequence[str]
-) -> tuple[list[StepResult], bool, str]:
+) -> tuple[Sequence[StepResult], bool, str]:
     """Return the steps of the file at `path`, if there is one, whether its run came to its end, and its case file.
 
     Raises FileError if its steps cannot be followed by steps of this mesh.
     """
     if not path.exists() or not path.stat().st_size:
         return [], False, ""
-    with Results(path, repeat=True) as old:
+    with contextlib.ExitStack() as closed:
+        old = closed.enter_context(Results(path, repeat=True))
         if not len(old):
             return [], False, ""
         begin_anew = "or start anew without resuming, which replaces the file"
@@ -370,7 +392,9 @@ def _steps_to_resume(
                 f"the steps in '{path}' hold the cell fields {names or 'none'}, not {sorted(cell_fields) or 'none'}: ask "
                 f"for the same ones, {begin_anew}"
             )
-        return list(old), old.complete, old.case_text
+        steps = StoredSteps(old)
+        closed.pop_all()  # the file stays open to read them
+        return steps, old.complete, old.case_text
 
 
 def _case_of(step: StepResult) -> Any:

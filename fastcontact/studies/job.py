@@ -32,7 +32,7 @@ from fastcontact.studies.settings import Combination, Settings
 
 # Keys of contact pairs and obstacles that belong to no formulation.
 KEYS = {
-    *("secondary", "primary", "formulation", "friction", "shape", "motion", "force", "ramp"),
+    *("secondary", "primary", "formulation", "friction", "shape", "motion", "force", "rotation", "ramp"),
     *("file", "group", "flip", "crease"),
 }
 # Raised when the measured numbers or their form in a store change.

@@ -9,9 +9,13 @@ import subprocess
 import sys
 import threading
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass, field
+from itertools import count as count_from
+from itertools import islice
 from pathlib import Path
 
+import fuzz_files
 import fuzz_hdf5
 import fuzz_seeds
 import h5py
@@ -63,6 +67,19 @@ def prepare(folder: Path) -> None:
     with h5py.File(folder / "outside" / fuzz_hdf5.BAIT, "w") as file:
         file["numbers"] = np.arange(1000.0)
         file.create_group("ENS_MAA/bait")
+
+
+def numbers(folder: Path, seed: int, count: int, suffixes: Collection[str] | None = None) -> list[int]:
+    """Return the numbers of the first `count` files, or of those that are made from seeds of the given suffixes."""
+    if suffixes is None:
+        return list(range(count))
+    names = json.loads((folder / "seeds" / "seeds.json").read_text(encoding="utf-8"))
+    seeds = {name: folder / "seeds" / file for name, file in names.items()}
+    known = {path.suffix for path in seeds.values()}
+    if unknown := set(suffixes) - known:
+        raise SystemExit(f"no seed has the format {', '.join(sorted(unknown))}: there are {', '.join(sorted(known))}")
+    wanted = (n for n in count_from() if seeds[fuzz_files.chosen(n, seed, seeds)[1]].suffix in suffixes)
+    return list(islice(wanted, count))
 
 
 def run(numbers: list[int], seed: int, folder: Path, failures: Path | None = None, workers: int = 1) -> Found:

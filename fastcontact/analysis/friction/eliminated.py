@@ -11,15 +11,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, diags_array, vstack
+from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction.cone_newton import EXACT, Forces, newton
 from fastcontact.analysis.friction.coulomb_law import Law
-from fastcontact.analysis.friction.slip_directions import aligning, idle
+from fastcontact.analysis.friction.slip_directions import aligning, compliance_of_rows, idle
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import FrictionTerms, LoadedNonsymmetric
+from fastcontact.linear.sparse_rows import scaled, taken
 from fastcontact.linear.springs import Springs
 
 Array = NDArray[np.float64]
@@ -71,6 +72,8 @@ def solve(
             state = problem.law.state(y, gaps)
         # At least once, for forces and displacement to start from are not in balance.
         y, gaps = problem.step(y, gaps, *state)
+        if not state[0].any():  # what closes was not known: the bodies lie as if there were no contact
+            y, gaps = problem.step(y, gaps, gaps[0] < 0.0, gaps[0] < 0.0)
         exact = max(EXACT, ENOUGH * tolerance)
         found = newton(problem, y, gaps, exact, PATIENCE if steps is None else steps - 1)
         if steps is None and not found.settled:
@@ -104,15 +107,15 @@ class Eliminated:
         self._nodes = np.arange(len(constraints)) if constraints.nodes is None else constraints.nodes
         k, m = len(rows) - 1, len(constraints)
         yielding = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
-        own = _own(rows, yielding)
+        own = compliance_of_rows(rows, yielding)
         self._turn = aligning(own) if k == 2 else None
         if self._turn is not None:
             turned = csr_array(self._turn @ vstack(rows, format="csr"))
             rows = tuple(turned[a * m : (a + 1) * m] for a in range(3))
             free = (self._turn @ free.ravel()).reshape(free.shape)
-            own = _own(rows, yielding)
+            own = compliance_of_rows(rows, yielding)
         still = idle(own)
-        slipping = [csr_array(diags_array(np.where(off, 0.0, 1.0)) @ T) for T, off in zip(rows[1:], still, strict=True)]
+        slipping = [scaled(T, np.where(off, 0.0, 1.0)) for T, off in zip(rows[1:], still, strict=True)]
         self._rows = (rows[0], *slipping)
         self._free = np.vstack([free[0], np.where(still, 0.0, free[1:])])
         self._slips = ~still
@@ -154,7 +157,7 @@ class Eliminated:
         closed = closed & self._usable
         shut = np.flatnonzero(closed)
         equations = (shut, *(np.flatnonzero(closed & sticking & slips) for slips in self._slips))
-        B = csr_array(vstack([R[at] for R, at in zip(self._rows, equations, strict=True)], format="csr"))
+        B = csr_array(vstack([taken(R, at) for R, at in zip(self._rows, equations, strict=True)], format="csr"))
         c = -np.concatenate([free[at] for free, at in zip(self._free, equations, strict=True)])
         sliding = self._sliding(y, gaps, np.flatnonzero(closed & ~sticking & (self.law.mu > 0.0)))
         drag = self._drag(B, shut, sliding) if len(sliding.at) else None
@@ -175,7 +178,7 @@ class Eliminated:
         if len(d) == 1:
             return _Sliding(at, pull)
         across = np.stack([-d[1], d[0]])
-        rows = sum(diags_array(part) @ T[at] for part, T in zip(across, self._rows[1:], strict=True))
+        rows = sum(scaled(taken(T, at), part) for part, T in zip(across, self._rows[1:], strict=True))
         spring = np.minimum(turning / np.maximum(1.0 - turning, 1e-300), STIFFEST) * self._unit[at] ** 2
         return _Sliding(
             at, pull, _Across(across, Springs(csr_array(rows), spring), (across * self._free[1:, at]).sum(axis=0))
@@ -185,9 +188,9 @@ class Eliminated:
         """Return what sliding adds to equations B whose first rows are the gaps of `shut`."""
         pull = np.zeros((len(self._rows) - 1, len(self._usable)))
         pull[:, sliding.at] = sliding.pull
-        through = self._rows[0][shut]
+        through = taken(self._rows[0], shut)
         for T, part in zip(self._rows[1:], pull, strict=True):
-            through = through + diags_array(part[shut]) @ T[shut]
+            through = through + scaled(taken(T, shut), part[shut])
         through = csr_array(vstack([through, B[len(shut) :]], format="csr"))
         if sliding.springs is None:
             return FrictionTerms(through)
@@ -220,9 +223,3 @@ class _Sliding:
             return dragged
         across, springs = self.springs, self.springs.springs
         return np.asarray(dragged - across.along * springs.stiffness * (springs.rows @ u + across.free))
-
-
-def _own(rows: tuple[csr_array, ...], yielding: Array) -> Array:
-    """Return the compliance (1 + k, 1 + k, m) of each constraint if every unknown gave way by itself (n,)."""
-    give = diags_array(yielding)
-    return np.array([[(one @ give).multiply(other).sum(axis=1) for other in rows] for one in rows])

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import block_array, csr_array, diags_array
 
+from fastcontact.analysis.friction import slip_directions_kernels
+
 Array = NDArray[np.float64]
 # A direction of slip in which a constraint gives less than this, relative to its gap, is none.
 IDLE = 1e-10
@@ -19,6 +21,22 @@ def own_compliance(F: Array, parts: int) -> Array:
     m = len(F) // parts
     index = np.arange(parts * m).reshape(parts, m)
     return np.asarray(F[index[:, None], index[None]])
+
+
+def compliance_of_rows(rows: tuple[csr_array, ...], yielding: Array) -> Array:
+    """Return the compliance (parts, parts, m) of each constraint if every unknown gave way by itself.
+
+    Parameters
+    ----------
+    rows : tuple of csr_array (m, n)
+        Of the gaps, and of the slips along each tangent.
+    yielding : ndarray (n,)
+        Compliance of each unknown [length / force].
+    """
+    own = np.empty((len(rows), len(rows), rows[0].shape[0]))
+    parts = tuple(tuple(getattr(R, part) for R in rows) for part in ("indptr", "indices", "data"))
+    slip_directions_kernels.products_of_rows(*parts, yielding, own)
+    return own
 
 
 def aligning(own: Array) -> csr_array | None:

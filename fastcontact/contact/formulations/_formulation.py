@@ -180,7 +180,7 @@ class Formulation(ABC):
         beyond = self.projection_tolerance if tolerance is None else tolerance
         assert self.normals is not None
         assert beyond is not None
-        pairing = pair(candidates.positions(deformed), self.primary, deformed, beyond, self.normals, at.obstacle)
+        pairing = pair(candidates.positions(deformed), self.primary, deformed, beyond, self.normals, at.stance)
         if self.normals != "secondary":
             return pairing
         return opposed(pairing, self._secondary_normals(candidates, deformed))
@@ -199,7 +199,7 @@ class Formulation(ABC):
     ) -> Constraints:
         """Return the constraints of paired candidates, with tangential rows where there is friction."""
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
-        gap0 += self.options.added_gap(candidates, pairing, self.primary, self.points, at.clearance_factor)
+        gap0 += self.added_gap(candidates, pairing, at)
         positions = candidates.positions(self.points)
         if not (self.friction or self.options.tied):
             return Constraints(B, gap0, positions, compliance)
@@ -208,10 +208,26 @@ class Formulation(ABC):
         drift: Array | None = None
         if isinstance(self.primary, RigidSide):
             drift = -np.stack([t @ (at.obstacle - at.obstacle_start) for t in directions])
+            turning = self.turning(candidates, at)
+            if turning is not None:
+                drift -= np.stack([np.einsum("nd,nd->n", t, turning) for t in directions])
         elif self.slip == "symmetric":
             drift = self._closing_slip(candidates, pairing, directions, at)
         friction = self.options.coefficients(self.friction, candidates)
         return Constraints(B, gap0, positions, compliance, along, directions, friction, drift)
+
+    def added_gap(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Array:
+        """Return what clearances and wear add to the gaps (n,) of candidates, zero where nothing is faced [length]."""
+        added = self.options.added_gap(candidates, pairing, self.primary, self.points, at.clearance_factor)
+        if at.worn is None:
+            return added
+        return added + np.where(pairing.paired, np.einsum("nk,nk->n", candidates.shape, at.worn[candidates.nodes]), 0.0)
+
+    def turning(self, candidates: Candidates, at: Configuration) -> Array | None:
+        """Return how far the rotation of an obstacle carries what candidates face (n, dim) [length]; None without any."""
+        assert isinstance(self.primary, RigidSide)
+        now, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
+        return self.primary.turning(now, before, at.stance, at.stance_start)
 
     def supported_along(self, axis: int, candidates: Candidates, pairing: Pairing) -> NDArray[np.bool_]:
         """Return which secondary nodes (n_nodes,) supports keep from slipping along an axis; see `Projection.compliant`."""
@@ -285,7 +301,7 @@ class Formulation(ABC):
         pairing = self.facing(nodes, at, max(self.projection_tolerance or 0.0, ON_SYMMETRY))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
         if with_clearance:
-            gap0 += self.options.added_gap(nodes, pairing, self.primary, self.points, at.clearance_factor)
+            gap0 += self.added_gap(nodes, pairing, at)
         u = at.displacement if displacement is None else displacement
         return np.where(pairing.paired, gap0 + G @ u.ravel(), np.inf), pairing.normal
 

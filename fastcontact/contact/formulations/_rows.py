@@ -1,4 +1,4 @@
-"""Sparse matrices of mortar contact: put together facet by facet, scaled by rows, turned into rows of displacements."""
+"""Sparse matrices of mortar contact: put together facet by facet, turned into rows of displacements."""
 
 from __future__ import annotations
 
@@ -28,14 +28,6 @@ class Entries:
         """Return the sum of all entries."""
         place = np.concatenate(self._rows), np.concatenate(self._columns)
         return csr_array(coo_array((np.concatenate(self._values), place), shape=size))
-
-
-def scaled(matrix: csr_array, factor: Array) -> csr_array:
-    """Return the matrix with its rows times `factor`; rows times zero are empty."""
-    values = matrix.data * np.repeat(factor, np.diff(matrix.indptr))
-    result = csr_array((values, matrix.indices, matrix.indptr), shape=matrix.shape)
-    result.eliminate_zeros()
-    return result
 
 
 def rows_of(mean: csr_array, direction: Array) -> csr_array:

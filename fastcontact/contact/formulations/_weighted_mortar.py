@@ -27,13 +27,14 @@ from fastcontact.contact.formulations._cut_lines import line_overlap
 from fastcontact.contact.formulations._dual_basis import COVERED, dual_functions, positive
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap
-from fastcontact.contact.formulations._rows import Entries, rows_of, scaled
+from fastcontact.contact.formulations._rows import Entries, rows_of
 from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
 from fastcontact.contact.pairing import Candidates, tangents_by_axes
 from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
+from fastcontact.linear.sparse_rows import scaled
 from fastcontact.mesh import elements
 
 Array = NDArray[np.float64]
@@ -111,6 +112,8 @@ class WeightedMortar(Formulation):
         normal = self._mean_normals(overlap, deformed)
         B = rows_of(mean, normal)
         gap0 = B @ self.points.ravel() + at.clearance_factor * self._clearance(own, across, weight)
+        if at.worn is not None:
+            gap0 += own @ at.worn / weight
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
         part = Constraints(B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=self._nodal(weight))
         if not (self.friction or self.options.tied):
@@ -190,6 +193,8 @@ class WeightedMortar(Formulation):
         """Return rows (m, n_dofs) of the slip along a tangent (m, dim); none where supports hold most of it."""
         supported = np.stack([self._supported(axis) for axis in range(direction.shape[1])], axis=1)
         free = np.einsum("md,md->m", direction**2, ~supported) >= FREE
+        if all(motion is sliding[0] for motion in sliding):
+            return rows_of(sliding[0], np.where(free[:, None], direction, 0.0))
         rows: csr_array | None = None
         for axis, motion in enumerate(sliding):
             component = np.zeros_like(direction)

@@ -2,34 +2,80 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.contact.obstacles import Obstacle
+from fastcontact.contact.obstacles.rotation import Rotation
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
+class Stance:
+    """Where a rigid obstacle stands.
+
+    Attributes
+    ----------
+    displacement : ndarray (dim,)
+        [length].
+    angle : float
+        By which it has turned [radian].
+    """
+
+    displacement: Array
+    angle: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
 class RigidSide:
-    """A rigid obstacle that may move; where it stands is part of the configuration."""
+    """A rigid obstacle that may move and turn; where it stands is part of the configuration."""
 
     obstacle: Obstacle  # where it stands at rest
     motion: Array  # (dim,): its displacement where the multiplier of its history is 1 [length]
+    rotation: Rotation | None = None
 
     @property
     def points(self) -> NDArray[np.int32]:
         """The nodes of the side (0,): none."""
         return np.empty(0, np.int32)
 
-    def facing(self, positions: Array, displacement: Array) -> tuple[Array, Array, NDArray[np.bool_], Array]:
-        """Return (gap, normal, paired, offset) of points at `positions` (n, dim), the obstacle displaced (dim,) [length].
+    def facing(self, positions: Array, at: Stance) -> tuple[Array, Array, NDArray[np.bool_], Array]:
+        """Return (gap, normal, paired, offset) of points at `positions` (n, dim) [length].
 
         Near there the gap is ``offset + normal . x``.
         """
-        gap, normal = self.obstacle.distance(positions - displacement)
+        local = positions - at.displacement
+        if self.rotation is None or at.angle == 0.0:
+            gap, normal = self.obstacle.distance(local)
+        else:
+            turned, centre = self.rotation.matrix(at.angle), np.array(self.rotation.centre)
+            gap, normal = self.obstacle.distance((local - centre) @ turned + centre)
+            normal = normal @ turned.T
         paired = np.isfinite(gap)
         offset = np.where(paired, gap, 0.0) - np.einsum("nd,nd->n", normal, positions)
         return gap, normal, paired, offset
+
+    def turning(self, positions: Array, before: Array, now: Stance, then: Stance) -> Array | None:
+        """Return how far the rotation alone carries points of the obstacle's surface (n, dim) [length]; None without any.
+
+        What faces the surface at `positions` (n, dim) [length] and was at `before` has slid over it by its own displacement
+        less that of the obstacle and less this. The slip is the change of place on the obstacle, seen from halfway through
+        the turn and as long as the arc: zero where a point sticks, and along the circle where it stands still in space.
+        """
+        angle = now.angle - then.angle
+        if self.rotation is None or angle == 0.0:
+            return None
+        half, centre = self.rotation.matrix(0.5 * angle), np.array(self.rotation.centre)
+        end, start = positions - centre - now.displacement, before - centre - then.displacement
+        slip = (end @ half - start @ half.T) * (0.5 * angle / math.sin(0.5 * angle))
+        return np.asarray((end - start) - slip)
+
+    def torque(self, positions: Array, forces: Array, at: Stance) -> float | None:
+        """Return the moment about the axis of the obstacle of `forces` (n, dim) [force] at `positions` [length]."""
+        if self.rotation is None:
+            return None
+        return self.rotation.torque(positions - at.displacement - np.array(self.rotation.centre), forces)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
-from scipy.sparse import bsr_array, csc_array, csr_array
+from scipy.sparse import bsr_array, csc_array
 
 from fastcontact.linear.multigrid.matrix import BlockMatrix, diagonal_blocks
 
@@ -30,13 +30,6 @@ class LocalChange:
 
     nodes: Nodes
     blocks: bsr_array
-
-    @classmethod
-    def of(cls, nodes: Nodes, matrix: Any, size: int) -> LocalChange:
-        """Return the change by a sparse `matrix` on the unknowns of `nodes`."""
-        blocks = bsr_array(matrix.tobsr((size, size)))
-        blocks.sort_indices()
-        return cls(nodes, blocks)
 
     @classmethod
     def of_diagonal(cls, nodes: Nodes, blocks: Array) -> LocalChange:
@@ -83,24 +76,14 @@ class LocalChange:
         return bsr_array((self.blocks.data, place[self.blocks.indices], np.r_[0, np.cumsum(count)]), shape=(n, n))
 
 
-def merged(one: LocalChange, other: LocalChange | None) -> LocalChange:
-    """Return the sum of two changes."""
-    if other is None:
-        return one
-    nodes = np.union1d(one.nodes, other.nodes)
-    total = bsr_array(one.spread(nodes) + other.spread(nodes))
-    total.sort_indices()
-    return LocalChange(nodes, total)
-
-
-def places(columns: Any, nodes: Nodes, size: int) -> Any:
-    """Return the numbers of `columns` where only those of `nodes`, ascending, are counted."""
-    return np.searchsorted(nodes, columns // size) * size + columns % size
-
-
-def renumbered(M: csr_array, nodes: Nodes, size: int) -> csr_array:
-    """Return a matrix with columns of `nodes` alone."""
-    return csr_array((M.data, places(M.indices, nodes, size), M.indptr), shape=(M.shape[0], len(nodes) * size))
+def merged(one: LocalChange, *others: LocalChange) -> LocalChange:
+    """Return the sum of changes."""
+    for other in others:
+        nodes = np.union1d(one.nodes, other.nodes)
+        total = bsr_array(one.spread(nodes) + other.spread(nodes))
+        total.sort_indices()
+        one = LocalChange(nodes, total)
+    return one
 
 
 def block_rows(A: BlockMatrix, nodes: Nodes, n: int) -> bsr_array:

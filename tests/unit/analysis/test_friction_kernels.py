@@ -4,8 +4,10 @@ import itertools
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 from fastcontact.analysis.friction import lemke_kernels, sweep_kernels
+from fastcontact.analysis.friction.slip_directions import compliance_of_rows
 
 
 def swept_once(F, free, mu, y):
@@ -69,3 +71,12 @@ def test_pivots_are_counted():
     needed = lemke_kernels.pivot(A @ A.T + np.eye(n), -np.ones(n), z, 1000)
     assert needed > 1
     assert lemke_kernels.pivot(A @ A.T + np.eye(n), -np.ones(n), z, needed - 1) < 0
+
+
+def test_compliance_of_rows_against_dense_products():
+    rng = np.random.default_rng(11)
+    rows = tuple(csr_array(rng.normal(size=(8, 30)) * (rng.random((8, 30)) < 0.3)) for _ in range(3))
+    yielding = rng.random(30)
+    stack = np.stack([R.toarray() for R in rows])
+    expected = np.einsum("ain,n,bin->abi", stack, yielding, stack)
+    assert compliance_of_rows(rows, yielding) == pytest.approx(expected)

@@ -20,7 +20,7 @@ import pytest
 from test_result_files import MESH, assert_same, step_result
 
 from fastcontact import FileError, ResultWriter, open_results
-from fastcontact.results import committed_file
+from fastcontact.results import committed_file, write_arrays
 from fastcontact.results.committed_file import uninterrupted
 
 
@@ -60,14 +60,15 @@ def write_until(path: Path, fail: Callable[[], list[int]]) -> list[int]:
     return calls
 
 
+@pytest.mark.parametrize("shared", [write_arrays.SHARED, 0], ids=["steps share a chunk", "a chunk a step"])
 @pytest.mark.parametrize("error", [OSError(errno.EIO, "Input/output error"), KeyboardInterrupt()], ids=["disk", "user"])
-def test_any_write_may_fail(error: BaseException, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_any_write_may_fail(error: BaseException, shared: int, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """HDF5, which does not take exceptions well, never sees one."""
-    calls = write_until(path, lambda: failing_after(10**9, error, monkeypatch, "_put"))
-    total, lengths = len(calls), set()
-    assert total > 80
-    monkeypatch.undo()
-    for count in range(0, total, 5):
+    monkeypatch.setattr(write_arrays, "SHARED", shared)
+    with monkeypatch.context() as patch:
+        total, lengths = len(write_until(path, lambda: failing_after(10**9, error, patch, "_put"))), set()
+    assert total > 60
+    for count in range(0, total, 4):
         with monkeypatch.context() as patch:
             refused = pytest.raises(FileError if isinstance(error, OSError) else type(error))
             with refused as caught:
@@ -118,11 +119,13 @@ def test_failing_reads_are_told_and_nothing_is_written_any_more(path: Path) -> N
     assert_holds(path, 1)
 
 
-def test_a_writer_that_failed_does_not_write_again(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("count", [0, 1, 5, 12])
+def test_a_writer_that_failed_does_not_write_again(count: int, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whichever write fails: among the first ones is the head of the file, by which other writers are noticed."""
     out = ResultWriter(path, MESH)
     out.write(step_result(0))
     with monkeypatch.context() as patch:
-        failing_after(5, OSError(errno.ENOSPC, "No space left on device"), patch, "_put")
+        failing_after(count, OSError(errno.ENOSPC, "No space left on device"), patch, "_put")
         with pytest.raises(FileError, match=r"written at step 2 \(No space left on device\), 1 steps are complete"):
             out.write(step_result(1))
     with pytest.raises(FileError, match=r"written at step 2 \(No space left on device\), 1 steps are complete"):

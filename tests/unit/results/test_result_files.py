@@ -21,7 +21,7 @@ from fastcontact import topology
 from fastcontact.errors import FileError, ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results import write_arrays
+from fastcontact.results import layout, write_arrays
 from fastcontact.results.reader import open_results
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.writer import ResultWriter
@@ -751,7 +751,20 @@ def test_the_file_is_what_the_standard_says(path: Path) -> None:
         assert steps["PointDataOffsets/group_TOP"][()].tolist() == [0, 0, 0]
         assert steps["CellOffsets"][()].tolist() == [[0], [0], [0]]
         stress = root["PointData/stress"]
-        assert (stress.compression, stress.compression_opts, stress.chunks) == ("gzip", 1, (n, 6))
-        assert not stress.shuffle
+        assert (stress.compression, stress.chunks) == (None, (3 * n, 6))  # small: three steps in 4 kB
         assert set(steps["PointDataOffsets"]) == set(root["PointData"])
         assert set(steps["CellDataOffsets"]) == set(root["CellData"])
+
+
+def test_larger_fields_are_compressed_step_by_step(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(write_arrays, "SHARED", 2 * 8 * MESH.n_points - 1)
+    write(path, 3)
+    with h5py.File(path) as file:
+        for name, width in layout.POINT_FIELDS.items():
+            field = file["VTKHDF/PointData"][name]
+            assert (field.compression, field.compression_opts) == ("gzip", 1)
+            assert field.chunks == (MESH.n_points, *[width] * (width > 1))
+            assert not field.shuffle
+    with open_results(path) as results:
+        for number, step in enumerate(results):
+            assert_same(step, step_result(number), f"step {number}")

@@ -1,0 +1,26 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Products of the rows of constraints with each other."""
+
+import numpy as np
+
+from fastcontact._jit.decorators import kernel
+
+
+@kernel
+def products_of_rows(indptr, indices, data, weights, out):
+    """Fill `out` (parts, parts, m) with ``sum_j w_j R_a[i, j] R_b[i, j]`` for all rows i of matrices R_a and R_b (m, n).
+
+    The matrices come as tuples of compressed rows, `weights` are w (n,).
+    """
+    own = np.zeros(weights.shape[0])
+    for a in range(len(indptr)):
+        for i in range(out.shape[2]):
+            for e in range(indptr[a][i], indptr[a][i + 1]):
+                own[indices[a][e]] = data[a][e] * weights[indices[a][e]]
+            for b in range(a, len(indptr)):
+                s = 0.0
+                for e in range(indptr[b][i], indptr[b][i + 1]):
+                    s += own[indices[b][e]] * data[b][e]
+                out[a, b, i] = out[b, a, i] = s
+            for e in range(indptr[a][i], indptr[a][i + 1]):
+                own[indices[a][e]] = 0.0

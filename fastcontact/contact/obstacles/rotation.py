@@ -1,0 +1,50 @@
+"""The rotation of a rigid obstacle: about which axis, and what it does to positions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """A rotation by any angle about an axis that moves along with the obstacle.
+
+    Attributes
+    ----------
+    centre : tuple of float (dim,)
+        A point of the axis before any motion [length].
+    axis : tuple of float (3,)
+        Direction of the axis, of any length [-]; (0, 0, 1) in the plane.
+    angle : float
+        At multiplier 1, by the right-hand rule [radian].
+    """
+
+    centre: tuple[float, ...]
+    axis: tuple[float, float, float]
+    angle: float
+
+    @cached_property
+    def direction(self) -> Array:
+        """Unit vector (3,) along the axis."""
+        return np.asarray(np.array(self.axis) / np.linalg.norm(self.axis))
+
+    def matrix(self, angle: float) -> Array:
+        """Return the matrix (dim, dim) that turns vectors by `angle` [radian] (Rodrigues' formula)."""
+        x, y, z = self.direction
+        across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        turned = np.eye(3) + math.sin(angle) * across + (1.0 - math.cos(angle)) * (across @ across)
+        dim = len(self.centre)
+        return turned[:dim, :dim]
+
+    def torque(self, arms: Array, forces: Array) -> float:
+        """Return the moment about the axis of `forces` (n, dim) [force] at `arms` (n, dim) from its point [length]."""
+        if arms.shape[1] == 2:
+            return float((arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]).sum())
+        return float(np.cross(arms, forces).sum(axis=0) @ self.direction)

@@ -1,0 +1,129 @@
+"""A symmetric change of a matrix that few rows give, ``D.T G + G.T D``, and its Galerkin product.
+
+Equations say ``u = u + D u`` at their pivots, with rows D of weights less one. They turn A into ``T.T A T``, which changes
+it by ``D.T G + G.T D`` with ``G = A[pivots] + A[pivots][:, pivots] D / 2``. Springs along rows R change it by ``R.T S R``,
+which has the same form.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import bsr_array, csc_array, csr_array
+
+from fastcontact.linear.elimination.elimination import Elimination
+from fastcontact.linear.multigrid import symmetric_change_kernels
+from fastcontact.linear.multigrid.local_change import LocalChange
+from fastcontact.linear.multigrid.matrix import BlockMatrix
+from fastcontact.linear.sparse_rows import scaled
+from fastcontact.linear.springs import Springs
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class SymmetricChange:
+    """The change ``D.T G + G.T D`` of a matrix (n, n).
+
+    Attributes
+    ----------
+    D, G : csr_array (m, n)
+    size : int
+        Unknowns of a node.
+    """
+
+    D: csr_array
+    G: csr_array
+    size: int
+
+    @classmethod
+    def of_equations(cls, A: BlockMatrix, elimination: Elimination) -> SymmetricChange:
+        """Return ``T.T A T - A`` for a symmetric A (n, n), where eliminated equations say ``u = T u``."""
+        pivots, m, size = elimination.pivots, len(elimination.pivots), len(A.rows)
+        shape = elimination.weights.shape
+        D = csr_array(elimination.weights + csr_array((np.full(m, -1.0), pivots, np.arange(m + 1)), shape=shape))
+        number, count = np.full(shape[1], -1, np.int32), np.empty(m, np.int32)
+        number[pivots] = np.arange(m)
+        of_A = A.indptr, A.indices, A.exact, size
+        symmetric_change_kernels.count_stiffness_rows(pivots, number, D.indptr, D.indices, *of_A, count)
+        low = _pointers(count)
+        columns, values = np.empty(low[-1], np.int32), np.empty(low[-1])
+        symmetric_change_kernels.stiffness_rows(
+            pivots, number, D.indptr, D.indices, D.data, *of_A, low, columns, values
+        )
+        return cls(D, csr_array((values, columns, low), shape=shape), size)
+
+    @classmethod
+    def of_springs(cls, springs: Springs, size: int) -> SymmetricChange:
+        """Return the matrix of springs."""
+        return cls(springs.rows, scaled(springs.rows, 0.5 * springs.stiffness), size)
+
+    def diagonal(self) -> LocalChange:
+        """Return its diagonal blocks."""
+        D, G, size = self.D, self.G, self.size
+        nodes = np.unique(D.indices // size)
+        place = np.full(D.shape[1] // size, -1, np.int32)
+        place[nodes] = np.arange(len(nodes))
+        blocks = np.zeros(len(nodes) * size * size)
+        symmetric_change_kernels.diagonal(D.indptr, D.indices, D.data, G.indptr, G.indices, G.data, place, size, blocks)
+        return LocalChange.of_diagonal(nodes, blocks.reshape(-1, size, size))
+
+    def on_finest(self) -> csc_array:
+        """Return the change itself (n, n)."""
+        half = csr_array(self.D.T @ self.G)
+        return csc_array(half + half.T)
+
+    def on_coarse(self, P: BlockMatrix) -> LocalChange:
+        """Return its Galerkin product ``P.T (D.T G + G.T D) P``."""
+        E, H = _restricted(self.D, P), _restricted(self.G, P)
+        return _symmetric_product(E, H, P.cols)
+
+
+@dataclass(frozen=True, eq=False)
+class _Restricted:
+    """Rows of blocks: coarse nodes and, for each, as many numbers as it has unknowns."""
+
+    indptr: Indices
+    nodes: Indices
+    numbers: Array
+
+
+def _restricted(rows: csr_array, P: BlockMatrix) -> _Restricted:
+    """Return ``rows @ P``."""
+    size, n_coarse, count = len(P.rows), int(P.indices.max()) + 1, np.empty(rows.shape[0], np.int32)
+    through = P.indptr, P.indices
+    symmetric_change_kernels.count_restricted(rows.indptr, rows.indices, *through, size, n_coarse, count)
+    low = _pointers(count)
+    nodes, numbers = np.empty(low[-1], np.int32), np.zeros(int(low[-1]) * len(P.cols))
+    symmetric_change_kernels.restrict(
+        rows.indptr, rows.indices, rows.data, *through, P.data, size, n_coarse, low, nodes, numbers, P.cols
+    )
+    return _Restricted(low, nodes, numbers)
+
+
+def _symmetric_product(E: _Restricted, H: _Restricted, cols: tuple[int, ...]) -> LocalChange:
+    """Return ``E.T H + H.T E`` on the nodes that they reach."""
+    nodes = np.unique(np.concatenate([E.nodes, H.nodes]))
+    place = np.empty(nodes[-1] + 1, np.int32)
+    place[nodes] = np.arange(len(nodes))
+    k, size, slots = len(nodes), len(cols), np.arange(len(E.nodes), dtype=np.int32)
+    by_column = csr_array((slots, place[E.nodes], E.indptr), shape=(len(E.indptr) - 1, k)).tocsc()
+    rows, found = (by_column.indptr, by_column.indices), (H.indptr, place[H.nodes])
+    count = np.empty(k, np.int32)
+    symmetric_change_kernels.count_products(*rows, *found, k, count)
+    into = _pointers(count)
+    columns, blocks = np.empty(into[-1], np.int32), np.zeros(int(into[-1]) * size * size)
+    symmetric_change_kernels.products(
+        *rows, by_column.data, E.numbers, *found, H.numbers, k, into, columns, blocks, cols
+    )
+    half = bsr_array((blocks.reshape(-1, size, size), columns, into), shape=(k * size, k * size))
+    total = bsr_array(half + half.T)
+    total.sort_indices()
+    return LocalChange(nodes, total)
+
+
+def _pointers(count: Indices) -> Indices:
+    return np.concatenate([[0], np.cumsum(count)]).astype(np.int32)

@@ -1,0 +1,79 @@
+"""The rotation of a rigid obstacle as a user gives it: checked, with its history."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from fastcontact.contact.obstacles.rotation import Rotation
+from fastcontact.elasticity.loads import check_number
+from fastcontact.errors import ModelError, unknown
+from fastcontact.model.contact_pair import ContactPair
+from fastcontact.model.ramp import Ramp, Table, multiplier, table_of
+
+KEYS = ("angle", "centre", "axis", "ramp")
+# What slides may turn so far in a step [radian]: its path is then the arc that a point of the surface makes.
+LARGEST_TURN = 1.0
+
+
+def rotation_of(name: str, given: Mapping[str, Any], kinematics: str) -> tuple[Rotation, Table | None]:
+    """Return the rotation of obstacle `name` and its history, None for that of the motion; ModelError if they are wrong."""
+    what = f"the rotation of obstacle '{name}'"
+    for key in given:
+        if key not in KEYS:
+            raise ModelError(unknown(f"key of {what}", key, KEYS))
+    if kinematics == "axisymmetric":
+        raise ModelError(
+            f"{what}: an axisymmetric model has no displacement round its axis, and tilting is not axisymmetric: make a "
+            "model in three dimensions"
+        )
+    dim = 3 if kinematics == "3d" else 2
+    for key in ("angle", "centre", "axis")[:dim]:
+        if key not in given:
+            raise ModelError(f"{what} needs '{key}'")
+    if dim == 2 and given.get("axis") is not None:
+        raise ModelError(f"{what}: in the plane it is about z, counter-clockwise: leave out the axis")
+    check_number(f"the angle of {what}", given["angle"])
+    axis = _vector(f"the axis of {what}", given["axis"], 3) if dim == 3 else (0.0, 0.0, 1.0)
+    if not any(axis):
+        raise ModelError(f"the axis of {what} has no length")
+    rotation = Rotation(_vector(f"the centre of {what}", given["centre"], dim), axis, float(given["angle"]))  # type: ignore[arg-type]
+    return rotation, table_of(given.get("ramp"), f"the ramp of {what}")
+
+
+def _vector(name: str, values: Sequence[float], size: int) -> tuple[float, ...]:
+    try:
+        vector = np.asarray(values, float)
+    except (TypeError, ValueError):
+        vector = np.empty(0)
+    if vector.shape != (size,) or not np.isfinite(vector).all():
+        raise ModelError(f"{name} must be {size} finite numbers, not {values!r}")
+    return tuple(vector.tolist())
+
+
+def angle_at(pair: ContactPair, ramp: Ramp, instant: float) -> float:
+    """Return by how much the obstacle of a pair has turned at an instant [radian]."""
+    if pair.rotation is None:
+        return 0.0
+    own = pair.ramp if pair.rotation_ramp is None else pair.rotation_ramp
+    return multiplier(own, ramp, instant) * pair.rotation.angle
+
+
+def check_turns(pairs: Iterable[ContactPair], ramp: Ramp) -> None:
+    """Raise ModelError if an obstacle with friction turns so far in a load step that the path of sliding is not known."""
+    for pair in pairs:
+        if pair.rotation is None or not pair.options.get("friction"):
+            continue
+        before = 0.0
+        for instant in ramp.instants:
+            angle = angle_at(pair, ramp, instant)
+            turn = abs(angle - before)
+            if turn > LARGEST_TURN:
+                raise ModelError(
+                    f"obstacle '{pair.name}' turns by {turn:.3g} radian in the step to {instant:g}, more than "
+                    f"{LARGEST_TURN:g}: with friction take at least {math.ceil(turn / LARGEST_TURN)} steps instead"
+                )
+            before = angle

@@ -1,0 +1,51 @@
+"""The steps of a result file that is resumed: read one by one, so that a long run is resumed in the memory of a short one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import overload
+
+from fastcontact.results.reader import Results
+from fastcontact.results.step import StepResult
+
+
+class StoredSteps(Sequence[StepResult]):
+    """The steps that a file held when it was opened, each read when it is used; the last one, with its `restart`, is kept.
+
+    Whoever changes the file calls `release` before: what HDF5 knows of an open file is not renewed. It is opened again when
+    a step is used.
+    """
+
+    def __init__(self, results: Results) -> None:
+        self._path: Path = results.path
+        self._results: Results | None = results
+        self._count = len(results)
+        self._last = results[-1]
+
+    def release(self) -> None:
+        """Close the file; a second call does nothing."""
+        if self._results is not None:
+            self._results.close()
+            self._results = None
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, number: int) -> StepResult: ...
+    @overload
+    def __getitem__(self, number: slice) -> list[StepResult]: ...
+    def __getitem__(self, number: int | slice) -> StepResult | list[StepResult]:
+        """Return a step by its position, from 0, or from the end if negative; a slice gives a list of steps."""
+        if isinstance(number, slice):
+            return [self[position] for position in range(*number.indices(self._count))]
+        position = range(self._count)[number]
+        if position == self._count - 1:
+            return self._last
+        if self._results is None:
+            self._results = Results(self._path)
+        return self._results[position]
+
+    def __repr__(self) -> str:
+        return f"StoredSteps('{self._path}': {self._count} steps)"

@@ -1,0 +1,85 @@
+"""Many small steps in one file: what one more of them costs does not grow with those that are there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from test_result_files import MESH, assert_same, nth_step
+
+from fastcontact import ResultWriter, open_results
+from fastcontact.results import reader, write_arrays, writer
+from fastcontact.results.committed_file import CommittedFile
+
+
+@pytest.mark.parametrize("synchronise", [False, True])
+def test_a_step_writes_what_it_adds_and_little_more(
+    synchronise: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A part of a table or an index that changes is not written as a whole."""
+    written: list[int] = []
+    ends: list[int] = []
+    put = CommittedFile._put
+
+    def counted(self: CommittedFile, place: int, data: bytes) -> None:
+        written[-1] += len(data)
+        put(self, place, data)
+
+    monkeypatch.setattr(CommittedFile, "_put", counted)
+    with ResultWriter(tmp_path / "run.vtkhdf", MESH, synchronise=synchronise) as out:
+        for number in range(240):
+            written.append(0)
+            out.write(nth_step(number))
+            ends.append(out._committed.end)
+        written.append(0)
+    added = (ends[239] - ends[79]) / 160
+    early, late = sum(written[80:160]) / 80, sum(written[160:240]) / 80
+    assert late < (4.0 if synchronise else 2.5) * added  # synchronised, changes go to the journal, too
+    assert late < 1.1 * early
+
+
+@pytest.mark.parametrize("shared", [write_arrays.SHARED, 0])
+def test_indices_do_not_gather_in_memory(shared: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However little HDF5 may keep, the file holds every step."""
+    monkeypatch.setattr(write_arrays, "SHARED", shared)
+    monkeypatch.setattr(writer, "INDICES", 1 << 13)
+    path, kept = tmp_path / "run.vtkhdf", []
+    with ResultWriter(path, MESH) as out:
+        for number in range(150):
+            out.write(nth_step(number))
+            kept.append(out._file.id.get_mdc_size()[2])
+    assert max(kept[100:]) <= max(kept[:50])
+    with open_results(path) as results:
+        assert len(results) == 150
+        for number, step in enumerate(results):
+            assert_same(step, nth_step(number), f"step {number}")
+
+
+def test_a_resumed_file_is_read_step_by_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A long run of a large model is resumed in the memory of its last step; the others are there when they are asked for."""
+    path, read = tmp_path / "run.vtkhdf", []
+    with ResultWriter(path, MESH) as out:
+        for number in range(6):
+            out.write(nth_step(number))
+    ordinary = reader.Results._read_step
+
+    def noting(self: reader.Results, number: int) -> object:
+        read.append(number)
+        return ordinary(self, number)
+
+    monkeypatch.setattr(reader.Results, "_read_step", noting)
+    with ResultWriter(path, MESH, resume=True) as out:
+        assert (len(out.done), read) == (6, [5])
+        assert repr(out.done).endswith("6 steps)")
+        assert_same(out.done[-1], nth_step(5), "last")
+        assert_same(out.done[-6], nth_step(0), "first")
+        assert [step.index for step in out.done] == [1, 2, 3, 4, 5, 6]
+        for number in range(6, 80):  # the file changes, the index of its fields gets another level
+            out.write(nth_step(number))
+        for number, step in enumerate(out.done):
+            assert_same(step, nth_step(number), f"step {number}")
+        assert [step.index for step in out.done[1:3]] == [2, 3]
+        with pytest.raises(IndexError):
+            out.done[6]
+    with open_results(path) as results:
+        assert len(results) == 80

@@ -1,0 +1,256 @@
+"""One period or one sector for the whole: against the whole, against Lame, against Westergaard's wavy surface."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.analysis.problem import prepare
+from fastcontact.analysis.seam_warnings import seam_warnings
+from fastcontact.cases.case import read_case
+from fastcontact.mesh.generate import block, box, merge_points, renamed, union
+
+INNER, OUTER, E, NU = 1.0, 2.0, 1000.0, 0.3
+
+
+def turn(angle):
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def sector(sectors, divisions=(8, 6), element="quad8"):
+    """A sector of a ring with ends that are no rays: they wind by 0.4 radian from the inside to the outside.
+
+    Groups BOTTOM (inside), TOP (outside), LEFT and RIGHT (ends).
+    """
+    mesh = block((1.0, 1.0), divisions, element)
+    s, t = mesh.points.T
+    radius, angle = INNER + (OUTER - INNER) * t, -2.0 * np.pi / sectors * s + 0.4 * t
+    return mesh.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
+
+
+def moved(mesh, Q, shift=0.0):
+    return mesh.replace(points=mesh.points @ Q.T + shift)
+
+
+def whole(part, sectors):
+    """All sectors in one mesh, with the groups of the sides of all."""
+    parts = []
+    for k in range(sectors):
+        Q = np.eye(part.dim)
+        Q[:2, :2] = turn(2.0 * np.pi * k / sectors)
+        parts.append(renamed(moved(part, Q), {name: f"{name} {k}" for name in part.group_names}))
+    return merge_points(union(*parts), 1e-9)
+
+
+def loaded(model, names):
+    """Pressure and shear inside, both of them not uniform over a sector; the outside is held."""
+    for k, (inside, outside) in enumerate(names):
+        back = turn(2.0 * np.pi * k / len(names))
+
+        def along(component, back=back):
+            def traction(x):
+                local = x @ back
+                normal = local / np.linalg.norm(local, axis=1)[:, None]
+                own = 5.0 * normal * (1.0 + local[:, [1]]) + 3.0 * normal[:, ::-1] * [-1.0, 1.0]
+                return (own @ back.T)[:, component]
+
+            return traction
+
+        model.add_traction(inside, x=along(0), y=along(1))
+        model.fix(outside, "xy")
+
+
+def ring(mesh, kinematics="plane_strain"):
+    model = fc.Model(mesh, kinematics)
+    model.add_material(fc.LinearElastic(E=E, nu=NU, density=2.0))
+    return model
+
+
+@pytest.mark.parametrize(("sectors", "swapped"), [(2, False), (5, False), (5, True), (12, False)])
+def test_a_sector_is_a_part_of_the_whole_ring(sectors, swapped):
+    part = sector(sectors)
+    one = ring(part)
+    loaded(one, [("BOTTOM", "TOP")])
+    one.add_cyclic_symmetry(*(("RIGHT", "LEFT") if swapped else ("LEFT", "RIGHT")), sectors=sectors)
+    all_of_it = ring(whole(part, sectors))
+    loaded(all_of_it, [(f"BOTTOM {k}", f"TOP {k}") for k in range(sectors)])
+    alone, together = (fc.solve(model, 1)[-1] for model in (one, all_of_it))
+    first = all_of_it.mesh.points_of("BLOCK 0")
+    place = np.linalg.norm(all_of_it.mesh.points[first][:, None] - part.points[None], axis=2).argmin(axis=1)
+    scale = np.abs(together.displacement).max()
+    assert alone.displacement[place] == pytest.approx(together.displacement[first], abs=1e-9 * scale)
+    assert np.abs(alone.displacement).max() > 1e-3
+
+
+@pytest.mark.parametrize(("element", "error"), [("quad4", 1e-2), ("quad8", 1e-4)])
+def test_a_sector_under_pressure_moves_as_lame_says(element, error):
+    """With the sector's nodes on curved ends, tied alone: nothing else makes it a ring."""
+    model = ring(sector(7, (6, 12), element))
+    model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=7)
+    model.add_pressure("BOTTOM", 10.0)
+    nodes = model.mesh.points_of("BOTTOM")
+    tangent = np.column_stack([-model.mesh.points[nodes[0], 1], model.mesh.points[nodes[0], 0]])[0]
+    model.relate([(int(nodes[0]), "x", float(tangent[0])), (int(nodes[0]), "y", float(tangent[1]))])
+    step = fc.solve(model, 1)[-1]
+    radius = np.linalg.norm(model.mesh.points, axis=1)
+    pushed = np.einsum("nd,nd->n", step.displacement, model.mesh.points) / radius
+    k = 10.0 * INNER**2 / (OUTER**2 - INNER**2)
+    lame = (1.0 + NU) / E * k * ((1.0 - 2.0 * NU) * radius + OUTER**2 / radius)
+    assert np.abs(pushed / lame - 1.0).max() < error
+
+
+def test_a_spinning_sector_in_space_reaches_the_axis():
+    """A quarter of a square bar about an axis that the ends share; centrifugal forces, a slanting axis, and the whole bar."""
+    part = box((1.0, 1.0, 2.0), (2, 2, 3), "hex8")
+    axis = np.array([2.0, -1.0, 2.0]) / 3.0
+    Q = np.column_stack([[1.0, 2.0, 0.0] / np.sqrt(5.0), np.cross(axis, [1.0, 2.0, 0.0] / np.sqrt(5.0)), axis])
+    shift = np.array([3.0, 1.0, -2.0])
+    one = ring(moved(part, Q, shift), "3d")
+    one.add_cyclic_symmetry("YMIN", "XMIN", sectors=4, origin=shift.tolist(), direction=(4.0, -2.0, 4.0))
+    all_of_it = ring(moved(whole(part, 4), Q, shift), "3d")
+    for model, bottoms in ((one, ["ZMIN"]), (all_of_it, [f"ZMIN {k}" for k in range(4)])):
+        model.add_centrifugal(3.0, origin=shift.tolist(), direction=axis.tolist())
+        for bottom in bottoms:
+            model.fix(bottom, "xyz")
+    alone, together = (fc.solve(model, 1)[-1] for model in (one, all_of_it))
+    first = all_of_it.mesh.points_of("BOX 0")
+    place = np.linalg.norm(all_of_it.mesh.points[first][:, None] - one.mesh.points[None], axis=2).argmin(axis=1)
+    scale = np.abs(together.displacement).max()
+    assert scale > 1e-3
+    assert alone.displacement[place] == pytest.approx(together.displacement[first], abs=1e-9 * scale)
+
+
+def test_a_sector_that_nothing_stops_from_turning_is_refused():
+    model = ring(sector(6))
+    model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=6)
+    model.add_pressure("BOTTOM", 1.0)
+    with pytest.raises(fc.ModelError, match=r"1 rigid-body motion is not supported: body 'BLOCK': .*rotation"):
+        fc.solve(model, 1)
+
+
+def wavy(begin, form, periodic=True, divisions=(96, 32)):
+    """One wave of a rigid floor below a block one period wide that is pushed down; the period begins at `begin`."""
+    model = ring(block((1.0, 1.0), divisions, origin=(begin, 0.0)))
+    height = 0.002
+
+    def floor(x):
+        waves = 2.0 * np.pi * x
+        return height * (np.cos(waves[:, 0]) - 1.0), -2.0 * np.pi * height * np.sin(waves)
+
+    model.add_obstacle("floor", secondary="BOTTOM", obstacle=fc.obstacles.Height(floor), formulation=form)
+    model.add_pressure("TOP", 1.0)
+    if periodic:
+        model.add_periodicity("LEFT", "RIGHT")
+        model.fix("TOP_LEFT", "x")
+    else:
+        model.fix("LEFT", "x")
+        model.fix("RIGHT", "x")
+    return model
+
+
+@pytest.mark.parametrize("form", ["node_to_segment", "continuous"])
+def test_a_wavy_floor_is_westergaards(form):
+    """Half-width a of the contact: mean pressure = p* sin^2(pi a), p* = pi E* height (Westergaard, J. Appl. Mech. 6, 1939).
+
+    The largest pressure is 2 sqrt(p* mean): 1.5, 0.3 and 0.002 % off with 48, 96 and 192 cells along a wave. A period that
+    begins elsewhere, and a wave between planes of symmetry, have the same pressures.
+    """
+    full = np.pi * E / (1.0 - NU**2) * 0.002
+    centred, mirrored, elsewhere = (
+        fc.solve(wavy(begin, form, periodic), 1)[-1].contact["floor"]
+        for begin, periodic in ((-0.5, True), (-0.5, False), (-0.375, True))
+    )
+    assert centred.pressure_max == pytest.approx(2.0 * np.sqrt(full), rel=0.006)
+    half = sum(centred.radius) / 2.0
+    assert half == pytest.approx(np.arcsin(np.sqrt(1.0 / full)) / np.pi, abs=0.5 / 96.0)
+    assert centred.pressure == pytest.approx(mirrored.pressure, abs=1e-7 * centred.pressure_max)
+    assert elsewhere.force == pytest.approx(centred.force, abs=1e-6)
+    assert elsewhere.pressure_max == pytest.approx(centred.pressure_max, rel=1e-6)
+
+
+def test_a_period_stretched_by_a_mean_strain():
+    """Ends moved apart: uniform strain and stress; across, the period gets as thin as it likes."""
+    model = ring(box((2.0, 1.0, 1.0), (3, 2, 2)), "3d")
+    model.add_periodicity("XMIN", "XMAX", x=0.02)
+    model.add_periodicity("YMIN", "YMAX", free="y")
+    model.add_periodicity("ZMIN", "ZMAX", free="z")
+    corner = int(np.linalg.norm(model.mesh.points, axis=1).argmin())
+    for axis in "xyz":
+        model.relate([(corner, axis, 1.0)])
+    step = fc.solve(model, 1)[-1]
+    exact = model.mesh.points * [0.01, -0.003, -0.003]
+    assert step.displacement == pytest.approx(exact, abs=1e-12)
+    assert step.stress[:, 0] == pytest.approx(np.full(model.mesh.n_points, 10.0))
+
+
+@pytest.mark.filterwarnings("ignore:contact 'floor' is closed where a period")
+def test_closed_contact_where_the_period_ends_is_told():
+    """Two nodes of one place have one gap: how their force is split is round-off, and told where it is not even."""
+    model = wavy(0.0, "node_to_segment")
+    (step,) = fc.solve(model, 1)
+    contact = step.contact["floor"]
+    assert contact.force[1] == pytest.approx(1.0)
+    problem = prepare(model, fc.linear_ramp(1), fc.Criteria())
+    ends = np.argsort(contact.coordinates[:, 0])[[0, -1]]
+    both = contact.pressure[ends].mean()
+    pressure = contact.pressure.copy()
+    pressure[ends] = both
+    even = dataclasses.replace(step, contact={"floor": dataclasses.replace(contact, pressure=pressure)})
+    assert seam_warnings(problem, even) == []
+    pressure = pressure.copy()
+    pressure[ends] = 0.9 * both, 1.1 * both
+    uneven = dataclasses.replace(step, contact={"floor": dataclasses.replace(contact, pressure=pressure)})
+    (text,) = seam_warnings(problem, uneven)
+    assert "at 1 places its pressures differ between the two nodes of one place, by up to 1.0" in text
+
+
+def test_ends_that_do_not_match_are_refused():
+    model = ring(sector(5))
+    with pytest.raises(fc.ModelError, match=r"turned by 1/6 of a turn, lies 0\.\d+ from the nearest node of 'RIGHT'"):
+        model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=6)
+    with pytest.raises(fc.ModelError, match="nodes, but need as many"):
+        model.add_cyclic_symmetry("LEFT", "TOP", sectors=5)
+    with pytest.raises(fc.ModelError, match="needs two sectors at least"):
+        model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=1)
+    with pytest.raises(fc.ModelError, match=r"lies .* from the nearest node of 'RIGHT'"):
+        model.add_periodicity("LEFT", "RIGHT")
+    with pytest.raises(fc.ModelError, match="a period has two ends"):
+        model.add_periodicity("LEFT", "LEFT")
+    with pytest.raises(fc.ModelError, match="'x' is free, so no displacement"):
+        model.add_periodicity("LEFT", "RIGHT", x=0.1, free="x")
+    axisymmetric = fc.Model(block(), "axisymmetric")
+    with pytest.raises(fc.ModelError, match="is the whole ring already"):
+        axisymmetric.add_cyclic_symmetry("LEFT", "RIGHT", sectors=4)
+
+
+def test_a_case_file_has_sectors_and_periods(tmp_path):
+    fc.write_mesh(tmp_path / "sector.med", sector(5))
+    text = """
+title = "A sector"
+kinematics = "plane_strain"
+mesh = { file = "sector.med" }
+material = [{ E = 1000.0, nu = 0.3 }]
+support = [{ group = "TOP", x = 0.0, y = 0.0 }]
+pressure = [{ group = "BOTTOM", value = 10.0 }]
+ramp = { steps = 1 }
+[[cyclic_symmetry]]
+first = "LEFT"
+second = "RIGHT"
+sectors = 5
+"""
+    path = tmp_path / "sector.toml"
+    path.write_text(text, encoding="utf-8")
+    case = read_case(path)
+    step = fc.solve(case.model, case.ramp, criteria=case.criteria)[-1]
+    model = ring(sector(5))
+    model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=5)
+    model.add_pressure("BOTTOM", 10.0)
+    model.fix("TOP", "xy")
+    assert step.displacement == pytest.approx(fc.solve(model, 1)[-1].displacement, abs=1e-12)
+    fc.write_mesh(tmp_path / "sector.med", block())
+    text = text.replace("cyclic_symmetry", "periodicity").replace(
+        "sectors = 5", "x = 0.01\nramp = [[0.0, 0.0], [1.0, 1.0]]"
+    )
+    path.write_text(text.replace("x = 0.0, y = 0.0", "y = 0.0"), encoding="utf-8")
+    assert len(read_case(path).model.relations) == 2
