@@ -100,6 +100,31 @@ def test_a_sector_under_pressure_moves_as_lame_says(element, error):
     assert np.abs(pushed / lame - 1.0).max() < error
 
 
+def test_sectors_of_a_press_fit_press_as_lame_says():
+    """Contact across the ends of the sectors, which wind, and meshes that do not match; shaft and hub of one material."""
+    parts = []
+    for name, inside, outside, cells in (("SHAFT", 0.5, 1.0, (8, 6)), ("HUB", 1.0, 2.0, (6, 8))):
+        mesh = block((1.0, 1.0), cells, "quad8")
+        s, t = mesh.points.T
+        radius = inside + (outside - inside) * t
+        angle = -2.0 * np.pi / 6.0 * s + 0.3 * (radius - 1.0)
+        mesh = mesh.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
+        parts.append(renamed(mesh, {group: f"{name}_{group}" for group in mesh.group_names}))
+    model = ring(union(*parts))
+    model.add_contact(
+        "fit", secondary="HUB_BOTTOM", primary="SHAFT_TOP", formulation="mortar", multipliers="standard", clearance=-0.01,
+        normals="averaged",
+    )  # fmt: skip
+    for name in ("SHAFT", "HUB"):
+        model.add_cyclic_symmetry(f"{name}_LEFT", f"{name}_RIGHT", sectors=6)
+        node = int(model.mesh.points_of(f"{name}_TOP")[0])
+        x, y = model.mesh.points[node].tolist()
+        model.relate([(node, "x", -y), (node, "y", x)])
+    contact = fc.solve(model, 1)[-1].contact["fit"]
+    lame = 0.01 * E / (1.0 - NU**2) / (1.25 / 0.75 + 5.0 / 3.0)
+    assert contact.pressure == pytest.approx(np.full(len(contact.points), lame), rel=0.01)
+
+
 def test_a_spinning_sector_in_space_reaches_the_axis():
     """A quarter of a square bar about an axis that the ends share; centrifugal forces, a slanting axis, and the whole bar."""
     part = box((1.0, 1.0, 2.0), (2, 2, 3), "hex8")
