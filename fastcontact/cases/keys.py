@@ -47,8 +47,15 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         ("speed",),
     ),
     "temperature": (
-        {"value": PLACE, "groups": (list, str), "reference": NUMBER, "ramp": list},
-        ("value",),
+        {
+            "value": PLACE,
+            "groups": (list, str),
+            **dict.fromkeys(("reference", "instant"), NUMBER),
+            "file": (str, list),
+            "field": str,
+            **dict.fromkeys(("times", "ramp"), list),
+        },
+        (),
     ),
     **dict.fromkeys(
         ("initial_stress", "initial_strain"),

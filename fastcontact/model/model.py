@@ -47,10 +47,11 @@ from fastcontact.elasticity.relations import Relation, stacked_rows
 from fastcontact.elasticity.springs import Springs, between, grounded, stacked
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
-from fastcontact.elasticity.temperature import Temperature, checked_value
+from fastcontact.elasticity.temperature import Temperature, checked_value, histories
 from fastcontact.elasticity.varying_constants import Cells
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.mesh.argument_types import check_fields, typed
+from fastcontact.mesh.files.paths import PathLike
 from fastcontact.mesh.html_table import html_table
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
@@ -75,6 +76,7 @@ from fastcontact.model.ramp import History, Ramp, Table, combined, multiplier, t
 from fastcontact.model.relation_rows import NORMAL, along, directions_of, matched, normals_of
 from fastcontact.model.repeated_pairs import check_repeated
 from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
+from fastcontact.model.temperature_files import read_temperatures
 
 Array = NDArray[np.float64]
 log = logging.getLogger("fastcontact")
@@ -334,6 +336,7 @@ class Model:
         groups: Sequence[str] | str | None = None,
         *,
         reference: float = 0.0,
+        times: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
         """Heat or cool groups of solid cells, by default all; their materials expand by their `expansion`.
@@ -343,19 +346,91 @@ class Model:
 
         Parameters
         ----------
-        value : float, callable or ndarray (n_points,)
-            A number, a function from reference positions (n, dim) [length] to temperatures (n,), or one for each point of the
-            mesh [temperature].
+        value : float, callable or ndarray (n_points,) or (n_instants, n_points)
+            A number, a function from reference positions (n, dim) [length] to temperatures (n,), one for each point of the
+            mesh, or that at several instants [temperature].
         groups : str or sequence of str, optional
         reference : float
             At which there is no thermal strain [temperature].
+        times : sequence of float (n_instants,), optional
+            Load factors of the instants, between which temperatures follow linearly [-].
         ramp : Ramp or iterable of (float, float), optional
             History of the rise, value minus reference.
         """
         names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
-        found = Temperature(names, checked_value(value), reference, table_of(ramp, "the ramp of the temperature"))
-        found.check(self.mesh)
-        self.temperatures.append(found)
+        checked = checked_value(value)
+        if times is not None:
+            if ramp is not None:
+                raise ModelError("a temperature has either times of its instants or a ramp, not both")
+            if not isinstance(checked, np.ndarray) or checked.ndim != 2:
+                raise ModelError("a temperature with times must be an array (n_instants, n_points)")
+            found = histories(names, checked, reference, times)
+        else:
+            found = [Temperature(names, checked, reference, table_of(ramp, "the ramp of the temperature"))]
+        for own in found:
+            own.check(self.mesh)
+        self.temperatures += found
+
+    @typed(ModelError)
+    def add_temperature_file(
+        self,
+        file: PathLike | Sequence[PathLike],
+        field: str,
+        groups: Sequence[str] | str | None = None,
+        *,
+        reference: float = 0.0,
+        instant: float | None = None,
+        times: Sequence[float] | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Heat or cool groups of solid cells, by default all, by a nodal field of a file, or of several files.
+
+        Read are MED, VTKHDF, such as result files, and what meshio reads, such as .vtu. A file with the points of the mesh in
+        their order gives the temperature of each; otherwise it is that of the point at the same place.
+
+        Parameters
+        ----------
+        file : path-like or sequence of them
+            One file, with one instant or several; or a file for each instant.
+        field : str
+            Its name.
+        groups : str or sequence of str, optional
+        reference : float
+            At which there is no thermal strain [temperature].
+        instant : float, optional
+            Time of the file to take alone.
+        times : sequence of float (n_instants,), optional
+            Load factors of the instants [-]; by default the times of the file. Between them temperatures follow linearly.
+        ramp : Ramp or iterable of (float, float), optional
+            History of the rise of a single instant.
+
+        Raises
+        ------
+        FileError, MeshError, ModelError
+            If a file cannot be read or lacks the field, a point has no temperature, or instants and times do not fit.
+        """
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        for name in names or ():
+            if not self.mesh.cells_of(name, dim=self.mesh.dim):
+                raise ModelError(f"group '{name}' holds no solid cells: it has no temperature")
+        values, own = read_temperatures(self.mesh, file, field, self._points_of_cells(names), instant)
+        values = np.where(np.isfinite(values), values, reference)
+        if len(values) == 1:
+            if times is not None:
+                raise ModelError(f"field '{field}' has one instant, so it has no times: give it a ramp")
+            self.add_temperature(values[0], names, reference=reference, ramp=ramp)
+            return
+        if ramp is not None:
+            raise ModelError(f"field '{field}' has {len(values)} instants and thus no ramp: give times, or one instant")
+        when = times if own is None or times is not None else own.tolist()
+        if when is None:
+            raise ModelError(f"field '{field}' has {len(values)} instants without times: give the load factor of each")
+        self.add_temperature(values, names, reference=reference, times=when)
+
+    def _points_of_cells(self, groups: Sequence[str] | None) -> NDArray[np.intp]:
+        """Return the points of the solid cells of groups, or of all."""
+        cells = self._cells_of(groups)
+        return np.unique(np.concatenate([self.mesh.cells[name][rows].ravel() for name, rows in cells.rows.items()]))
 
     @typed(ModelError)
     def add_initial_stress(
