@@ -62,7 +62,7 @@ def seam_warnings(problem: Problem, last: StepResult) -> list[str]:
                 found.append(
                     f"contact '{name}' is closed where a period or sector begins and ends: at {int(wrong.sum())} places its "
                     f"forces are split unevenly between the two nodes of one place, by {apart[worst]:.4g} in pressure "
-                    f"(points {contact.points[a[worst]]} and {contact.points[b[worst]]}). Their pressure is the mean, but that "
-                    "of neighbours may waver: let the period end where the contact is open"
+                    f"(points {contact.points[a[worst]]} and {contact.points[b[worst]]}). Their pressure is the mean, but "
+                    "that of neighbours may waver: let the period end where the contact is open"
                 )
     return found
