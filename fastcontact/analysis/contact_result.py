@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,8 +57,6 @@ def contact_result(
     forces = _forces(pair, part, multiplier, along)
     faced = np.where(np.isfinite(normal), normal, 0.0)
     middle = contact_middle(pair, faced, np.einsum("nd,nd->n", forces.secondary, faced), closed, gap)
-    turns = isinstance(pair.primary, RigidSide) and pair.primary.rotation is not None
-    deformed = coordinates + at.displacement[points]
     return ContactResult(
         name=name,
         formulation=pair.name,
@@ -75,17 +74,25 @@ def contact_result(
         shear=along.shear,
         sticking=closed & along.sticking,
         dissipation=along.dissipation,
-        obstacle_displacement=at.obstacle.copy() if isinstance(pair.primary, RigidSide) else None,
         middle=middle.position,
         place=middle.places(coordinates),
         tangent=middle.tangent,
         primary_points=forces.primary_points,
         primary_force_vectors=forces.primary,
-        obstacle_angle=at.angle if turns else None,
-        torque=pair.primary.torque(deformed, forces.secondary, at.stance)
-        if isinstance(pair.primary, RigidSide)
-        else None,
+        **_obstacle(pair, at, coordinates + at.displacement[points], forces.secondary),
     )
+
+
+def _obstacle(pair: Formulation, at: Configuration, deformed: Array, forces: Array) -> dict[str, Any]:
+    """Return where a rigid obstacle stands, and its torque by `forces` at the places `deformed`; nothing of bodies."""
+    side = pair.primary
+    if not isinstance(side, RigidSide):
+        return {}
+    return {
+        "obstacle_displacement": at.obstacle.copy(),
+        "obstacle_angle": None if side.rotation is None else at.angle,
+        "torque": side.torque(deformed, forces, at.stance),
+    }
 
 
 @dataclass(frozen=True, eq=False)
