@@ -44,7 +44,7 @@ from fastcontact.elasticity.material_field import MaterialField, material_field
 from fastcontact.elasticity.materials import KINEMATICS, Constant, Material
 from fastcontact.elasticity.recovery import internal_force, stress_at_points
 from fastcontact.elasticity.relations import Relation, stacked_rows
-from fastcontact.elasticity.springs import Springs, between, grounded, stacked
+from fastcontact.elasticity.springs import Springs, grounded, joined, stacked
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
 from fastcontact.elasticity.temperature import Temperature, checked_value, histories
@@ -76,6 +76,7 @@ from fastcontact.model.ramp import History, Ramp, Table, combined, multiplier, t
 from fastcontact.model.relation_rows import NORMAL, along, directions_of, matched, normals_of
 from fastcontact.model.repeated_pairs import check_repeated
 from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
+from fastcontact.model.spread_forces import SpreadForce, spread_of
 from fastcontact.model.temperature_files import read_temperatures
 
 Array = NDArray[np.float64]
@@ -581,6 +582,9 @@ class Model:
         y: float | None = None,
         z: float | None = None,
         distribute: bool | None = None,
+        at: Sequence[float] | None = None,
+        weighting: str = "uniform",
+        radius: float | None = None,
         ramp: History = None,
     ) -> None:
         """Load a group with forces [force].
@@ -593,8 +597,26 @@ class Model:
         distribute : bool, optional
             True: the total force, spread as a uniform traction over the facets of the group. False: the force on every
             node of the group. By default True for a group of facets and False for a group of points.
+        at : sequence of float (dim,), optional
+            Place through which the total force acts, spread over the group by area and distance from there, with the arms of
+            the group for what moment is left [length].
+        weighting : str
+            Of the force spread about `at`: ``"uniform"``, or falling to zero at the radius as ``"linear"``, ``"quadratic"``
+            or ``"cubic"`` functions of the distance.
+        radius : float, optional
+            Beyond which the group bears nothing [length]; by default the distance of its farthest node.
+        ramp : Ramp or iterable of (float, float), optional
         """
         self.mesh.points_of(group)
+        spread = spread_of(f"the force on '{group}'", at, weighting, radius)
+        if spread is not None:
+            if distribute is False:
+                raise ModelError(
+                    f"the force on '{group}' acts through a place or on every node: leave out at or distribute"
+                )
+            axes = axes_of(f"the force on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
+            self._add(SpreadForce(group, axes, spread, table_of(ramp, f"the ramp of the force on '{group}'")))  # type: ignore[arg-type]
+            return
         if distribute is None:
             distribute = group in self.mesh.cell_groups and bool(self.mesh.cells_of(group, dim=self.mesh.dim - 1))
         kind: type[TotalForce] | type[NodalForce] = TotalForce if distribute else NodalForce
@@ -851,7 +873,16 @@ class Model:
         self.relations.append(Relation(name, rows, float(value), table_of(ramp, f"the ramp of {name}")))
 
     @typed(ModelError)
-    def add_coupling(self, reference: str, group: str, *, kind: str = "rigid", components: str | None = None) -> None:
+    def add_coupling(
+        self,
+        reference: str,
+        group: str,
+        *,
+        kind: str = "rigid",
+        components: str | None = None,
+        weighting: str = "uniform",
+        radius: float | None = None,
+    ) -> None:
         """Couple a reference point with the nodes of a group, for small rotations.
 
         Forces, moments and supports at the reference point then act on the group; see
@@ -868,6 +899,10 @@ class Model:
             nothing (RBE3).
         components : str, optional
             Displacements that follow in a rigid coupling, such as ``"z"``; by default all.
+        weighting : str
+            Of a distributing coupling, by the distance from the reference point, as of `add_force`.
+        radius : float, optional
+            As of `add_force` [length].
 
         Raises
         ------
@@ -876,7 +911,9 @@ class Model:
         """
         letters = "xyz"[: self.mesh.dim] if components is None else components
         axes = axes_of(f"the coupling of '{reference}'", dict.fromkeys(letters, 1.0), self.mesh.dim)
-        self.relations.append(coupling(self.mesh, self.kinematics, (reference, group), kind, sorted(axes)))
+        self.relations.append(
+            coupling(self.mesh, self.kinematics, (reference, group), kind, sorted(axes), (weighting, radius))
+        )
 
     @typed(ModelError)
     def add_moment(
@@ -934,15 +971,17 @@ class Model:
         axial: float | None = None,
         transverse: float | None = None,
         direction: Sequence[float] | None = None,
+        translation: Sequence[float] | None = None,
     ) -> None:
-        """Hang every node of a group on the ground by springs, or join two nodes by them.
+        """Hang every node of a group on the ground by springs, or join two nodes or two groups by them.
 
         Parameters
         ----------
         group : str or int
             Group or point number.
         to : str or int, optional
-            Group of one node or point number: the springs then lie between the single node of `group` and this one.
+            Group or point number: springs then join each node of `group` with the one of this group that lies upon it after a
+            `translation`, as of `relate_groups`; a single node is joined with all of the other group.
         x, y, z : float
             Stiffness along the axes [force / length]; in axisymmetry over the full circle.
         axial, transverse : float
@@ -950,6 +989,8 @@ class Model:
             keeps its reference direction.
         direction : sequence of float, optional
             Takes the place of the line between the two nodes: a vector of any length.
+        translation : sequence of float (dim,), optional
+            What brings the first group upon the second; by default the way from middle to middle [length].
         """
         name = f"the spring on '{group}'" if to is None else f"the spring between '{group}' and '{to}'"
         given = {"x": x, "y": y, "z": z}
@@ -967,10 +1008,16 @@ class Model:
         if to is None:
             self.springs.append(grounded(name, nodes, axes, self.n_dofs, self.mesh.dim, along, vector))
             return
-        ends = [*nodes, *self._nodes(to)]
-        if len(ends) != 2:
-            raise ModelError(f"{name} needs one node at each end, but finds {len(nodes)} and {len(ends) - len(nodes)}")
-        self.springs.append(between(name, self.mesh.points, int(ends[0]), int(ends[1]), axes, along, vector))
+        opposite = self._nodes(to)
+        if not len(opposite):
+            raise ModelError(f"group '{to}' is empty: no spring can be there")
+        if len(nodes) > 1 < len(opposite):
+            place = matched(self.mesh, (str(group), nodes), (str(to), opposite), translation)
+            opposite = opposite[place]
+        elif translation is not None:
+            raise ModelError(f"{name} joins all nodes with a single one: leave out the translation")
+        first, second = np.broadcast_arrays(nodes, opposite)
+        self.springs.append(joined(name, self.mesh.points, (first, second), axes, along, vector))
 
     def _direction(
         self, name: str, along: Mapping[str, float], joined: bool, direction: Sequence[float] | None

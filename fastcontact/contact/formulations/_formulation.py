@@ -20,6 +20,7 @@ from fastcontact.contact.prescribed_normals import Normals, checked_normals, opp
 from fastcontact.contact.projection import at_nodes_of_facets, interpolated, nodal_normals, places, smooth_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.tied import TiedPair, tied
+from fastcontact.contact.tied_offset import with_arms
 from fastcontact.errors import ContactError, unknown
 
 Array = NDArray[np.float64]
@@ -153,7 +154,14 @@ class Formulation(ABC):
     @cached_property
     def tied(self) -> TiedPair | None:
         """The equations of a tied pair, on the bodies as they lie before any load."""
-        return tied(self.unilateral(Configuration.undeformed(self.points))) if self.options.tied else None
+        if not self.options.tied:
+            return None
+        part = self.unilateral(Configuration.undeformed(self.points))
+        if isinstance(self.primary, Surface) and part.tangents:
+            smooth = self.normals if self.normals != "secondary" and self.normals is not None else "facet"
+            pairing = pair(part.positions, self.primary, self.points, np.inf, smooth)
+            part = with_arms(part, pairing, self.primary, self.points)
+        return tied(part)
 
     def never_opening(self, positions: Array, at: Configuration) -> NDArray[np.bool_] | None:
         """Return which reference places (m, dim) [length] never open again, (m,); None if all may."""
