@@ -15,7 +15,7 @@ from fastcontact.mesh import elements
 from fastcontact.results.step import ContactResult
 
 Array = NDArray[np.float64]
-# In facet lengths: nodes that stand out as far beyond the end of the other side may still be pressed, by parts of their facets.
+# In facet lengths: nodes that stand out as far beyond the other side may still be pressed, by parts of their facets.
 STANDS_OUT = 3.0
 
 
