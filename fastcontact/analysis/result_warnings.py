@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.analysis.problem import Problem
-from fastcontact.analysis.seam_warnings import seam_warnings
+from fastcontact.analysis.seams import seam_warnings
 from fastcontact.analysis.state import State
 from fastcontact.analysis.volumetric_locking import locking_warning
 from fastcontact.analysis.wear import too_fast

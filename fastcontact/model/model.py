@@ -758,8 +758,8 @@ class Model:
     ) -> None:
         """Let the model be one period of a part that repeats itself: its two ends deform alike.
 
-        Rigid translations stay free and need supports. Contact should be open at the ends: their nodes have a pressure each,
-        and only both together follow from the gap.
+        Rigid translations stay free and need supports. Contact is best open at the ends: of two nodes that are one place
+        only the sum of the forces follows from the gap, and pressures of their neighbours may waver.
 
         Parameters
         ----------
