@@ -69,6 +69,9 @@ def with_load(lines):
 
 MODEL = {
     "system of nodes": (instead("*Node\n", "*Node, system=C\n"), r"\*NODE: SYSTEM=C is not supported: give rectang"),
+    "element twice": (
+        before("*Nset, nset=bottom", "*Element, type=C3D8\n2, 1, 2, 3, 4, 5, 6, 7, 8\n"), "element 2 is defined twice",
+    ),
     "range that falls": (instead("1, 4\n*Nset", "4, 1\n*Nset"), "the range 4 to 1 by 1 is empty: it must ascend"),
     "surface twice": (before("*Surface, name=roof", "*Surface, name=SM\nup, S1\n"), "surface 'SM' is defined twice"),
     "load without a step": (before("*Step", "*Cload\n17, 3, 1.\n"), r"\*CLOAD: loads belong into a step"),
@@ -160,6 +163,10 @@ CONTACTS = {
     "adjust a wedge": (
         instead("type=SURFACE TO", "adjust=0.5, type=SURFACE TO", instead("11, 0., 0., 1.", "11, 0., 0., 1.1")),
         r"ADJUST=0\.5 would move \d+ nodes of 'ss'",
+    ),
+    "pair of one": (
+        instead("ss, sm\n*B", "ss\n*B"),
+        "a contact pair needs two surfaces, the secondary and the primary",
     ),
     "tie of one": (instead(CONTACT, "*Tie, name=t\nss\n"), "a tie needs two surfaces, the secondary and the primary"),
     "surface of an element that is none": (
