@@ -72,6 +72,8 @@ def solve(
             state = problem.law.state(y, gaps)
         # At least once, for forces and displacement to start from are not in balance.
         y, gaps = problem.step(y, gaps, *state)
+        if not state[0].any():  # what closes was not known: the bodies lie as if there were no contact
+            y, gaps = problem.step(y, gaps, gaps[0] < 0.0, gaps[0] < 0.0)
         exact = max(EXACT, ENOUGH * tolerance)
         found = newton(problem, y, gaps, exact, PATIENCE if steps is None else steps - 1)
         if steps is None and not found.settled:

@@ -1,10 +1,11 @@
 """Which unknown each equation eliminates, and the inverse of the columns of these pivots.
 
-Five ways, the first that succeeds: every equation has an unknown that no other equation has; the equations of a node have
-unknowns that those of no other node have; layers of equations, each with an unknown that no later layer has; the equations of
-a node have large enough entries in that node's unknowns; the assignment of unknowns to equations with the largest product of
-entries (Duff and Koster, 2001). The columns of the pivots are inverted in small independent blocks, or, where equations of
-many nodes share unknowns, factorised (`coupled_pivots`).
+Six ways, the first that succeeds: every equation has an unknown that no other equation has; the equations of a node have
+unknowns that those of no other node have; layers of equations, each with an unknown that no later layer has; layers of nodes,
+whose equations have unknowns that those of no later layer have; the equations of a node have large enough entries in that
+node's unknowns; the assignment of unknowns to equations with the largest product of entries (Duff and Koster, 2001). The
+columns of the pivots are inverted in small blocks, independent or in layers, or, where equations of many nodes share
+unknowns otherwise, factorised (`coupled_pivots`).
 """
 
 from __future__ import annotations
@@ -56,10 +57,12 @@ def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[I
         return np.empty(0, np.intp), csr_array((0, 0))
     if (found := layered(B, layers=1)) is not None:
         return found
-    if nodes is not None and (pivots := of_groups(B, nodes)) is not None:
+    if nodes is not None and (pivots := of_groups(B, nodes, layers=1)) is not None:
         return pivots, block_inverse(csr_array(B[:, pivots]))
     if (found := layered(B)) is not None:
         return found
+    if nodes is not None and (pivots := of_groups(B, nodes)) is not None:
+        return pivots, inverse_of(B, pivots, size)
     if nodes is not None and (pivots := of_nodes(B, nodes, size)) is not None:
         return pivots, inverse_of(B, pivots, size)
     pivots = assigned(B)
@@ -78,6 +81,8 @@ def inverse_of(B: csr_array, pivots: Indices, size: int) -> csr_array | CoupledP
     label = connected_components(P, directed=False)[1]
     largest = np.bincount(label).max(initial=0)
     if largest > LARGEST_BLOCK:
+        if (found := _triangular_inverse(P)) is not None:
+            return found
         try:
             return CoupledPivots(P, pivots, size)
         except CoupledError:
@@ -86,31 +91,61 @@ def inverse_of(B: csr_array, pivots: Indices, size: int) -> csr_array | CoupledP
     return block_inverse(P)
 
 
-def of_groups(B: csr_array, groups: Indices) -> Indices | None:
-    """Return the unknown (m,) of each row among those of its group alone; None where there are too few."""
+def _triangular_inverse(P: csr_array) -> csr_array | None:
+    """Return the inverse of a matrix of small blocks on its diagonal, coupled in few layers; None where it is not so."""
+    label = connected_components(P, connection="strong")[1]
+    if np.bincount(label).max() > LARGEST_BLOCK:
+        return None
+    inside = np.repeat(label, np.diff(P.indptr)) == label[P.indices]
+    diagonal, beyond = (
+        csr_array((np.where(part, P.data, 0.0), P.indices, P.indptr), shape=P.shape, copy=True)
+        for part in (inside, ~inside)
+    )
+    diagonal.eliminate_zeros()
+    beyond.eliminate_zeros()
+    return _layered_inverse(block_inverse(diagonal), beyond)
+
+
+def of_groups(B: csr_array, groups: Indices, layers: int = MOST_LAYERS) -> Indices | None:
+    """Return the unknown (m,) of each row among those of its group alone; None where there are too few.
+
+    In so many layers at most: unknowns of a group alone are those that no other group of its own and later layers has.
+    """
     m, n = B.shape
     group, row = np.unique(groups, return_inverse=True)[1], np.repeat(np.arange(m), np.diff(B.indptr))
-    lowest, highest = np.full(n, m), np.full(n, -1)
-    np.minimum.at(lowest, B.indices, group[row])
-    np.maximum.at(highest, B.indices, group[row])
-    return _pivots_in_groups(B, group, lowest[B.indices] == highest[B.indices])
+    pivots = np.full(m, -1, np.intp)
+    for _ in range(layers):
+        among = pivots[row] < 0
+        lowest, highest = np.full(n, m), np.full(n, -1)
+        np.minimum.at(lowest, B.indices[among], group[row[among]])
+        np.maximum.at(highest, B.indices[among], group[row[among]])
+        found = _pivots_in_groups(B, group, among & (lowest[B.indices] == highest[B.indices]))
+        if not (found >= 0).any():
+            return None
+        pivots = np.where(pivots < 0, found, pivots)
+        if (pivots >= 0).all():
+            return pivots
+    return None
 
 
 def of_nodes(B: csr_array, nodes: Indices, size: int) -> Indices | None:
     """Return the unknown (m,) of each row among those of its node; None where entries there are too small."""
     row = np.repeat(np.arange(B.shape[0]), np.diff(B.indptr))
-    return _pivots_in_groups(B, np.unique(nodes, return_inverse=True)[1], B.indices // size == nodes[row])
+    pivots = _pivots_in_groups(B, np.unique(nodes, return_inverse=True)[1], B.indices // size == nodes[row])
+    return pivots if (pivots >= 0).all() else None
 
 
-def _pivots_in_groups(B: csr_array, group: Indices, is_own: Mask) -> Indices | None:
+def _pivots_in_groups(B: csr_array, group: Indices, is_own: Mask) -> Indices:
     """Return pivots (m,) among the entries of B that are its group's own, whose unknowns no two groups share.
 
     Complete pivoting in each group, in all of them at once; a pivot is at least SMALLEST of the largest entry of its row.
+    Groups without as many pivots as rows have none, -1.
     """
     m, n = B.shape
     row, own = np.repeat(np.arange(m), np.diff(B.indptr)), np.flatnonzero(is_own)
+    pivots = np.full(m, -1, np.intp)
     if not len(own):
-        return None
+        return pivots
     found = B.indices[np.sort(own[np.unique(B.indices[own], return_index=True)[1]])]
     line, column, owner = _place_in_group(group), np.zeros(n, np.intp), np.zeros(n, np.intp)
     owner[B.indices[own]] = group[row[own]]
@@ -119,17 +154,22 @@ def _pivots_in_groups(B: csr_array, group: Indices, is_own: Mask) -> Indices | N
     table[group[row[own]], line[row[own]], column[B.indices[own]]] = B.data[own]
     equation, unknown = np.zeros(table.shape[:2], np.intp), np.zeros((len(table), table.shape[2]), np.intp)
     equation[group, line], unknown[owner[found], column[found]] = np.arange(m), found
-    count, largest, pivots = np.bincount(group), abs(B).max(axis=1).toarray().ravel(), np.empty(m, np.intp)
+    count, largest = np.bincount(group), abs(B).max(axis=1).toarray().ravel()
+    failed = np.zeros(len(count), bool)
     for made in range(table.shape[1]):
-        left = np.flatnonzero(count > made)
+        left = np.flatnonzero((count > made) & ~failed)
+        if not len(left):
+            break
         r, c = np.divmod(np.abs(table[left]).reshape(len(left), -1).argmax(axis=1), table.shape[2])
         i, pivot = equation[left, r], table[left, r, c]
-        if not ((np.abs(pivot) >= SMALLEST * largest[i]) & (pivot != 0.0)).all():
-            return None
+        good = (np.abs(pivot) >= SMALLEST * largest[i]) & (pivot != 0.0)
+        failed[left[~good]] = True
+        left, r, c, i, pivot = (part[good] for part in (left, r, c, i, pivot))
         pivots[i] = unknown[left, c]
         # The row of the pivot becomes zero, too: it is not found again.
         factor = table[left, :, c] / pivot[:, None]
         table[left] -= factor[:, :, None] * table[left, r][:, None]
+    pivots[failed[group]] = -1
     return pivots
 
 
@@ -153,9 +193,9 @@ def layered(B: csr_array, smallest: float = SMALLEST, layers: int = MOST_LAYERS)
     largest = np.zeros(m)
     np.maximum.at(largest, row, size)
     strong = size >= smallest * largest[row]
-    pivots, layer = np.full(m, -1, np.intp), np.full(m, -1)
+    pivots = np.full(m, -1, np.intp)
     left = np.ones(m, bool)
-    for number in range(layers):
+    for _ in range(layers):
         among = left[row]
         count = np.bincount(B.indices[among], minlength=n)
         own = np.flatnonzero(among & strong & (count[B.indices] == 1))
@@ -163,23 +203,29 @@ def layered(B: csr_array, smallest: float = SMALLEST, layers: int = MOST_LAYERS)
         rows, first = np.unique(row[own], return_index=True)
         if not len(rows):
             return None
-        pivots[rows], layer[rows] = B.indices[own[first]], number
+        pivots[rows] = B.indices[own[first]]
         left[rows] = False
         if not left.any():
-            return pivots, _layered_inverse(csr_array(B[:, pivots]), int(layer.max()))
+            P = csr_array(B[:, pivots])
+            beyond = csr_array(P - diags_array(P.diagonal(), format="csr"))
+            beyond.eliminate_zeros()
+            inverse = _layered_inverse(csr_array(diags_array(1.0 / P.diagonal(), format="csr")), beyond)
+            return None if inverse is None else (pivots, inverse)
     return None
 
 
-def _layered_inverse(P: csr_array, depth: int) -> csr_array:
-    """Return the inverse of a matrix that couples every row to deeper layers only: a finite Neumann series."""
-    diagonal = diags_array(1.0 / P.diagonal(), format="csr")
-    beyond = csr_array(P - diags_array(P.diagonal(), format="csr"))
-    beyond.eliminate_zeros()
-    total = term = csr_array(diagonal)
-    for _ in range(depth):
-        term = csr_array(-(diagonal @ beyond @ term))
+def _layered_inverse(inner: csr_array, beyond: csr_array) -> csr_array | None:
+    """Return the inverse of a matrix that couples every row to deeper layers only: a finite Neumann series.
+
+    `inner` is the inverse of what couples no layers, `beyond` what does. None where there are more than MOST_LAYERS.
+    """
+    total = term = inner
+    for _ in range(MOST_LAYERS):
+        term = csr_array(-(inner @ beyond @ term))
+        if not term.nnz:
+            return total
         total = csr_array(total + term)
-    return total
+    return None
 
 
 def assigned(B: csr_array) -> Indices:

@@ -38,7 +38,7 @@ ALIKE = 0.02
 SLOWEST = 0.999
 # A warm start of a nonsymmetric solution is improved by this factor, but not to less than this part of its tolerance, and by
 # so many iterations at most where that is met.
-WARM, WARM_LEAST, MOST_WARM = 0.1, 1e-3, 10
+WARM, WARM_LEAST, MOST_WARM = 0.05, 1e-3, 10
 # Where the smoother amplifies something, its bound of the spectrum is raised by this factor, so many times.
 RAISE, RAISES = 1.3, 4
 

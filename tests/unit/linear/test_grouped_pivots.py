@@ -40,6 +40,9 @@ def test_groups_without_unknowns_of_their_own_are_told():
     B = csr_array(np.ones((2, 3)))
     assert pivot_order.of_groups(B, np.arange(2)) is None
     assert pivot_order.of_groups(B, np.zeros(2, np.intp)) is None  # two equal equations of one group
+    weak = csr_array(np.array([[0.1, 0.0, 1.0], [0.0, 0.1, 1.0]]))  # no group has a pivot that is large enough
+    assert pivot_order.of_groups(weak, np.arange(2)) is None
+    assert pivot_order.of_nodes(weak, np.arange(2), 1) is None
 
 
 def test_forces_move_along_the_rows_that_multipliers_act_through():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from fastcontact.linear.elimination.pivot_order import layered
+from fastcontact.linear.elimination.pivot_order import chosen, inverse_of, layered, of_groups
 
 
 def in_layers(seed, sizes=(5, 4, 3), n_others=6):
@@ -47,3 +47,42 @@ def test_weak_unknowns_are_no_pivots():
     B = csr_array(np.array([[0.1, 1.0, 0.0], [0.0, 1.0, 1.0]]))
     assert layered(B, 0.25)[0].tolist() == [1, 2]
     assert layered(B, 0.05)[0].tolist() == [0, 2]
+
+
+def nodes_in_layers(rng, corners=40, middles=60):
+    """Equations of nodes, three each: those of corners on themselves, those of middles also on two corners; all on others."""
+    n, equation = corners + middles, np.linalg.qr(rng.normal(size=(corners + middles, 3, 3)))[0]
+    B = np.zeros((3 * n, 3 * n + 30))
+    for node in range(n):
+        own = slice(3 * node, 3 * node + 3)
+        B[own, own] = equation[node]
+        for other in rng.choice(corners, 2, replace=False) if node >= corners else ():
+            B[own, 3 * other : 3 * other + 3] = 0.5 * equation[node]
+        B[own, 3 * n + rng.choice(30, 4, replace=False)] = 0.25 * rng.normal(size=(3, 4))
+    order = rng.permutation(3 * n)
+    return csr_array(B[order]), np.repeat(np.arange(n), 3)[order]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_nodes_in_layers_have_a_sparse_inverse(seed):
+    B, nodes = nodes_in_layers(np.random.default_rng(seed))
+    assert layered(B) is None  # three equations of a node share its three unknowns
+    assert of_groups(B, nodes, layers=1) is None
+    pivots, inverse = chosen(B, nodes, 3)
+    assert np.array_equal(pivots, of_groups(B, nodes))
+    P = B[:, pivots].toarray()
+    assert inverse.toarray() @ P == pytest.approx(np.eye(len(P)), abs=1e-10)
+    assert inverse.nnz < 12 * len(P)
+    # Forces act through other rows of the same pattern.
+    through = B + csr_array((0.1 * np.cos(np.arange(B.nnz)) * B.data, B.indices, B.indptr), shape=B.shape)
+    inverse = inverse_of(csr_array(through), pivots, 3)
+    assert inverse.toarray() @ through[:, pivots].toarray() == pytest.approx(np.eye(len(P)), abs=1e-9)
+    assert inverse.nnz < 12 * len(P)
+
+
+def test_a_chain_of_more_layers_is_no_sum_of_few_products():
+    m = 80
+    B = csr_array(np.eye(m) + 0.5 * np.eye(m, k=1))
+    inverse = inverse_of(B, np.arange(m), 1)
+    assert not isinstance(inverse, csr_array)
+    assert inverse.solve(B @ np.ones(m)) == pytest.approx(np.ones(m))
