@@ -13,7 +13,7 @@ from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.initial_states import COMPONENTS
 from fastcontact.elasticity.material_axes import CylindricalAxes
-from fastcontact.elasticity.materials import LinearElastic, Material
+from fastcontact.elasticity.materials import LinearElastic, Material, check_expansion
 from fastcontact.elasticity.varying_constants import Tabulated
 from fastcontact.errors import CaseError, unknown
 from fastcontact.mesh.files.mesh_files import read_mesh
@@ -33,6 +33,8 @@ def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
     if "axes" in constants:
         constants["axes"] = _axes("material", constants["axes"])
     if kind is LinearElastic:
+        if isinstance(constants.get("expansion"), list):  # no array over cells: case files have tables for that
+            check_expansion(constants["expansion"], 1)
         for key in constants:
             if (
                 key not in ("volumetric", "incompatible_modes")

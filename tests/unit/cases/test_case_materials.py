@@ -57,6 +57,8 @@ def test_constants_that_vary_reach_the_model(tmp_path):
     found = material(tmp_path, "E = 1.0\nnu = 0.3\ndensity = {along = 'x', table = [[0, 1], [1, 2]]}")
     assert found.E == 1.0
     assert found.density.range[1] < 2.0
+    found = material(tmp_path, "E = 1.0\nnu = 0.3\nexpansion = {along = 'x', table = [[0, 1e-5], [1, 2e-5]]}")
+    assert found.expansion.given == fc.Tabulated("x", [(0.0, 1e-5), (1.0, 2e-5)])
 
 
 @pytest.mark.parametrize(
