@@ -8,7 +8,7 @@ make the polygon that is cut, in the ``axes`` (3, 3) of its plane: two tangents 
 import numpy as np
 from numba import prange
 
-from fastcontact._jit.decorators import inlined_kernel, kernel, parallel_kernel
+from fastcontact._jit.decorators import inlined_kernel, innermost_kernel, kernel, parallel_kernel
 from fastcontact.contact.search.box_tree_kernels import DEPTH
 
 # A polygon of up to 4 corners clipped by one of up to 4 has at most 8.
@@ -201,7 +201,7 @@ def facing_pairs(
     return found
 
 
-@kernel
+@innermost_kernel
 def _fill_terms(n_terms, s, t, terms):
     """Fill `terms` (n_terms, 3) with the terms of a facet's polynomial and their derivatives."""
     terms[0, 0], terms[0, 1], terms[0, 2] = 1.0, 0.0, 0.0
@@ -230,7 +230,7 @@ def _flatten(facet, origin, axes, flat):
                 flat[k, a] += (facet[k, d] - shift) * axes[a, d]
 
 
-@kernel
+@innermost_kernel
 def _locate(flat, x, y, xi, terms):
     """Move `xi` (2,) to where a facet passes over (x, y) and fill `terms` there; return its area per unit of xi.
 
@@ -260,7 +260,7 @@ def _locate(flat, x, y, xi, terms):
     return 0.0
 
 
-@kernel
+@innermost_kernel
 def _stretch(facet, terms):
     """Return the area of a facet per unit of xi."""
     area = 0.0
@@ -276,7 +276,7 @@ def _stretch(facet, terms):
     return np.sqrt(area)
 
 
-@kernel
+@innermost_kernel
 def _fill_shape(to_terms, terms, shape):
     for k in range(shape.shape[0]):
         shape[k] = 0.0
