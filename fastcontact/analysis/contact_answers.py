@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastcontact.analysis.wear import worn_in_step
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import facet_measure, fine_rule
-from fastcontact.contact.obstacles.rigid_side import RigidSide
-from fastcontact.contact.pairing import Candidates, rows_along
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh import elements
@@ -157,7 +156,7 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
 
     ``depth = sum of coefficient * pressure * slip``, with the mean of the pressures at both ends of a step. Slip is the
     relative tangential displacement of a node and of what it faces at the end of the step; where friction holds nodes it is
-    zero. The geometry is not changed by it; given back as `clearance` it is, in another analysis.
+    zero. The geometry is not changed by it; with the option ``wear`` of the contact pair it is.
 
     Parameters
     ----------
@@ -186,45 +185,27 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
     if not (np.isfinite(coefficient) and coefficient >= 0.0):
         raise ContactError(f"the coefficient of wear {coefficient} must be a number, zero or more")
     pair = _bound(model, name)
-    rubbing = bool(pair.friction)
     depth, found = np.zeros(len(pair.secondary.points)), []
     before: StepResult | None = None
     for step in steps:
-        contact = step.contact[name]
-        pressure = contact.pressure + (0.0 if before is None else before.contact[name].pressure)
-        slip = np.linalg.norm(_slip(pair, before, step, name), axis=1)
-        if rubbing:
-            slip = np.where(contact.sticking, 0.0, slip)
-        depth = depth + coefficient * 0.5 * np.maximum(pressure, 0.0) * np.where(contact.active, slip, 0.0)
+        pressure = 0.0 if before is None else before.contact[name].pressure
+        depth = depth + worn_in_step(pair, _end_of(before, step, name), step.contact[name], pressure, coefficient)
         found.append(depth)
         before = step
     return np.array(found).reshape(len(found), len(depth))
 
 
-def _slip(pair: Formulation, before: StepResult | None, step: StepResult, name: str) -> Array:
-    """Return the slip (m, dim) of the secondary nodes in a step along what they face, else zero [length]."""
+def _end_of(before: StepResult | None, step: StepResult, name: str) -> Configuration:
+    """Return the configuration of a contact pair at the end of a step."""
     dim = step.displacement.shape[1]
     start = np.zeros_like(step.displacement) if before is None else before.displacement
+    pairs = [None if own is None else own.contact[name] for own in (step, before)]
     now, then = (
-        np.zeros(dim) if own is None or own.contact[name].obstacle_displacement is None
-        else np.asarray(own.contact[name].obstacle_displacement)
-        for own in (step, before)
-    )  # fmt: skip
-    angles = [0.0 if own is None else own.contact[name].obstacle_angle or 0.0 for own in (step, before)]
-    at = Configuration(step.displacement, start, now, then, angle=angles[0], angle_start=angles[1])
-    nodes = Candidates(pair.secondary.points[:, None], np.ones((len(pair.secondary.points), 1)))
-    pairing = pair.facing(nodes, at, pair.projection_tolerance or 0.0)
-    moved = (step.displacement - start).ravel()
-    slip = np.zeros((len(nodes.nodes), dim))
-    for axis, unit in enumerate(np.eye(dim)):
-        along = np.tile(unit, (len(slip), 1))
-        slip[:, axis] = rows_along(along, nodes, pairing, pair.primary, moved.size) @ moved
-    if isinstance(pair.primary, RigidSide):
-        slip -= now - then
-        turning = pair.turning(nodes, at)
-        slip -= 0.0 if turning is None else turning
-    slip -= np.einsum("nd,nd->n", slip, pairing.normal)[:, None] * pairing.normal
-    return np.where(pairing.paired[:, None], slip, 0.0)
+        np.zeros(dim) if own is None or own.obstacle_displacement is None else np.asarray(own.obstacle_displacement)
+        for own in pairs
+    )
+    angles = [0.0 if own is None else own.obstacle_angle or 0.0 for own in pairs]
+    return Configuration(step.displacement, start, now, then, angle=angles[0], angle_start=angles[1])
 
 
 def lumped_areas(side: Surface, points: Array, axisymmetric: bool) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,22 +74,25 @@ def contact_result(
         shear=along.shear,
         sticking=closed & along.sticking,
         dissipation=along.dissipation,
-        obstacle_displacement=at.obstacle.copy() if isinstance(pair.primary, RigidSide) else None,
         middle=middle.position,
         place=middle.places(coordinates),
         tangent=middle.tangent,
         primary_points=forces.primary_points,
         primary_force_vectors=forces.primary,
-        **_turned(pair, points, forces.secondary, at),
+        **_obstacle(pair, at, coordinates + at.displacement[points], forces.secondary),
     )
 
 
-def _turned(pair: Formulation, points: NDArray[np.int32], forces: Array, at: Configuration) -> dict[str, float | None]:
-    """Return the angle and the torque of a rigid obstacle that turns, nothing of others."""
-    if not isinstance(pair.primary, RigidSide) or pair.primary.rotation is None:
+def _obstacle(pair: Formulation, at: Configuration, deformed: Array, forces: Array) -> dict[str, Any]:
+    """Return where a rigid obstacle stands, and its torque by `forces` at the places `deformed`; nothing of bodies."""
+    side = pair.primary
+    if not isinstance(side, RigidSide):
         return {}
-    deformed = pair.points[points] + at.displacement[points]
-    return {"obstacle_angle": at.angle, "torque": pair.primary.torque(deformed, forces, at.stance)}
+    return {
+        "obstacle_displacement": at.obstacle.copy(),
+        "obstacle_angle": None if side.rotation is None else at.angle,
+        "torque": side.torque(deformed, forces, at.stance),
+    }
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,8 @@ from fastcontact.analysis.iterate import gaps_and_forces
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
+from fastcontact.analysis.wear import Worn
+from fastcontact.results.step import ContactResult
 
 Array = NDArray[np.float64]
 
@@ -35,6 +37,22 @@ def keep_contact(problem: Problem, start: State, load: StepLoad, settled: Settle
         extrapolation=start.extrapolation.converged(end.u, gaps_and_forces(settled.constraints, settled.solution)),
         never_opening=never_opening(problem, start, settled), traction=tractions(problem, settled),
     )  # fmt: skip
+
+
+def keep_wear(
+    problem: Problem, start: State, load: StepLoad, end: State, results: dict[str, ContactResult]
+) -> tuple[State, dict[str, ContactResult]]:
+    """Return the state at the end of a step with what has been worn off, and the results of contact pairs with it."""
+    worn, told, displacement = dict(start.worn), dict(results), problem.displacement(end.u)
+    for name, contact in results.items():
+        pair = problem.pairs[name]
+        if pair.options.wear is None:
+            continue
+        before = start.worn.get(name, Worn.nothing(len(contact.points)))
+        at = problem.configuration(name, start, load, displacement, end.u)
+        worn[name] = before.after(pair, at, contact, pair.options.wear)
+        told[name] = replace(contact, wear=worn[name].depth)
+    return replace(end, worn=worn), told
 
 
 def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> dict[str, tuple[Array, Array]]:

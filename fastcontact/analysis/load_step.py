@@ -19,7 +19,7 @@ from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis.balance import Balance, balance
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import StepContext
-from fastcontact.analysis.keep_contact import keep_contact
+from fastcontact.analysis.keep_contact import keep_contact, keep_wear
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_result import contact_results, counted, recover
@@ -67,6 +67,7 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     if settled is not None:
         end = keep_contact(problem, start, load, settled, end)
         contact = contact_results(problem, start, load, settled, end)
+        end, contact = keep_wear(problem, start, load, end, contact)
         end = end.after_touching(name for name, pair in contact.items() if pair.active.any())
     if problem.unsupported_bodies is not None and end.rigid is not None:
         iterations["regularised"] = problem.unsupported_bodies.report(end.rigid, end.largest_rigid_force)

@@ -173,7 +173,16 @@ class Problem:
             state.traction.get(name),
             load.angles.get(name, 0.0),
             state.angles.get(name, 0.0),
+            self._worn(name, state),
         )
+
+    def _worn(self, name: str, state: State) -> Array | None:
+        """Return what has been worn off a contact pair at all points (n_points,) [length], None for nothing."""
+        if name not in state.worn:
+            return None
+        depth = np.zeros(self.model.mesh.n_points)
+        depth[self.pairs[name].secondary.points] = state.worn[name].depth
+        return depth
 
     def initial_state(self) -> State:
         """Return the state before the first load step."""

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.analysis.problem import Problem
-from fastcontact.analysis.seam_warnings import seam_warnings
+from fastcontact.analysis.seams import seam_warnings
 from fastcontact.analysis.state import State
 from fastcontact.analysis.volumetric_locking import locking_warning
+from fastcontact.analysis.wear import too_fast
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import element_kernels, recovery
@@ -49,7 +50,7 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
         if pair.options.gap_only:
             continue
         found += _deep(pair, contact, state.u) + _lost(pair, contact, name in state.touched, loaded)
-        found += _unresolved(name, pair, contact)
+        found += _unresolved(name, pair, contact) + _too_fast(name, pair, state)
     return found + seam_warnings(problem, last) + _unsettled(state) + _loose(problem, last)
 
 
@@ -62,6 +63,17 @@ def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> lis
     return [
         f"contact '{contact.name}' penetrates by {depth:.4g}, which is {depth / size:.1%} of the largest displacement: "
         f"raise its penalty from {penalty:.4g} to about {penalty * depth / (DEEP * size):.2g}, or leave it out"
+    ]
+
+
+def _too_fast(name: str, pair: Formulation, state: State) -> list[str]:
+    """Return a warning where a contact wears faster than its load steps can follow."""
+    many = too_fast(pair, state.worn[name]) if name in state.worn else 0.0
+    if many <= 1.0:
+        return []
+    return [
+        f"contact '{name}' wears so much in a load step that pressures may waver from node to node: take "
+        f"{math.ceil(many)} times as many steps, or larger elements"
     ]
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fastcontact.analysis.contact_result import contact_result
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.seams import joined
 from fastcontact.analysis.state import State
 from fastcontact.elasticity import recovery
 from fastcontact.model.pretension import section_results
@@ -86,13 +87,14 @@ def contact_results(
     """
     displacement = problem.displacement(end.u)
     paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
-    return {
+    found = {
         name: contact_result(
             name, problem.pairs[name], settled.constraints.parts[name], settled.solution, rows,
             problem.configuration(name, start, load, paired_at, end.u), end.first_contact.get(name), displacement,
         )
         for name, rows in settled.constraints.rows().items()
     }  # fmt: skip
+    return joined(problem, found)
 
 
 def counted(settled: SettledContact | None, linear_iterations: int) -> dict[str, Any]:

@@ -47,8 +47,15 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         ("speed",),
     ),
     "temperature": (
-        {"value": PLACE, "groups": (list, str), "reference": NUMBER, "ramp": list},
-        ("value",),
+        {
+            "value": PLACE,
+            "groups": (list, str),
+            **dict.fromkeys(("reference", "instant"), NUMBER),
+            "file": (str, list),
+            "field": str,
+            **dict.fromkeys(("times", "ramp"), list),
+        },
+        (),
     ),
     **dict.fromkeys(
         ("initial_stress", "initial_strain"),
@@ -62,14 +69,21 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
             (),
         ),
     ),
-    "force": ({"group": str, **AXES, "distribute": bool, "ramp": list}, ("group",)),
+    "force": (
+        {"group": str, **AXES, "distribute": bool, "at": list, "weighting": str, "radius": NUMBER, "ramp": list},
+        ("group",),
+    ),
     "moment": ({"group": str, **AXES, "ramp": list}, ("group",)),
     "hydrostatic_pressure": (
         {"group": str, **dict.fromkeys(("weight", "level"), NUMBER), "axis": str, "ramp": list},
         ("group", "weight", "level"),
     ),
     "coupling": (
-        {**dict.fromkeys(("reference", "group", "kind", "components"), str), "place": list},
+        {
+            **dict.fromkeys(("reference", "group", "kind", "components", "weighting"), str),
+            "place": list,
+            "radius": NUMBER,
+        },
         ("reference", "group"),
     ),
     "couple": ({"group": str, "component": str}, ("group", "component")),
@@ -99,7 +113,15 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         ("name", "section"),
     ),
     "spring": (
-        {"group": (str, int), "to": (str, int), **AXES, "axial": NUMBER, "transverse": NUMBER, "direction": list},
+        {
+            "group": (str, int),
+            "to": (str, int),
+            **AXES,
+            "axial": NUMBER,
+            "transverse": NUMBER,
+            "direction": list,
+            "translation": list,
+        },
         ("group",),
     ),
 }

@@ -47,6 +47,21 @@ def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
     model.add_material(kind(**constants), groups)
 
 
+def _add_temperature(model: Model, **given: Any) -> None:
+    """Add a temperature by its value, or by a field of files."""
+    if ("value" in given) == ("file" in given):
+        raise CaseError("a temperature needs either 'value', or 'file' and 'field'")
+    if "value" in given:
+        for key in ("field", "instant", "times"):
+            if key in given:
+                raise CaseError(f"the key '{key}' belongs to a temperature with 'file'")
+        model.add_temperature(**given)
+    elif "field" not in given:
+        raise CaseError("a temperature with 'file' needs 'field', its name there")
+    else:
+        model.add_temperature_file(**given)
+
+
 def _add_initial_stress(model: Model, axes: Any = None, **given: Any) -> None:
     model.add_initial_stress(axes=_axes("initial_stress", axes), **given)
 
@@ -95,7 +110,7 @@ _ADD: dict[str, Callable[..., None]] = {
     "body_force": Model.add_body_force,
     "gravity": Model.add_gravity,
     "centrifugal": Model.add_centrifugal,
-    "temperature": Model.add_temperature,
+    "temperature": _add_temperature,
     "initial_stress": _add_initial_stress,
     "initial_strain": _add_initial_strain,
     "force": Model.add_force,
@@ -126,7 +141,7 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
                 if key not in entry:
                     raise CaseError(f"{where} needs '{key}'")
             with at(where):
-                add(model, **_arguments(where, _placed(where, entry)))
+                add(model, **_arguments(where, _found(folder, _placed(where, entry))))
     for name, entry in data.get("contact", {}).items():
         if not isinstance(entry, dict):
             raise CaseError(f"'contact' needs a name for each pair: write [contact.NAME] above its keys, not '{name}'")
@@ -150,6 +165,18 @@ def _placed(where: str, entry: dict[str, Any]) -> dict[str, Any]:
         elif key in entry:
             found[key] = _function(f"{where}.{key}", value)
     return found
+
+
+def _found(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
+    """Return an entry with the paths of its files seen from the folder of the case file."""
+    file = entry.get("file")
+    if file is None:
+        return entry
+    given = [file] if isinstance(file, str) else file
+    if not all(isinstance(name, str) for name in given):
+        raise CaseError(f"'file' must be a path or a list of paths, not {repr(file)}")
+    paths = [folder / name for name in given]
+    return {**entry, "file": paths[0] if isinstance(file, str) else paths}
 
 
 def _function(where: str, value: Any) -> Any:

@@ -35,6 +35,8 @@ class Configuration:
         [pressure]; None where nothing depends on them.
     angle, angle_start : float
         By which a rigid obstacle has turned, likewise [radian].
+    worn : ndarray (n_points,), optional
+        Depth worn off at the secondary nodes before the load step [length]; None for nothing.
     """
 
     displacement: Array
@@ -46,6 +48,7 @@ class Configuration:
     traction: tuple[Array, Array] | None = None
     angle: float = 0.0
     angle_start: float = 0.0
+    worn: Array | None = None
 
     @property
     def stance(self) -> Stance:

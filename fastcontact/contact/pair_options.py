@@ -38,6 +38,8 @@ class PairOptions:
     tangential_penalty : callable, optional
         Shear by slip of what sticks, a function from reference positions (n, dim) on the secondary side to positive numbers
         (n,) [pressure / length]; None: none slips.
+    wear : float, optional
+        Archard's coefficient by hardness, of what sliding takes off the secondary side [1 / pressure]; None: nothing.
     search_distance : float, optional
         What is farther off, or deeper inside, now and as the load step begins, is not faced [length]; None: at any
         distance.
@@ -51,6 +53,7 @@ class PairOptions:
     penalty: float | None = None
     tangential_penalty: Field | None = None
     search_distance: float | None = None
+    wear: float | None = None
 
     @property
     def gap_only(self) -> bool:

@@ -86,6 +86,26 @@ def between(
     return Springs(name, _rows(entries, np.tile(dofs.ravel(), (len(values), 1)), points.size), values, False)
 
 
+def joined(
+    name: str,
+    points: Array,
+    ends: tuple[NDArray[np.integer], NDArray[np.integer]],
+    stiffness: Mapping[int, float],
+    along: Mapping[str, float],
+    direction: Array | None = None,
+) -> Springs:
+    """Return springs between pairs of the `points` (n_points, dim) [length], as `between` describes them for one pair.
+
+    `ends` (n,) of int each are the first and the second points; `direction` (dim,) [-].
+    """
+    parts = [
+        between(name, points, int(first), int(second), stiffness, along, direction)
+        for first, second in zip(*ends, strict=True)
+    ]
+    rows = csr_array(vstack([part.rows for part in parts], format="csr"))
+    return Springs(name, rows, np.concatenate([part.stiffness for part in parts]), False)
+
+
 def _line(name: str, points: Array, first: int, second: int) -> Array:
     """Return the unit vector (dim,) from one point to another."""
     line = points[second] - points[first]

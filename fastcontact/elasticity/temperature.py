@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -29,12 +30,19 @@ class Temperature:
         At which there is no thermal strain [temperature].
     ramp : tuple, optional
         History of the rise over the reference.
+    times : tuple of float
+        Instants of the history of which it is a part, if it is one.
+    place : int
+        Which of them it is that of.
     """
 
     groups: tuple[str, ...] | None
     value: Value | Array
     reference: float
     ramp: Table | None = None
+    # Of a history by instants: these, and which one it is; told by `histories`.
+    times: tuple[float, ...] = field(default=(), init=False)
+    place: int = field(default=0, init=False)
 
     @property
     def name(self) -> str:
@@ -76,3 +84,49 @@ class Temperature:
 def checked_value(value: Any) -> Any:
     """Return a temperature, a list of numbers as an array."""
     return np.array(value, float) if isinstance(value, (list, tuple, np.ndarray)) and np.ndim(value) else value
+
+
+def histories(
+    groups: tuple[str, ...] | None, values: Array, reference: float, times: Sequence[float]
+) -> list[Temperature]:
+    """Return a temperature for each of several instants, that between them follow one another linearly.
+
+    Parameters
+    ----------
+    groups : tuple of str or None
+    values : ndarray (n_instants, n_points)
+        [temperature]
+    reference : float
+        [temperature]
+    times : sequence of float
+        Ascending load factors of the instants.
+
+    Raises
+    ------
+    ModelError
+        If there are not as many times as instants, or they do not ascend.
+    """
+    instants = checked_times(times, len(values))
+    found = []
+    for place, time in enumerate(instants):
+        hat = tuple((other, float(other == time)) for other in instants)
+        own = Temperature(groups, values[place], reference, hat)
+        object.__setattr__(own, "times", instants)
+        object.__setattr__(own, "place", place)
+        found.append(own)
+    return found
+
+
+def checked_times(times: Sequence[float], count: int) -> tuple[float, ...]:
+    """Return the load factors of the instants of a history; ModelError unless they are `count`, at least two, and ascend."""
+    try:
+        found = np.asarray(times, float)
+    except (TypeError, ValueError):
+        raise ModelError(f"the times of the temperature must be numbers, not {times!r}") from None
+    if found.shape != (count,) or count < 2:
+        raise ModelError(
+            f"the temperature has {count} instants, but {found.size} times: give the load factor of each, at least two"
+        )
+    if not (np.isfinite(found).all() and (np.diff(found) > 0.0).all()):
+        raise ModelError(f"the times of the temperature must ascend, not {found.tolist()}")
+    return tuple(found.tolist())

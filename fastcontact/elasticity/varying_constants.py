@@ -203,6 +203,13 @@ def wrapped(value: Any, vector: bool = False) -> Any:
     """Return a constant as it is if it is a number, else as `Varying`; with `vector`, each of a sequence."""
     if vector and isinstance(value, Sequence) and not isinstance(value, str):
         return tuple(wrapped(v) for v in value)
+    if isinstance(value, list | tuple):
+        try:
+            value = np.asarray(value, float)
+        except (TypeError, ValueError):
+            raise ModelError(
+                f"a constant of a material is a number or one for each cell or point, not {value!r}"
+            ) from None
     if isinstance(value, Varying) or not (callable(value) or (isinstance(value, np.ndarray) and value.ndim > 0)):
         return value
     return Varying(value)

@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fastcontact.elasticity.loads import Load, Table, Traction
+from fastcontact.elasticity.loads import Load, Table
 from fastcontact.elasticity.relations import Relation
 from fastcontact.errors import MeshError, ModelError, unknown
 from fastcontact.mesh.generate.reference_points import ROTATION
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.model.spread_forces import Spread, mean_rotation, shares_of, turned
 
 Array = NDArray[np.float64]
 Points = NDArray[np.intp]
@@ -103,39 +104,6 @@ def distributing_rows(reference: ReferencePoint, points: Points, places: Array, 
     return rows
 
 
-def mean_rotation(weight: Array, arms: Array) -> Array:
-    """Return how displacements of n points make the mean rotation (n_rotations, n, dim) [1 / length].
-
-    Of `weight` (n,) [-] and `arms` (n, dim) from their middle [length]. Its products with moments are forces at the points
-    that have this moment, and no resultant.
-    """
-    x, y = arms[:, 0], arms[:, 1]
-    zero = np.zeros_like(x)
-    if arms.shape[1] == 2:
-        cross = np.stack([np.column_stack([-y, x])])
-        inertia = np.array([[weight @ (x * x + y * y)]])
-    else:
-        z = arms[:, 2]
-        cross = np.stack(
-            [np.column_stack([zero, -z, y]), np.column_stack([z, zero, -x]), np.column_stack([-y, x, zero])]
-        )
-        inertia = (weight @ (arms**2).sum(axis=1)) * np.eye(3) - np.einsum("n,ni,nj->ij", weight, arms, arms)
-    if np.linalg.matrix_rank(inertia, tol=1e-12 * np.abs(inertia).max(initial=1e-300)) < len(inertia):
-        raise ModelError(
-            "the points lie in one line or place, so they have no mean rotation about it: take a wider group"
-        )
-    return np.einsum("kl,lnd,n->knd", np.linalg.inv(inertia), cross, weight)
-
-
-def weights_of(mesh: Mesh, kinematics: str, group: str) -> tuple[Points, Array]:
-    """Return the points (n,) of a group, and their shares (n,) of its area, equal ones where it has no facets [-]."""
-    points = mesh.points_of(group).astype(np.intp)
-    if group in mesh.cell_groups and mesh.cells_of(group, dim=mesh.dim - 1):
-        areas = Traction(group, {0: 1.0}, None).vector(mesh, kinematics)[points, 0]
-        return points, areas / areas.sum()
-    return points, np.full(len(points), 1.0 / max(len(points), 1))
-
-
 def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
     """Return a reference point by the name of its group; ModelError if it is none."""
     if name + ROTATION not in mesh.point_groups:
@@ -146,7 +114,10 @@ def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
     return ReferencePoint(point, mesh.point(name + ROTATION), tuple(mesh.points[point].tolist()))
 
 
-def coupling(mesh: Mesh, kinematics: str, names: tuple[str, str], kind: str, axes: Sequence[int]) -> Relation:
+def coupling(
+    mesh: Mesh, kinematics: str, names: tuple[str, str], kind: str, axes: Sequence[int],
+    weighting: tuple[str, float | None] = ("uniform", None),
+) -> Relation:  # fmt: skip
     """Return the relation of a coupling.
 
     Parameters
@@ -158,6 +129,8 @@ def coupling(mesh: Mesh, kinematics: str, names: tuple[str, str], kind: str, axe
     kind : {"rigid", "distributing"}
     axes : sequence of int
         Components that follow; all for a distributing one.
+    weighting : (str, float or None)
+        Of a distributing one, by the distance from the reference point; see `Spread`.
 
     MeshError, ModelError if there are no such groups, or they cannot be coupled.
     """
@@ -171,7 +144,13 @@ def coupling(mesh: Mesh, kinematics: str, names: tuple[str, str], kind: str, axe
     if kind == "distributing" and len(axes) < mesh.dim:
         raise ModelError(f"{name}: a distributing coupling has all components of the displacement")
     reference = reference_of(mesh, names[0])
-    points, weight = weights_of(mesh, kinematics, names[1])
+    spread = None
+    if weighting != ("uniform", None):
+        if kind == "rigid":
+            raise ModelError(f"{name}: in a rigid coupling all nodes follow alike, without weighting or radius")
+        spread = Spread(reference.place, *weighting)
+        spread.check(name, mesh.dim)
+    points, weight = shares_of(mesh, kinematics, names[1], spread)
     own = np.isin(points, (reference.point, reference.rotation))
     if own.any() or not len(points):
         raise ModelError(f"{name}: the group needs points, without the reference point itself")
@@ -210,10 +189,8 @@ class Moment(Load):
         if self.group + ROTATION in mesh.point_groups:
             forces[mesh.point(self.group + ROTATION), : len(moment)] += moment
             return
-        points, weight = weights_of(mesh, kinematics, self.group)
-        places = mesh.points[points]
+        points, weight = shares_of(mesh, kinematics, self.group)
         try:
-            turn = mean_rotation(weight, places - weight @ places)
+            forces[points] += turned(weight, mesh.points[points], moment)
         except ModelError as error:
             raise ModelError(f"{self.name}: {error}") from error
-        forces[points] += np.einsum("k,knd->nd", moment, turn)

@@ -35,8 +35,14 @@ def sentences(model: Any) -> Iterator[str]:
     for load in model.loads:
         yield f"Load: {load.name}: {_load(load)}{_history(load.ramp)}."
     for own in model.temperatures:
+        if own.place:  # a further instant of the one before
+            continue
         value = "a number for each point" if isinstance(own.value, np.ndarray) else _value(own.value)
         where = own.name.removeprefix("the temperature of ")
+        if own.times:
+            when = f", at {len(own.times)} instants from {own.times[0]:g} to {own.times[-1]:g}"
+            yield f"Temperature: {value} over {own.reference:g} in {where}{when}."
+            continue
         yield f"Temperature: {value} over {own.reference:g} in {where}{_history(own.ramp)}."
     for state in model.initial_states:
         parts = [f"{COMPONENTS[number]} = {value:g}" for number, value in state.components.items()]

@@ -44,13 +44,14 @@ from fastcontact.elasticity.material_field import MaterialField, material_field
 from fastcontact.elasticity.materials import KINEMATICS, Constant, Material
 from fastcontact.elasticity.recovery import internal_force, stress_at_points
 from fastcontact.elasticity.relations import Relation, stacked_rows
-from fastcontact.elasticity.springs import Springs, between, grounded, stacked
+from fastcontact.elasticity.springs import Springs, grounded, joined, stacked
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
-from fastcontact.elasticity.temperature import Temperature, checked_value
+from fastcontact.elasticity.temperature import Temperature, checked_value, histories
 from fastcontact.elasticity.varying_constants import Cells
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.mesh.argument_types import check_fields, typed
+from fastcontact.mesh.files.paths import PathLike
 from fastcontact.mesh.html_table import html_table
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
@@ -75,6 +76,8 @@ from fastcontact.model.ramp import History, Ramp, Table, combined, multiplier, t
 from fastcontact.model.relation_rows import NORMAL, along, directions_of, matched, normals_of
 from fastcontact.model.repeated_pairs import check_repeated
 from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
+from fastcontact.model.spread_forces import SpreadForce, spread_of
+from fastcontact.model.temperature_files import read_temperatures
 
 Array = NDArray[np.float64]
 log = logging.getLogger("fastcontact")
@@ -334,6 +337,7 @@ class Model:
         groups: Sequence[str] | str | None = None,
         *,
         reference: float = 0.0,
+        times: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
         """Heat or cool groups of solid cells, by default all; their materials expand by their `expansion`.
@@ -343,19 +347,91 @@ class Model:
 
         Parameters
         ----------
-        value : float, callable or ndarray (n_points,)
-            A number, a function from reference positions (n, dim) [length] to temperatures (n,), or one for each point of the
-            mesh [temperature].
+        value : float, callable or ndarray (n_points,) or (n_instants, n_points)
+            A number, a function from reference positions (n, dim) [length] to temperatures (n,), one for each point of the
+            mesh, or that at several instants [temperature].
         groups : str or sequence of str, optional
         reference : float
             At which there is no thermal strain [temperature].
+        times : sequence of float (n_instants,), optional
+            Load factors of the instants, between which temperatures follow linearly [-].
         ramp : Ramp or iterable of (float, float), optional
             History of the rise, value minus reference.
         """
         names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
-        found = Temperature(names, checked_value(value), reference, table_of(ramp, "the ramp of the temperature"))
-        found.check(self.mesh)
-        self.temperatures.append(found)
+        checked = checked_value(value)
+        if times is not None:
+            if ramp is not None:
+                raise ModelError("a temperature has either times of its instants or a ramp, not both")
+            if not isinstance(checked, np.ndarray) or checked.ndim != 2:
+                raise ModelError("a temperature with times must be an array (n_instants, n_points)")
+            found = histories(names, checked, reference, times)
+        else:
+            found = [Temperature(names, checked, reference, table_of(ramp, "the ramp of the temperature"))]
+        for own in found:
+            own.check(self.mesh)
+        self.temperatures += found
+
+    @typed(ModelError)
+    def add_temperature_file(
+        self,
+        file: PathLike | Sequence[PathLike],
+        field: str,
+        groups: Sequence[str] | str | None = None,
+        *,
+        reference: float = 0.0,
+        instant: float | None = None,
+        times: Sequence[float] | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Heat or cool groups of solid cells, by default all, by a nodal field of a file, or of several files.
+
+        Read are MED, VTKHDF, such as result files, and what meshio reads, such as .vtu. A file with the points of the mesh in
+        their order gives the temperature of each; otherwise it is that of the point at the same place.
+
+        Parameters
+        ----------
+        file : path-like or sequence of them
+            One file, with one instant or several; or a file for each instant.
+        field : str
+            Its name.
+        groups : str or sequence of str, optional
+        reference : float
+            At which there is no thermal strain [temperature].
+        instant : float, optional
+            Time of the file to take alone.
+        times : sequence of float (n_instants,), optional
+            Load factors of the instants [-]; by default the times of the file. Between them temperatures follow linearly.
+        ramp : Ramp or iterable of (float, float), optional
+            History of the rise of a single instant.
+
+        Raises
+        ------
+        FileError, MeshError, ModelError
+            If a file cannot be read or lacks the field, a point has no temperature, or instants and times do not fit.
+        """
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        for name in names or ():
+            if not self.mesh.cells_of(name, dim=self.mesh.dim):
+                raise ModelError(f"group '{name}' holds no solid cells: it has no temperature")
+        values, own = read_temperatures(self.mesh, file, field, self._points_of_cells(names), instant)
+        values = np.where(np.isfinite(values), values, reference)
+        if len(values) == 1:
+            if times is not None:
+                raise ModelError(f"field '{field}' has one instant, so it has no times: give it a ramp")
+            self.add_temperature(values[0], names, reference=reference, ramp=ramp)
+            return
+        if ramp is not None:
+            raise ModelError(f"field '{field}' has {len(values)} instants and thus no ramp: give times, or one instant")
+        when = times if own is None or times is not None else own.tolist()
+        if when is None:
+            raise ModelError(f"field '{field}' has {len(values)} instants without times: give the load factor of each")
+        self.add_temperature(values, names, reference=reference, times=when)
+
+    def _points_of_cells(self, groups: Sequence[str] | None) -> NDArray[np.intp]:
+        """Return the points of the solid cells of groups, or of all."""
+        cells = self._cells_of(groups)
+        return np.unique(np.concatenate([self.mesh.cells[name][rows].ravel() for name, rows in cells.rows.items()]))
 
     @typed(ModelError)
     def add_initial_stress(
@@ -506,6 +582,9 @@ class Model:
         y: float | None = None,
         z: float | None = None,
         distribute: bool | None = None,
+        at: Sequence[float] | None = None,
+        weighting: str = "uniform",
+        radius: float | None = None,
         ramp: History = None,
     ) -> None:
         """Load a group with forces [force].
@@ -518,8 +597,26 @@ class Model:
         distribute : bool, optional
             True: the total force, spread as a uniform traction over the facets of the group. False: the force on every
             node of the group. By default True for a group of facets and False for a group of points.
+        at : sequence of float (dim,), optional
+            Place through which the total force acts, spread over the group by area and distance from there, with the arms of
+            the group for what moment is left [length].
+        weighting : str
+            Of the force spread about `at`: ``"uniform"``, or falling to zero at the radius as ``"linear"``, ``"quadratic"``
+            or ``"cubic"`` functions of the distance.
+        radius : float, optional
+            Beyond which the group bears nothing [length]; by default the distance of its farthest node.
+        ramp : Ramp or iterable of (float, float), optional
         """
         self.mesh.points_of(group)
+        spread = spread_of(f"the force on '{group}'", at, weighting, radius)
+        if spread is not None:
+            if distribute is False:
+                raise ModelError(
+                    f"the force on '{group}' acts through a place or on every node: leave out at or distribute"
+                )
+            axes = axes_of(f"the force on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
+            self._add(SpreadForce(group, axes, spread, table_of(ramp, f"the ramp of the force on '{group}'")))  # type: ignore[arg-type]
+            return
         if distribute is None:
             distribute = group in self.mesh.cell_groups and bool(self.mesh.cells_of(group, dim=self.mesh.dim - 1))
         kind: type[TotalForce] | type[NodalForce] = TotalForce if distribute else NodalForce
@@ -661,8 +758,8 @@ class Model:
     ) -> None:
         """Let the model be one period of a part that repeats itself: its two ends deform alike.
 
-        Rigid translations stay free and need supports. Contact should be open at the ends: their nodes have a pressure each,
-        and only both together follow from the gap.
+        Rigid translations stay free and need supports. Contact is best open at the ends: of two nodes that are one place
+        only the sum of the forces follows from the gap, and pressures of their neighbours may waver.
 
         Parameters
         ----------
@@ -776,7 +873,16 @@ class Model:
         self.relations.append(Relation(name, rows, float(value), table_of(ramp, f"the ramp of {name}")))
 
     @typed(ModelError)
-    def add_coupling(self, reference: str, group: str, *, kind: str = "rigid", components: str | None = None) -> None:
+    def add_coupling(
+        self,
+        reference: str,
+        group: str,
+        *,
+        kind: str = "rigid",
+        components: str | None = None,
+        weighting: str = "uniform",
+        radius: float | None = None,
+    ) -> None:
         """Couple a reference point with the nodes of a group, for small rotations.
 
         Forces, moments and supports at the reference point then act on the group; see
@@ -793,6 +899,10 @@ class Model:
             nothing (RBE3).
         components : str, optional
             Displacements that follow in a rigid coupling, such as ``"z"``; by default all.
+        weighting : str
+            Of a distributing coupling, by the distance from the reference point, as of `add_force`.
+        radius : float, optional
+            As of `add_force` [length].
 
         Raises
         ------
@@ -801,7 +911,9 @@ class Model:
         """
         letters = "xyz"[: self.mesh.dim] if components is None else components
         axes = axes_of(f"the coupling of '{reference}'", dict.fromkeys(letters, 1.0), self.mesh.dim)
-        self.relations.append(coupling(self.mesh, self.kinematics, (reference, group), kind, sorted(axes)))
+        self.relations.append(
+            coupling(self.mesh, self.kinematics, (reference, group), kind, sorted(axes), (weighting, radius))
+        )
 
     @typed(ModelError)
     def add_moment(
@@ -859,15 +971,17 @@ class Model:
         axial: float | None = None,
         transverse: float | None = None,
         direction: Sequence[float] | None = None,
+        translation: Sequence[float] | None = None,
     ) -> None:
-        """Hang every node of a group on the ground by springs, or join two nodes by them.
+        """Hang every node of a group on the ground by springs, or join two nodes or two groups by them.
 
         Parameters
         ----------
         group : str or int
             Group or point number.
         to : str or int, optional
-            Group of one node or point number: the springs then lie between the single node of `group` and this one.
+            Group or point number: springs then join each node of `group` with the one of this group that lies upon it after a
+            `translation`, as of `relate_groups`; a single node is joined with all of the other group.
         x, y, z : float
             Stiffness along the axes [force / length]; in axisymmetry over the full circle.
         axial, transverse : float
@@ -875,6 +989,8 @@ class Model:
             keeps its reference direction.
         direction : sequence of float, optional
             Takes the place of the line between the two nodes: a vector of any length.
+        translation : sequence of float (dim,), optional
+            What brings the first group upon the second; by default the way from middle to middle [length].
         """
         name = f"the spring on '{group}'" if to is None else f"the spring between '{group}' and '{to}'"
         given = {"x": x, "y": y, "z": z}
@@ -892,10 +1008,16 @@ class Model:
         if to is None:
             self.springs.append(grounded(name, nodes, axes, self.n_dofs, self.mesh.dim, along, vector))
             return
-        ends = [*nodes, *self._nodes(to)]
-        if len(ends) != 2:
-            raise ModelError(f"{name} needs one node at each end, but finds {len(nodes)} and {len(ends) - len(nodes)}")
-        self.springs.append(between(name, self.mesh.points, int(ends[0]), int(ends[1]), axes, along, vector))
+        opposite = self._nodes(to)
+        if not len(opposite):
+            raise ModelError(f"group '{to}' is empty: no spring can be there")
+        if len(nodes) > 1 < len(opposite):
+            place = matched(self.mesh, (str(group), nodes), (str(to), opposite), translation)
+            opposite = opposite[place]
+        elif translation is not None:
+            raise ModelError(f"{name} joins all nodes with a single one: leave out the translation")
+        first, second = np.broadcast_arrays(nodes, opposite)
+        self.springs.append(joined(name, self.mesh.points, (first, second), axes, along, vector))
 
     def _direction(
         self, name: str, along: Mapping[str, float], joined: bool, direction: Sequence[float] | None
@@ -968,6 +1090,8 @@ class Model:
               or a function of the secondary position [pressure / length].
             - ``slip``: ``"symmetric"`` (default): closing a gap along the mean of both sides' normals is no slip;
               ``"primary"``: all relative motion along the tangents to the primary side is, as in code_aster.
+            - ``wear``: Archard's coefficient by hardness: ``coefficient * pressure * slip`` is worn off the secondary side in
+              each load step, and the next one begins with it; depths are in the results [1 / pressure].
             - ``search_distance``: what is farther off than this, or deeper inside, now and as the load step begins, is not
               faced [length].
             - ``normals``: ``"facet"`` or ``"averaged"`` between the facets that meet at a node at less than 45 degrees, which

@@ -18,7 +18,7 @@ from fastcontact.model.ramp import Table, table_of
 # Options that every contact pair takes, beside those of its formulation.
 SHARED_OPTIONS = (
     "clearance", "clearance_primary", "clearance_ramp", "excluded", "frictionless", "kind", "penalty", "search_distance",
-    "tangential_penalty",
+    "tangential_penalty", "wear",
 )  # fmt: skip
 
 
@@ -45,6 +45,7 @@ def pair_options(
         penalty=_positive(name, "penalty", options, "no penetration"),
         tangential_penalty=_tangential_penalty(name, options.get("tangential_penalty")),
         search_distance=_positive(name, "search_distance", options, "any distance"),
+        wear=_positive(name, "wear", options, "none"),
     )
 
 
@@ -63,6 +64,8 @@ def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
         raise ContactError(
             f"contact '{name}' cannot be tied to a rigid obstacle: prescribe the displacements of the group, or couple them"
         )
+    if kind != "unilateral" and "wear" in options:
+        raise ContactError(f"contact '{name}' is {kind}, which does not wear: leave out 'wear' or 'kind'")
     for option in ("clearance", "clearance_primary", "penalty", "search_distance"):
         if kind == "tied" and option in options:
             raise ContactError(

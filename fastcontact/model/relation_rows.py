@@ -74,7 +74,7 @@ def matched(
     (name, nodes), (other, opposite) = first, second
     if len(nodes) != len(opposite):
         raise ModelError(
-            f"groups '{name}' and '{other}' have {len(nodes)} and {len(opposite)} nodes: relations need them one by one"
+            f"groups '{name}' and '{other}' have {len(nodes)} and {len(opposite)} nodes: they are joined one by one"
         )
     ours, theirs = mesh.points[nodes], mesh.points[opposite]
     low, high = ours.min(axis=0), ours.max(axis=0)
@@ -89,6 +89,6 @@ def matched(
     if distance[far] > APART * size or len(np.unique(place)) < len(place):
         raise ModelError(
             f"point {nodes[far]} of '{name}', moved by {shift}, lies {distance[far]:.3g} from the nearest node of '{other}': "
-            "relations between groups need nodes upon nodes; give the translation that brings them there, or another mesh"
+            "groups are joined nodes upon nodes; give the translation that brings them there, or another mesh"
         )
     return np.asarray(place, np.intp)

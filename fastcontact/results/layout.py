@@ -84,9 +84,10 @@ def restart_table(number: int) -> str:
     return f"restart{number % 2}"
 
 
-def contact_row(dim: int) -> np.dtype[Any]:
-    """Return the type of one row of a contact table: one secondary node in one step."""
-    scalars = [(name, "<f8") for name in ("abscissa", "place", "gap", "pressure", "multiplier")]
+def contact_row(dim: int, wears: bool = False) -> np.dtype[Any]:
+    """Return the type of one row of a contact table: one secondary node in one step; with depth where the pair `wears`."""
+    names = ("abscissa", "place", "gap", "pressure", "multiplier", *(("wear",) if wears else ()))
+    scalars = [(name, "<f8") for name in names]
     vectors = [(name, "<f8", (dim,)) for name in ("coordinates", "force_vectors", "normal", "shear")]
     return np.dtype([("points", "<i4"), ("active", "i1"), ("sticking", "i1"), *scalars, *vectors])
 
@@ -242,7 +243,7 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
 
 def check_contact(where: str, contact: ContactResult, mesh: Mesh) -> None:
     """Refuse the state of a pair whose arrays do not fit one another or name points that are not in the mesh."""
-    row = contact_row(mesh.dim)
+    row = contact_row(mesh.dim, contact.wear is not None)
     for name in row.names or ():
         found, shape = np.shape(getattr(contact, name)), (len(contact.points), *row[name].shape)
         if found != shape:

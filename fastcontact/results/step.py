@@ -93,6 +93,8 @@ class ContactResult:
     tangent : ndarray (dim,), optional
         In plane problems the direction along which half-widths are measured, either way [-]; None where `place` counts: in
         axisymmetry, in 3D, and on a ring that is pressed all round.
+    wear : ndarray (m,), optional
+        Depth worn off so far, with the option ``wear`` [length]; the next load step begins with it. None without.
     primary_points : ndarray of int (k,)
         Point numbers of the primary side; none for a rigid obstacle.
     primary_force_vectors : ndarray (k, dim)
@@ -123,6 +125,7 @@ class ContactResult:
     primary_force_vectors: Array = None  # type: ignore[assignment]
     obstacle_angle: float | None = None
     torque: float | None = None
+    wear: Array | None = None
 
     def __post_init__(self) -> None:
         if self.middle is None:

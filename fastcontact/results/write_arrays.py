@@ -195,7 +195,7 @@ def append_tables(
     own = file["fastcontact"]
     for name in step.contact:
         if name not in pairs:
-            pairs[name] = _new_pair(own["contact"], name, mesh.dim)
+            pairs[name] = _new_pair(own["contact"], name, mesh.dim, step.contact[name].wear is not None)
     for name, pair in pairs.items():
         _append_contact(pair, number, step.contact.get(name))
     if step.material_stress is not None:
@@ -246,7 +246,7 @@ def header_size(mesh: Mesh) -> int:
 def step_size(mesh: Mesh, step: StepResult) -> int:
     """Return an upper bound for what a step takes in the file, but for its restart state [bytes]."""
     fields = 8 * (sum(layout.POINT_FIELDS.values()) * mesh.n_points + sum(map(np.size, step.cell_fields.values())))
-    row = layout.contact_row(mesh.dim).itemsize
+    row = layout.contact_row(mesh.dim, True).itemsize
     faced = layout.primary_row(mesh.dim).itemsize
     contact = sum(
         (len(pair.points) + 2 * ROWS) * row + (len(pair.primary_points) + 2 * ROWS) * faced + BYTES
@@ -259,10 +259,10 @@ def step_size(mesh: Mesh, step: StepResult) -> int:
     return int(1.01 * fields) + contact + len(as_json([step.iterations, step.warnings]))
 
 
-def _new_pair(parent: Any, name: str, dim: int) -> Any:
+def _new_pair(parent: Any, name: str, dim: int, wears: bool) -> Any:
     pair = parent.create_group(None)  # without a name until it is whole: the program may be interrupted
     pair["name"] = as_json(name)
-    growing_table(pair, "rows", layout.contact_row(dim))
+    growing_table(pair, "rows", layout.contact_row(dim, wears))
     growing_table(pair, "primary", layout.primary_row(dim))
     growing_table(pair, "steps", layout.contact_step(dim))
     parent[str(len(parent))] = pair

@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from multiprocessing import connection
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -147,17 +149,34 @@ def on_processes(count: int, jobs: Sequence[Job], rest: list[int]) -> Iterator[t
         for index, result in on_executor(pool, jobs, rest):
             left.remove(index)
             yield index, result
+        pool.shutdown()  # they have nothing left to do, and end in their own way
     except BrokenProcessPool:
         for index in left:
             yield index, _alone(jobs[index])
+    except BaseException:
+        pool.end()
+        raise
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 
 
-def started_pool(count: int) -> ProcessPoolExecutor:
+class Workers(ProcessPoolExecutor):
+    """A pool of processes that can be ended in the middle of their work, and that end with this process."""
+
+    def __init__(self, count: int) -> None:
+        # Forked children of a process with OpenMP threads die, so workers are spawned.
+        context = multiprocessing.get_context("spawn")
+        heard, self.line = context.Pipe(duplex=False)
+        super().__init__(count, context, initializer=end_with_parent, initargs=(heard,))
+
+    def end(self) -> None:
+        """End the processes now; Python would wait for what they are doing before it ends itself."""
+        self.line.close()
+
+
+def started_pool(count: int) -> Workers:
     """Return a pool of processes of which one has answered; raises FastcontactError if none can start."""
-    # Forked children of a process with OpenMP threads die, so workers are spawned.
-    pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), initializer=end_with_parent)
+    pool = Workers(count)
     try:
         with _worker_settings():
             pool.submit(os.getpid).result()
@@ -172,10 +191,15 @@ def started_pool(count: int) -> ProcessPoolExecutor:
 def _alone(job: Job) -> Result:
     pool = started_pool(1)
     try:
-        return pool.submit(run, job, 1).result()
+        result = pool.submit(run, job, 1).result()
+        pool.shutdown()
+        return result
     except BrokenProcessPool:
         text = "its worker process was killed, as the system does when the memory is full: use coarser meshes"
         return {"error": text, "kind": "BrokenProcessPool"}
+    except BaseException:
+        pool.end()
+        raise
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 
@@ -204,13 +228,13 @@ def on_executor(executor: Executor, jobs: Sequence[Job], rest: list[int]) -> Ite
         raise
 
 
-def end_with_parent() -> None:
-    """Let this process end as soon as the one that started it has ended, however that came."""
+def end_with_parent(line: Connection) -> None:
+    """Let this process end as soon as the one that started it has ended, however that came, or closes its end of `line`."""
     parent = multiprocessing.parent_process()
 
     def wait() -> None:
         if parent is not None:
-            parent.join()
+            connection.wait([parent.sentinel, line])
             os._exit(1)
 
     threading.Thread(target=wait, daemon=True).start()

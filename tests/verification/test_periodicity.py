@@ -7,7 +7,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.analysis.problem import prepare
-from fastcontact.analysis.seam_warnings import seam_warnings
+from fastcontact.analysis.seams import seam_warnings
 from fastcontact.cases.case import read_case
 from fastcontact.mesh.generate import block, box, merge_points, renamed, union
 
@@ -100,6 +100,31 @@ def test_a_sector_under_pressure_moves_as_lame_says(element, error):
     assert np.abs(pushed / lame - 1.0).max() < error
 
 
+def test_sectors_of_a_press_fit_press_as_lame_says():
+    """Contact across the ends of the sectors, which wind, and meshes that do not match; shaft and hub of one material."""
+    parts = []
+    for name, inside, outside, cells in (("SHAFT", 0.5, 1.0, (8, 6)), ("HUB", 1.0, 2.0, (6, 8))):
+        mesh = block((1.0, 1.0), cells, "quad8")
+        s, t = mesh.points.T
+        radius = inside + (outside - inside) * t
+        angle = -2.0 * np.pi / 6.0 * s + 0.3 * (radius - 1.0)
+        mesh = mesh.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
+        parts.append(renamed(mesh, {group: f"{name}_{group}" for group in mesh.group_names}))
+    model = ring(union(*parts))
+    model.add_contact(
+        "fit", secondary="HUB_BOTTOM", primary="SHAFT_TOP", formulation="mortar", multipliers="standard", clearance=-0.01,
+        normals="averaged",
+    )  # fmt: skip
+    for name in ("SHAFT", "HUB"):
+        model.add_cyclic_symmetry(f"{name}_LEFT", f"{name}_RIGHT", sectors=6)
+        node = int(model.mesh.points_of(f"{name}_TOP")[0])
+        x, y = model.mesh.points[node].tolist()
+        model.relate([(node, "x", -y), (node, "y", x)])
+    contact = fc.solve(model, 1)[-1].contact["fit"]
+    lame = 0.01 * E / (1.0 - NU**2) / (1.25 / 0.75 + 5.0 / 3.0)
+    assert contact.pressure == pytest.approx(np.full(len(contact.points), lame), rel=0.01)
+
+
 def test_a_spinning_sector_in_space_reaches_the_axis():
     """A quarter of a square bar about an axis that the ends share; centrifugal forces, a slanting axis, and the whole bar."""
     part = box((1.0, 1.0, 2.0), (2, 2, 3), "hex8")
@@ -184,25 +209,37 @@ def test_a_period_stretched_by_a_mean_strain():
     assert step.stress[:, 0] == pytest.approx(np.full(model.mesh.n_points, 10.0))
 
 
+@pytest.mark.parametrize("divisions", [(48, 16), (96, 32)])
+def test_the_two_nodes_of_one_place_have_one_pressure(divisions):
+    """A period that begins in the middle of the contact: how a node's force is split is round-off, its pressure is not."""
+    middle, end = (
+        fc.solve(wavy(begin, "node_to_segment", divisions=divisions), 1)[-1].contact["floor"] for begin in (-0.5, 0.0)
+    )
+    order, shifted = np.argsort(middle.coordinates[:, 0]), np.argsort(end.coordinates[:, 0])
+    half = divisions[0] // 2
+    assert end.force[1] == pytest.approx(1.0)
+    assert end.pressure[shifted][: half + 1] == pytest.approx(middle.pressure[order][half:], rel=1e-6, abs=1e-6)
+    assert end.pressure[shifted][half:] == pytest.approx(middle.pressure[order][: half + 1], rel=1e-6, abs=1e-6)
+    assert end.active[shifted][[0, -1]].all()
+
+
 @pytest.mark.filterwarnings("ignore:contact 'floor' is closed where a period")
-def test_closed_contact_where_the_period_ends_is_told():
-    """Two nodes of one place have one gap: how their force is split is round-off, and told where it is not even."""
-    model = wavy(0.0, "node_to_segment")
+def test_an_uneven_split_where_the_period_ends_is_told():
+    model = wavy(0.0, "continuous")
     (step,) = fc.solve(model, 1)
     contact = step.contact["floor"]
-    assert contact.force[1] == pytest.approx(1.0)
     problem = prepare(model, fc.linear_ramp(1), fc.Criteria())
     ends = np.argsort(contact.coordinates[:, 0])[[0, -1]]
-    both = contact.pressure[ends].mean()
-    pressure = contact.pressure.copy()
-    pressure[ends] = both
-    even = dataclasses.replace(step, contact={"floor": dataclasses.replace(contact, pressure=pressure)})
-    assert seam_warnings(problem, even) == []
-    pressure = pressure.copy()
-    pressure[ends] = 0.9 * both, 1.1 * both
-    uneven = dataclasses.replace(step, contact={"floor": dataclasses.replace(contact, pressure=pressure)})
-    (text,) = seam_warnings(problem, uneven)
-    assert "at 1 places its pressures differ between the two nodes of one place, by up to 1.0" in text
+    assert contact.pressure[ends[0]] == contact.pressure[ends[1]] > 0.9 * contact.pressure_max
+
+    def split(*parts):
+        multiplier = contact.multiplier.copy()
+        multiplier[ends] = np.array(parts) * contact.pressure[ends]
+        return dataclasses.replace(step, contact={"floor": dataclasses.replace(contact, multiplier=multiplier)})
+
+    assert seam_warnings(problem, split(1.0, 1.0)) == []
+    (text,) = seam_warnings(problem, split(0.9, 1.1))
+    assert "at 1 places its forces are split unevenly between the two nodes of one place, by 1.0" in text
 
 
 def test_ends_that_do_not_match_are_refused():

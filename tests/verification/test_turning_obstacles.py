@@ -1,10 +1,13 @@
 """Rigid obstacles that turn: the torque of full slip, what a turn leaves as it is, turned models, and what is refused."""
 
+import json
+
 import numpy as np
 import pytest
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
+from fastcontact.cli import main
 from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
 from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.mesh.generate import block, box
@@ -129,6 +132,20 @@ def test_a_disc_that_rolls_hardly_needs_a_torque():
     rolled, dragged = parts
     assert dragged == pytest.approx(1.0, rel=2e-3)
     assert abs(rolled) < 0.05
+
+
+def test_a_driven_wheel_rolls_on_by_its_arc():
+    """Pushed down by a force, free to move along, and turned: it goes on by radius times angle, but for a little creep."""
+    model = spun_disc()
+    model.contact.clear()
+    model.add_obstacle(
+        "disc", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, 5.0), 5.0), force={"x": 0.0, "y": -15.0}, ramp=PRESS,
+        rotation={"angle": -0.04, "centre": (0.0, 5.0), "ramp": PRESS_AND_TURN}, friction=FRICTION,
+    )  # fmt: skip
+    contact = fc.solve(model, np.linspace(1.0, 9.0, 17))[-1].contact["disc"]
+    assert contact.force == pytest.approx([0.0, -15.0], abs=1e-6)
+    assert contact.obstacle_displacement[0] == pytest.approx(0.04 * 5.0, rel=0.01)
+    assert abs(contact.torque) < 0.01 * FRICTION * 15.0 * 5.0
 
 
 def test_a_turn_about_a_far_centre_is_a_translation():
@@ -261,7 +278,7 @@ def test_an_axis_without_length_and_too_large_turns_are_refused():
         )  # fmt: skip
 
 
-def test_a_case_file_turns_an_obstacle(tmp_path):
+def test_a_case_file_turns_an_obstacle(tmp_path, capsys):
     text = """
 title = "A spun disc"
 kinematics = "plane_strain"
@@ -283,6 +300,11 @@ friction = 0.3
     case = read_case(path)
     contact = fc.solve(case.model, case.ramp, criteria=case.criteria)[-1].contact["disc"]
     assert contact.torque == pytest.approx(-0.3 * 5.0 * normal_forces(contact).sum(), rel=5e-3)
+    assert main(["run", str(path), "--json", str(tmp_path / "disc.json")]) == 0
+    told = json.loads((tmp_path / "disc.json").read_text(encoding="utf-8"))["contact"]["disc"]
+    assert told["torque"] == pytest.approx(contact.torque)
+    assert told["obstacle_angle"] == -0.5
+    assert "obstacle 'disc' has turned by -0.5 radian, with a torque of" in capsys.readouterr().out
     path.write_text(text.replace("angle = -0.5", "angel = -0.5"), encoding="utf-8")
     with pytest.raises(fc.CaseError, match=r"did you mean 'obstacle\.disc\.rotation\.angle'"):
         read_case(path)

@@ -227,7 +227,7 @@ class Building:
         for (axis, table), points in alike.items():
             if any(value for _, value in table):
                 group = self._point_group("force", points)
-                self.model.add_force(group, distribute=False, ramp=table, **{"xyz"[axis]: 1.0})
+                self.model.add_force(group, distribute=False, ramp=table, **_along(axis))
 
     def _pressures(self, groups: list[tuple[str, Table]]) -> None:
         for group, table in groups:
@@ -442,3 +442,8 @@ def nodal_gaps(model: Model, secondary: str, primary: str) -> Array:
     found = model.bind(pair).constraints(Configuration.undeformed(model.mesh.points))
     faced = np.diff(found.B.indptr) > 0
     return found.gap0[faced] if faced.any() else np.zeros(1)
+
+
+def _along(axis: int) -> dict[str, Any]:
+    """Return a unit force along an axis, as the model takes it."""
+    return {"xyz"[axis]: 1.0}

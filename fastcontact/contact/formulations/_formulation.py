@@ -20,6 +20,7 @@ from fastcontact.contact.prescribed_normals import Normals, checked_normals, opp
 from fastcontact.contact.projection import at_nodes_of_facets, interpolated, nodal_normals, places, smooth_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.tied import TiedPair, tied
+from fastcontact.contact.tied_offset import with_arms
 from fastcontact.errors import ContactError, unknown
 
 Array = NDArray[np.float64]
@@ -153,7 +154,14 @@ class Formulation(ABC):
     @cached_property
     def tied(self) -> TiedPair | None:
         """The equations of a tied pair, on the bodies as they lie before any load."""
-        return tied(self.unilateral(Configuration.undeformed(self.points))) if self.options.tied else None
+        if not self.options.tied:
+            return None
+        part = self.unilateral(Configuration.undeformed(self.points))
+        if isinstance(self.primary, Surface) and part.tangents:
+            smooth = self.normals if self.normals != "secondary" and self.normals is not None else "facet"
+            pairing = pair(part.positions, self.primary, self.points, np.inf, smooth)
+            part = with_arms(part, pairing, self.primary, self.points)
+        return tied(part)
 
     def never_opening(self, positions: Array, at: Configuration) -> NDArray[np.bool_] | None:
         """Return which reference places (m, dim) [length] never open again, (m,); None if all may."""
@@ -191,7 +199,7 @@ class Formulation(ABC):
     ) -> Constraints:
         """Return the constraints of paired candidates, with tangential rows where there is friction."""
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
-        gap0 += self.options.added_gap(candidates, pairing, self.primary, self.points, at.clearance_factor)
+        gap0 += self.added_gap(candidates, pairing, at)
         positions = candidates.positions(self.points)
         if not (self.friction or self.options.tied):
             return Constraints(B, gap0, positions, compliance)
@@ -207,6 +215,13 @@ class Formulation(ABC):
             drift = self._closing_slip(candidates, pairing, directions, at)
         friction = self.options.coefficients(self.friction, candidates)
         return Constraints(B, gap0, positions, compliance, along, directions, friction, drift)
+
+    def added_gap(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Array:
+        """Return what clearances and wear add to the gaps (n,) of candidates, zero where nothing is faced [length]."""
+        added = self.options.added_gap(candidates, pairing, self.primary, self.points, at.clearance_factor)
+        if at.worn is None:
+            return added
+        return added + np.where(pairing.paired, np.einsum("nk,nk->n", candidates.shape, at.worn[candidates.nodes]), 0.0)
 
     def turning(self, candidates: Candidates, at: Configuration) -> Array | None:
         """Return how far the rotation of an obstacle carries what candidates face (n, dim) [length]; None without any."""
@@ -286,7 +301,7 @@ class Formulation(ABC):
         pairing = self.facing(nodes, at, max(self.projection_tolerance or 0.0, ON_SYMMETRY))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
         if with_clearance:
-            gap0 += self.options.added_gap(nodes, pairing, self.primary, self.points, at.clearance_factor)
+            gap0 += self.added_gap(nodes, pairing, at)
         u = at.displacement if displacement is None else displacement
         return np.where(pairing.paired, gap0 + G @ u.ravel(), np.inf), pairing.normal
 

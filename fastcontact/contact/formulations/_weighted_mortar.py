@@ -112,6 +112,8 @@ class WeightedMortar(Formulation):
         normal = self._mean_normals(overlap, deformed)
         B = rows_of(mean, normal)
         gap0 = B @ self.points.ravel() + at.clearance_factor * self._clearance(own, across, weight)
+        if at.worn is not None:
+            gap0 += own @ at.worn / weight
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
         part = Constraints(B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=self._nodal(weight))
         if not (self.friction or self.options.tied):

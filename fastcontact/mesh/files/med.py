@@ -325,6 +325,16 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
         return times, np.stack([_read_instant(file, entry["NOE"], n_points, n_components) for entry in instants])
 
 
+def read_field_points(path: PathLike, field: str) -> Array | None:
+    """Return the points (n_points, dim) of the mesh of a field [length]; None where the mesh is in another file."""
+    with opened(path) as file:
+        name = decoded(bytes(attribute(file["CHA"][field], "MAI")))
+        if f"ENS_MAA/{name}" not in file:
+            return None
+        mesh = file[f"ENS_MAA/{name}"]
+        return _read_points(_first_step(mesh), mesh)
+
+
 def _field_size(file: Any, group: Any, instants: list[Any], n_components: int) -> int:
     """Return the number of points of the field's mesh, or of the field where the mesh is in another file."""
     name = decoded(bytes(attribute(group, "MAI")))

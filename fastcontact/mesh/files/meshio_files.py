@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.errors import FastcontactWarning, FileError, MeshError
+from fastcontact.errors import FastcontactWarning, FileError, MeshError, unknown
 from fastcontact.mesh import elements
 from fastcontact.mesh.files import abaqus, gmsh_versions, hdf5
 from fastcontact.mesh.files.blocks import VERTEX
@@ -91,6 +91,25 @@ def _format(path: Path, writing: bool) -> str:
         if file.read(1) != b"$":
             raise FileError(f"'{path}' is no Gmsh file, which starts with $MeshFormat: convert it to .med")
     return "gmsh"
+
+
+def read_point_data(path: Path, field: str) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the numbers (n_points, ...) [unit of the field] of a field, and its points (n_points, 2 or 3) [length].
+
+    FileError if meshio cannot read the file, or it has no such field.
+    """
+    file_format = _format(path, writing=False)
+    _check_before(path, file_format)
+    if file_format == "gmsh":
+        raise FileError(f"'{path}': fields of Gmsh files are not read: write the field to a .vtu or .med file")
+    found = read_in_process(path, file_format, field)
+    if "error" in found:
+        raise _refusal("read", path, found["error"])
+    if field not in found["fields"]:
+        raise FileError(f"'{path}': {unknown('field', field, found['fields'])}")
+    if found["field"] is None or found["points"] is None or len(found["field"]) != len(found["points"]):
+        raise FileError(f"field '{field}' of '{path}' has no number for each point: write it anew")
+    return found["field"], found["points"]
 
 
 def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:

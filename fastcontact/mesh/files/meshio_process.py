@@ -47,15 +47,15 @@ def library() -> Any:
     return meshio
 
 
-def read_in_process(path: Path, file_format: str) -> dict[str, Any]:
+def read_in_process(path: Path, file_format: str, field: str = "") -> dict[str, Any]:
     """Return what `plain_content` returns in a child process, or ``{"error": reason}`` if one of its limits stopped it."""
     interpreter = Path(sys.executable or "").name.lower()
     if getattr(sys, "frozen", False) or not ("python" in interpreter or "pypy" in interpreter):
-        return plain_content(path, file_format)
+        return plain_content(path, file_format, field)
     size = path.stat().st_size
     seconds, memory = SECONDS + SECONDS_PER_BYTE * size, MEMORY + MEMORY_PER_BYTE * size
     limits = f"{seconds:.0f}", str(memory), str(RETURNED + RETURNED_PER_BYTE * size)
-    command = [sys.executable, "-P", "-m", __name__, str(path.resolve()), file_format, *limits]
+    command = [sys.executable, "-P", "-m", __name__, str(path.resolve()), file_format, *limits, field]
     folders = os.pathsep.join(map(os.path.abspath, sys.path))
     try:
         done = subprocess.run(
@@ -83,19 +83,21 @@ def _answer(done: subprocess.CompletedProcess[bytes], seconds: float) -> dict[st
         return {"error": f"the reading process failed: {lines[-1] if lines else 'no answer'}"}
 
 
-def plain_content(path: Path, file_format: str) -> dict[str, Any]:
+def plain_content(path: Path, file_format: str, field: str = "") -> dict[str, Any]:
     """Read a file in a format, by meshio's name, as plain data; meshio neither prints nor ends the process.
 
     Found are ``points``, an array (n_points, 2 or 3) [length]; ``cells``, a list of kind, number of cells and connectivity
     (n_cells, n_nodes); ``cell_data`` and ``point_data``, the arrays that mean groups; ``cell_sets``, ``point_sets``,
     ``field_data``; ``said``, what meshio would have printed. Arrays that hold no numbers are None. If meshio cannot read
-    the file, only ``error``, the reason.
+    the file, only ``error``, the reason. With the name of a `field` at points also ``fields``, the names of all of them, and
+    ``field``, its numbers, None without any.
     """
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             found = library().read(path, file_format=file_format)
-            return {**plain_parts(found), "said": said.getvalue()}
+            named = {"fields": list(found.point_data), "field": _numbers(found.point_data.get(field))} if field else {}
+            return {**plain_parts(found), **named, "said": said.getvalue()}
     except MemoryError:
         return {"error": "it announces more than memory can hold"}
     except (Exception, SystemExit) as error:
@@ -138,7 +140,7 @@ def _limit(kind: int, value: int) -> None:
 def main() -> None:
     """Read the file named on the command line and write the packed result to the standard output."""
     path, file_format = sys.argv[1:3]
-    seconds, memory, returned = map(int, sys.argv[3:])
+    seconds, memory, returned = map(int, sys.argv[3:6])
     library()
     if sys.platform != "win32":
         import resource
@@ -146,7 +148,7 @@ def main() -> None:
         _limit(resource.RLIMIT_CORE, 0)
         _limit(resource.RLIMIT_CPU, int(time.process_time()) + 1 + seconds)
         _limit(resource.RLIMIT_AS, memory)
-    answer = packed(plain_content(Path(path), file_format))
+    answer = packed(plain_content(Path(path), file_format, *sys.argv[6:7]))
     if answer.nbytes > returned:
         answer = packed({"error": "it holds more than a file of its size can mean"})
     sys.stdout.buffer.write(answer.tobytes())

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Sequence
+import subprocess
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +60,7 @@ def animate(
     Raises
     ------
     FastcontactError
-        If there are no steps, the suffix is another one, or ffmpeg is missing.
+        If there are no steps, the suffix is another one, ffmpeg is missing or fails.
     FileError
         If the file cannot be written.
     """
@@ -71,7 +73,7 @@ def animate(
     writer = writer_of(target, pictures_per_second)
     colours, box = _over_all(mesh, steps, field, scale, mirrored)
     figure = first.figure
-    with replacing(target) as temporary, writer.saving(figure, temporary, RESOLUTION):
+    with _failure_of_ffmpeg(target), replacing(target) as temporary, writer.saving(figure, temporary, RESOLUTION):
         for step in steps:
             figure.clear()
             axes = figure.add_subplot(projection="3d" if mesh.dim == 3 else None)
@@ -100,6 +102,19 @@ def writer_of(path: Path, pictures_per_second: int) -> Any:
     return FFMpegWriter(
         fps=pictures_per_second, extra_args=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]
     )
+
+
+@contextlib.contextmanager
+def _failure_of_ffmpeg(path: Path) -> Iterator[None]:
+    """Tell in one line what ffmpeg said last."""
+    try:
+        yield
+    except subprocess.CalledProcessError as error:
+        said = str(error.stderr or "").strip().splitlines()
+        reason = f"{error.returncode} ({said[-1][:200]})" if said else str(error.returncode)
+        raise FastcontactError(
+            f"'{path}' was not written, ffmpeg ended with code {reason}: write a .gif instead"
+        ) from error
 
 
 def _size(mesh: Mesh, mirrored: bool) -> tuple[float, float]:

@@ -115,6 +115,35 @@ def test_workers_end_with_their_parent(number, tmp_path):
         time.sleep(0.05)
 
 
+STOPPED = """
+import time
+from fastcontact.studies.execute import on_processes, started_pool
+from fastcontact.studies import execute
+
+def endless(job, threads):
+    time.sleep(job)
+    return {"seconds": job}
+
+class Sized(float):
+    size = 1
+
+execute.run = endless
+if __name__ == "__main__":
+    print("begun", flush=True)
+    for _ in on_processes(2, [Sized(0.0), Sized(600.0), Sized(600.0)], [0, 1, 2]):
+        raise KeyboardInterrupt
+"""
+
+
+def test_a_study_that_is_interrupted_does_not_wait_for_its_runs(tmp_path):
+    script = tmp_path / "stopped.py"
+    script.write_text(STOPPED)
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=300, check=False)
+    assert done.stdout == "begun\n"
+    assert done.stderr.rstrip().endswith("KeyboardInterrupt")
+    assert done.returncode not in (0, 1)
+
+
 def is_running(process):
     """Return whether a process is there and no mere entry of one that has ended."""
     try:

@@ -230,7 +230,7 @@ def test_a_spring_shares_the_load_with_a_contact():
         (("BOTTOM",), "has no component"),
         (("BOTTOM", None, "z"), "component"),
         (("BOTTOM", None, "axial"), "no second node"),
-        (("BOTTOM", "TOP_LEFT", "axial"), "one node at each end, but finds 2 and 1"),
+        (("BOTTOM", "BLOCK", "axial"), "have 2 and 4 nodes: they are joined one by one"),
         (("TOP_LEFT", "TOP_LEFT", "axial"), "both ends are point"),
         ((99, None, "y"), "point 99 is not in the mesh"),
     ],

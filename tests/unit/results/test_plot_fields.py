@@ -2,6 +2,10 @@
 
 import dataclasses
 import io
+import os
+import re
+import shutil
+import subprocess
 
 import numpy as np
 import pytest
@@ -471,9 +475,6 @@ def test_an_animation_is_not_a_picture_too(result, tmp_path, capsys):
 
 def test_an_animation_hands_every_picture_to_ffmpeg(tmp_path, monkeypatch):
     """A program of that name that keeps what it is given: as many raw pictures as there are steps."""
-    import os
-    import re
-
     folder = tmp_path / "bin"
     folder.mkdir()
     (folder / "ffmpeg").write_text('#!/bin/sh\nfor last; do :; done\necho "$@" > "$0.asked"\ncat > "$last"\n')
@@ -484,6 +485,34 @@ def test_an_animation_hands_every_picture_to_ffmpeg(tmp_path, monkeypatch):
     fc.plot.animate(mesh, steps, tmp_path / "a.mp4", mirrored=True)
     width, height = re.search(r"-s (\d+)x(\d+)", (folder / "ffmpeg.asked").read_text()).groups()
     assert (tmp_path / "a.mp4").stat().st_size == 3 * 4 * int(width) * int(height)
+
+
+@pytest.mark.parametrize("reads", [True, False])
+def test_what_ffmpeg_says_when_it_fails_is_told_in_one_line(reads, tmp_path, monkeypatch):
+    folder, target = tmp_path / "bin", tmp_path / "a.mp4"
+    folder.mkdir()
+    (folder / "ffmpeg").write_text(
+        f"#!/bin/sh\n{'cat > /dev/null' * reads}\necho begin >&2\necho 'no encoder' >&2\nexit 3\n"
+    )
+    (folder / "ffmpeg").chmod(0o755)
+    monkeypatch.setenv("PATH", f"{folder}{os.pathsep}{os.environ['PATH']}")
+    mesh = block((1.0, 1.0), (2, 2), "quad4")
+    with pytest.raises(
+        FastcontactError, match=r"a.mp4' was not written, ffmpeg ended with code 3 \(no encoder\): write a"
+    ):
+        fc.plot.animate(mesh, [step_of(mesh)] * 3, target)
+    assert [path.name for path in tmp_path.iterdir()] == ["bin"]
+
+
+@pytest.mark.skipif(not shutil.which("ffmpeg"), reason="needs the program ffmpeg")
+@pytest.mark.parametrize("suffix", ["mp4", "mkv", "webm"])
+def test_ffmpeg_reads_as_many_pictures_as_there_are_steps(suffix, tmp_path):
+    mesh, path = block((1.0, 1.0), (2, 2), "quad4"), tmp_path / f"a.{suffix}"
+    fc.plot.animate(mesh, [step_of(mesh, displacement=0.1 * k * mesh.points) for k in (1, 2, 3)], path, mirrored=True)
+    read = subprocess.run(["ffmpeg", "-i", path, "-f", "framemd5", "-"], capture_output=True, text=True, check=True)
+    pictures = [line for line in read.stdout.splitlines() if not line.startswith("#")]
+    assert len(pictures) == 3
+    assert len({line.split()[-1] for line in pictures}) == 3  # none is like another
 
 
 def made_contact(mesh, group, pressure):

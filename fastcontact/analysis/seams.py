@@ -1,0 +1,68 @@
+"""Contact at the ends of a part that repeats itself, where two nodes are one place.
+
+Their gaps are one and the same condition, or nearly so, which fixes the sum of their forces alone. Their pressure is that of
+the place: the sum of both forces over both areas.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.analysis.contact_answers import lumped_areas
+from fastcontact.analysis.problem import Problem
+from fastcontact.model.periodicity import Seam
+from fastcontact.results.step import ContactResult, StepResult
+
+# Pressures of the two nodes of one place differ by this part of the largest pressure where their split is arbitrary.
+APART = 0.02
+
+
+def joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
+    """Return the results of contact pairs with one pressure for each place, and closed where one of its nodes is."""
+    found = dict(results)
+    for name, contact in results.items() if problem.model.seams else ():
+        pair = problem.pairs[name]
+        areas = lumped_areas(pair.secondary, pair.points, pair.axisymmetric)
+        pressure, active = contact.pressure.copy(), contact.active.copy()
+        for seam in problem.model.seams:
+            a, b = _rows(problem, contact, seam)
+            pressure[a] = pressure[b] = (areas[a] * pressure[a] + areas[b] * pressure[b]) / (areas[a] + areas[b])
+            active[a] = active[b] = active[a] | active[b]
+        found[name] = replace(contact, pressure=pressure, active=active)
+    return found
+
+
+def _rows(problem: Problem, contact: ContactResult, seam: Seam) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the rows of the nodes of one place among those of a contact, where it has both."""
+    row = np.full(problem.model.mesh.n_points, -1, np.intp)
+    row[contact.points] = np.arange(len(contact.points))
+    both = (row[seam.first] >= 0) & (row[seam.second] >= 0)
+    return row[seam.first[both]], row[seam.second[both]]
+
+
+def seam_warnings(problem: Problem, last: StepResult) -> list[str]:
+    """Return a warning for each contact whose forces are split unevenly between nodes of one place.
+
+    Not for node-to-segment, where no other node has a part in it.
+    """
+    found = []
+    for name, contact in last.contact.items():
+        largest, pair = contact.pressure_max, problem.pairs[name]
+        if pair.options.gap_only or pair.name == "node_to_segment" or not largest > 0.0:
+            continue
+        for seam in problem.model.seams:
+            a, b = _rows(problem, contact, seam)
+            apart = np.where(contact.active[a], np.abs(contact.multiplier[a] - contact.multiplier[b]), 0.0)
+            wrong = apart > APART * largest
+            if wrong.any():
+                worst = int(np.argmax(apart))
+                found.append(
+                    f"contact '{name}' is closed where a period or sector begins and ends: at {int(wrong.sum())} places its "
+                    f"forces are split unevenly between the two nodes of one place, by {apart[worst]:.4g} in pressure "
+                    f"(points {contact.points[a[worst]]} and {contact.points[b[worst]]}). Their pressure is the mean, but "
+                    "that of neighbours may waver: let the period end where the contact is open"
+                )
+    return found

@@ -1,0 +1,103 @@
+"""Wear after Archard (J. Appl. Phys. 24, 1953): a depth in proportion to pressure and sliding distance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.contact.configuration import Configuration
+from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.pairing import Candidates, rows_along
+from fastcontact.mesh import elements
+from fastcontact.results.step import ContactResult
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Worn:
+    """What has been worn off a contact pair at the end of a load step.
+
+    Attributes
+    ----------
+    depth, pressure : ndarray (m,)
+        At the secondary nodes [length], and the pressure there [pressure].
+    pace : float
+        The most that any step has worn off, by pressure [length / pressure].
+    """
+
+    depth: Array
+    pressure: Array
+    pace: float = 0.0
+
+    @classmethod
+    def nothing(cls, count: int) -> Worn:
+        """Return the beginning, for `count` nodes."""
+        return cls(np.zeros(count), np.zeros(count))
+
+    def after(self, pair: Formulation, at: Configuration, contact: ContactResult, coefficient: float) -> Worn:
+        """Return what has been worn off after a load step more, see `worn_in_step`."""
+        more = worn_in_step(pair, at, contact, self.pressure, coefficient)
+        mean = 0.5 * np.maximum(contact.pressure + self.pressure, 0.0)
+        pace = np.divide(more, mean, out=np.zeros_like(more), where=mean > 0.0)
+        return Worn(self.depth + more, contact.pressure, max(self.pace, float(pace.max(initial=0.0))))
+
+
+def worn_in_step(
+    pair: Formulation, at: Configuration, contact: ContactResult, before: Array | float, coefficient: float
+) -> Array:
+    """Return the depth (m,) that a load step wears off at the secondary nodes [length].
+
+    Parameters
+    ----------
+    pair : Formulation
+    at : Configuration
+        At the end of the step.
+    contact : ContactResult
+        Likewise.
+    before : ndarray (m,) or float
+        Pressures as the step began; what wears is the mean of both [pressure].
+    coefficient : float
+        Archard's, by hardness [1 / pressure].
+    """
+    distance = np.linalg.norm(slip_of_nodes(pair, at), axis=1)
+    if pair.friction:
+        distance = np.where(contact.sticking, 0.0, distance)
+    pressure = np.maximum(contact.pressure + before, 0.0)
+    return np.asarray(coefficient * 0.5 * pressure * np.where(contact.active, distance, 0.0))
+
+
+def slip_of_nodes(pair: Formulation, at: Configuration) -> Array:
+    """Return the slip (m, dim) of the secondary nodes in a step along what they face, else zero [length]."""
+    dim = at.displacement.shape[1]
+    nodes = Candidates(pair.secondary.points[:, None], np.ones((len(pair.secondary.points), 1)))
+    pairing = pair.facing(nodes, at, pair.projection_tolerance or 0.0)
+    moved = (at.displacement - at.start).ravel()
+    slip = np.zeros((len(nodes.nodes), dim))
+    for axis, unit in enumerate(np.eye(dim)):
+        along = np.tile(unit, (len(slip), 1))
+        slip[:, axis] = rows_along(along, nodes, pairing, pair.primary, moved.size) @ moved
+    if isinstance(pair.primary, RigidSide):
+        slip -= at.obstacle - at.obstacle_start
+        turning = pair.turning(nodes, at)
+        slip -= 0.0 if turning is None else turning
+    slip -= np.einsum("nd,nd->n", slip, pairing.normal)[:, None] * pairing.normal
+    return np.where(pairing.paired[:, None], slip, 0.0)
+
+
+def too_fast(pair: Formulation, worn: Worn) -> float:
+    """Return by how much load steps wear faster than pressures can follow: above 1 they may waver from node to node.
+
+    A wave of gaps with the period of two edges h gives rise to pressures of ``pi E* / (2 h)`` times its height (Johnson,
+    Contact Mechanics, 13.2). What a step wears off follows from the mean of the pressures before and after, and takes effect
+    in the next one: such a wave dies out while pace times this stiffness is less than two. Pressures at integration points
+    answer up to twice as stiffly.
+    """
+    edge = np.inf
+    for block in pair.secondary.blocks:
+        size = np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
+        edge = min(edge, float(size.min()) / elements.get(block.element).order)
+    return worn.pace * np.pi * pair.modulus / (2.0 * edge)

@@ -1,0 +1,70 @@
+"""Tied sides that lie apart: what ties them turns with the primary facet, as a stiff arm of the length of the gap.
+
+Equal displacements across a gap would stop no rotation: the forces of both sides would have lines of action a gap apart, and
+shear would lose its moment. With the arm, the relative displacement along a tangent t is ``t . (u_s - u_p) + g n . du_p/dt``,
+the gap g, the normal n and the derivative along t on the primary facet; it is zero in any small rotation of both sides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array
+
+from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.pairing import Pairing, normals
+from fastcontact.contact.surface import Surface
+
+Array = NDArray[np.float64]
+# Gaps below this part of the size of the secondary side are round-off.
+ROUND_OFF = 1e-9
+
+
+def with_arms(part: Constraints, pairing: Pairing, primary: Surface, points: Array) -> Constraints:
+    """Return constraints whose tangential rows are zero in small rotations of both sides, also across a gap.
+
+    Parameters
+    ----------
+    part : Constraints
+        Of m places, with tangents.
+    pairing : Pairing
+        What the places face.
+    primary : Surface
+    points : ndarray (n_points, dim)
+        Reference coordinates [length].
+    """
+    size = float(np.ptp(part.positions, axis=0).max(initial=0.0))
+    normal, facing = normals(part.directions), pairing.places(primary, np.arange(len(part)))
+    axes = np.einsum("mkj,mkd->mdj", facing.gradient, points[facing.nodes])
+    along = np.einsum("mkj,mjd->mkd", facing.gradient, np.linalg.pinv(axes))
+    rotations = _rotations(points)
+    rows = []
+    for own, direction in zip(part.tangents, part.directions, strict=True):
+        slope = np.einsum("mkd,md->mk", along, direction)
+        lever = _rows(slope[:, :, None] * normal[:, None, :], facing.nodes, points.size)
+        arm, left = np.asarray(lever @ rotations), np.asarray(own @ rotations)
+        square = np.maximum((arm**2).sum(axis=1), 1e-300)
+        length = (arm * left).sum(axis=1) / square
+        moved = np.abs(np.stack([own @ np.tile(e, len(points)) for e in np.eye(points.shape[1])])).max(axis=0)
+        length[(np.abs(length) <= ROUND_OFF * size) | (moved > ROUND_OFF)] = 0.0
+        rows.append(csr_array(own - diags_array(length) @ lever) if length.any() else own)
+    return replace(part, tangents=tuple(rows))
+
+
+def _rotations(points: Array) -> Array:
+    """Return the displacements (n_dofs, 1), in space (n_dofs, 3) of unit rotations about the middle [length]."""
+    x = points - points.mean(axis=0)
+    if points.shape[1] == 2:
+        return np.column_stack([-x[:, 1], x[:, 0]]).reshape(-1, 1)
+    return np.stack([np.cross(axis, x).ravel() for axis in np.eye(3)], axis=1)
+
+
+def _rows(values: Array, nodes: NDArray[np.int32], n_dofs: int) -> csr_array:
+    """Return a matrix (m, n_dofs) of the `values` (m, k, dim) at the components of `nodes` (m, k)."""
+    m, k, dim = values.shape
+    columns = nodes[:, :, None].astype(np.intp) * dim + np.arange(dim)
+    found = csr_array((values.ravel(), columns.ravel(), k * dim * np.arange(m + 1)), shape=(m, n_dofs))
+    found.sum_duplicates()
+    return found

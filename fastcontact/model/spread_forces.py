@@ -1,0 +1,169 @@
+"""Forces spread over a group by the distance from a place, through which their resultant passes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.elasticity.loads import Load, Table, Traction, check_number
+from fastcontact.errors import MeshError, ModelError, unknown
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+Points = NDArray[np.intp]
+# Weights by the distance over the radius, from 1 at the place to 0 at the radius.
+WEIGHTINGS: dict[str, Callable[[Array], Array]] = {
+    "uniform": np.ones_like,
+    "linear": lambda s: 1.0 - s,
+    "quadratic": lambda s: 1.0 - s**2,
+    "cubic": lambda s: 1.0 - 3.0 * s**2 + 2.0 * s**3,
+}
+# A moment below this, relative to force times size, is round-off and needs no arms.
+ROUND_OFF = 1e-12
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How shares of a group depend on the distance from a place.
+
+    Attributes
+    ----------
+    place : tuple of float (dim,)
+        [length]
+    weighting : str
+        ``"uniform"``, ``"linear"``, ``"quadratic"`` or ``"cubic"``.
+    radius : float or None
+        Beyond which shares are zero [length]; None: the distance of the farthest node.
+    """
+
+    place: tuple[float, ...]
+    weighting: str = "uniform"
+    radius: float | None = None
+
+    def check(self, name: str, dim: int) -> None:
+        """Raise ModelError if it cannot be; `name` tells whose it is."""
+        if len(self.place) != dim:
+            raise ModelError(f"{name}: the place {self.place} it is spread about must be {dim} numbers")
+        for number in self.place:
+            check_number(f"a coordinate of the place of {name}", number)
+        if self.weighting not in WEIGHTINGS:
+            raise ModelError(f"{name}: {unknown('weighting', self.weighting, WEIGHTINGS)}")
+        if self.radius is not None:
+            check_number(f"the radius of {name}", self.radius)
+            if not self.radius > 0.0:
+                raise ModelError(f"the radius of {name} = {self.radius:g} must be positive")
+
+    def weights(self, places: Array, radius: float) -> Array:
+        """Return the weights (n,) [-] at `places` (n, dim) [length], zero beyond the radius."""
+        s = np.linalg.norm(places - np.array(self.place), axis=1) / radius
+        return np.where(s <= 1.0, WEIGHTINGS[self.weighting](np.minimum(s, 1.0)), 0.0)
+
+
+def shares_of(mesh: Mesh, kinematics: str, group: str, spread: Spread | None = None) -> tuple[Points, Array]:
+    """Return the points (n,) of a group, and their shares (n,) of what is spread over it [-].
+
+    By area, where the group has facets, times the weights of `spread`. ModelError if nothing lies inside its radius.
+    """
+    points, radius = mesh.points_of(group).astype(np.intp), 0.0
+    if spread is not None and len(points):
+        away = float(np.linalg.norm(mesh.points[points] - np.array(spread.place), axis=1).max())
+        radius = away if spread.radius is None else spread.radius
+
+    def weigh(places: Array) -> Array:
+        return np.ones(len(places)) if spread is None or not radius else spread.weights(places, radius)
+
+    if group in mesh.cell_groups and mesh.cells_of(group, dim=mesh.dim - 1):
+        shares = Traction(group, {0: weigh}, None).vector(mesh, kinematics)[points, 0]
+    else:
+        shares = weigh(mesh.points[points])
+    total = float(shares.sum())
+    if len(points) and not total > 0.0:
+        raise ModelError(
+            f"no part of '{group}' lies within the radius it is spread over: take a larger radius, or another place"
+        )
+    return points, shares / total if len(points) else shares
+
+
+def turned(weight: Array, places: Array, moment: Array) -> Array:
+    """Return the forces (n, dim) [force] at points that have a `moment` (1,) or (3,) and no resultant.
+
+    In proportion to `weight` (n,) [-] and the arms of `places` (n, dim) [length]; see `mean_rotation`.
+    """
+    return np.asarray(np.einsum("k,knd->nd", moment, mean_rotation(weight, places - weight @ places)))
+
+
+def mean_rotation(weight: Array, arms: Array) -> Array:
+    """Return how displacements of n points make the mean rotation (n_rotations, n, dim) [1 / length].
+
+    Of `weight` (n,) [-] and `arms` (n, dim) from their middle [length]. Its products with moments are forces at the points
+    that have this moment, and no resultant.
+    """
+    x, y = arms[:, 0], arms[:, 1]
+    zero = np.zeros_like(x)
+    if arms.shape[1] == 2:
+        cross = np.stack([np.column_stack([-y, x])])
+        inertia = np.array([[weight @ (x * x + y * y)]])
+    else:
+        z = arms[:, 2]
+        cross = np.stack(
+            [np.column_stack([zero, -z, y]), np.column_stack([z, zero, -x]), np.column_stack([-y, x, zero])]
+        )
+        inertia = (weight @ (arms**2).sum(axis=1)) * np.eye(3) - np.einsum("n,ni,nj->ij", weight, arms, arms)
+    if np.linalg.matrix_rank(inertia, tol=1e-12 * np.abs(inertia).max(initial=1e-300)) < len(inertia):
+        raise ModelError(
+            "the points lie in one line or place, so they have no mean rotation about it: take a wider group"
+        )
+    return np.einsum("kl,lnd,n->knd", np.linalg.inv(inertia), cross, weight)
+
+
+@dataclass(frozen=True)
+class SpreadForce(Load):
+    """Components of a force [force], spread over a group by the distance from the place through which it acts."""
+
+    KIND = "the force"
+    CONSTANT = True
+    group: str
+    components: Mapping[int, float]
+    spread: Spread
+    ramp: Table | None = None
+
+    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+        if kinematics == "axisymmetric":
+            raise ModelError(f"{self.name}: in axisymmetry no force acts through a place: give a traction that varies")
+        if not len(mesh.points_of(self.group)):
+            raise MeshError(f"{self.name}: the group is empty")
+        self.spread.check(self.name, mesh.dim)
+        self.vector(mesh, kinematics)
+
+    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
+        force = np.zeros(mesh.dim)
+        for axis, value in self.components.items():
+            force[axis] = value
+        points, weight = shares_of(mesh, kinematics, self.group, self.spread)
+        places = mesh.points[points]
+        found = weight[:, None] * force
+        arm = np.array(self.spread.place) - weight @ places
+        moment = (
+            np.atleast_1d(np.cross(arm, force)) if mesh.dim == 3 else np.array([arm[0] * force[1] - arm[1] * force[0]])
+        )
+        size = float(np.ptp(mesh.points, axis=0).max())
+        if np.abs(moment).max() > ROUND_OFF * np.abs(force).max() * size:
+            try:
+                found = found + turned(weight, places, moment)
+            except ModelError as error:
+                raise ModelError(f"{self.name}: {error}") from error
+        forces[points] += found
+
+
+def spread_of(name: str, place: Sequence[float] | None, weighting: str, radius: float | None) -> Spread | None:
+    """Return how something is spread about a place, None without one; ModelError if only weighting or radius are given."""
+    if place is None:
+        if weighting != "uniform" or radius is not None:
+            raise ModelError(
+                f"{name} has a weighting or a radius, but no place from which distances count: give at=..."
+            )
+        return None
+    return Spread(tuple(float(v) for v in place), weighting, radius)

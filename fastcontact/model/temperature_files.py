@@ -1,0 +1,57 @@
+"""Temperatures of the nodes of a model, from files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.errors import ModelError
+from fastcontact.mesh.files.paths import PathLike
+from fastcontact.mesh.files.point_fields import at_points_of, read_point_field
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+# How far a time of a file may lie from the one that is wanted, relative to the latest.
+SAME_TIME = 1e-9
+
+
+def read_temperatures(
+    mesh: Mesh, file: PathLike | Sequence[PathLike], field: str, wanted: NDArray[np.intp], instant: float | None
+) -> tuple[Array, Array | None]:
+    """Return a field (n_instants, n_points) at the `wanted` (k,) of int points, elsewhere NaN, and its times (n_instants,).
+
+    Temperatures are in the unit of the file [temperature], times are load factors [-] or None.
+
+    Raises
+    ------
+    FileError, MeshError, ModelError
+        If a file cannot be read or lacks the field, a wanted point has no value, or there is no such instant.
+    """
+    files = [file] if isinstance(file, (str, os.PathLike)) else list(file)
+    if not files:
+        raise ModelError("no file is given for the temperature")
+    parts, times = [], []
+    for path in files:
+        found = read_point_field(path, field)
+        values = at_points_of(found, mesh, wanted, f"field '{field}' of '{path}'")
+        if len(files) > 1 and len(values) > 1:
+            raise ModelError(
+                f"'{path}' has {len(values)} instants: one of several files has one, or give one file alone"
+            )
+        parts.append(values)
+        times.append(found.times)
+    values, own = np.concatenate(parts), times[0] if len(files) == 1 else None
+    if instant is None:
+        return values, own
+    if own is None:
+        raise ModelError(f"field '{field}' of '{files[0]}' has no times: leave out instant")
+    row = int(np.abs(own - instant).argmin())
+    if abs(own[row] - instant) > SAME_TIME * np.abs(own).max():
+        raise ModelError(
+            f"field '{field}' of '{files[0]}' has no instant {instant:g}, the next is {own[row]:g}, of {own[0]:g} to "
+            f"{own[-1]:g}"
+        )
+    return values[row : row + 1], None
