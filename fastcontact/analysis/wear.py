@@ -15,6 +15,8 @@ from fastcontact.mesh import elements
 from fastcontact.results.step import ContactResult
 
 Array = NDArray[np.float64]
+# In facet lengths: nodes that stand out as far beyond the other side may still be pressed, by parts of their facets.
+STANDS_OUT = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,14 +69,14 @@ def worn_in_step(
     if pair.friction:
         distance = np.where(contact.sticking, 0.0, distance)
     pressure = np.maximum(contact.pressure + before, 0.0)
-    return np.asarray(coefficient * 0.5 * pressure * np.where(contact.active, distance, 0.0))
+    return np.asarray(coefficient * 0.5 * pressure * distance)
 
 
 def slip_of_nodes(pair: Formulation, at: Configuration) -> Array:
     """Return the slip (m, dim) of the secondary nodes in a step along what they face, else zero [length]."""
     dim = at.displacement.shape[1]
     nodes = Candidates(pair.secondary.points[:, None], np.ones((len(pair.secondary.points), 1)))
-    pairing = pair.facing(nodes, at, pair.projection_tolerance or 0.0)
+    pairing = pair.facing(nodes, at, max(pair.projection_tolerance or 0.0, STANDS_OUT))
     moved = (at.displacement - at.start).ravel()
     slip = np.zeros((len(nodes.nodes), dim))
     for axis, unit in enumerate(np.eye(dim)):

@@ -117,19 +117,28 @@ class CellStress:
         self, at: tuple[str, Array, Array, Array], cells: NDArray[np.int32], material: NDArray[np.int32], moduli: Array,
         out: Array,
     ) -> None:  # fmt: skip
-        """Fill `out` where moduli differ from point to point: the strains first, as stresses of moduli that are one.
+        """Fill `out` where moduli differ from point to point.
 
-        Beside the quadrature points moduli are those of the polynomial through them.
+        At the quadrature points one point of all cells after the other. Elsewhere the strains come first, as stresses of
+        moduli that are one; moduli are those of the polynomial through the quadrature points.
         """
         name, xi, N, dN = at
-        loops, unit = element_kernels.loops(self._mesh.dim), np.eye(self._moduli.shape[1])[None]
-        first, strain = np.zeros(len(cells), np.int32), np.empty_like(out)
-        loops.stress(self._mesh.points, cells, N, dN, unit, first, self._axisymmetric, self._displacement, strain)
+        loops, shared = element_kernels.loops(self._mesh.dim), (self._axisymmetric, self._displacement)
+        if xi is elements.get(name).quadrature[0]:
+            one = np.empty((len(cells), 1, out.shape[2]))
+            for q in range(len(xi)):
+                own = np.ascontiguousarray(material[:, q])
+                loops.stress(self._mesh.points, cells, N[q : q + 1], dN[q : q + 1], moduli, own, *shared, one)
+                out[:, q] = one[:, 0]
+            return
+        unit, first = np.eye(self._moduli.shape[1])[None], np.zeros(len(cells), np.int32)
+        strain = np.empty_like(out)
+        loops.stress(self._mesh.points, cells, N, dN, unit, first, *shared, strain)
         weights = _beside(name, xi)
         for rows in range(0, len(cells), VARYING):
-            own = slice(rows, rows + VARYING)
-            local = np.einsum("nq,cqij->cnij", weights, moduli[material[own]], optimize=True)
-            out[own] = np.einsum("cnij,cnj->cni", local, strain[own])
+            part = slice(rows, rows + VARYING)
+            local = np.einsum("nq,cqij->cnij", weights, moduli[material[part]], optimize=True)
+            out[part] = np.einsum("cnij,cnj->cni", local, strain[part])
 
     def _add_modes(
         self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32], out: Array,

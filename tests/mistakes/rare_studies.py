@@ -91,7 +91,7 @@ def no_worker_starts(patch):
         def submit(self, *_):
             raise BrokenProcessPool
 
-    patch.setattr(execute, "ProcessPoolExecutor", Pool)
+    patch.setattr(execute, "Workers", Pool)
     execute.started_pool(1)
 
 

@@ -291,3 +291,33 @@ def test_a_damaged_grid_of_vtk_is_told(tmp_path):
         file.create_group("other")
     with pytest.raises(fc.FileError, match="holds no unstructured grid of VTK"):
         model.add_temperature_file(tmp_path / "empty.vtkhdf", "TEMP")
+
+
+def test_a_field_whose_mesh_is_in_another_file_goes_by_the_order_of_its_points(tmp_path):
+    mesh = plane("quad4", "plane_stress")
+    path = med(tmp_path / "field.med", mesh, [field_of(mesh)])
+    with h5py.File(path, "a") as file:
+        del file["ENS_MAA"]
+    model = free(mesh, "plane_stress", STEEL)
+    model.add_temperature_file(path, "TEMP")
+    np.testing.assert_array_equal(model.temperatures[0].value, field_of(mesh))
+    other = free(plane("quad8", "plane_stress"), "plane_stress", STEEL)
+    with pytest.raises(fc.MeshError, match=r"has 12 points and no coordinates, the mesh has \d+"):
+        other.add_temperature_file(path, "TEMP")
+
+
+def test_a_grid_of_vtk_without_steps_has_one_instant(tmp_path):
+    mesh = plane("quad4", "plane_stress")
+    path = vtkhdf(tmp_path / "one.vtkhdf", mesh, [field_of(mesh)], [0.0])
+    with h5py.File(path, "a") as file:
+        del file["VTKHDF/Steps"]
+    model = free(mesh, "plane_stress", STEEL)
+    model.add_temperature_file(path, "TEMP")
+    np.testing.assert_array_equal(model.temperatures[0].value, field_of(mesh))
+    with pytest.raises(fc.FileError, match="unknown field 'TMP': did you mean 'TEMP'"):
+        model.add_temperature_file(path, "TMP")
+    none = vtkhdf(tmp_path / "none.vtkhdf", mesh, [field_of(mesh)], [0.0])
+    with h5py.File(none, "a") as file:
+        file["VTKHDF/Steps"].attrs["NSteps"] = 0
+    with pytest.raises(fc.FileError, match="has no instant"):
+        model.add_temperature_file(none, "TEMP")

@@ -5,7 +5,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
-from fastcontact.mesh.generate import block, block_on_block, box
+from fastcontact.mesh.generate import block, block_on_block, box, renamed, union
 
 COEFFICIENT, FORCE = 2e-5, 40.0
 PRESS, SLIDE = [(0.0, 0.0), (1.0, 1.0), (100.0, 1.0)], [(0.0, 0.0), (1.0, 0.0), (100.0, 99.0)]
@@ -189,3 +189,29 @@ def test_a_block_in_space_wears_along_any_way(formulation):
     ends = np.array([0.5, *np.ones(5), 0.5]) / 3.0
     assert ends @ depth @ ends == pytest.approx(1e-4 * FORCE * 3.0, rel=0.01)
     assert contact.active.sum() > steps[0].contact["sole"].active.sum()
+
+
+def test_bodies_in_space_that_slide_over_their_edges():
+    """To and fro by mortar: also nodes that stand out beyond the other body wear while parts of their facets are pressed.
+
+    Strains along the surfaces shorten the way by 1.1 %.
+    """
+    parts = []
+    for side, divisions, z in (("L", (6, 6, 2), -1.0), ("U", (4, 4, 2), 0.0)):
+        part = box((2.0, 2.0, 1.0), divisions, "hex8", (-1.0, -1.0, z))
+        parts.append(renamed(part, {name: f"{side}_{name}" for name in part.group_names}))
+    mesh = union(*parts)
+    points, upper = mesh.points.copy(), mesh.points_of("U_BOX")
+    points[upper, 2] += 0.02 * (1.0 - points[upper, 2]) * (points[upper, 0] ** 2 + points[upper, 1] ** 2)
+    model = fc.Model(mesh.replace(points=points), "3d")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("L_ZMIN", "xyz")
+    model.couple("U_ZMAX", "z")
+    model.add_force("U_ZMAX", z=-FORCE, distribute=True, ramp=PRESS)
+    model.prescribe("U_ZMAX", x=0.1, y=0.05, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0), (3.0, -1.0), (4.0, 1.0)])
+    model.add_contact("sole", secondary="U_ZMIN", primary="L_ZMAX", wear=1e-4)
+    contact = fc.solve(model, [1.0, 2.0, 3.0, 4.0])[-1].contact["sole"]
+    order = np.lexsort((contact.coordinates[:, 1], contact.coordinates[:, 0]))
+    ends = np.array([0.5, 1.0, 1.0, 1.0, 0.5]) / 2.0
+    worn = ends @ contact.wear[order].reshape(5, 5) @ ends
+    assert worn == pytest.approx(1e-4 * FORCE * 5.0 * np.hypot(0.1, 0.05), rel=0.015)

@@ -388,3 +388,51 @@ def test_a_table_is_straight_between_its_places_and_constant_beyond():
     ):
         with pytest.raises(fc.ModelError, match=words):
             fc.Tabulated(*arguments)
+
+
+@pytest.mark.parametrize("kinematics", ["plane_strain", "3d"])
+def test_the_error_of_a_graded_body_is_estimated_like_that_of_others(kinematics):
+    """With a function that is constant the estimate, which looks at other points of the cells, is that of the constant."""
+    mesh = space("hex8") if kinematics == "3d" else fc.generate.block((2.0, 1.0), (6, 3), "quad8")
+    found = []
+    for E, expansion in ((1000.0, 1e-5), (lambda x: np.full(len(x), 1000.0), lambda x: np.full(len(x), 1e-5))):
+        model = held(mesh, kinematics)
+        model.add_material(fc.LinearElastic(E, 0.3, expansion=expansion))
+        model.add_temperature(lambda x: 30.0 * x[:, 0] ** 2)
+        found.append(fc.estimate_error(model, solved(model)))
+    np.testing.assert_allclose(found[0].cells, found[1].cells, rtol=1e-8, atol=1e-12)
+    assert found[0].relative > 1e-3
+
+
+def test_density_and_expansion_of_any_material_may_vary():
+    """Weight and free expansion of anisotropic bodies, with functions that are constant and with numbers."""
+    D = fc.LinearElastic(1000.0, 0.3).moduli("3d")
+    results = []
+    for density, expansion in (
+        (2.0, 1e-5),
+        (np.full(16, 2.0), (lambda x: np.full(len(x), 1e-5), 1e-5, np.full(16, 1e-5))),
+    ):
+        model = fc.Model(space("hex8"), "3d")
+        model.add_material(fc.Anisotropic(D, density=density, expansion=expansion))
+        model.fix("BOTTOM", "xyz")
+        model.add_gravity(y=-1.0)
+        model.add_temperature(50.0)
+        results.append(solved(model, linear_solver="direct"))
+        assert results[-1].reaction[:, 1].sum() == pytest.approx(4.0, rel=1e-9)
+    np.testing.assert_allclose(results[0].displacement, results[1].displacement, atol=1e-14)
+
+
+def test_contact_and_warnings_know_the_range_of_moduli():
+    """The softest place scales contact; moduli that differ much are told; without cells nothing is known of them."""
+    mesh = fc.generate.block_on_block("quad4", divisions_lower=(4, 2), divisions_upper=(4, 2))
+    model = fc.Model(mesh, "plane_strain")
+    low = mesh.points[:, 1].min()
+    E = fc.Tabulated("y", [(low, 1000.0), (low + 10.0, 3000.0)])
+    model.add_material(fc.Orthotropic((E,) * 3, (0.3,) * 3, (400.0,) * 3))
+    material = model.materials[0][0]
+    assert 1000.0 < material.young[0] < material.young[1] < 3000.0
+    assert material.contact_modulus == pytest.approx(material.young[0] / (1 - 0.3**2), rel=0.05)
+    loose = fc.Orthotropic((E,) * 3, (0.3,) * 3, (400.0,) * 3)
+    for name in ("young", "contact_modulus"):
+        with pytest.raises(fc.ModelError, match="constants of the material depend on the position"):
+            getattr(loose, name)

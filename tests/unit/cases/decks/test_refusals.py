@@ -1,0 +1,261 @@
+"""What a deck may not say: each is refused with its keyword, its line and a sentence."""
+
+import pytest
+from deck_text import CONTACT, MATERIAL, NODES, STEP, WHOLE, deck_of
+
+import fastcontact as fc
+
+FLAT = """*Node
+1, 0., 0.
+2, 1., 0.
+3, 1., 1.
+4, 0., 1.
+5, 2., 0.
+6, 2., 1.
+*Element, type=CPE4, elset=one
+1, 1, 2, 3, 4
+*Element, type=CPE4, elset=two
+2, 2, 5, 6, 3
+*Material, name=steel
+*Elastic
+1000., 0.3
+*Solid Section, elset=one, material=steel
+1.
+*Solid Section, elset=two, material=steel
+1.
+*Boundary
+1, 1, 2
+4, 1
+*Step
+*Static
+*Cload
+5, 1, 1.
+*End Step
+"""
+SPRING = "*Element, type=SPRINGA, elset=springs\n7, 1, 11\n"
+GAP = "*Node\n21, 0., 0., 3.\n*Element, type=GAPUNI, elset=gaps\n7, 15, 21\n"
+
+
+def before(marker, lines, text=WHOLE):
+    """The deck with lines before one that begins so."""
+    assert marker in text
+    return text.replace(marker, lines + marker, 1)
+
+
+def instead(old, new, text=WHOLE):
+    assert old in text
+    return text.replace(old, new, 1)
+
+
+def in_parts(of_instance="", further="", parts="*Part, name=p\n"):
+    """The solids in a part, with one instance."""
+    body = NODES.replace("*Heading\n two cubes\n", "")
+    sections = MATERIAL[MATERIAL.index("*Solid") :]
+    assembly = f"*Assembly, name=a\n*Instance, name=i, part=p\n{of_instance}*End Instance\n{further}*End Assembly\n"
+    return parts + body + sections + "*End Part\n" + assembly + MATERIAL[: MATERIAL.index("*Solid")]
+
+
+def with_material(lines):
+    return before("*Solid Section, elset=low", lines)
+
+
+def with_law(lines):
+    return before("*Contact Pair", lines)
+
+
+def with_load(lines):
+    return before("*Dsload", lines)
+
+
+MODEL = {
+    "system of nodes": (instead("*Node\n", "*Node, system=C\n"), r"\*NODE: SYSTEM=C is not supported: give rectang"),
+    "element twice": (
+        before("*Nset, nset=bottom", "*Element, type=C3D8\n2, 1, 2, 3, 4, 5, 6, 7, 8\n"), "element 2 is defined twice",
+    ),
+    "range that falls": (instead("1, 4\n*Nset", "4, 1\n*Nset"), "the range 4 to 1 by 1 is empty: it must ascend"),
+    "surface twice": (before("*Surface, name=roof", "*Surface, name=SM\nup, S1\n"), "surface 'SM' is defined twice"),
+    "load without a step": (before("*Step", "*Cload\n17, 3, 1.\n"), r"\*CLOAD: loads belong into a step"),
+    "nodes in a step": (with_load("*Nset, nset=new\n1\n"), r"\*NSET: cannot stand inside of a step"),
+    "material in a step": (with_load("*Material, name=new\n"), r"\*MATERIAL: cannot stand inside of a step"),
+    "friction nowhere": (before("*Surface Int", "*Friction\n0.1\n"), r"\*FRICTION: belongs below \*SURFACE INTER"),
+    "kinematic nowhere": (before("*Boundary", "*Kinematic\n1, 3\n"), r"\*KINEMATIC: belongs below \*COUPLING"),
+    "coupling alone": (before("*Boundary", "*Coupling, ref node=1, surface=ss\n"), r"\*KINEMATIC or \*DISTRIBUTING must"),
+    "coupling at the end": (
+        instead(STEP, "*Coupling, ref node=1, surface=ss\n"),
+        r"\*COUPLING: \*KINEMATIC or \*DISTRIBUTING must follow",
+    ),
+    "perturbation": (instead("*Step\n", "*Step, perturbation\n"), "PERTURBATION is not supported: contact has no lin"),
+    "step without length": (instead("*Static\n", "*Static\n1., 0.\n"), "the increment and the length of the step must"),
+    "thickness": (FLAT.replace("material=steel\n1.", "material=steel\n0.", 1), "the thickness 0 must be positive"),
+    "two thicknesses": (FLAT.replace("1.\n*Boundary", "2.\n*Boundary"), "thickness 2 after 1: plane models have one"),
+    "not flat": (FLAT.replace("6, 2., 1.", "6, 2., 1., 0.5"), "CPE4 lie in the plane z = const, but z differs"),
+    "two kinematics": (FLAT.replace("CPE4, elset=two", "CAX4, elset=two"), "of type CAX4 and CPE4 .* cannot be in one"),
+    "include with a parameter": ("*Include, input=a.inp, more=1\n", r"\*INCLUDE: the parameter MORE is not supported"),
+    "transform": (before("*Boundary", "*Transform, nset=top\n"), r"\*TRANSFORM: one data line with six coordinates"),
+    "transform without axes": (
+        before("*Boundary", "*Transform, nset=top\n1., 0., 0., 2., 0., 0.\n*Boundary\ntop, 1\n"),
+        r"the local axes are not defined at the point \[0.0, 0.0, 2.0\]",
+    ),
+}  # fmt: skip
+PARTS = {
+    "instance of nothing": (in_parts().replace("part=p", "part=q"), "part 'q' is not defined; parts: p"),
+    "instance twice": (
+        in_parts(further="*Instance, name=I, part=p\n*End Instance\n"),
+        r"\*INSTANCE: instance 'I' is defined twice",
+    ),
+    "instance of three lines": (
+        in_parts("0., 0., 0.\n0., 0., 0., 0., 0., 1., 0.\n1.\n"),
+        "an instance has at most two data lines: a translation and a rotation",
+    ),
+    "part twice": (in_parts(parts="*Part, name=P\n*End Part\n*Part, name=p\n"), "part 'p' is defined twice"),
+    "nodes in an instance": (in_parts("*Node\n1, 0., 0., 0.\n"), r"\*NODE: is not supported inside of an instance"),
+    "supports in an instance": (
+        in_parts("*Boundary\ntop, 1\n"),
+        "is supported for the whole assembly only, not inside",
+    ),
+    "set of no instance": (
+        in_parts(further="*Nset, nset=all, instance=j\ntop\n") + "*Boundary\nall, 1\n" + STEP.replace("roof", "i.roof"),
+        r"\*NSET: instance 'J' is not defined; instances: i",
+    ),
+}
+MATERIALS = {
+    "elastic of another kind": (
+        instead("*Elastic", "*Elastic, type=lamina"),
+        "TYPE=LAMINA is not supported; known are",
+    ),
+    "constants without energy": (
+        instead("*Elastic\n200000., 0.", "*Elastic, type=engineering constants\n1., 1., 1., 2., 0., 0., 1., 1.,\n1."),
+        r"\*ELASTIC: material 'steel': ",
+    ),
+    "orientation of nothing": (
+        before("*Material", "*Orientation, name=o\n"),
+        "a data line with six coordinates is nee",
+    ),
+    "orientation with an origin": (
+        before("*Material", "*Orientation, name=o\n1., 0., 0., 0., 1., 0., 0., 0., 1.\n"),
+        "an origin of the axes is not supported",
+    ),
+    "orientation turned further": (
+        before("*Material", "*Orientation, name=o\n1., 0., 0., 0., 1., 0.\n3, 30.\n"),
+        "a further rotation of the axes is not supported",
+    ),
+    "density": (with_material("*Density\n0.\n"), "material 'steel': the density 0 must be positive"),
+}
+CONTACTS = {
+    "negative friction": (with_law("*Friction\n-0.1\n"), "the coefficient of friction -0.1 is negative"),
+    "friction by pressure": (with_law("*Friction\n0.1, , 5.\n"), "friction that depends on pressure or temperature"),
+    "slope": (with_law("*Surface Behavior, pressure-overclosure=LINEAR\n0.\n"), "the slope 0 must be positive"),
+    "friction where it is tied": (
+        with_law("*Surface Behavior, pressure-overclosure=TIED\n1.\n*Friction\n0.1\n"),
+        r"\*SURFACE INTERACTION: friction with tied contact is not supported",
+    ),
+    "clearance of nothing": (
+        before("*Boundary", "*Clearance, slave=ss, master=roof, value=0.1\n"),
+        "there is no contact pair of 'ss' and 'roof' above this line",
+    ),
+    "clearance of a wedge": (
+        before(
+            "*Boundary", "*Clearance, slave=ss, master=sm, value=0.1\n", instead("11, 0., 0., 1.", "11, 0., 0., 1.1")
+        ),
+        r"\*CLEARANCE is supported between sides of one distance, these are",
+    ),
+    "adjust by a word": (instead("type=SURFACE TO", "adjust=some, type=SURFACE TO"), "ADJUST=some: only a distance"),
+    "adjust a wedge": (
+        instead("type=SURFACE TO", "adjust=0.5, type=SURFACE TO", instead("11, 0., 0., 1.", "11, 0., 0., 1.1")),
+        r"ADJUST=0\.5 would move \d+ nodes of 'ss'",
+    ),
+    "pair of one": (
+        instead("ss, sm\n*B", "ss\n*B"),
+        "a contact pair needs two surfaces, the secondary and the primary",
+    ),
+    "tie of one": (instead(CONTACT, "*Tie, name=t\nss\n"), "a tie needs two surfaces, the secondary and the primary"),
+    "surface of an element that is none": (
+        instead("up, S1\n", "7, S1\n", before("*Nset, nset=bottom", SPRING)),
+        "element 7 is no solid, so it has no faces",
+    ),
+    "free faces of one that is none": (
+        instead("up, S1\n", "7,\n", before("*Nset, nset=bottom", SPRING)),
+        "element 7 is no solid, so it has no faces",
+    ),
+    "nodes that are no faces": (
+        before("*Surface, name=roof", "*Surface, name=few, type=NODE\n15\n16\n", instead("ss, sm", "few, sm")),
+        "the nodes of surface 'few' make up no whole faces: 2 of 2 belong to none",
+    ),
+}
+RELATIONS = {
+    "equation of none": (before("*Boundary", "*Equation\n0\n"), "an equation cannot have 0 terms"),
+    "equation too short": (before("*Boundary", "*Equation\n2\n15, 1, 1.\n"), "the equation has 1 terms, 2 are announced"),
+    "equation too long": (
+        before("*Boundary", "*Equation\n1\n15, 1, 1., 16, 1, 1.\n"),
+        "the equation has 2 terms, 1 are announced",
+    ),
+    "equation of a rotation": (before("*Boundary", "*Equation\n1\n15, 4, 1.\n"), "component 4 of '15' is none of 1 to 3"),
+    "equation of zeros": (before("*Boundary", "*Equation\n1\n15, 1, 0.\n"), "all coefficients of the equation are zero"),
+    "equation of a set": (before("*Boundary", "*Equation\n1\ntop, 1, 1.\n"), "'top' holds 4 nodes where one is needed"),
+    "coupling of component 7": (
+        before("*Boundary", "*Coupling, ref node=15, surface=roof\n*Kinematic\n7\n"),
+        "the components 7 to 7 are none of 1 to 6",
+    ),
+    "distributing of one component": (
+        before("*Boundary", "*Coupling, ref node=15, surface=roof\n*Distributing\n3\n"),
+        "is supported with the components 1 to 3, or 1",
+    ),
+    "rigid body of its own node": (
+        before("*Boundary", "*Rigid Body, nset=alone, ref node=15\n", before("*Nset, nset=top", "*Nset, nset=alone\n15\n")),
+        "'alone' holds no nodes that could follow the reference node",
+    ),
+    "springs of two": (before("*Boundary", SPRING + "*Spring, elset=springs\n\n1.\n2.\n"), "need an empty line and then one"),
+    "spring with a law": (before("*Boundary", SPRING + "*Spring, elset=springs\n\n1., 2.\n"), "only linear springs are supp"),
+    "spring of no stiffness": (before("*Boundary", SPRING + "*Spring, elset=springs\n\n0.\n"), "the stiffness 0 must be"),
+    "spring of a solid": (before("*Boundary", "*Spring, elset=up\n\n1.\n"), "element 2 is no spring of type SPRINGA"),
+    "spring without stiffness": (before("*Boundary", SPRING), r"element 7 of type SPRINGA has no \*SPRING"),
+    "gap without a direction": (before("*Boundary", GAP + "*Gap, elset=gaps\n1.\n"), "the direction of the gap elements is"),
+    "gap of a solid": (before("*Boundary", "*Gap, elset=up\n1., 0., 0., 1.\n"), "acts on elements of type GAPUNI only"),
+    "gap on one node": (
+        before("*Boundary", GAP + "*Gap, elset=gaps\n1., 0., 0., 1.\n"),
+        "gap elements are supported on all nodes of whole faces only",
+    ),
+}  # fmt: skip
+LOADS = {
+    "velocity": (instead("*Boundary", "*Boundary, type=VELOCITY"), "TYPE=VELOCITY is not supported, only DISPLACEMENT"),
+    "antisymmetry": (instead("x0, 1", "x0, XASYMM"), "XASYMM is not supported: give the components"),
+    "rotation of a solid": (
+        with_load("*Boundary\n15, 4, 4, 0.1\n"),
+        "component 4 does not exist at nodes of this model",
+    ),
+    "force on component 7": (with_load("*Cload\n15, 7, 1.\n"), "a force cannot act on component 7 of this node"),
+    "load of another kind": (with_load("*Dload\nup, ROTA, 1.\n"), "load ROTA is not supported; known are P1, P2"),
+    "gravity without direction": (with_load("*Dload\nup, GRAV, 9.81\n"), "the direction of GRAV is missing"),
+    "pressure on a spring": (
+        with_load("*Dload\n7, P1, 1.\n").replace("*Nset, nset=bottom", SPRING + "*Nset, nset=bottom"),
+        "element 7 is no solid, so it has no faces",
+    ),
+    "amplitude without values": (
+        before("*Step", "*Amplitude, name=a\n0., 1., 0., 2.\n"),
+        "needs pairs of ascending times",
+    ),
+}
+CASES = {**MODEL, **PARTS, **MATERIALS, **CONTACTS, **RELATIONS, **LOADS}
+
+
+@pytest.mark.parametrize("what", CASES)
+def test_it_is_refused(what, tmp_path):
+    text, said = CASES[what]
+    with pytest.raises(fc.CaseError, match=rf"^deck\.inp, line \d+, .*{said}"):
+        deck_of(tmp_path, text)
+
+
+def test_a_deck_without_solids(tmp_path):
+    with pytest.raises(fc.CaseError, match="the deck has no solid elements"):
+        deck_of(tmp_path, "*Node\n1, 0., 0., 0.\n*Boundary\n1, 1\n" + STEP.replace("*Dsload\nroof, P, 100.\n", ""))
+
+
+def test_what_was_changed_is_read_as_it_was(tmp_path):
+    assert deck_of(tmp_path, WHOLE).model.contact
+    assert deck_of(tmp_path, FLAT).model.kinematics == "plane_strain"
+    whole = (
+        in_parts(further="*Nset, nset=held, instance=i\nbottom\n")
+        + "*Boundary\nheld, 1, 3\n"
+        + STEP.replace("roof", "i.roof")
+    )
+    assert len(deck_of(tmp_path, whole).points_of("held")) == 4
