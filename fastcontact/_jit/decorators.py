@@ -68,9 +68,17 @@ def inlined_kernel(function: Callable[..., Any]) -> Any:
     return _compile(function, parallel=False, inline="always")
 
 
-def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = FASTMATH, inline: str = "never") -> Any:
+def innermost_kernel(function: Callable[..., Any]) -> Any:
+    """Like `kernel`, for what the innermost loops call: LLVM puts the machine code in the place of each call.
+
+    Small arrays then stay in registers, where `inlined_kernel` leaves them in memory.
+    """
+    return _compile(function, parallel=False, forceinline=True)
+
+
+def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = FASTMATH, **inlining: Any) -> Any:
     options: dict[str, Any] = {"fastmath": fastmath, "parallel": parallel, "nogil": True, "error_model": "numpy"}
-    options["inline"] = inline
+    options |= inlining
     try:
         cached = numba.njit(cache=True, **options)(function)
         if cache.is_trusted(cached):

@@ -6,8 +6,9 @@ make the polygon that is cut, in the ``axes`` (3, 3) of its plane: two tangents 
 """
 
 import numpy as np
+from numba import prange
 
-from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact._jit.decorators import inlined_kernel, innermost_kernel, kernel, parallel_kernel
 from fastcontact.contact.search.box_tree_kernels import DEPTH
 
 # A polygon of up to 4 corners clipped by one of up to 4 has at most 8.
@@ -16,6 +17,8 @@ MOST = 12
 SLIVER = 1e-12
 # Newton's method on a facet; its error is the square of the last step.
 MAX_ITERATIONS, STEP = 30, 1e-8
+# Secondary facets that one thread takes at a time.
+CHUNK = 32
 
 
 @kernel
@@ -198,7 +201,7 @@ def facing_pairs(
     return found
 
 
-@kernel
+@innermost_kernel
 def _fill_terms(n_terms, s, t, terms):
     """Fill `terms` (n_terms, 3) with the terms of a facet's polynomial and their derivatives."""
     terms[0, 0], terms[0, 1], terms[0, 2] = 1.0, 0.0, 0.0
@@ -227,7 +230,7 @@ def _flatten(facet, origin, axes, flat):
                 flat[k, a] += (facet[k, d] - shift) * axes[a, d]
 
 
-@kernel
+@innermost_kernel
 def _locate(flat, x, y, xi, terms):
     """Move `xi` (2,) to where a facet passes over (x, y) and fill `terms` there; return its area per unit of xi.
 
@@ -257,7 +260,7 @@ def _locate(flat, x, y, xi, terms):
     return 0.0
 
 
-@kernel
+@innermost_kernel
 def _stretch(facet, terms):
     """Return the area of a facet per unit of xi."""
     area = 0.0
@@ -273,7 +276,7 @@ def _stretch(facet, terms):
     return np.sqrt(area)
 
 
-@kernel
+@innermost_kernel
 def _fill_shape(to_terms, terms, shape):
     for k in range(shape.shape[0]):
         shape[k] = 0.0
@@ -302,32 +305,29 @@ def _symmetrise(mass):
 
 
 @kernel
-def integrate(
-    secondary, n_secondary, origin, axes, deformed, reference, to_terms, middle,
+def first_pairs(pairs, n_facets):
+    """Return where the pairs of each secondary facet begin (n_facets + 1,), pairs ascending in that facet."""
+    start = np.zeros(n_facets + 1, np.intp)
+    for i in range(pairs.shape[0]):
+        start[pairs[i, 0] + 1] += 1
+    for s in range(n_facets):
+        start[s + 1] += start[s]
+    return start
+
+
+@kernel
+def _integrate(
+    low, high, start, secondary, n_secondary, origin, axes, deformed, reference, to_terms, middle,
     primary, n_primary, other_deformed, other_to_terms, other_middle, pairs, points, weights, mass, coupling,
 ):  # fmt: skip
-    """Integrate products of shape functions over the parts where facets face each other.
-
-    Both facets are followed along the normal of the secondary polygon; areas are those of the reference surface. Parts
-    are cut into triangles around their centres: the rule is not exact on mapped facets, and its error then depends on no
-    first corner and does not jump where a corner comes or goes as the facets move. Between flat triangles it is exact.
-
-    Planes and polygons are those of `facing_pairs`, `pairs` (n_pairs, 2) its result. `deformed` and `reference`
-    (n_facets, n_terms, 3) are the terms of the secondary facets where they are and where they were, `to_terms`
-    (n_terms, n_nodes) leads to them from nodal values, `middle` (2,) are the reference coordinates to start from; the same
-    with `other` for the primary facets. `points` (n_q, 2) and `weights` (n_q,) are a rule on the triangle. Filled in place:
-    `mass` (n_facets, n_nodes, n_nodes) of the secondary shape functions over the part that faces the primary side, and
-    `coupling` (n_pairs, n_nodes, n_other_nodes), secondary times primary shape functions.
-
-    Returns -1, or the number of a pair with a facet too distorted to be followed.
-    """
+    """Integrate over the parts of the secondary facets [low, high), whose pairs begin at `start`; see `integrate`."""
     subject, window, spare = np.empty((MOST, 2)), np.empty((MOST, 2)), np.empty((MOST, 2))
     n, m = to_terms.shape[0], other_to_terms.shape[0]
     terms, other_terms, shape, other_shape = np.empty((n, 3)), np.empty((m, 3)), np.empty(n), np.empty(m)
     flat, other_flat, xi, other_xi = np.empty((n, 2)), np.empty((m, 2)), np.empty(2), np.empty(2)
-    mass[:], coupling[:] = 0.0, 0.0
+    mass[low:high], coupling[start[low] : start[high]] = 0.0, 0.0
     exact = n == 3 and m == 3
-    for i in range(pairs.shape[0]):
+    for i in range(start[low], start[high]):
         s, p = pairs[i, 0], pairs[i, 1]
         _flatten(deformed[s], origin[s], axes[s], flat)
         _flatten(other_deformed[p], origin[s], axes[s], other_flat)
@@ -351,5 +351,41 @@ def integrate(
                 _fill_shape(other_to_terms, other_terms, other_shape)
                 area = weights[q] * twice * _stretch(reference[s], terms) / seen
                 _add_products(area, shape, other_shape, mass, coupling, s, i)
-    _symmetrise(mass)
+    _symmetrise(mass[low:high])
+    return -1
+
+
+@parallel_kernel
+def integrate(
+    secondary, n_secondary, origin, axes, deformed, reference, to_terms, middle,
+    primary, n_primary, other_deformed, other_to_terms, other_middle, pairs, points, weights, mass, coupling,
+):  # fmt: skip
+    """Integrate products of shape functions over the parts where facets face each other.
+
+    Both facets are followed along the normal of the secondary polygon; areas are those of the reference surface. Parts
+    are cut into triangles around their centres: the rule is not exact on mapped facets, and its error then depends on no
+    first corner and does not jump where a corner comes or goes as the facets move. Between flat triangles it is exact.
+
+    Planes and polygons are those of `facing_pairs`, `pairs` (n_pairs, 2) its result, ascending in the secondary facet.
+    `deformed` and `reference` (n_facets, n_terms, 3) are the terms of the secondary facets where they are and where they
+    were, `to_terms` (n_terms, n_nodes) leads to them from nodal values, `middle` (2,) are the reference coordinates to start
+    from; the same with `other` for the primary facets. `points` (n_q, 2) and `weights` (n_q,) are a rule on the triangle.
+    Filled in place: `mass` (n_facets, n_nodes, n_nodes) of the secondary shape functions over the part that faces the primary
+    side, and `coupling` (n_pairs, n_nodes, n_other_nodes), secondary times primary shape functions. Each facet is one
+    thread's.
+
+    Returns -1, or the number of a pair with a facet too distorted to be followed.
+    """
+    n_facets = secondary.shape[0]
+    start, parts = first_pairs(pairs, n_facets), (n_facets + CHUNK - 1) // CHUNK
+    wrong = np.full(parts, -1, np.intp)
+    for part in prange(parts):
+        low, high = part * CHUNK, min(n_facets, (part + 1) * CHUNK)
+        wrong[part] = _integrate(
+            low, high, start, secondary, n_secondary, origin, axes, deformed, reference, to_terms, middle, primary,
+            n_primary, other_deformed, other_to_terms, other_middle, pairs, points, weights, mass, coupling,
+        )  # fmt: skip
+    for part in range(parts):
+        if wrong[part] >= 0:
+            return wrong[part]
     return -1

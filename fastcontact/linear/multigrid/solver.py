@@ -39,6 +39,8 @@ SLOWEST = 0.999
 # A warm start of a nonsymmetric solution is improved by this factor, but not to less than this part of its tolerance, and by
 # so many iterations at most where that is met.
 WARM, WARM_LEAST, MOST_WARM = 0.05, 1e-3, 10
+# A nonsymmetric iteration whose residual does not fall to this part in so many iterations stands still for good.
+FALLS, STANDING = 0.99, 40
 # Where the smoother amplifies something, its bound of the spectrum is raised by this factor, so many times.
 RAISE, RAISES = 1.3, 4
 
@@ -222,17 +224,21 @@ class Multigrid:
         It may meet the tolerance while the forces of a small contact are not right yet.
         """
         made, wanted = 0, max(min(enough, WARM * iteration.norm), WARM_LEAST * enough)
+        least, fallen = iteration.norm, 0  # the residual when it last fell, and the iterations until then
         while iteration.norm > wanted:
             done = iteration.norm <= enough
             if done and made >= MOST_WARM:
                 return
-            if made >= MAX_NONSYMMETRIC or not iteration.step(multiply, self.precondition):
+            stands = made - fallen >= STANDING
+            if stands or made >= MAX_NONSYMMETRIC or not iteration.step(multiply, self.precondition):
                 if done:
                     return
                 left = iteration.norm / enough
                 raise StallError(f"conjugate residuals stand at {left:.1e} times the tolerance after {made} iterations")
             made += 1
             self.counters.iterations += 1
+            if iteration.norm < FALLS * least:
+                least, fallen = iteration.norm, made
 
     def diagonal(self) -> Array:
         """Return the diagonal (n,) of K."""

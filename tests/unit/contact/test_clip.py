@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fastcontact._jit.decorators import set_threads, threads
 from fastcontact.contact.formulations import _cut_faces_kernels
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.facet_tables import tables
@@ -83,6 +84,16 @@ def test_pieces_of_one_square_cover_the_other(seed, nx, ny, gap):
     assert mass.sum(axis=(1, 2)) == pytest.approx(1.0 / (nx * ny), abs=1e-12)
     per_facet = np.bincount(pairs[:, 0], weights=coupling.sum(axis=(1, 2)), minlength=nx * ny)
     assert per_facet == pytest.approx(1.0 / (nx * ny), abs=1e-12)
+
+
+def test_facets_are_integrated_to_the_same_bits_by_any_number_of_threads():
+    before, found = threads(), []
+    for count in (1, min(2, before)):
+        set_threads(count)
+        found.append(integrated(grid(9, 8, 0.0, True), grid(7, 11, 0.1, False), ("quad4", "quad4")))
+    set_threads(before)
+    for one, other in zip(*found, strict=True):
+        assert np.array_equal(one, other)
 
 
 def overlap_of_intervals(a, b):
