@@ -63,10 +63,17 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
             else:
                 each = {key: value}
             for argument, member in each.items():
-                check_type(f"the argument {argument} of {name}", member, types_of(call).get(key, Any), error)
+                whose = f"the argument {argument} of {_called(name, args)}"
+                check_type(whose, member, types_of(call).get(key, Any), error)
         return call(*args, **kwargs)
 
     return checking
+
+
+def _called(name: str, args: tuple[Any, ...]) -> str:
+    """Return the name of a function, or of a method of the class that a user knows."""
+    owner, _, method = name.rpartition(".")
+    return f"{type(args[0]).__name__}.{method}" if owner and args else name
 
 
 def check_fields(what: str, values: abc.Mapping[str, Any], kind: type, error: type[FastcontactError]) -> None:

@@ -23,7 +23,7 @@ from fastcontact.cases.case import Case, build_case
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import FastcontactError, FastcontactWarning
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.model.model import AGAINST_OBSTACLES
+from fastcontact.model.contact_pair import AGAINST_OBSTACLES
 from fastcontact.model.pair_options import SHARED_OPTIONS
 from fastcontact.results.step import StepResult
 from fastcontact.studies import quantities

@@ -12,7 +12,7 @@ from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import CaseError, unknown
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import Circle
-from fastcontact.model.model import AGAINST_OBSTACLES
+from fastcontact.model.contact_pair import AGAINST_OBSTACLES
 
 SHAPES = {"triangles": ("tri3", "tri6"), "quadrangles": ("quad4", "quad8", "quad9")}
 # Elements that "all" stands for.

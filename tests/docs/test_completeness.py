@@ -82,6 +82,6 @@ def test_every_formulation_solver_shape_and_theory_is_named():
 
 def test_every_method_that_builds_a_model_is_named_in_a_how_to_page():
     how_to = "\n".join(path.read_text(encoding="utf-8") for path in (pages.DOCS / "howto").glob("*.md"))
-    for name, method in vars(fc.Model).items():
+    for name, method in inspect.getmembers(fc.Model):
         if inspect.isfunction(method) and (name.startswith("add_") or name in ("fix", "prescribe", "couple", "relate")):
             assert quoted(name, how_to), name

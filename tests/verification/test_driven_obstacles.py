@@ -11,7 +11,7 @@ from fastcontact import obstacles
 from fastcontact.cases.case import read_case
 from fastcontact.cases.summary import lines, of_step, summarise
 from fastcontact.mesh.generate import block, box, quarter_disc
-from fastcontact.model.model import AGAINST_OBSTACLES
+from fastcontact.model.contact_pair import AGAINST_OBSTACLES
 
 
 def block_under_a_ball(kinematics, element="quad4", centre=3.0, **options):

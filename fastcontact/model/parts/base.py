@@ -1,0 +1,139 @@
+"""What every part of a model builds on: the mesh, the kinematics, and lists of what was added."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, vstack
+
+from fastcontact.elasticity.initial_states import InitialState
+from fastcontact.elasticity.loads import Load, Value
+from fastcontact.elasticity.materials import KINEMATICS, Material
+from fastcontact.elasticity.relations import Relation, stacked_rows
+from fastcontact.elasticity.springs import Springs, stacked
+from fastcontact.elasticity.temperature import Temperature
+from fastcontact.elasticity.varying_constants import Cells
+from fastcontact.errors import ModelError, unknown
+from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.quality import check_cells
+from fastcontact.model.contact_pair import ContactPair
+from fastcontact.model.periodicity import Seam
+from fastcontact.model.pretension import Pretension
+from fastcontact.model.ramp import Table
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Support:
+    """A prescribed displacement component of all nodes of a group: `value` [length] times the ramp.
+
+    `value` is a number or a function of position, `ramp` a history of its own or None.
+    """
+
+    group: str
+    component: int
+    value: Value
+    ramp: Table | None = None
+
+    @property
+    def name(self) -> str:
+        """What it is and where it acts, for messages."""
+        return f"the displacement {'xyz'[self.component]} prescribed on '{self.group}'"
+
+
+class ModelBase:
+    """Mesh, kinematics, and what was added to them."""
+
+    @typed(ModelError)
+    def __init__(self, mesh: Mesh, kinematics: str, case_text: str = "") -> None:
+        if kinematics not in KINEMATICS:
+            raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
+        if (kinematics == "3d") != (mesh.dim == 3):
+            fitting = ", ".join(f"'{name}'" for name in KINEMATICS if (name == "3d") == (mesh.dim == 3))
+            raise ModelError(f"kinematics '{kinematics}' do not fit a mesh in {mesh.dim} dimensions: use {fitting}")
+        if not mesh.solids:
+            raise ModelError(f"the mesh has no solid cells, only {', '.join(mesh.cells) or 'points'}")
+        check_cells(mesh)
+        if kinematics == "axisymmetric":
+            radius = mesh.points[:, 0].min()
+            if radius < -1e-9 * np.abs(mesh.points).max():
+                raise ModelError(
+                    f"point {int(mesh.points[:, 0].argmin())} has the radius x = {radius:.6g} < 0: "
+                    "an axisymmetric model lies at x >= 0, with y along the axis"
+                )
+        self.mesh = mesh
+        self.kinematics = kinematics
+        self.case_text = case_text
+        self.units: dict[str, str] = {}  # names of the units of length, force, pressure where they are known
+        self.materials: list[tuple[Material, tuple[str, ...] | None]] = []
+        self.supports: list[Support] = []
+        self.loads: list[Load] = []
+        self.temperatures: list[Temperature] = []
+        self.initial_states: list[InitialState] = []
+        self.relations: list[Relation] = []
+        self.springs: list[Springs] = []
+        self.pretensions: list[Pretension] = []
+        self.seams: list[Seam] = []  # nodes that are one place of a part that repeats itself
+        self.contact: list[ContactPair] = []
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of displacement components of all points."""
+        return self.mesh.n_points * self.mesh.dim
+
+    def _cells_of(self, groups: Sequence[str] | None) -> Cells:
+        """Return the solid cells of groups, or all."""
+        if groups is None:
+            return Cells(self.mesh, {name: np.arange(len(block)) for name, block in self.mesh.solids.items()})
+        found = self.mesh.split(np.unique(np.concatenate([self.mesh.cell_groups[name] for name in groups])))
+        return Cells(self.mesh, {name: found[name] for name in self.mesh.solids if name in found})
+
+    def _points_of_cells(self, groups: Sequence[str] | None) -> NDArray[np.intp]:
+        """Return the points of the solid cells of groups, or of all."""
+        cells = self._cells_of(groups)
+        return np.unique(np.concatenate([self.mesh.cells[name][rows].ravel() for name, rows in cells.rows.items()]))
+
+    def _nodes(self, place: str | int) -> NDArray[Any]:
+        if isinstance(place, str):
+            return self.mesh.points_of(place)
+        if not 0 <= place < self.mesh.n_points:
+            raise ModelError(f"point {place} is not in the mesh of {self.mesh.n_points} points (numbers from 0)")
+        return np.array([place])
+
+    def _direction(
+        self, name: str, along: Mapping[str, float], joined: bool, direction: Sequence[float] | None
+    ) -> Array | None:
+        """Return the unit vector (dim,) along which a spring is axial; None for the line between its nodes, or for none."""
+        if direction is None:
+            if along and not joined:
+                raise ModelError(
+                    f"{name} has an axial or transverse stiffness but no second node: name it by `to`, give a direction, "
+                    "or x, y or z"
+                )
+            return None
+        if not along:
+            raise ModelError(f"{name} has a direction, but no axial or transverse stiffness that would use it")
+        vector = np.asarray(direction, float)
+        length = np.linalg.norm(vector)
+        if vector.shape != (self.mesh.dim,) or not (np.isfinite(length) and length > 0):
+            raise ModelError(
+                f"the direction {direction} of {name} must be a vector of {self.mesh.dim} numbers, not all zero"
+            )
+        return np.asarray(vector / length)
+
+    def _related(self) -> NDArray[np.bool_]:
+        """Return which points (n_points,) relations and springs hold."""
+        related = np.zeros(self.mesh.n_points, bool)
+        related[self.holding_rows().indices // self.mesh.dim] = True
+        return related
+
+    def holding_rows(self) -> csr_array:
+        """Return the rows (m, n_dofs) [unit of the caller] of relations and springs; their product with free motions is 0."""
+        relations = stacked_rows(self.relations, self.n_dofs)
+        return csr_array(vstack([relations, stacked(self.springs, self.n_dofs)], format="csr"))

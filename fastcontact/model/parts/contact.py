@@ -1,0 +1,223 @@
+"""The contact pairs of a model, with bodies and with rigid obstacles.
+
+A `Value` is a number, or a function from reference positions (n, dim) [length] to numbers (n,) [unit of the quantity].
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.contact.default_formulation import against_obstacle, default_formulation
+from fastcontact.contact.formulations import FORMULATIONS, Formulation
+from fastcontact.contact.obstacles import MeshedSurface, Obstacle
+from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.side_checks import check_obstacle, check_sides
+from fastcontact.contact.surface import Surface, surface
+from fastcontact.elasticity.loads import Value, axes_of, check_number
+from fastcontact.errors import ContactError, ModelError, unknown
+from fastcontact.mesh.argument_types import check_fields, typed
+from fastcontact.model.contact_pair import AGAINST_OBSTACLES, ContactPair, Driving, method
+from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
+from fastcontact.model.obstacle_rotation import rotation_of
+from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
+from fastcontact.model.parts.connections import ModelConnections
+from fastcontact.model.ramp import History, table_of
+from fastcontact.model.repeated_pairs import check_repeated
+
+log = logging.getLogger("fastcontact")
+
+
+class ModelContact(ModelConnections):
+    """A model with contact pairs."""
+
+    @typed(ModelError)
+    def add_contact(
+        self, name: str, *, secondary: str, primary: str, formulation: str | None = None, **options: Any
+    ) -> None:
+        """Let the facets of group `secondary` come into contact with those of group `primary`.
+
+        Parameters
+        ----------
+        name : str
+            Name of the pair in the results.
+        secondary, primary : str
+            The side whose nodes or integration points are projected and carry the constraints, and the side
+            projected upon. Facets are oriented from the solid behind them.
+        formulation : str, optional
+            ``"node_to_segment"``, ``"continuous"`` or ``"mortar"``. By default mortar with dual multipliers, which is right
+            on any two surfaces; ``repr(model)`` and the log tell it.
+        **options
+            What every formulation takes, in addition to the fields of the formulation itself:
+
+            - ``friction``: coefficient of Coulomb friction.
+            - ``kind``: ``"unilateral"`` (default) contact closes and opens. ``"bilateral"`` closes every gap that faces
+              the other side from the beginning and never opens, but slides without friction. In
+              ``"bilateral_once_closed"`` what is closed at the end of a load step never opens again. ``"tied"`` neither
+              opens nor slides: the two sides are paired once, as they lie, and their relative displacement stays zero,
+              also across initial gaps, which are kept (a rotation then strains by its angle times the gap).
+              ``"gap_only"`` watches the gaps, negative where the sides penetrate, and has no forces.
+            - ``clearance``: added to the gap, a number or a function from reference positions (n, dim) on the secondary
+              side to lengths (n,); positive opens the gap, negative is an interference, as of a press fit [length].
+              ``clearance_primary``: the same on the primary side, at the positions faced. ``clearance_ramp``: their
+              history, as pairs (instant, multiplier); without one they are there from the beginning.
+            - ``excluded``: groups whose nodes carry no contact. Where the formulation has integration points, those
+              nearer to such a node than to any other take no part. The two sides may share such nodes. ``frictionless``:
+              groups whose nodes carry no friction, likewise.
+            - ``penalty``: pressure by penetration [pressure / length], instead of none at all; results tell the
+              penetration. It does not soften friction; ``tangential_penalty`` does: shear by slip of what sticks, a number
+              or a function of the secondary position [pressure / length].
+            - ``slip``: ``"symmetric"`` (default): closing a gap along the mean of both sides' normals is no slip;
+              ``"primary"``: all relative motion along the tangents to the primary side is, as in code_aster.
+            - ``wear``: Archard's coefficient by hardness: ``coefficient * pressure * slip`` is worn off the secondary side in
+              each load step, and the next one begins with it; depths are in the results [1 / pressure].
+            - ``search_distance``: what is farther off than this, or deeper inside, now and as the load step begins, is not
+              faced [length].
+            - ``normals``: ``"facet"`` or ``"averaged"`` between the facets that meet at a node at less than 45 degrees, which
+              curved sides that fit closely need; ``"secondary"``: those of the secondary side; a vector out of the primary
+              side's body: one normal for all of it. ``projection_tolerance``: how far points may stand out beyond the end of
+              the primary side and still carry force, in facet lengths.
+        """
+        if formulation is None:
+            formulation, options, reason = default_formulation(self.mesh.dim, options)
+            log.info("contact '%s': %s, since %s", name, method(formulation, options), reason)
+        self._add_pair(ContactPair(name, secondary, primary, formulation, options))
+
+    @typed(ModelError)
+    def add_obstacle(
+        self,
+        name: str,
+        *,
+        secondary: str,
+        obstacle: Obstacle,
+        motion: Mapping[str, float] | None = None,
+        force: Mapping[str, float] | None = None,
+        rotation: Mapping[str, Any] | None = None,
+        ramp: History = None,
+        formulation: str | None = None,
+        **options: Any,
+    ) -> None:
+        """Let the facets of group `secondary` come into contact with a rigid obstacle.
+
+        Parameters
+        ----------
+        name, secondary
+            As in `add_contact`.
+        obstacle : Obstacle
+            A shape of `fastcontact.obstacles`, or any object with their ``distance`` method.
+        motion : mapping of str to float, optional
+            Its displacement at multiplier 1, e.g. ``{"y": -0.1}`` [length]; it stands still without.
+        force : mapping of str to float, optional
+            The force on it at multiplier 1, e.g. ``{"y": -100.0}`` [force], in axisymmetry over the full circle. In
+            these components the obstacle is a rigid body that moves freely until contact holds it; in the others it
+            follows `motion`. Results tell where it is.
+        rotation : mapping, optional
+            How it turns: ``angle`` at multiplier 1 [radian]; ``centre``, a point of the axis (dim,) before any motion, with
+            which it moves [length]; in space ``axis``, the direction; ``ramp``, a history of its own. Results tell the torque
+            on the obstacle's axis. Not in axisymmetry.
+        ramp : Ramp or iterable of (float, float), optional
+            History of motion and force, and of a rotation without one of its own.
+        formulation : str, optional
+            ``"node_to_segment"`` (then: node against obstacle), by default on linear triangles and, in space, on
+            facets whose nodes all carry pressure (tri3, quad4, quad9), or ``"continuous"``, by default on all others.
+        **options
+            Fields of the formulation.
+        """
+        moves = axes_of(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
+        displacement = tuple(float(moves.get(axis, 0.0)) for axis in range(self.mesh.dim))  # type: ignore[arg-type]
+        if not np.isfinite(displacement).all():
+            raise ModelError(f"the motion {motion} of obstacle '{name}' must be finite numbers")
+        if isinstance(obstacle, MeshedSurface):
+            obstacle.check_apart(self.mesh)
+        obstacle.distance(self.mesh.points[:1])  # what does not fit this dimension shows at once
+        history = table_of(ramp, f"the ramp of the motion of obstacle '{name}'")
+        if formulation is None:
+            formulation, reason = against_obstacle(self.mesh.dim, *self._facet_kinds(secondary), options)
+            log.info("contact '%s': %s, since %s", name, method(formulation, options), reason)
+        driving = self._driving(name, moves, force)
+        turned = (None, None) if rotation is None else rotation_of(name, rotation, self.kinematics)
+        self._add_pair(
+            ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving, *turned)
+        )
+
+    def _facet_kinds(self, group: str) -> tuple[list[str], bool]:
+        """Return the kinds of facets of a group, and whether linear triangles or tetrahedra alone have them."""
+        facets = self.mesh.cells_of(group, self.mesh.dim - 1) if group in self.mesh.cell_groups else {}
+        if not facets:  # which `check` tells
+            return [], False
+        simplices = [block for name, block in self.mesh.solids.items() if name in ("tri3", "tet4")]
+        theirs = any(np.isin(self.mesh.points_of(group), block).all() for block in simplices)
+        return list(facets), theirs
+
+    def _driving(self, name: str, moves: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
+        """Return the force on obstacle `name` by component, None for prescribed ones; empty without any."""
+        if not force:
+            return ()
+        forces = axes_of(f"the force on obstacle '{name}'", dict(force), self.mesh.dim)
+        for axis, value in forces.items():
+            check_number(f"the force {'xyz'[axis]} on obstacle '{name}'", value)
+            if axis in moves:
+                raise ModelError(
+                    f"obstacle '{name}' is both moved and pushed along {'xyz'[axis]}: name this component either in its "
+                    "motion or in its force"
+                )
+            if axis == 0 and self.kinematics == "axisymmetric":
+                raise ModelError(
+                    f"a force cannot move obstacle '{name}' along x, the radius: in axisymmetry give y only"
+                )
+        return tuple(float(forces[k]) if k in forces else None for k in range(self.mesh.dim))  # type: ignore[arg-type]
+
+    @property
+    def force_driven(self) -> ForceDrivenObstacles:
+        """The rigid obstacles that forces drive."""
+        return ForceDrivenObstacles([pair for pair in self.contact if pair.force], (self.mesh.n_points, self.mesh.dim))
+
+    def _add_pair(self, pair: ContactPair) -> None:
+        if pair.name in {other.name for other in self.contact}:
+            raise ContactError(f"there is already a contact pair '{pair.name}': names must differ")
+        bound = self.bind(pair)
+        if isinstance(bound.primary, RigidSide):
+            check_obstacle(self.mesh, pair.name, bound.secondary, bound.primary)
+        for other in self.contact:
+            check_repeated(self.mesh, pair, other)
+        self.contact.append(pair)
+
+    def bind(self, pair: ContactPair, supported: NDArray[np.bool_] | None = None) -> Formulation:
+        """Return the formulation of a contact pair on this mesh; see `add_contact` for the errors.
+
+        `supported` (n_points, dim) are the displacement components that supports prescribe, where they are known.
+        """
+        if pair.formulation not in FORMULATIONS:
+            raise ContactError(unknown("contact formulation", pair.formulation, FORMULATIONS))
+        kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
+        given = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "supported")
+        known = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in given)]
+        for option in pair.options:
+            if option not in known:
+                raise ContactError(unknown(f"option of {pair.formulation}", option, known))
+        own = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
+        check_fields(f"contact '{pair.name}'", own, kind, ContactError)
+        secondary = surface(self.mesh, pair.secondary)
+        options = pair_options(
+            pair.name, pair.options, self.mesh, secondary, against_obstacle=pair.obstacle is not None
+        )
+        primary: Surface | RigidSide
+        if pair.obstacle is not None:
+            if pair.formulation not in AGAINST_OBSTACLES:
+                raise ContactError(
+                    unknown("contact formulation for a rigid obstacle", pair.formulation, AGAINST_OBSTACLES)
+                )
+            primary = RigidSide(pair.obstacle, np.array(pair.motion), pair.rotation)
+        else:
+            primary = surface(self.mesh, pair.primary)
+            check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
+        modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
+        axisymmetric = self.kinematics == "axisymmetric"
+        return kind(
+            secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, supported=supported, **own
+        )

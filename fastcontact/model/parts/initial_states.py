@@ -1,0 +1,269 @@
+"""Temperatures, initial stresses and initial strains of a model.
+
+A `Value` is a number, or a function from reference positions (n, dim) [length] to numbers (n,) [unit of the quantity].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.elasticity.initial_states import StressOffset, initial_state
+from fastcontact.elasticity.loads import Value
+from fastcontact.elasticity.material_axes import Axes
+from fastcontact.elasticity.material_field import MaterialField
+from fastcontact.elasticity.materials import Constant
+from fastcontact.elasticity.recovery import internal_force, stress_at_points
+from fastcontact.elasticity.temperature import Temperature, checked_value, histories
+from fastcontact.errors import ModelError
+from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.files.paths import PathLike
+from fastcontact.model.parts.loads import ModelLoads
+from fastcontact.model.ramp import History, Table, table_of
+from fastcontact.model.temperature_files import read_temperatures
+
+Array = NDArray[np.float64]
+
+
+class ModelInitialStates(ModelLoads):
+    """A model with temperatures, initial stresses and strains."""
+
+    def add_temperature(
+        self,
+        value: Value | Array,
+        groups: Sequence[str] | str | None = None,
+        *,
+        reference: float = 0.0,
+        times: Sequence[float] | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Heat or cool groups of solid cells, by default all; their materials expand by their `expansion`.
+
+        Temperatures are those of the nodes: cells beside a group have a gradient where they share nodes with it. The rises of
+        several add up.
+
+        Parameters
+        ----------
+        value : float, callable or ndarray (n_points,) or (n_instants, n_points)
+            A number, a function from reference positions (n, dim) [length] to temperatures (n,), one for each point of the
+            mesh, or that at several instants [temperature].
+        groups : str or sequence of str, optional
+        reference : float
+            At which there is no thermal strain [temperature].
+        times : sequence of float (n_instants,), optional
+            Load factors of the instants, between which temperatures follow linearly [-].
+        ramp : Ramp or iterable of (float, float), optional
+            History of the rise, value minus reference.
+        """
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        checked = checked_value(value)
+        if times is not None:
+            if ramp is not None:
+                raise ModelError("a temperature has either times of its instants or a ramp, not both")
+            if not isinstance(checked, np.ndarray) or checked.ndim != 2:
+                raise ModelError("a temperature with times must be an array (n_instants, n_points)")
+            found = histories(names, checked, reference, times)
+        else:
+            found = [Temperature(names, checked, reference, table_of(ramp, "the ramp of the temperature"))]
+        for own in found:
+            own.check(self.mesh)
+        self.temperatures += found
+
+    @typed(ModelError)
+    def add_temperature_file(
+        self,
+        file: PathLike | Sequence[PathLike],
+        field: str,
+        groups: Sequence[str] | str | None = None,
+        *,
+        reference: float = 0.0,
+        instant: float | None = None,
+        times: Sequence[float] | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Heat or cool groups of solid cells, by default all, by a nodal field of a file, or of several files.
+
+        Read are MED, VTKHDF, such as result files, and what meshio reads, such as .vtu. A file with the points of the mesh in
+        their order gives the temperature of each; otherwise it is that of the point at the same place.
+
+        Parameters
+        ----------
+        file : path-like or sequence of them
+            One file, with one instant or several; or a file for each instant.
+        field : str
+            Its name.
+        groups : str or sequence of str, optional
+        reference : float
+            At which there is no thermal strain [temperature].
+        instant : float, optional
+            Time of the file to take alone.
+        times : sequence of float (n_instants,), optional
+            Load factors of the instants [-]; by default the times of the file. Between them temperatures follow linearly.
+        ramp : Ramp or iterable of (float, float), optional
+            History of the rise of a single instant.
+
+        Raises
+        ------
+        FileError, MeshError, ModelError
+            If a file cannot be read or lacks the field, a point has no temperature, or instants and times do not fit.
+        """
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        for name in names or ():
+            if not self.mesh.cells_of(name, dim=self.mesh.dim):
+                raise ModelError(f"group '{name}' holds no solid cells: it has no temperature")
+        values, own = read_temperatures(self.mesh, file, field, self._points_of_cells(names), instant)
+        values = np.where(np.isfinite(values), values, reference)
+        if len(values) == 1:
+            if times is not None:
+                raise ModelError(f"field '{field}' has one instant, so it has no times: give it a ramp")
+            self.add_temperature(values[0], names, reference=reference, ramp=ramp)
+            return
+        if ramp is not None:
+            raise ModelError(f"field '{field}' has {len(values)} instants and thus no ramp: give times, or one instant")
+        when = times if own is None or times is not None else own.tolist()
+        if when is None:
+            raise ModelError(f"field '{field}' has {len(values)} instants without times: give the load factor of each")
+        self.add_temperature(values, names, reference=reference, times=when)
+
+    @typed(ModelError)
+    def add_initial_stress(
+        self,
+        groups: Sequence[str] | str | None = None,
+        *,
+        xx: Constant | None = None,
+        yy: Constant | None = None,
+        zz: Constant | None = None,
+        xy: Constant | None = None,
+        yz: Constant | None = None,
+        xz: Constant | None = None,
+        axes: Axes = None,
+        ramp: History = None,
+    ) -> None:
+        """Give groups of solid cells, by default all, a stress that they have where nothing is displaced.
+
+        What of it is not in balance deforms the bodies. In axisymmetry x, y, z are radius, axis and circumference.
+
+        Parameters
+        ----------
+        groups : str or sequence of str, optional
+        xx, yy, zz, xy, yz, xz : float, callable or ndarray (n,), optional
+            Components, zero where not given; numbers, functions or arrays as E of `LinearElastic` [pressure].
+        axes : sequence or callable, optional
+            What they are along, as of `Orthotropic`: unit vectors in rows (3, 3) [-], or a function, taken at each place.
+        ramp : Ramp or iterable of (float, float), optional
+            History; by default the whole of it is there from the first step on.
+        """
+        given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
+        self._add_initial("stress", groups, given, axes, ramp)
+
+    @typed(ModelError)
+    def add_initial_strain(
+        self,
+        groups: Sequence[str] | str | None = None,
+        *,
+        xx: Constant | None = None,
+        yy: Constant | None = None,
+        zz: Constant | None = None,
+        xy: Constant | None = None,
+        yz: Constant | None = None,
+        xz: Constant | None = None,
+        axes: Axes = None,
+        ramp: History = None,
+    ) -> None:
+        """Give groups of solid cells, by default all, a strain that costs no stress: shrinkage, swelling, misfit.
+
+        Parameters
+        ----------
+        groups : str or sequence of str, optional
+        xx, yy, zz, xy, yz, xz : float, callable or ndarray (n,), optional
+            Components, as of `add_initial_stress`; xy, yz and xz are shears, twice those of the tensor [-].
+        axes : sequence or callable, optional
+            What they are along: unit vectors in rows (3, 3) [-], or a function.
+        ramp : Ramp or iterable of (float, float), optional
+            History; by default the whole of it is there from the first step on.
+        """
+        given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
+        self._add_initial("strain", groups, given, axes, ramp)
+
+    def _add_initial(
+        self, kind: str, groups: Sequence[str] | str | None, given: Mapping[str, Any], axes: Axes, ramp: History
+    ) -> None:
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        for name in names or ():
+            if not self.mesh.cells_of(name, dim=self.mesh.dim):
+                raise ModelError(f"group '{name}' holds no solid cells: it has no initial {kind}")
+        table = table_of(ramp, f"the ramp of the initial {kind}")
+        self.initial_states.append(
+            initial_state(kind, names, self._cells_of(names), given, axes, self.kinematics, table)
+        )
+
+    def temperature_rise(self, factors: Sequence[float]) -> Array | None:
+        """Return the rise of the temperature (n_points,) [temperature], None without temperatures.
+
+        `factors` has a multiplier for each that was added, as ``step.iterations["temperature_factors"]`` of a step result.
+        """
+        if not self.temperatures or not len(factors):
+            return None
+        rises = [factor * own.rise(self.mesh) for factor, own in zip(factors, self.temperatures, strict=True)]
+        return np.asarray(np.sum(rises, axis=0))
+
+    def stress_offset(
+        self, temperature_factors: Sequence[float] = (), initial_factors: Sequence[float] = (),
+        field: MaterialField | None = None,
+    ) -> StressOffset | None:  # fmt: skip
+        """Return what stresses have beside those of the displacements, by temperatures and initial states; None without any.
+
+        The factors are those of a step result, `StepResult.iterations`; `field` is the `material_field`, where it is known.
+        """
+        rise, states = self.temperature_rise(temperature_factors), []
+        if len(initial_factors):
+            states = list(zip(initial_factors, self.initial_states, strict=True))
+        if rise is None and not states:
+            return None
+        return (field or self.material_field()).offset(rise, states, self.mesh.n_points)
+
+    def thermal_forces_by_ramp(self) -> dict[Table | None, Array]:
+        """Return by history the nodal forces (n_points, dim) at multiplier 1 by which temperatures load the cells [force].
+
+        ModelError if a material that is heated has no expansion.
+        """
+        by_ramp: dict[Table | None, Array] = {}
+        if not self.temperatures:
+            return by_ramp
+        field = self.material_field()
+        for own in self.temperatures:
+            rise = own.rise(self.mesh)
+            missing = field.without_expansion(self.mesh, rise)
+            if missing:
+                raise ModelError(
+                    f"{own.name} acts on {missing} solid cells whose material has no coefficient of thermal expansion: give "
+                    "it expansion=..., 0.0 if it does not expand"
+                )
+            by_ramp[own.ramp] = by_ramp.get(own.ramp, 0.0) + self._forces_of(field, field.offset(rise))
+        return by_ramp
+
+    def initial_forces_by_ramp(self) -> dict[Table | None, Array]:
+        """Return by history the nodal forces (n_points, dim) of initial stresses and strains at multiplier 1 [force]."""
+        by_ramp: dict[Table | None, Array] = {}
+        field = self.material_field() if self.initial_states else None
+        for state in self.initial_states:
+            assert field is not None
+            forces = self._forces_of(field, field.offset(None, [(1.0, state)], self.mesh.n_points))
+            by_ramp[state.ramp] = by_ramp.get(state.ramp, 0.0) + forces
+        return by_ramp
+
+    def _forces_of(self, field: MaterialField, offset: StressOffset | None) -> Array:
+        """Return the nodal forces (n_points, dim) [force] of what stresses have beside those of the displacements."""
+        held = stress_at_points(
+            self.mesh,
+            self.kinematics,
+            field.moduli,
+            field.loops,
+            np.zeros(self.mesh.points.shape),
+            field.treatment,
+            offset,
+        )
+        return -internal_force(self.mesh, self.kinematics, held)

@@ -1,0 +1,242 @@
+"""The loads of a model: forces on its surfaces, volumes and points.
+
+A `Value` is a number, or a function from reference positions (n, dim) [length] to numbers (n,) [unit of the quantity].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.elasticity.inertia_loads import Centrifugal, Densities, Gravity, InertiaLoad
+from fastcontact.elasticity.loads import (
+    BodyForce,
+    Hydrostatic,
+    Load,
+    NodalForce,
+    Pressure,
+    TotalForce,
+    Traction,
+    Value,
+    axes_of,
+    check_number,
+)
+from fastcontact.errors import ModelError
+from fastcontact.mesh.argument_types import typed
+from fastcontact.model.checks import check_forces
+from fastcontact.model.couplings import Moment
+from fastcontact.model.parts.materials import ModelMaterials
+from fastcontact.model.ramp import History, Table, table_of
+from fastcontact.model.spread_forces import SpreadForce, spread_of
+
+Array = NDArray[np.float64]
+
+
+class ModelLoads(ModelMaterials):
+    """A model with loads."""
+
+    @typed(ModelError)
+    def add_pressure(self, group: str, value: Value, *, ramp: History = None) -> None:
+        """Press on a group of outer facets with `value` [pressure], positive along their normals into the body.
+
+        It is a number, or a function from reference positions (n, dim) [length] to pressures (n,) [pressure].
+        """
+        self._add(Pressure(group, value, table_of(ramp, f"the ramp of the pressure on '{group}'")))
+
+    @typed(ModelError)
+    def add_traction(
+        self,
+        group: str,
+        *,
+        x: Value | None = None,
+        y: Value | None = None,
+        z: Value | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Load a group of facets with forces per reference area [pressure]; values as in `add_pressure`."""
+        axes = axes_of(f"the traction on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
+        self._add(Traction(group, axes, table_of(ramp, f"the ramp of the traction on '{group}'")))
+
+    @typed(ModelError)
+    def add_body_force(
+        self,
+        groups: Sequence[str] | str | None = None,
+        *,
+        x: Value | None = None,
+        y: Value | None = None,
+        z: Value | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Load groups of solid cells, by default all, with forces per volume [force / length^3], such as the weight."""
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        axes = axes_of("the body force", {"x": x, "y": y, "z": z}, self.mesh.dim)
+        self._add(BodyForce(names, axes, table_of(ramp, "the ramp of the body force")))
+
+    def add_gravity(
+        self,
+        groups: Sequence[str] | str | None = None,
+        *,
+        x: float | None = None,
+        y: float | None = None,
+        z: float | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Load groups of solid cells, by default all, with their weight: density times acceleration [length / time^2].
+
+        The densities are those of the materials; units must fit, as do N, mm, MPa with tonnes, seconds and y=-9810.0.
+        """
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        axes = axes_of("gravity", {"x": x, "y": y, "z": z}, self.mesh.dim)
+        self._add(Gravity(names, axes, table_of(ramp, "the ramp of gravity")))
+
+    def add_centrifugal(
+        self,
+        speed: float,
+        groups: Sequence[str] | str | None = None,
+        *,
+        origin: Sequence[float] = (0.0, 0.0, 0.0),
+        direction: Sequence[float] | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Load groups of solid cells with the centrifugal force of a rotation, from the densities of the materials.
+
+        Parameters
+        ----------
+        speed : float
+            Angular speed [radian / time].
+        groups : str or sequence of str, optional
+            By default all solid cells.
+        origin : sequence of 2 or 3 floats
+            A point of the axis [length].
+        direction : sequence of 3 floats, optional
+            Along the axis, of any length [-]. By default (0, 0, 1), in axisymmetry the axis (0, 1, 0).
+        ramp : Ramp or iterable of (float, float), optional
+            History of the force, that is of the square of the speed.
+        """
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        if direction is None:
+            direction = (0.0, 1.0, 0.0) if self.kinematics == "axisymmetric" else (0.0, 0.0, 1.0)
+        place = (*origin, 0.0) if len(origin) == 2 else tuple(origin)
+        if len(place) != 3 or len(direction) != 3:
+            raise ModelError(
+                f"the axis of the centrifugal force needs three components, not origin {origin} and direction {direction}"
+            )
+        table = table_of(ramp, "the ramp of the centrifugal force")
+        self._add(Centrifugal(names, speed, place, tuple(direction), table))  # type: ignore[arg-type]
+
+    @typed(ModelError)
+    def add_hydrostatic_pressure(
+        self, group: str, *, weight: float, level: float, axis: str | None = None, ramp: History = None
+    ) -> None:
+        """Press on a group of outer facets as a liquid does: `weight` times the depth below its level.
+
+        Parameters
+        ----------
+        group : str
+        weight : float
+            Of the liquid by volume [force / length^3].
+        level : float
+            Coordinate of its surface; above it nothing presses [length].
+        axis : str, optional
+            Along which the level is measured, upwards: by default the last one, y or z.
+        ramp : Ramp or iterable of (float, float), optional
+        """
+        name = "xyz"[self.mesh.dim - 1] if axis is None else axis
+        (along,) = axes_of(f"the hydrostatic pressure on '{group}'", {name: 1.0}, self.mesh.dim)
+        for what, value in (("weight", weight), ("level", level)):
+            check_number(f"the {what} of the hydrostatic pressure on '{group}'", value)
+        self.add_pressure(group, Hydrostatic(float(weight), float(level), along), ramp=ramp)
+
+    @typed(ModelError)
+    def add_force(
+        self,
+        group: str,
+        *,
+        x: float | None = None,
+        y: float | None = None,
+        z: float | None = None,
+        distribute: bool | None = None,
+        at: Sequence[float] | None = None,
+        weighting: str = "uniform",
+        radius: float | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Load a group with forces [force].
+
+        Parameters
+        ----------
+        group : str
+        x, y, z : float
+            Components. In axisymmetry forces are those over the full circle; on facets a radial one is refused.
+        distribute : bool, optional
+            True: the total force, spread as a uniform traction over the facets of the group. False: the force on every
+            node of the group. By default True for a group of facets and False for a group of points.
+        at : sequence of float (dim,), optional
+            Place through which the total force acts, spread over the group by area and distance from there, with the arms of
+            the group for what moment is left [length].
+        weighting : str
+            Of the force spread about `at`: ``"uniform"``, or falling to zero at the radius as ``"linear"``, ``"quadratic"``
+            or ``"cubic"`` functions of the distance.
+        radius : float, optional
+            Beyond which the group bears nothing [length]; by default the distance of its farthest node.
+        ramp : Ramp or iterable of (float, float), optional
+        """
+        self.mesh.points_of(group)
+        spread = spread_of(f"the force on '{group}'", at, weighting, radius)
+        if spread is not None:
+            if distribute is False:
+                raise ModelError(
+                    f"the force on '{group}' acts through a place or on every node: leave out at or distribute"
+                )
+            axes = axes_of(f"the force on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
+            self._add(SpreadForce(group, axes, spread, table_of(ramp, f"the ramp of the force on '{group}'")))  # type: ignore[arg-type]
+            return
+        if distribute is None:
+            distribute = group in self.mesh.cell_groups and bool(self.mesh.cells_of(group, dim=self.mesh.dim - 1))
+        kind: type[TotalForce] | type[NodalForce] = TotalForce if distribute else NodalForce
+        axes = axes_of(f"the force on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
+        self._add(kind(group, axes, table_of(ramp, f"the ramp of the force on '{group}'")))
+
+    @typed(ModelError)
+    def add_moment(
+        self,
+        group: str,
+        *,
+        x: float | None = None,
+        y: float | None = None,
+        z: float | None = None,
+        ramp: History = None,
+    ) -> None:
+        """Load a reference point, or a group, with a moment [force times length]; in the plane about z.
+
+        On a group of facets it is spread in proportion to area and distance from the middle, without a resultant force.
+        """
+        name = f"the moment on '{group}'"
+        given = {"x": x, "y": y, "z": z}
+        if self.mesh.dim == 2 and (x is not None or y is not None):
+            raise ModelError(f"{name}: in the plane moments are about z")
+        axes = axes_of(name, given, 3)
+        self._add(Moment(group, axes, table_of(ramp, f"the ramp of {name}")))
+
+    def _add(self, load: Load) -> None:
+        load.check(self.mesh, self.kinematics)
+        self.loads.append(load)
+
+    def forces_by_ramp(self) -> dict[Table | None, Array]:
+        """Return by history the nodal forces (n_points, dim) of all loads at multiplier 1 [force]."""
+        related = self._related()
+        by_ramp: dict[Table | None, Array] = {}
+        for load in self.loads:
+            forces = self.load_vector(load)
+            check_forces(self.mesh, forces, related, load.name)
+            by_ramp[load.ramp] = by_ramp.get(load.ramp, 0.0) + forces
+        return by_ramp
+
+    def load_vector(self, load: Load) -> Array:
+        """Return the nodal forces (n_points, dim) of a load at multiplier 1 [force]."""
+        density = None
+        if isinstance(load, InertiaLoad):
+            density = Densities([m for m, _ in self.materials], self._material_of_cells())
+        return load.vector(self.mesh, self.kinematics, density)

@@ -1,0 +1,112 @@
+"""The materials of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.elasticity.material_field import MaterialField, material_field
+from fastcontact.elasticity.materials import Material
+from fastcontact.elasticity.stiffness import stiffness
+from fastcontact.errors import ModelError
+from fastcontact.mesh.argument_types import typed
+from fastcontact.model.parts.base import ModelBase
+
+Array = NDArray[np.float64]
+
+
+class ModelMaterials(ModelBase):
+    """A model with materials."""
+
+    @typed(ModelError)
+    def add_material(self, material: Material, groups: Sequence[str] | str | None = None) -> None:
+        """Give a material to groups of solid cells, by default to all; groups override what was given to all before."""
+        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        for name in names or ():
+            if not self.mesh.cells_of(name, dim=self.mesh.dim):
+                raise ModelError(f"group '{name}' holds no solid cells, so it cannot have a material")
+        if not isinstance(material, Material):
+            raise ModelError(
+                f"{material!r} is no material: give LinearElastic(E=..., nu=...), Orthotropic(...) or Anisotropic(...)"
+            )
+        self.materials.append((material.bound(self._cells_of(names)), names))
+
+    def material_numbers(self) -> tuple[Array, dict[str, NDArray[np.int32]]]:
+        """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and by element every solid cell's number there.
+
+        The first are those of the materials; materials that vary have further ones, for the middle of each cell.
+        """
+        field = self.material_field()
+        return field.moduli, field.rows
+
+    def material_field(self) -> MaterialField:
+        """Return the materials of all solid cells; ModelError if a cell has none, or two."""
+        return material_field(
+            self.mesh, self.kinematics, [material for material, _ in self.materials], self._material_of_cells()
+        )
+
+    def _material_of_cells(self) -> dict[str, NDArray[np.int32]]:
+        """Return by element every solid cell's material (n_cells,)."""
+        if not self.materials:
+            raise ModelError("no material: call add_material(LinearElastic(E=..., nu=...)) for the solid cells")
+        numbers = {name: np.full(len(block), -1, np.int32) for name, block in self.mesh.solids.items()}
+        for index, (_, groups) in enumerate(self.materials):
+            for name in numbers if groups is None else ():
+                self._check_material(index, None, numbers[name])
+                numbers[name][:] = index
+            for group in groups or ():
+                for name, rows in self.mesh.split(self.mesh.cell_groups[group]).items():
+                    if name in numbers:
+                        self._check_material(index, group, numbers[name][rows])
+                        numbers[name][rows] = index
+        self._check_all_have_material(numbers)
+        return numbers
+
+    def averaged_materials(self) -> NDArray[np.bool_]:
+        """Return which moduli (n_moduli,) have a mean dilatation; none in plane stress, where none locks."""
+        return self.material_field().averaged
+
+    def _check_material(self, index: int, group: str | None, given: NDArray[np.int32]) -> None:
+        """Refuse a material for cells that have another one already, which was not given to all cells."""
+        new = self.materials[index][0]
+        for number in np.unique(given[given >= 0]):
+            old, groups = self.materials[number]
+            if old != new and (groups is not None or group is None):
+                raise ModelError(
+                    f"{int((given == number).sum())} cells of {'the mesh' if group is None else repr(group)} have two "
+                    f"materials, {old.described} and {new.described}: give each group one; "
+                    "one for all other cells comes first, without groups"
+                )
+
+    def _check_all_have_material(self, numbers: dict[str, NDArray[np.int32]]) -> None:
+        without = {name: np.flatnonzero(values < 0) for name, values in numbers.items()}
+        total = sum(map(len, without.values()))
+        if not total:
+            return
+        offsets = self.mesh.offsets
+        cells = np.concatenate([rows + offsets[name] for name, rows in without.items()])
+        groups = [g for g, members in self.mesh.cell_groups.items() if np.isin(members, cells).any()]
+        named = f", in {', '.join(repr(g) for g in groups)}" if groups else ""
+        raise ModelError(f"{total} solid cells have no material{named}: add_material for their groups")
+
+    @typed(ModelError)
+    def internal_forces(self, displacement: Array) -> Array:
+        """Return the nodal forces (n_points, dim) [force] that hold the solid cells deformed by `displacement`.
+
+        They are in balance with loads, contact, supports, relations, springs and the forces of heat and initial states
+        (`thermal_forces_by_ramp`, `initial_forces_by_ramp`); axisymmetric: over the full circle.
+
+        Parameters
+        ----------
+        displacement : ndarray (n_points, dim)
+            Of a step result [length].
+        """
+        field = self.material_field()
+        if np.size(displacement) != self.n_dofs:
+            raise ModelError(
+                f"the displacement has the shape {np.shape(displacement)}, but the mesh {self.mesh.points.shape}"
+            )
+        K = stiffness(self.mesh, self.kinematics, field.moduli, field.loops, None, field.treatment)
+        return np.asarray(K @ np.ravel(displacement)).reshape(-1, self.mesh.dim)

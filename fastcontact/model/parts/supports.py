@@ -1,0 +1,123 @@
+"""The supports of a model: prescribed displacements, and the axis of symmetry.
+
+A `Value` is a number, or a function from reference positions (n, dim) [length] to numbers (n,) [unit of the quantity].
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.elasticity.loads import Value, axes_of, check_value, evaluated
+from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
+from fastcontact.errors import ModelError
+from fastcontact.mesh.argument_types import typed
+from fastcontact.model.parts.base import Support
+from fastcontact.model.parts.contact import ModelContact
+from fastcontact.model.ramp import History, Table, table_of
+from fastcontact.model.relation_rows import NORMAL, along, normals_of
+
+Array = NDArray[np.float64]
+log = logging.getLogger("fastcontact")
+
+
+class ModelSupports(ModelContact):
+    """A model with supports."""
+
+    @typed(ModelError)
+    def fix(self, group: str, components: str) -> None:
+        """Hold displacement components (``"x"``, ``"y"``, ``"xy"``, in 3D also ``"z"``) of a group's nodes at zero.
+
+        ``"normal"``: those along the normals of a group of facets.
+        """
+        if not components:
+            raise ModelError(f"fix('{group}', ...) names no component: give for example 'x' or 'xy'")
+        if components == NORMAL:
+            self.prescribe(group, normal=0.0)
+        else:
+            self._support(group, dict.fromkeys(components, 0.0), None)
+
+    @typed(ModelError)
+    def prescribe(self, group: str, *, normal: Value | None = None, ramp: History = None, **components: Value) -> None:
+        """Prescribe displacement components of all nodes of a group, e.g. ``y=-2.0`` [length], times the ramp.
+
+        A component is a number, or a function from reference positions (n, dim) [length] to displacements (n,) [length].
+        `normal` is the displacement out of the body along the mean normal of the facets at each node, for groups of facets.
+        """
+        if normal is not None:
+            name = f"the displacement normal prescribed on '{group}'"
+            check_value(name, normal)
+            nodes, directions = normals_of(self.mesh, group)
+            values = evaluated(normal, self.mesh.points[nodes], name)
+            table = table_of(ramp, f"the ramp of {name}")
+            self.relations.append(Relation(name, along(nodes, directions, self.n_dofs), values, table))
+        if components or normal is None:
+            self._support(group, components, ramp)
+
+    def _support(self, group: str, components: Mapping[str, Value], ramp: History) -> None:
+        if not len(self.mesh.points_of(group)):
+            raise ModelError(f"group '{group}' is empty: no displacement can be prescribed on it")
+        for axis, value in axes_of(f"prescribe('{group}')", components, self.mesh.dim).items():
+            support = Support(
+                group, axis, value, table_of(ramp, f"the ramp of the displacement prescribed on '{group}'")
+            )
+            check_value(support.name, value)
+            self.supports.append(support)
+
+    def prescribed(self) -> tuple[NDArray[np.bool_], Array]:
+        """Return (fixed, values), both (n_points, dim): supported components, and their displacement at ramp value 1."""
+        fixed, by_ramp = self.prescribed_by_ramp()
+        return fixed, sum(by_ramp.values(), np.zeros(self.mesh.points.shape))
+
+    def prescribed_by_ramp(self) -> tuple[NDArray[np.bool_], dict[Table | None, Array]]:
+        """Return supported components (n_points, dim), and by history their displacement at multiplier 1 [length]."""
+        fixed = np.zeros(self.mesh.points.shape, bool)
+        by_ramp: dict[Table | None, Array] = {}
+        owner: dict[tuple[int, int], Support] = {}
+        for support in self.supports:
+            nodes, k = self.mesh.points_of(support.group), support.component
+            values = evaluated(support.value, self.mesh.points[nodes], support.name)
+            for node, value in zip(nodes[fixed[nodes, k]], values[fixed[nodes, k]], strict=True):
+                other = owner[int(node), k]
+                found = by_ramp[other.ramp][node, k]
+                if found != value or (other.ramp != support.ramp and value != 0.0):
+                    raise ModelError(
+                        f"'{support.group}' prescribes {'xyz'[k]} = {value:g} at point {node}, but "
+                        f"'{other.group}' prescribes {found:g} there"
+                        f"{' with another ramp' if found == value else ''}: remove one of the two"
+                    )
+            new = ~fixed[nodes, k]
+            total = by_ramp.setdefault(support.ramp, np.zeros(self.mesh.points.shape))
+            fixed[nodes, k], total[nodes[new], k] = True, values[new]
+            owner.update({(int(node), k): support for node in nodes[new]})
+        self._hold_axis(fixed, by_ramp)
+        return fixed, by_ramp
+
+    def _hold_axis(self, fixed: NDArray[np.bool_], by_ramp: Mapping[Table | None, Array]) -> None:
+        """Add the symmetry at the axis of an axisymmetric model to the supports, and refuse those that contradict it."""
+        axis = self.axis_nodes
+        for values in by_ramp.values():
+            off = axis[np.abs(values[axis, 0]) > ON_AXIS * np.abs(values).max()]
+            if len(off):
+                raise ModelError(
+                    f"x = {values[off[0], 0]:g} is prescribed at point {off[0]} on the axis of symmetry, where the radial "
+                    "displacement is zero: leave the points at x = 0 out of the group"
+                )
+            values[axis, 0] = 0.0
+        fixed[axis, 0] = True
+
+    @property
+    def axis_nodes(self) -> NDArray[np.intp]:
+        """Nodes (k,) on the axis of an axisymmetric model, where x is held at zero without any support; none in others."""
+        return axis_nodes(self.mesh) if self.kinematics == "axisymmetric" else np.empty(0, np.intp)
+
+    def _tell_axis(self) -> None:
+        """Log what is held on the axis although no support names it."""
+        named = [self.mesh.points_of(support.group) for support in self.supports if support.component == 0]
+        held = np.setdiff1d(self.axis_nodes, np.concatenate(named)) if named else self.axis_nodes
+        if len(held):
+            log.info("axis of symmetry: x is held at zero at %d nodes with x = 0 (first: point %d)", len(held), held[0])
