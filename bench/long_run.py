@@ -162,7 +162,12 @@ def measured(case_file: Path, path: Path, every: int, seconds: float | None) -> 
     notes: list[dict[str, float]] = []
     begin = time.monotonic()
     with fc.ResultWriter(path, case.model, case_text=case.text, synchronise=True) as out:
-        for step in fc.solve_steps(case.model, case.ramp):
+        options = {
+            "linear_solver": case.linear_solver,
+            "linear_tolerance": case.linear_tolerance,
+            "criteria": case.criteria,
+        }
+        for step in fc.solve_steps(case.model, case.ramp, **options):  # as the command does
             out.write(step)
             if step.index % every:
                 continue

@@ -74,11 +74,16 @@ class Locks:
 
 def cut_sections(found: DeckMesh, mesh: Mesh) -> Mesh:
     """Return the mesh cut along all pretension sections."""
+    sections: set[str] = set()
     for section in found.made.content.pretensions:
         found.made.surface(section.surface, section.place)
+        group = group_of_surface(found, section.surface)
+        if group in sections:
+            raise section.place.refuse(f"surface '{group}' has a pretension section already")
+        sections.add(group)
         normal = None if section.normal is None else section.normal[: found.dim]
         try:
-            mesh = cut(mesh, group_of_surface(found, section.surface), normal)
+            mesh = cut(mesh, group, normal)
         except MeshError as error:
             raise section.place.refuse(str(error)) from error
     return mesh
@@ -90,8 +95,6 @@ def add_sections(model: Model, found: DeckMesh, locks: Locks) -> list[Relation]:
     for point, section in locks.points.items():
         group, place = group_of_surface(found, section.surface), section.place
         normal = None if section.normal is None else section.normal[: found.dim]
-        if any(p.label == group for p in model.pretensions):
-            raise place.refuse(f"surface '{group}' has a pretension section already")
         model.add_pretension(group, group, force=0.0, locked_from=locks.begins.get(point), normal=normal)
         row = model.pretensions[-1].row(model.n_dofs)
         node = csr_array((np.ones(1), ([0], [point * found.dim])), shape=row.shape)

@@ -44,6 +44,13 @@ def test_a_ramp_is_one(ramp):
         fc.solve(cube(), ramp)
 
 
+def test_a_size_has_as_many_numbers_as_the_plane():
+    with pytest.raises(fc.MeshError, match="argument size of block must be two numbers, not the tuple"):
+        block((1.0,), (2, 2))
+    with pytest.raises(fc.MeshError, match="divisions of block must be two"):
+        block((1.0, 1.0), "ab")
+
+
 def test_a_line_has_no_mean_rotation():
     with pytest.raises(fc.ModelError, match=r"coupling of 'HANDLE' with 'line': .* have no mean rotation"):
         cube().add_coupling("HANDLE", "line", kind="distributing")

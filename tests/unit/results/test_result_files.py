@@ -737,6 +737,18 @@ def test_damage_inside_is_told_and_never_read_as_data(path: Path) -> None:
         open_results(path)
 
 
+def test_forces_on_the_primary_side_that_are_cut_off(path: Path) -> None:
+    step = step_result(2)
+    force = {"primary_points": np.arange(3, dtype=np.int32), "primary_force_vectors": np.ones((3, 2))}
+    contact = {name: dataclasses.replace(pair, **force) for name, pair in step.contact.items()}
+    with ResultWriter(path, MESH) as out:
+        out.write(dataclasses.replace(step, contact=contact))
+    with h5py.File(path, "r+") as file:
+        file["fastcontact/contact/0/primary"].resize(2, axis=0)
+    with pytest.raises(FileError, match="the table of primary forces of 'left' is cut off"):
+        open_results(path)[0]
+
+
 def test_the_file_is_what_the_standard_says(path: Path) -> None:
     write(path, 3)
     with h5py.File(path) as file:

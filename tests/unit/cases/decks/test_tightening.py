@@ -99,6 +99,11 @@ def test_a_shortening_in_the_place_of_a_force(tmp_path):
             "node 99 has a section already, in line 34",
         ),
         (
+            BAR.replace("*Boundary", "*Node\n98, 0., 0., 9.\n*Pre-tension Section, surface=cut, node=98\n*Boundary")
+            + TIGHT,
+            "surface 'cut' has a pretension section already",
+        ),
+        (
             BAR + TIGHT + cooled(HELD) + cooled("*Boundary, op=new\nbottom, 1, 3\ntop, 1, 3\n"),
             "node 99 of a pretension section is let go here: once locked it stays so",
         ),
