@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 from pathlib import Path
 
@@ -31,7 +32,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Under another linear solver results are asked for, whichever way they come."""
+    """Hear Ctrl-C, also where the tests run in background; under another linear solver results come whichever way."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if config.getoption("--linear-solver"):
         config.addinivalue_line("filterwarnings", "ignore:multigrid gave up")
 
