@@ -39,6 +39,14 @@ def pytest_configure(config: pytest.Config) -> None:
         config.addinivalue_line("filterwarnings", "ignore:multigrid gave up")
 
 
+@pytest.fixture(autouse=True)
+def signals():
+    """Give signals back to Python after each test; gmsh takes them, and a broken pipe would then end the tests."""
+    yield
+    for number in (signal.SIGINT, *([signal.SIGPIPE] if hasattr(signal, "SIGPIPE") else [])):
+        signal.signal(number, signal.getsignal(number))
+
+
 @pytest.fixture(scope="session", autouse=True)
 def linear_solver(request: pytest.FixtureRequest):
     """The linear solver that ``--linear-solver`` names, in place of the automatic choice; iterative ones to round-off.

@@ -99,7 +99,7 @@ def contact_answers(model: Model, steps: Iterable[StepResult], name: str) -> lis
     pair = _bound(model, name)
     areas, work, found = lumped_areas(pair.secondary, pair.points, pair.axisymmetric), 0.0, []
     for step in steps:
-        contact = step.contact[name]
+        contact = _of_pair(pair, step, name)
         work += contact.dissipation
         found.append(_answers(contact, areas, pair.axisymmetric, work))
     return found
@@ -187,7 +187,13 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
     pair = _bound(model, name)
     depth, found = np.zeros(len(pair.secondary.points)), []
     before: StepResult | None = None
-    for step in steps:
+    for number, step in enumerate(steps, 1):
+        _of_pair(pair, step, name)
+        if step.index != number:
+            raise ContactError(
+                f"wear adds up over all load steps: step {number} was expected and step {step.index} came; give all from the "
+                "first on, in their order"
+            )
         pressure = 0.0 if before is None else before.contact[name].pressure
         depth = depth + worn_in_step(pair, _end_of(before, step, name), step.contact[name], pressure, coefficient)
         found.append(depth)
@@ -222,6 +228,16 @@ def lumped_areas(side: Surface, points: Array, axisymmetric: bool) -> Array:
         shares *= (measure.sum(axis=1) / shares.sum(axis=1))[:, None]
         np.add.at(areas, block.local, shares)
     return areas
+
+
+def _of_pair(pair: Formulation, step: StepResult, name: str) -> ContactResult:
+    """Return the result of a contact pair in a step; ContactError if that is of another model."""
+    found = step.contact.get(name)
+    if found is None or len(step.displacement) != len(pair.points) or len(found.points) != len(pair.secondary.points):
+        raise ContactError(
+            f"load step {step.index} is of another model: it has no such contact pair '{name}' on this mesh"
+        )
+    return found
 
 
 def _bound(model: Model, name: str) -> Formulation:

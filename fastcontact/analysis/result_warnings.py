@@ -170,8 +170,24 @@ def _large_strain(problem: Problem, last: StepResult) -> list[str]:
         strains = np.einsum("cij,cj->ci", field.compliance[field.rows[name][others]], mean)
         strain = max(strain, float(recovery.equivalent_strain(strains).max(initial=0.0)))
     if strain <= STRAIN:
-        return []
+        return _large_stress_free_strain(problem, last)
     return [f"the largest equivalent strain is {strain:.3f}, beyond the {STRAIN} where linear kinematics hold well"]
+
+
+def _large_stress_free_strain(problem: Problem, last: StepResult) -> list[str]:
+    """Return a warning where temperatures or initial states strain bodies by much, of which stresses need not tell."""
+    model = problem.model
+    if not (model.temperatures or model.initial_states):
+        return []
+    moduli = np.eye(problem.field.moduli.shape[1])[None]  # of which stresses are strains
+    rows = {name: np.zeros(len(block), np.int32) for name, block in model.mesh.solids.items()}
+    strain = float(np.abs(recovery.nodal_stress(model.mesh, model.kinematics, moduli, rows, last.displacement)).max())
+    if strain <= STRAIN:
+        return []
+    return [
+        f"temperatures and initial states bring strains of {strain:.3g}, beyond the {STRAIN} where linear kinematics hold "
+        "well: are they in the units of the model?"
+    ]
 
 
 def _shear_modulus(law: Material) -> float:

@@ -207,7 +207,7 @@ def build_case(
         linear_tolerance=tolerance,
         probes=probes,
         theories=theories,
-        checks=_checks(data, probes, theories),
+        checks=_checks(data, probes, theories, mesh.dim),
         units=_units(data),
         approach=approach,
         folder=Path(folder).resolve(),
@@ -222,11 +222,11 @@ def _units(data: dict[str, Any]) -> dict[str, str]:
     return {"length": "-", "force": "-", "pressure": "-", **data.get("units", {})}
 
 
-def _checks(data: dict[str, Any], probes: Mapping[str, int], theories: Mapping[str, Any]) -> list[Check]:
+def _checks(data: dict[str, Any], probes: Mapping[str, int], theories: Mapping[str, Any], dim: int) -> list[Check]:
     checks = []
     for i, entry in enumerate(tables("check", data.get("check", []))):
         check_keys(f"check[{i}]", entry, CHECK)
-        checks.append(read_check(f"check[{i}]", entry, probes, _pairs(data), theories))
+        checks.append(read_check(f"check[{i}]", entry, probes, _pairs(data), theories, dim))
     return checks
 
 

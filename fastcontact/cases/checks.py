@@ -24,6 +24,7 @@ CHECK: dict[str, Any] = {
 # Quantities of a contact pair, and of a probe.
 LENGTHS = ("radius", "stick_radius", "displacement")
 OF_PAIRS = ("force", "pressure_max", "radius", "stick_radius")
+ONLY_IN_SPACE = ("stress.yz", "stress.xz", "displacement.z")
 OF_PROBES = ("pressure", "shear", "von_mises", *(f"stress.{c}" for c in STRESS), *(f"displacement.{a}" for a in _AXES))
 
 
@@ -88,8 +89,12 @@ def read_check(
     probes: Mapping[str, int],
     pairs: Mapping[str, Any],
     theories: Mapping[str, Any],
+    dim: int = 3,
 ) -> Check:
-    """Return the check that an entry of a case file with the right keys describes; raises CaseError for wrong values."""
+    """Return the check that an entry of a case file with the right keys describes; raises CaseError for wrong values.
+
+    In the plane (`dim` 2) there are no components along z but the stress.
+    """
     for key in ("quantity", "tolerance"):
         if key not in entry:
             raise CaseError(f"{where} needs '{key}'")
@@ -99,6 +104,8 @@ def read_check(
     if owner not in {**probes, **pairs}:
         raise CaseError(unknown(f"contact pair or probe in {where}.quantity", owner, [*probes, *pairs]))
     allowed = OF_PROBES if owner in probes else OF_PAIRS
+    if dim == 2:
+        allowed = tuple(name for name in allowed if name not in ONLY_IN_SPACE)
     if what not in allowed:
         raise CaseError(unknown(f"quantity in {where}", what, allowed))
     of = what if what in ("force", "radius", "stick_radius") else "pressure_max"
@@ -112,6 +119,8 @@ def read_check(
         source=entry.get("source", ""),
         factor=float(entry.get("factor", _whole(what, theories.get(entry.get("theory", ""), {})))),
     )
+    if check.value == 0.0:
+        raise CaseError(f"{where}: the value is 0, so no relative deviation can be told; check another quantity")
     if check.theory:
         if check.theory not in theories:
             raise CaseError(unknown(f"theory in {where}", check.theory, theories))

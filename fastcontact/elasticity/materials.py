@@ -247,9 +247,9 @@ class Material:
 
 def check_positive(name: str, value: Any, what: str = "a positive number") -> None:
     """Raise ModelError if a constant of a material, `name` in the message, is not a positive number."""
-    number: Any = value if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    number: Any = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     if not 0.0 < number < math.inf:
-        raise ModelError(f"{name} = {value} must be {what}")
+        raise ModelError(f"{name} = {value!r} must be {what}")
     if not 1.0 / LARGEST <= number <= LARGEST:
         raise ModelError(f"{name} is out of range: it must lie between {1.0 / LARGEST:g} and {LARGEST:g}, in any unit")
 

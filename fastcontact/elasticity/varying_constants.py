@@ -49,7 +49,7 @@ class Tabulated:
         if self.along not in AXES:
             raise ModelError(f"a table is along {', '.join(AXES[:3])} or {AXES[3]}, not along {self.along!r}")
         try:
-            rows = tuple((float(place), float(value)) for place, value in self.table)
+            rows = tuple((_number(place), _number(value)) for place, value in self.table)
         except (TypeError, ValueError):
             raise ModelError(f"the table along {self.along} must be pairs [place, value] of numbers") from None
         for number in (number for row in rows for number in row):
@@ -68,6 +68,13 @@ class Tabulated:
             raise ModelError("a table is along z, but the mesh is plane: take x, y or radius")
         places, values = np.array(self.table).T
         return np.interp(at, places, values)
+
+
+def _number(value: Any) -> float:
+    """Return a number of a table; TypeError of anything else, such as text."""
+    if isinstance(value, str | bytes):
+        raise TypeError(value)
+    return float(value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,6 +210,8 @@ def wrapped(value: Any, vector: bool = False) -> Any:
     """Return a constant as it is if it is a number, else as `Varying`; with `vector`, each of a sequence."""
     if vector and isinstance(value, Sequence) and not isinstance(value, str):
         return tuple(wrapped(v) for v in value)
+    if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "fiu":
+        return float(value)
     if isinstance(value, list | tuple):
         try:
             value = np.asarray(value, float)

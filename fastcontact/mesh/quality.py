@@ -102,6 +102,7 @@ def check_cells(mesh: Mesh) -> None:
     place.
     """
     for name in mesh.solids:
+        _check_nodes(mesh, name)
         _check_twice(mesh, name)
         measure, flat, inverted = _bad_cells(mesh, name)
         for bad, what, remedy in (
@@ -140,6 +141,20 @@ def poorest_cell(mesh: Mesh) -> str:
             cell = _described(mesh, name, row, measure[row])
             return f"{cell} is poor: its volume is only {flatness[row]:.1e} of its longest edge cubed; remesh there"
     return ""
+
+
+def _check_nodes(mesh: Mesh, name: str) -> None:
+    """Raise MeshError if a cell has a node twice: its facets there have no area, and its stresses no number."""
+    nodes = np.sort(mesh.cells[name], axis=1)
+    twice = nodes[:, 1:] == nodes[:, :-1]
+    bad = np.flatnonzero(twice.any(axis=1))
+    if len(bad):
+        node = int(nodes[bad[0], :-1][twice[bad[0]]][0])
+        centre = ", ".join(f"{x:.6g}" for x in mesh.points[nodes[bad[0]]].mean(axis=0))
+        raise MeshError(
+            f"cell {mesh.offsets[name] + int(bad[0])} ({name} at ({centre})) has point {node} twice, one of {len(bad)} such "
+            "cells: write it as the element that it collapses to, a triangle, wedge, pyramid or tetrahedron"
+        )
 
 
 def _check_twice(mesh: Mesh, name: str) -> None:

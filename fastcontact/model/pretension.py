@@ -14,12 +14,14 @@ from fastcontact.elasticity.relations import Relation
 from fastcontact.errors import ModelError
 from fastcontact.mesh.generate.cut import OPPOSITE
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.model.relation_rows import along, matched
+from fastcontact.model.relation_rows import along, matched, normals_of
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
 # How far nodes of a section may lie off its plane, relative to its size.
 FLAT = 1e-6
+# A bolt whose direction is farther from the normal of its section than this cosine tells is a mistake [-].
+ALONG = 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +152,7 @@ def pretension(
         if value is not None:
             check_number(f"the {what} of {name}", value)
     nodes, facing = _sides(mesh, name, section, opposite)
-    direction = _normal(mesh, name, nodes, normal)
+    direction = _outwards(mesh, name, section, _normal(mesh, name, nodes, normal))
     return Pretension(label, nodes, facing, direction, force or 0.0, shortening, locked_from, ramp)
 
 
@@ -189,6 +191,20 @@ def _normal(mesh: Mesh, name: str, nodes: Nodes, normal: Sequence[float] | None)
     return np.asarray(np.where(np.abs(found) < 1e-12, 0.0, found))
 
 
+def _outwards(mesh: Mesh, name: str, section: str, direction: Array) -> Array:
+    """Return a direction (dim,) along a bolt so that it points out of the body that has the section, to the other side."""
+    if section not in mesh.cell_groups or not mesh.cells_of(section, mesh.dim - 1):
+        return direction
+    mean = normals_of(mesh, section)[1].mean(axis=0)
+    cosine = float(direction @ mean / np.linalg.norm(mean))
+    if abs(cosine) < ALONG:
+        angle = np.degrees(np.arccos(min(abs(cosine), 1.0)))
+        raise ModelError(
+            f"the normal of {name} is {angle:.0f} degrees off that of '{section}': leave it out, or cut the bolt across"
+        )
+    return direction if cosine > 0.0 else -direction
+
+
 def _across(normal: Array) -> Array:
     """Return the unit vectors (dim - 1, dim) across a normal, parallel to axes where it is."""
     axis = int(np.argmax(np.abs(normal)))
@@ -207,9 +223,12 @@ def with_locks(sections: Sequence[Pretension], begin: float, displacement: Array
 
 
 def check_locks(sections: Sequence[Pretension], instants: Sequence[float]) -> None:
-    """Raise ModelError if a section is locked inside of a load step."""
+    """Raise ModelError if a section is locked inside of a load step, before the first one or after the last one."""
     for own in sections:
         at = own.locked_from
+        if at is not None and not 0.0 < at <= instants[-1]:
+            when = "its force never acts" if at <= 0.0 else f"the last load step ends at {instants[-1]:g}"
+            raise ModelError(f"{own.name} is locked from {at:g}, but {when}: lock it at the end of a load step")
         if at is not None and instants[0] < at < instants[-1] and at not in instants:
             raise ModelError(
                 f"{own.name} is locked from {at:g}, but no load step ends there: give the ramp that instant, or lock it at "

@@ -187,3 +187,24 @@ def test_what_is_refused(call, said):
     model.fix("TOP", "x")
     with pytest.raises(fc.ContactError, match=said):
         call(model, fc.solve(model, 1))
+
+
+def sliding(cells):
+    """Return the model of a block that a rigid floor presses while it slides."""
+    model = fc.Model(fc.generate.block((2.0, 1.0), (cells, 2)), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1e3, nu=0.0))
+    model.add_obstacle("floor", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0)))
+    model.prescribe("TOP", x=1.0, y=-0.01)
+    return model
+
+
+def test_steps_of_another_model_or_order_are_refused():
+    model = sliding(4)
+    steps = fc.solve(model, 2)
+    for answer in (lambda m: fc.wear(m, steps, "floor", 1e-3), lambda m: fc.contact_history(m, steps, "floor")):
+        assert len(answer(model)) == 2
+        with pytest.raises(fc.errors.ContactError, match="load step 1 is of another model"):
+            answer(sliding(6))
+    for wrong in (steps[::-1], steps[1:]):
+        with pytest.raises(fc.errors.ContactError, match="step 1 was expected and step 2 came"):
+            fc.wear(model, wrong, "floor", 1e-3)

@@ -102,7 +102,7 @@ class ModelBase:
     def _nodes(self, place: str | int) -> NDArray[Any]:
         if isinstance(place, str):
             return self.mesh.points_of(place)
-        if not 0 <= place < self.mesh.n_points:
+        if place != int(place) or not 0 <= place < self.mesh.n_points:
             raise ModelError(f"point {place} is not in the mesh of {self.mesh.n_points} points (numbers from 0)")
         return np.array([place])
 

@@ -68,6 +68,9 @@ class ModelConnections(ModelInitialStates):
             raise ModelError(f"there is already a pretension '{name}': names must differ")
         table = table_of(ramp, f"the ramp of pretension '{name}'")
         own = pretension(self.mesh, name, section, opposite, normal, (force, shortening, locked_from), table)
+        for other in self.pretensions:
+            if np.isin(own.nodes, [other.nodes, other.opposite]).any():
+                raise ModelError(f"{own.name} and {other.name} are in one section, which has one force")
         self.pretensions.append(own)
         self.relations.extend(own.relations(self.n_dofs))
         if force is not None:
@@ -228,9 +231,10 @@ class ModelConnections(ModelInitialStates):
             raise ModelError(f"{name}: an axisymmetric model is the whole ring already")
         place = (0.0,) * self.mesh.dim if origin is None else tuple(origin)
         along = (0.0, 0.0, 1.0) if self.mesh.dim == 2 else tuple(direction)
-        if sectors < 2 or len(place) != self.mesh.dim or len(along) != 3 or not any(along):
+        if sectors < 2 or sectors != int(sectors) or len(place) != self.mesh.dim or len(along) != 3 or not any(along):
             raise ModelError(
-                f"{name} needs two sectors at least, an origin of {self.mesh.dim} numbers and a direction of three, not "
+                f"{name} needs a whole number of sectors, two at least, an origin of {self.mesh.dim} numbers and a direction "
+                f"of three, not "
                 f"{sectors}, {place} and {along}"
             )
         relations, seam = cyclic(self.mesh, (first, second), sectors, place, along)

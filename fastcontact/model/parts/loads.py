@@ -193,6 +193,11 @@ class ModelLoads(ModelMaterials):
             axes = axes_of(f"the force on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
             self._add(SpreadForce(group, axes, spread, table_of(ramp, f"the ramp of the force on '{group}'")))  # type: ignore[arg-type]
             return
+        if distribute is None and group in self.mesh.cell_groups and self.mesh.cells_of(group, dim=self.mesh.dim):
+            raise ModelError(
+                f"'{group}' is a group of solid cells: name facets or points for the force, or take add_body_force; "
+                "distribute=False loads every node of the cells with it"
+            )
         if distribute is None:
             distribute = group in self.mesh.cell_groups and bool(self.mesh.cells_of(group, dim=self.mesh.dim - 1))
         kind: type[TotalForce] | type[NodalForce] = TotalForce if distribute else NodalForce
