@@ -90,6 +90,7 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
         "closed_nodes": int(contact.active.sum()),
         "obstacle_displacement": None if moved is None else moved.tolist(),
         **({} if contact.torque is None else {"obstacle_angle": contact.obstacle_angle, "torque": contact.torque}),
+        **({} if contact.wear is None else {"wear_max": float(contact.wear.max(initial=0.0))}),
         "penetration": contact.penetration,
         "penalty": penalty,
     }
@@ -196,6 +197,8 @@ def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str
             f"  obstacle '{name}' has turned by {contact['obstacle_angle']:.6g} radian, with a torque of "
             f"{contact['torque']:.6g} {unit['force']} {unit['length']}"
         )
+    if "wear_max" in contact:
+        found.append(f"  contact '{name}' is worn by up to {contact['wear_max']:.4g} {unit['length']}")
     if contact["penalty"] is not None:
         found.append(
             f"  contact '{name}' penetrates by up to {contact['penetration']:.4g} {unit['length']}, with a penalty of "

@@ -223,12 +223,13 @@ def with_locks(sections: Sequence[Pretension], begin: float, displacement: Array
 
 
 def check_locks(sections: Sequence[Pretension], instants: Sequence[float]) -> None:
-    """Raise ModelError if a section is locked inside of a load step, before the first one or after the last one."""
+    """Raise ModelError if a section is locked inside of a load step, or from the beginning."""
     for own in sections:
         at = own.locked_from
-        if at is not None and not 0.0 < at <= instants[-1]:
-            when = "its force never acts" if at <= 0.0 else f"the last load step ends at {instants[-1]:g}"
-            raise ModelError(f"{own.name} is locked from {at:g}, but {when}: lock it at the end of a load step")
+        if at is not None and at <= 0.0:
+            raise ModelError(
+                f"{own.name} is locked from {at:g}, and its force never acts: lock it at the end of a load step"
+            )
         if at is not None and instants[0] < at < instants[-1] and at not in instants:
             raise ModelError(
                 f"{own.name} is locked from {at:g}, but no load step ends there: give the ramp that instant, or lock it at "

@@ -265,7 +265,7 @@ CASES = [
         "check of an unknown quantity",
         '"C1.stress.yy"',
         '"C1.stres.yy"',
-        r"case\.toml: unknown quantity in check\[0\] 'stres\.yy': did you mean 'stress\.yy' or 'stress\.yz' or 'stress\.xy'\?",
+        r"case\.toml: unknown quantity in check\[0\] 'stres\.yy': did you mean 'stress\.yy' or 'stress\.xy' or 'stress\.zz'\?",
     ),
     ("check without tolerance", "tolerance = 0.01", "", r"case\.toml: check\[0\] needs 'tolerance'"),
     ("broken TOML", "[ramp]", "[ramp", r"'case.toml' is not valid TOML: .*line 34"),
