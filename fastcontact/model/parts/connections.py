@@ -233,9 +233,8 @@ class ModelConnections(ModelInitialStates):
         along = (0.0, 0.0, 1.0) if self.mesh.dim == 2 else tuple(direction)
         if sectors < 2 or sectors != int(sectors) or len(place) != self.mesh.dim or len(along) != 3 or not any(along):
             raise ModelError(
-                f"{name} needs a whole number of sectors, two at least, an origin of {self.mesh.dim} numbers and a direction "
-                f"of three, not "
-                f"{sectors}, {place} and {along}"
+                f"{name} needs two sectors at least, a whole number, an origin of {self.mesh.dim} numbers and a direction of "
+                f"three, not {sectors}, {place} and {along}"
             )
         relations, seam = cyclic(self.mesh, (first, second), sectors, place, along)
         self.relations.extend(relations)

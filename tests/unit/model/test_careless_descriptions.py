@@ -73,7 +73,7 @@ def test_points_and_sectors_are_whole_numbers():
     for place in (1.5, 12.7):
         with pytest.raises(fc.errors.ModelError, match=f"point {place} is not in the mesh"):
             plate().add_spring(place, y=1.0)
-    with pytest.raises(fc.errors.ModelError, match="a whole number of sectors"):
+    with pytest.raises(fc.errors.ModelError, match="two sectors at least, a whole number"):
         plate("plane_strain").add_cyclic_symmetry("LEFT", "BOTTOM", sectors=2.5)
 
 
