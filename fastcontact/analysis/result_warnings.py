@@ -72,8 +72,8 @@ def _too_fast(name: str, pair: Formulation, state: State) -> list[str]:
     if many <= 1.0:
         return []
     return [
-        f"contact '{name}' wears so much in a load step that pressures may waver from node to node: take "
-        f"{math.ceil(many)} times as many steps, or larger elements"
+        f"contact '{name}' wears so much in a load step that pressures may waver from node to node and depths are too large: "
+        f"take {math.ceil(many)} times as many steps, or larger elements"
     ]
 
 
