@@ -63,12 +63,7 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     end = replace(
         start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles
     )
-    contact: dict[str, ContactResult] = {}
-    if settled is not None:
-        end = keep_contact(problem, start, load, settled, end)
-        contact = contact_results(problem, start, load, settled, end)
-        end, contact = keep_wear(problem, start, load, end, contact)
-        end = end.after_touching(name for name, pair in contact.items() if pair.active.any())
+    end, contact = (end, {}) if settled is None else after_contact(problem, start, load, settled, end)
     if problem.unsupported_bodies is not None and end.rigid is not None:
         iterations["regularised"] = problem.unsupported_bodies.report(end.rigid, end.largest_rigid_force)
     end = replace(end, solver=problem.solver.snapshot())
@@ -139,3 +134,13 @@ def solve_displacements(
         lift = lift + problem.unsupported_bodies.rigid(rigid.position)
     v = loaded.full_solution(system.reduced(contact_force), settled.solution.u)
     return system.displacement(v, lift), contact_force
+
+
+def after_contact(
+    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State
+) -> tuple[State, dict[str, ContactResult]]:
+    """Return the end of the step with what later steps start from, and the results of all contact pairs."""
+    end = keep_contact(problem, start, load, settled, end)
+    results = contact_results(problem, start, load, settled, end)
+    end, results = keep_wear(problem, start, load, end, results)
+    return end.after_touching(name for name, pair in results.items() if pair.active.any()), results
