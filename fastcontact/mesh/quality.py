@@ -98,8 +98,8 @@ def check_cells(mesh: Mesh) -> None:
     """Check that every solid cell has a positive Jacobian at its default quadrature points.
 
     MeshError if a cell is degenerate (its area or volume is zero to rounding) or inverted (clockwise, or folded so that
-    the Jacobian is negative at a quadrature point), or is in the mesh twice; the message names the first one and its
-    place.
+    the Jacobian is negative at a quadrature point), has a node twice, or is in the mesh twice; the message names the
+    first one and its place.
     """
     for name in mesh.solids:
         _check_nodes(mesh, name)

@@ -47,6 +47,13 @@ class Support:
         return f"the displacement {'xyz'[self.component]} prescribed on '{self.group}'"
 
 
+def group_names(groups: Sequence[str] | str | None) -> tuple[str, ...] | None:
+    """Return the names of groups as users give them, one or several; None for all."""
+    if groups is None:
+        return None
+    return (groups,) if isinstance(groups, str) else tuple(groups)
+
+
 class ModelBase:
     """Mesh, kinematics, and what was added to them."""
 
@@ -86,6 +93,14 @@ class ModelBase:
     def n_dofs(self) -> int:
         """Number of displacement components of all points."""
         return self.mesh.n_points * self.mesh.dim
+
+    def _solid_groups(self, groups: Sequence[str] | str | None, otherwise: str) -> tuple[str, ...] | None:
+        """Return groups of solid cells by name, None for all; ModelError that ends with `otherwise` if one holds none."""
+        names = group_names(groups)
+        for name in names or ():
+            if not self.mesh.cells_of(name, dim=self.mesh.dim):
+                raise ModelError(f"group '{name}' holds no solid cells{otherwise}")
+        return names
 
     def _cells_of(self, groups: Sequence[str] | None) -> Cells:
         """Return the solid cells of groups, or all."""

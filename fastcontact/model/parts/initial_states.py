@@ -21,6 +21,7 @@ from fastcontact.elasticity.temperature import Temperature, checked_value, histo
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.paths import PathLike
+from fastcontact.model.parts.base import group_names
 from fastcontact.model.parts.loads import ModelLoads
 from fastcontact.model.ramp import History, Table, table_of
 from fastcontact.model.temperature_files import read_temperatures
@@ -58,7 +59,7 @@ class ModelInitialStates(ModelLoads):
         ramp : Ramp or iterable of (float, float), optional
             History of the rise, value minus reference.
         """
-        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        names = group_names(groups)
         checked = checked_value(value)
         if times is not None:
             if ramp is not None:
@@ -110,10 +111,7 @@ class ModelInitialStates(ModelLoads):
         FileError, MeshError, ModelError
             If a file cannot be read or lacks the field, a point has no temperature, or instants and times do not fit.
         """
-        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
-        for name in names or ():
-            if not self.mesh.cells_of(name, dim=self.mesh.dim):
-                raise ModelError(f"group '{name}' holds no solid cells: it has no temperature")
+        names = self._solid_groups(groups, ": it has no temperature")
         values, own = read_temperatures(self.mesh, file, field, self._points_of_cells(names), instant)
         values = np.where(np.isfinite(values), values, reference)
         if len(values) == 1:
@@ -191,10 +189,7 @@ class ModelInitialStates(ModelLoads):
     def _add_initial(
         self, kind: str, groups: Sequence[str] | str | None, given: Mapping[str, Any], axes: Axes, ramp: History
     ) -> None:
-        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
-        for name in names or ():
-            if not self.mesh.cells_of(name, dim=self.mesh.dim):
-                raise ModelError(f"group '{name}' holds no solid cells: it has no initial {kind}")
+        names = self._solid_groups(groups, f": it has no initial {kind}")
         table = table_of(ramp, f"the ramp of the initial {kind}")
         self.initial_states.append(
             initial_state(kind, names, self._cells_of(names), given, axes, self.kinematics, table)

@@ -27,6 +27,7 @@ from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.model.checks import check_forces
 from fastcontact.model.couplings import Moment
+from fastcontact.model.parts.base import group_names
 from fastcontact.model.parts.materials import ModelMaterials
 from fastcontact.model.ramp import History, Table, table_of
 from fastcontact.model.spread_forces import SpreadForce, spread_of
@@ -70,7 +71,7 @@ class ModelLoads(ModelMaterials):
         ramp: History = None,
     ) -> None:
         """Load groups of solid cells, by default all, with forces per volume [force / length^3], such as the weight."""
-        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        names = group_names(groups)
         axes = axes_of("the body force", {"x": x, "y": y, "z": z}, self.mesh.dim)
         self._add(BodyForce(names, axes, table_of(ramp, "the ramp of the body force")))
 
@@ -87,7 +88,7 @@ class ModelLoads(ModelMaterials):
 
         The densities are those of the materials; units must fit, as do N, mm, MPa with tonnes, seconds and y=-9810.0.
         """
-        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        names = group_names(groups)
         axes = axes_of("gravity", {"x": x, "y": y, "z": z}, self.mesh.dim)
         self._add(Gravity(names, axes, table_of(ramp, "the ramp of gravity")))
 
@@ -115,7 +116,7 @@ class ModelLoads(ModelMaterials):
         ramp : Ramp or iterable of (float, float), optional
             History of the force, that is of the square of the speed.
         """
-        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
+        names = group_names(groups)
         if direction is None:
             direction = (0.0, 1.0, 0.0) if self.kinematics == "axisymmetric" else (0.0, 0.0, 1.0)
         place = (*origin, 0.0) if len(origin) == 2 else tuple(origin)

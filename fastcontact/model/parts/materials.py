@@ -23,10 +23,7 @@ class ModelMaterials(ModelBase):
     @typed(ModelError)
     def add_material(self, material: Material, groups: Sequence[str] | str | None = None) -> None:
         """Give a material to groups of solid cells, by default to all; groups override what was given to all before."""
-        names = (groups,) if isinstance(groups, str) else groups if groups is None else tuple(groups)
-        for name in names or ():
-            if not self.mesh.cells_of(name, dim=self.mesh.dim):
-                raise ModelError(f"group '{name}' holds no solid cells, so it cannot have a material")
+        names = self._solid_groups(groups, ", so it cannot have a material")
         if not isinstance(material, Material):
             raise ModelError(
                 f"{material!r} is no material: give LinearElastic(E=..., nu=...), Orthotropic(...) or Anisotropic(...)"
