@@ -81,7 +81,7 @@ def _table(subject: Any, name: str, options: argparse.Namespace, show: bool) -> 
         if show:
             say(f"{name} {text} ...", error=True)
 
-    sizes = ()
+    sizes: tuple[Any, ...] = ()
     if options.sizes:
         if not getattr(subject, "BY_UNKNOWNS", False):
             raise FastcontactError(f"the table of '{name}' has sizes of its own: leave --sizes out")
