@@ -44,16 +44,6 @@ def graph(indptr, indices, storage, data, size):
     return start, neighbours[:at].copy()
 
 
-@parallel_kernel
-def transpose_blocks(slot, data, out, rows, cols):
-    """Fill `out` with the transposed blocks `slot` (n_blocks,) of `data`; blocks are rows x cols."""
-    m, n = len(rows), len(cols)
-    for k in prange(slot.shape[0]):
-        for a in range(m):
-            for b in range(n):
-                out[(k * n + b) * m + a] = data[(slot[k] * m + a) * n + b]
-
-
 @kernel
 def _aggregates_of(i, indptr, indices, aggregate, found):
     """Fill `found` with the aggregates of node i and its neighbours, ascending; return their number."""
