@@ -91,8 +91,8 @@ class BlockMatrix:
     def diagonal_blocks(self) -> Array:
         """Return the diagonal blocks (n_rows, size, size) of a square matrix, in double precision."""
         size = len(self.rows)
-        parts = [self.diagonal_part(part).astype(float) for part in self.exact]
-        return np.asarray(sum(parts)).reshape(-1, size, size)
+        parts = [self.diagonal_part(part).astype(float, copy=False) for part in self.exact]
+        return np.asarray(sum(parts[1:], parts[0])).reshape(-1, size, size)
 
     def diagonal_part(self, part: Values) -> Values:
         """Return the diagonal blocks (n_rows * size * size,) of a square matrix, from the high or the low part."""
@@ -119,10 +119,10 @@ class BlockMatrix:
 
 def diagonal_blocks(indptr: Indices, indices: Indices, data: Values, size: int) -> Values:
     """Return the diagonal blocks (n * size * size,) of a square matrix in canonical format, zero where there is none."""
-    row = np.repeat(np.arange(len(indptr) - 1, dtype=np.int32), np.diff(indptr))
-    own, out = np.flatnonzero(indices == row), np.zeros((len(indptr) - 1, size * size), data.dtype)
-    out[row[own]] = data.reshape(-1, size * size)[own]
-    return out.ravel()
+    out = np.zeros((len(indptr) - 1) * size * size, data.dtype)
+    pattern = (part.astype(np.int32, copy=False) for part in (indptr, indices))
+    split_matrix_kernels.diagonal_blocks(*pattern, data.reshape(-1), size * size, out)
+    return out
 
 
 def block_matrix(K: bsr_array) -> BlockMatrix:
@@ -162,7 +162,9 @@ class ScaledMatrix:
         if precision == "double":
             self.scaled = block_matrix(K)
             return
-        self.unit = float(0.5 ** np.round(np.log2(K.diagonal().max())))
+        size = range(K.blocksize[0])
+        largest = block_matrix(K).diagonal_blocks()[:, size, size].max()
+        self.unit = float(0.5 ** np.round(np.log2(largest)))
         self.scaled = _split(K, self.unit, release)
 
     def change(self, precision: str) -> None:
