@@ -20,7 +20,7 @@ from typing import Any
 from fastcontact._jit import compiling
 from fastcontact._version import __version__
 from fastcontact.cli._completion import SHELLS, PrintCompletion
-from fastcontact.cli._interrupts import interruptible
+from fastcontact.cli._interrupts import forget, interruptible
 from fastcontact.cli._terminal import add_loudness, encodable, printable, say
 from fastcontact.errors import ConvergenceError, FastcontactError, unknown
 
@@ -94,6 +94,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 1
     except KeyboardInterrupt as error:
         say("\n".join(["interrupted", *_notes(error)]), error=True)
+        forget(error)
         return 130  # as shells have it
 
 

@@ -25,6 +25,7 @@ from fastcontact.mesh.mesh import Mesh
 GENERATORS: dict[str, Callable[..., Mesh]] = {
     "half-spheres": half_spheres,
     "quarter-disc": quarter_disc,
+    "block": block,
     "block-on-block": block_on_block,
     "cylinder-on-block": cylinder_on_block,
     "box": box,

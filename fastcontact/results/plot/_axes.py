@@ -1,4 +1,4 @@
-"""Axes to draw on, and the names of units."""
+"""Axes to draw on."""
 
 from __future__ import annotations
 
@@ -20,16 +20,6 @@ Array = NDArray[np.float64]
 Units = Mapping[str, str]
 UNITS: Units = {"length": "mm", "force": "N", "pressure": "MPa"}
 UNKNOWN: Units = {}
-
-
-def labelled(text: str, units: Units, quantity: str) -> str:
-    """Return the label of an axis, with the unit of its quantity where that is known."""
-    return f"{text} [{units[quantity]}]" if units.get(quantity) else text
-
-
-def valued(value: float, units: Units, quantity: str, digits: int = 4) -> str:
-    """Return a value as text with its unit, where that is known."""
-    return f"{value:.{digits}g} {units.get(quantity, '')}".rstrip()
 
 
 def placed(place: Array, size: float) -> str:

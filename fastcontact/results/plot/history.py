@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from fastcontact.analytic.pressure_curve import NAMES
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
-from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, contacts_of, labelled, new_axes
+from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, contacts_of, new_axes
 from fastcontact.results.step import StepResult
+from fastcontact.results.units import labelled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

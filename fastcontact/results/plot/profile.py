@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
-from fastcontact.results.plot._axes import UNKNOWN, Units, labelled, new_axes, valued
+from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes
 from fastcontact.results.step import ContactResult, half_width
+from fastcontact.results.units import labelled, valued
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

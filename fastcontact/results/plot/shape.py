@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNKNOWN, Units, labelled, new_axes, part_shown, placed, valued
+from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes, part_shown, placed
 from fastcontact.results.plot.fields import Field, field_of
 from fastcontact.results.plot.patches import fill, outlines
 from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen
 from fastcontact.results.step import StepResult
+from fastcontact.results.units import labelled, valued
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
