@@ -5,45 +5,30 @@ Together both parts have 48 of the 53 bits of double precision. Kernels take num
 split, (numbers,) where they are not.
 """
 
-import numpy as np
-
-from fastcontact._jit.decorators import inlined_kernel, kernel
-
-
-@inlined_kernel
-def entry(numbers, k):
-    """Return number `k` in double precision, split or not."""
-    if len(numbers) == 2:
-        return np.float64(numbers[0][k]) + np.float64(numbers[-1][k])
-    return np.float64(numbers[0][k])
+from fastcontact._jit.decorators import kernel
+from fastcontact.linear.multigrid.symmetric_storage_kernels import entry_of, part_of, place_of
 
 
 @kernel
-def split(factor, numbers, high, low):
-    """Fill the parts (n,) of ``factor numbers``; `low` may be in the place of the beginning of `numbers`."""
-    for k in range(numbers.shape[0]):
-        number = factor * numbers[k]
-        high[k] = number
-        low[k] = number - np.float64(high[k])
-
-
-@kernel
-def forces_at(dofs, indptr, indices, K, factor, size, u, f, out):
+def forces_at(dofs, indptr, indices, storage, K, factor, size, u, f, out):
     """Fill `out` (m,) with ``(factor K u - f)[dofs]``; the numbers of the block matrix K come as a tuple."""
     for p in range(dofs.shape[0]):
         i, a = dofs[p] // size, dofs[p] % size
-        s = 0.0
+        s, part = 0.0, part_of(storage, i)
         for k in range(indptr[i], indptr[i + 1]):
+            place = place_of(storage, part, i, indices[k], k)
             for b in range(size):
-                s += entry(K, (k * size + a) * size + b) * u[indices[k] * size + b]
+                s += entry_of(K, place, a, b, size) * u[indices[k] * size + b]
         out[p] = factor * s - f[dofs[p]]
 
 
 @kernel
-def forces_of(dofs, values, indptr, indices, K, factor, size, out):
+def forces_of(dofs, values, indptr, indices, storage, K, factor, size, out):
     """Add ``factor K[:, dofs] values`` for a symmetric K to `out` (n,)."""
     for p in range(dofs.shape[0]):
         i, a = dofs[p] // size, dofs[p] % size
+        part = part_of(storage, i)
         for k in range(indptr[i], indptr[i + 1]):
+            place = place_of(storage, part, i, indices[k], k)
             for b in range(size):
-                out[indices[k] * size + b] += factor * entry(K, (k * size + a) * size + b) * values[p]
+                out[indices[k] * size + b] += factor * entry_of(K, place, a, b, size) * values[p]

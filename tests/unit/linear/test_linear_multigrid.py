@@ -426,8 +426,10 @@ def test_the_loop_allocates_nothing_that_grows_with_the_problem():
 def test_memory_is_what_the_levels_hold():
     solver, f, _ = prepared()
     top = solver.hierarchy.levels[0]
-    blocks = len(top.A.indices)
-    assert top.A.nbytes == 4 * (9 * blocks + blocks + len(f) // 3 + 1)
+    nodes, stored = len(f) // 3, len(top.A.storage[2])
+    # Stored blocks with their columns, the pattern of all, where rows of both begin, and where upper triangles do.
+    assert top.A.nbytes == 4 * (9 * stored + stored + len(top.A.indices) + 2 * (nodes + 1) + nodes)
+    assert stored < 0.56 * len(top.A.indices)  # two parts
     assert solver.hierarchy.nbytes < 3.0 * top.A.nbytes  # small problems pay relatively more for prolongators
     assert solver.nbytes == pytest.approx(solver.hierarchy.nbytes + 5 * 8 * len(f), rel=1e-3)
 
