@@ -33,6 +33,7 @@ _NAMES = {
     "analysis.contact_answers": ("ContactAnswers", "contact_answers", "contact_history", "contact_moment", "wear"),
     "analysis.criteria": ("Criteria",),
     "analysis.run": ("solve", "solve_steps"),
+    "analysis.sensitivities": ("Sensitivities", "sensitivities"),
     "cases.decks.deck": ("Deck", "read_deck"),
     "elasticity.anisotropic_materials": ("Anisotropic", "Orthotropic"),
     "elasticity.material_axes": ("CylindricalAxes",),
