@@ -156,13 +156,12 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     steps = summary["steps"]
     found = [
         f"{summary['title']}",
-        f"  {summary['mesh']['n_points']} points, {summary['n_dofs']} degrees of freedom, {len(steps)} load steps, "
+        f"  {summary['mesh']['n_points']} points, {summary['n_dofs']} degrees of freedom, {count(len(steps), 'load step')}, "
         f"{sum(s['active_set_iterations'] for s in steps)} active-set iterations, "
         f"{sum(s['geometry_updates'] for s in steps)} geometry updates",
     ]
     if parts := [len(s["substeps"]) for s in steps if "substeps" in s]:
-        many = "1 load step" if len(parts) == 1 else f"{len(parts)} load steps"
-        found.append(f"  {many} did not converge as a whole and went in {sum(parts)} parts")
+        found.append(f"  {count(len(parts), 'load step')} did not converge as a whole and went in {sum(parts)} parts")
     for name, contact in summary["contact"].items():
         found += _contact_lines(name, contact, unit)
     for name, section in steps[-1].get("pretension", {}).items():
@@ -181,6 +180,11 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     for check in summary["checks"]:
         found += [_check_line(check, unit), *_why(check)]
     return found
+
+
+def count(number: int, what: str) -> str:
+    """Return a number of things in words: "1 load step", "2 load steps"."""
+    return f"{number} {what}" + "s" * (number != 1)
 
 
 def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str]) -> list[str]:

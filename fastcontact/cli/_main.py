@@ -14,7 +14,6 @@ import pkgutil
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Any
 
 from fastcontact._jit import compiling
@@ -104,8 +103,14 @@ def _run(given: list[str]) -> int:
     log.handlers[:] = [handler]
     log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
     if sys.stderr.isatty() and not (arguments.quiet or arguments.verbose):  # the log tells it with -v
-        compiling.listeners[:] = [partial(say, f"{compiling.TEXT} ...", error=True)]
+        compiling.listeners[:] = [_say_compiling]
     return int(arguments.run(arguments) or 0)
+
+
+def _say_compiling() -> None:
+    """Say once that kernels are being compiled."""
+    compiling.listeners.remove(_say_compiling)
+    say(f"{compiling.TEXT} ...", error=True)
 
 
 def _notes(error: BaseException) -> list[str]:

@@ -66,10 +66,19 @@ class Panels(tuple[Any, ...]):
         return png(self[0].figure)
 
 
+def drawable(ax: Any) -> Any:
+    """Return axes that were given; FastcontactError if they are none."""
+    if not (hasattr(ax, "plot") and hasattr(ax, "figure")):
+        raise FastcontactError(
+            f"pictures are drawn on axes of matplotlib, not on {ax!r}: leave the argument out for new ones"
+        )
+    return ax
+
+
 def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None = None) -> Any:
     """Return `ax`, or new axes in a figure of their own, ``projection="3d"`` for solids."""
     if ax is not None:
-        return ax
+        return drawable(ax)
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure

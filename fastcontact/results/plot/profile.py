@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import is_dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -90,6 +91,11 @@ def _largest(curve: PressureCurve, units: Units) -> str:
 
 def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
     """Return what can be drawn of theories, by legend."""
+    for given in (theory, *others.values()):
+        if given is not None and not is_dataclass(given) and pressure_curve(given) is None:
+            raise FastcontactError(
+                f"a theory has a pressure, as those of fastcontact.analytic do, which {given!r} has not"
+            )
     found = {legend: pressure_curve(other) for legend, other in others.items()}
     own = pressure_curve(theory)
     return {**({own.name: own} if own is not None else {}), **{k: c for k, c in found.items() if c is not None}}
