@@ -10,6 +10,8 @@ from fastcontact.analysis.contact_answers import wear as wear
 from fastcontact.analysis.criteria import Criteria as Criteria
 from fastcontact.analysis.run import solve as solve
 from fastcontact.analysis.run import solve_steps as solve_steps
+from fastcontact.analysis.sensitivities import Sensitivities as Sensitivities
+from fastcontact.analysis.sensitivities import sensitivities as sensitivities
 from fastcontact.cases.decks.deck import Deck as Deck
 from fastcontact.cases.decks.deck import read_deck as read_deck
 from fastcontact.contact import obstacles as obstacles

@@ -25,7 +25,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, linear_ramp
 from fastcontact.results.step import StepResult
-from fastcontact.results.units import units_of_results
+from fastcontact.results.units import known_units, units_of_results
 
 # Suffix of input decks of Abaqus and CalculiX.
 DECK = ".inp"
@@ -121,7 +121,7 @@ def _case_of_deck(path: Path) -> Case:
         linear_solver="auto",
         linear_tolerance=1e-10,
         probes={},
-        units=_units({}),
+        units=known_units({}),
         folder=path.parent.resolve(),
         deck=deck,
     )
@@ -207,8 +207,8 @@ def build_case(
         linear_tolerance=tolerance,
         probes=probes,
         theories=theories,
-        checks=_checks(data, probes, theories, mesh.dim),
-        units=_units(data),
+        checks=_checks(data, probes, theories),
+        units=known_units(data.get("units", {})),
         approach=approach,
         folder=Path(folder).resolve(),
     )
@@ -218,15 +218,11 @@ def _pairs(data: dict[str, Any]) -> dict[str, Any]:
     return {**data.get("contact", {}), **data.get("obstacle", {})}
 
 
-def _units(data: dict[str, Any]) -> dict[str, str]:
-    return {"length": "-", "force": "-", "pressure": "-", **data.get("units", {})}
-
-
-def _checks(data: dict[str, Any], probes: Mapping[str, int], theories: Mapping[str, Any], dim: int) -> list[Check]:
+def _checks(data: dict[str, Any], probes: Mapping[str, int], theories: Mapping[str, Any]) -> list[Check]:
     checks = []
     for i, entry in enumerate(tables("check", data.get("check", []))):
         check_keys(f"check[{i}]", entry, CHECK)
-        checks.append(read_check(f"check[{i}]", entry, probes, _pairs(data), theories, dim))
+        checks.append(read_check(f"check[{i}]", entry, probes, _pairs(data), theories, str(data["kinematics"])))
     return checks
 
 
@@ -305,7 +301,7 @@ def described(data: dict[str, Any]) -> dict[str, Any]:
     theories, approach = _theories(data)
     return {
         "title": data.get("title", ""),
-        "units": units_of_results(_units(data), str(data.get("kinematics", ""))),
+        "units": units_of_results(data.get("units", {}), str(data.get("kinematics", ""))),
         "theories": theories,
         "approach": approach,
         "ramp": _ramp(data.get("ramp", {})).table,

@@ -7,6 +7,8 @@ import signal
 import sys
 from collections.abc import Sequence
 
+INTERRUPTED = 130  # as shells have it
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
@@ -16,7 +18,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return run(argv)
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        return 130
+        return INTERRUPTED
 
 
 def entry_point() -> None:
@@ -25,4 +27,6 @@ def entry_point() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     code = main()
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is left to say: a second Ctrl-C ends at once
+    if code == INTERRUPTED:
+        sys.unraisablehook = lambda found: None  # finalisers of what was left half made
     sys.exit(code)

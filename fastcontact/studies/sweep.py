@@ -20,6 +20,7 @@ from fastcontact.studies.case_parameters import substituted
 from fastcontact.studies.execute import Progress, raise_first, run_all
 from fastcontact.studies.job import Job, fields_of, job_of
 from fastcontact.studies.levels import make_mesh, recipe
+from fastcontact.studies.progress import told
 from fastcontact.studies.quantities import of_theory
 from fastcontact.studies.report import of_case
 from fastcontact.studies.settings import one_combination, settings
@@ -45,6 +46,7 @@ def parameter_sweep(
     workers: int | None = None,
     store: str | Path | None = None,
     on_progress: Callable[[Progress], None] | None = None,
+    progress: bool = False,
 ) -> Sweep:
     """Solve a case for all combinations of some parameters' values.
 
@@ -60,7 +62,7 @@ def parameter_sweep(
     level : int, optional
         Refinement, as in `convergence_study`; by default 2 where ``[study]`` gives the meshes of level 0, otherwise the
         mesh of the case.
-    executor, workers, store, on_progress
+    executor, workers, store, on_progress, progress
         As in `convergence_study`.
 
     Returns
@@ -80,7 +82,8 @@ def parameter_sweep(
     jobs = [_job(case, choice, element, formulation, level) for choice in choices]
     # An unknown key would make every run fail.
     build_case(jobs[0].data, name=case.name, folder=case.folder, mesh=case.mesh)
-    results = run_all(jobs, executor=executor, workers=workers, store=store, on_progress=on_progress)
+    with told(on_progress, progress) as told_to:
+        results = run_all(jobs, executor=executor, workers=workers, store=store, on_progress=told_to)
     raise_first("no point of the sweep could be solved", jobs, results)
     runs = list(zip(choices, results, strict=True))
     return Sweep(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fastcontact.cases.decks.blocks import Block, Row, as_number, unquoted
 from fastcontact.cases.decks.content import Axes, Content, Equation, Link, Pair
+from fastcontact.cases.decks.cyclic_symmetry import sector_ends
 
 # Terms of an equation: more tie everything to everything.
 MOST_TERMS = 100_000
@@ -40,6 +41,9 @@ def clearance(content: Content, block: Block) -> None:
 
 def tie(content: Content, block: Block) -> None:
     """*TIE: sides that neither open nor slide."""
+    if "CYCLIC SYMMETRY" in block.parameters:
+        content.sector_ends.append(sector_ends(block))
+        return
     tolerance = block.get("POSITION TOLERANCE")
     value = as_number(block.place, tolerance) if tolerance else None
     adjust = block.choice("ADJUST", ("YES", "NO"))

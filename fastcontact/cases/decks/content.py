@@ -136,6 +136,25 @@ class Pair:
 
 
 @dataclass(frozen=True)
+class SectorEnds:
+    """The two ends of a sector that repeats itself round an axis: their surfaces, by the name of the tie."""
+
+    place: Place
+    name: str
+    surfaces: tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Sectors:
+    """How many sectors make the whole round an axis, by two of its points, and the name of the tie of their ends."""
+
+    place: Place
+    count: int
+    tie: str
+    points: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Equation:
     """A linear equation: node, component and coefficient of each term."""
 
@@ -218,6 +237,8 @@ class Content:
     materials: dict[str, Material] = field(default_factory=dict)
     interactions: dict[str, Interaction] = field(default_factory=dict)
     pairs: list[Pair] = field(default_factory=list)
+    sector_ends: list[SectorEnds] = field(default_factory=list)
+    sectors: list[Sectors] = field(default_factory=list)
     equations: list[Equation] = field(default_factory=list)
     links: list[Link] = field(default_factory=list)
     axes: list[Axes] = field(default_factory=list)

@@ -13,10 +13,11 @@ from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, labelled, new_axes, valued
+from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, new_axes
 from fastcontact.results.plot.hiding import across
 from fastcontact.results.plot.patches import fill
 from fastcontact.results.step import ContactResult
+from fastcontact.results.units import labelled, valued
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

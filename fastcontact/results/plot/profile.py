@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import is_dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
-from fastcontact.results.plot._axes import UNKNOWN, Units, labelled, new_axes, valued
+from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes
 from fastcontact.results.step import ContactResult, half_width
+from fastcontact.results.units import labelled, valued
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -89,6 +91,11 @@ def _largest(curve: PressureCurve, units: Units) -> str:
 
 def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
     """Return what can be drawn of theories, by legend."""
+    for given in (theory, *others.values()):
+        if given is not None and not is_dataclass(given) and pressure_curve(given) is None:
+            raise FastcontactError(
+                f"a theory has a pressure, as those of fastcontact.analytic do, which {given!r} has not"
+            )
     found = {legend: pressure_curve(other) for legend, other in others.items()}
     own = pressure_curve(theory)
     return {**({own.name: own} if own is not None else {}), **{k: c for k, c in found.items() if c is not None}}

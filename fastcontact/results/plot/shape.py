@@ -10,16 +10,19 @@ from numpy.typing import NDArray
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNKNOWN, Units, labelled, new_axes, part_shown, placed, valued
+from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes, part_shown, placed
 from fastcontact.results.plot.fields import Field, field_of
 from fastcontact.results.plot.patches import fill, outlines
 from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen
 from fastcontact.results.step import StepResult
+from fastcontact.results.units import labelled, valued
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
+# Size of solids beside their frame, which with its labels takes the rest.
+ROOM = 0.9
 LARGEST = 1e30  # of coordinates that can be drawn: the libraries multiply them
 
 
@@ -100,7 +103,10 @@ def _framed(axes: Any, drawn: Any, shown: Field, heading: str, units: Units, bel
     """Give axes their colour bar, title, labels, and a legend that begins at a height [-]; return them."""
     caption, dim = labelled(shown.caption, units, shown.quantity), shown.mesh.dim
     axes.figure.colorbar(drawn, ax=axes, label=caption, shrink=0.6 if dim == 3 else 0.8)
-    axes.set_aspect("equal")
+    if dim == 3:  # smaller, so that the labels of all axes have room
+        axes.set_box_aspect([float(np.diff(getattr(axes, f"get_{axis}lim")())[0]) for axis in "xyz"], zoom=ROOM)
+    else:
+        axes.set_aspect("equal")
     axes.set_title(heading, fontsize="medium", pad=18 if dim == 3 else None)
     axes.set(**{f"{axis}label": labelled(axis, units, "length") for axis in "xyz"[:dim]})
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, below))

@@ -123,7 +123,11 @@ def _draw(panel: Panel, ax: Any) -> None:
         ax.grid(which="major", alpha=panel.grid)
     if panel.minor_grid:
         ax.grid(which="minor", alpha=panel.minor_grid)
-    if ax.get_legend_handles_labels()[0]:
+    entries = len(ax.get_legend_handles_labels()[0])
+    if entries and any(curve.bars is not None for curve in panel.curves):  # matplotlib does not see them in the way
+        low, high = ax.get_ylim()
+        ax.set_ylim(low, high * (high / low) ** (0.02 * panel.legend_size * entries / 2.2))
+    if entries:
         ax.legend(fontsize=panel.legend_size)
 
 
