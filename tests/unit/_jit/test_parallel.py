@@ -104,8 +104,22 @@ def test_assembly_and_recovery_give_the_same_bits_for_any_number_of_threads(thre
         threads(count)
         K = stiffness.stiffness(mesh, kinematics, moduli, material)
         stress = recovery.stress_at_points(mesh, kinematics, moduli, material, u)
-        found.append((K.data.tobytes(), stress[element].tobytes()))
+        nodal = recovery.nodal_stress(mesh, kinematics, moduli, material, u)
+        found.append((K.data.tobytes(), stress[element].tobytes(), nodal.tobytes()))
     assert len(set(found)) == 1
+
+
+def test_every_node_belongs_to_one_part_of_a_nodal_average(threads):
+    cells = fc.generate.box((1.0, 1.0, 1.0), (24, 24, 24), "hex8").cells["hex8"]
+    for count in (1, 2, 4):
+        threads(count)
+        average = recovery.NodalAverage(25**3, 6)
+        parts = average._parts(cells)
+        assert len(parts) == count
+        assert [k for low, high in parts for k in range(low, high)] == list(range(25**3))
+        work = [((cells >= low) & (cells < high)).sum() for low, high in parts]
+        assert max(work) < 1.3 * min(work)
+        assert average._parts(cells[:0]) == [(0, 25**3)]
 
 
 @pytest.mark.parametrize("batch", [0, 1000, 10**9])
