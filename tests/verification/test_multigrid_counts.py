@@ -130,6 +130,8 @@ def test_left_solutions_and_extrapolated_starts_end_where_the_direct_solver_does
         ({"multipliers": "standard"}, 5.5),
         ({"ratio": 1e4}, 3.5),
         ({"ratio": 1e8}, 3.5),
+        ({"ratio": 1e-2}, 6.0),
+        ({"ratio": 1e-4}, 8.0),
         ({"nu": 0.45}, 3.5),
         ({"nu": 0.49}, 3.5),
         ({"element": "tet4"}, 3.5),

@@ -148,7 +148,7 @@ class Multigrid:
             cg.x[:] = 0.0 if guess is None else guess
             self._begin(f, elimination)
         self._solved = f
-        enough = max(self.tolerance, tolerance or 0.0) * scale
+        enough = self._enough(tolerance or 0.0) * scale
         made, raised, first = 0, 0, cg.norm
         while cg.norm > enough:
             if made >= MAX_ITERATIONS or raised > RAISES:
@@ -157,7 +157,9 @@ class Multigrid:
                     f"above {self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
                 )
             watch = monitor if made and made % WATCH_EVERY == 0 else None
-            error = cg.norm / scale * _amplification(cg.norm / first, made) if watch is not None else 0.0
+            error = (
+                self._contrast * cg.norm / scale * _amplification(cg.norm / first, made) if watch is not None else 0.0
+            )
             if watch is not None and watch(cg.x, self.multiplier(elimination, cg.x, f), error):
                 break
             if cg.step(self._multiply, self.precondition):
@@ -199,8 +201,9 @@ class Multigrid:
             self._residuals = ConjugateResiduals(len(f))
         self._solved = None
         iteration = self._residuals
-        enough = max(self.tolerance, tolerance) * self._scale(f, elimination)
+        scale = self._scale(f, elimination)
         self.constrain(elimination, springs)
+        enough = self._enough(tolerance) * scale
 
         def multiply(p: Array, q: Array) -> None:
             self.K.combine(1.0, p, 0.0, q, q)
@@ -287,6 +290,15 @@ class Multigrid:
             self.K.add_forces_of(elimination.pivots, elimination.offset, forces)
             square += self._cg.dot(forces, forces)
         return float(np.sqrt(square))
+
+    def _enough(self, tolerance: float) -> float:
+        """Return the relative residual to reach: `tolerance`, but not less than the solver's own."""
+        return max(self.tolerance, tolerance / self._contrast)
+
+    @property
+    def _contrast(self) -> float:
+        """By how much relative residuals flatter the softer body where pivots belong to a much stiffer one."""
+        return max(1.0, self._constrained.stiffening)
 
     def _multiply(self, p: Array, q: Array) -> None:
         self.K.combine(1.0, p, 0.0, q, q)
