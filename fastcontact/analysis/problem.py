@@ -211,6 +211,7 @@ def prepare(
         columns=not all(pair.eliminable for pair in pairs.values()),
     )  # fmt: skip
     field = model.material_field()
+    solver.contrast = field.contrast
     sides = material_sides(mesh, field.distinct)
     K = stiffness(mesh, model.kinematics, field.moduli, field.loops, None, field.treatment)
     K = stiffened(K, model.springs)

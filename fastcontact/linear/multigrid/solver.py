@@ -41,6 +41,8 @@ SLOWEST = 0.999
 WARM, WARM_LEAST, MOST_WARM = 0.05, 1e-3, 10
 # A nonsymmetric iteration whose residual does not fall to this part in so many iterations stands still for good.
 FALLS, STANDING = 0.99, 40
+# Materials with a smaller contrast are solved for as if they had none.
+MILD = 10.0
 # Where the smoother amplifies something, its bound of the spectrum is raised by this factor, so many times.
 RAISE, RAISES = 1.3, 4
 
@@ -59,6 +61,11 @@ class Multigrid:
     precision : {"single", "double"}
         Of the numbers inside the multigrid cycle; the iteration around it is in double precision.
 
+    Attributes
+    ----------
+    contrast : float
+        See `LinearSolver`.
+
     Raises
     ------
     ModelError
@@ -70,6 +77,7 @@ class Multigrid:
             raise ModelError(f"the precision of the multigrid cycle is 'single' or 'double', not '{precision}'")
         self.tolerance, self.precision = tolerance, precision
         self.counters = Counters()
+        self.contrast = 1.0
 
     @property
     def nbytes(self) -> int:
@@ -297,8 +305,8 @@ class Multigrid:
 
     @property
     def _contrast(self) -> float:
-        """By how much relative residuals flatter the softer body where pivots belong to a much stiffer one."""
-        return max(1.0, self._constrained.stiffening)
+        """By how much relative residuals flatter a solution: that of the softer body, beside pivots of a much stiffer one."""
+        return max(1.0, self._constrained.stiffening, self.contrast if self.contrast > MILD else 1.0)
 
     def _multiply(self, p: Array, q: Array) -> None:
         self.K.combine(1.0, p, 0.0, q, q)
