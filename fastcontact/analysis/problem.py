@@ -254,7 +254,8 @@ def _prepare_solver(
     matrix = system.matrix if bodies is None else bodies.with_springs(system.matrix)
     if bodies is not None:
         involved = np.union1d(involved, bodies.dofs)
-    kept = solver.prepare(matrix, system.unknowns_of(modes), involved, release=True)
+    modes = system.unknowns_of(modes)  # and those of all displacements are gone
+    kept = solver.prepare(matrix, modes, involved, release=True)
     if matrix is system.matrix:
         system.keep(kept)
     return involved

@@ -57,6 +57,47 @@ def row_times_both_ways(
     return sums(indices, numbers, x, types.intp, types.intp, types.intp, x.dtype, y, rows), code
 
 
+def add_row_transposed(
+    _context: Any,
+    indices: Any,
+    numbers: Any,
+    begin: Any,
+    end: Any,
+    own: Any,
+    x: Any,
+    y: Any,
+    at: Any,
+    rows: Any,
+    cols: Any,
+) -> Any:
+    """Return the types of `block_products.add_row_transposed`, and what writes it."""
+    from numba.core import types
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        from numba.core import cgutils
+
+        write, m, n = _Writer(context, builder, x.dtype), len(rows), len(cols)
+        offset, step = args[2].type, args[2].type(1)
+        indices, vector, into = (write.start(signature.args[k], args[k]) for k in (0, 5, 6))
+        data, place = write.starts(signature.args[1], args[1]), builder.mul(args[4], offset(m))
+        own = [write.numbers([vector], place, r, 1) for r in range(m)]
+        with cgutils.for_range_slice(builder, args[2], args[3], step, offset, inc=True) as (k, _):
+            column = builder.load(builder.gep(indices, [k]))
+            column = column if column.type == offset else builder.sext(column, offset)
+            j, block = builder.add(args[7], builder.mul(column, offset(n))), builder.mul(k, offset(m * n))
+            for piece in _pieces(n):
+                total = write.zeros(piece.width)
+                for r in range(m):
+                    numbers = write.numbers(data, block, r * n + piece.column, piece.width)
+                    total = write.plus(total, numbers, write.everywhere(own[r], piece.width))
+                write.add(into, j, piece.column, piece.width, total)
+        return context.get_dummy_value()
+
+    return types.none(
+        indices, numbers, types.intp, types.intp, types.intp, x, y, types.intp, rows, cols
+    ), code  # fmt: skip
+
+
 def add_product(_context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, sizes: Any) -> Any:
     """Return the types of `block_products.add_product`, and what writes it."""
     return _added(lambda r, t, _m, k: r * k + t, to, left, right, sizes)
@@ -133,6 +174,12 @@ class _Writer:
         """Return a total and a product, which may be rounded at once."""
         product = self.builder.fmul(one, other, flags=("contract",))
         return self.builder.fadd(total, product, flags=("contract",))
+
+    def add(self, start: Any, at: Any, column: int, width: int, vector: Any) -> None:
+        """Add a vector to numbers in memory."""
+        total = self.builder.fadd(self.numbers([start], at, column, width), vector)
+        align = 4 if str(self.real) == "float" else 8
+        self.builder.store(total, self.where(start, at, column, width), align=align)
 
     def everywhere(self, number: Any, width: int) -> Any:
         """Return a vector with the same number everywhere."""
@@ -258,15 +305,11 @@ class _RowBothWays(_Row):
         """Add the sums to y; nothing beside them is touched."""
         for piece, vector in zip(self.pieces, self.added, strict=True):
             if piece.used == piece.width:
-                self._add(j, piece.column, piece.width, vector)
+                self.add(self.y, j, piece.column, piece.width, vector)
             else:
-                self._add(j, piece.column, 2, self.shuffled(vector, [0, 1]))
-                self._add(j, piece.column + 2, 1, self.builder.extract_element(vector, self.lane(2)))
+                self.add(self.y, j, piece.column, 2, self.shuffled(vector, [0, 1]))
+                self.add(self.y, j, piece.column + 2, 1, self.builder.extract_element(vector, self.lane(2)))
         self.added = []
-
-    def _add(self, j: Any, column: int, width: int, vector: Any) -> None:
-        total = self.builder.fadd(self.numbers([self.y], j, column, width), vector)
-        self.builder.store(total, self.where(self.y, j, column, width), align=4 if str(self.real) == "float" else 8)
 
 
 def _pieces(n: int) -> list[Piece]:

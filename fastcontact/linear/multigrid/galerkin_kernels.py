@@ -19,39 +19,45 @@ PARTS = 8
 
 
 @kernel
+def _near(i, indptr, indices, storage, data, square, found):
+    """Fill `found` with the columns of the blocks of row i that are not zero, but for the diagonal; return their number."""
+    part, count = part_of(storage, i), 0
+    for k in range(indptr[i], indptr[i + 1]):
+        if indices[k] == i:
+            continue
+        own = place_of(storage, part, i, indices[k], k)[0]
+        for e in range(own * square, (own + 1) * square):
+            if data[e] != 0.0:
+                found[count] = indices[k]
+                count += 1
+                break
+    return count
+
+
+@parallel_kernel
 def graph(indptr, indices, storage, data, size):
     """Return (start, neighbours) of the blocks that are not zero; the diagonal is left out.
 
     A row without neighbours is a node that no other moves with: all its unknowns are supported.
     """
     n = indptr.shape[0] - 1
-    start = np.zeros(n + 1, np.int32)
-    neighbours = np.empty(indices.shape[0], np.int32)
-    at = 0
-    square = size * size
+    start, widest = np.zeros(n + 1, np.int32), 0
     for i in range(n):
-        part = part_of(storage, i)
-        for k in range(indptr[i], indptr[i + 1]):
-            if indices[k] == i:
-                continue
-            own = place_of(storage, part, i, indices[k], k)[0]
-            for e in range(own * square, (own + 1) * square):
-                if data[e] != 0.0:
-                    neighbours[at] = indices[k]
-                    at += 1
-                    break
-        start[i + 1] = at
-    return start, neighbours[:at].copy()
-
-
-@parallel_kernel
-def transpose_blocks(slot, data, out, rows, cols):
-    """Fill `out` with the transposed blocks `slot` (n_blocks,) of `data`; blocks are rows x cols."""
-    m, n = len(rows), len(cols)
-    for k in prange(slot.shape[0]):
-        for a in range(m):
-            for b in range(n):
-                out[(k * n + b) * m + a] = data[(slot[k] * m + a) * n + b]
+        widest = max(widest, indptr[i + 1] - indptr[i])
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        found = np.empty(widest, np.int32)
+        for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
+            start[i + 1] = _near(i, indptr, indices, storage, data, size * size, found)
+    for i in range(n):
+        start[i + 1] += start[i]
+    neighbours = np.empty(start[n], np.int32)
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        found = np.empty(widest, np.int32)
+        for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
+            count = _near(i, indptr, indices, storage, data, size * size, found)
+            for e in range(count):
+                neighbours[start[i] + e] = found[e]
+    return start, neighbours
 
 
 @kernel

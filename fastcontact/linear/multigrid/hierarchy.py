@@ -21,6 +21,7 @@ from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
 from fastcontact.linear.multigrid.coarse import Coarse
 from fastcontact.linear.multigrid.level import Level
 from fastcontact.linear.multigrid.matrix import BlockMatrix
+from fastcontact.linear.multigrid.restriction import Restriction
 from fastcontact.linear.multigrid.smoother import DEGREE, SAFETY, chebyshev, largest_eigenvalue
 
 Array = NDArray[np.float64]
@@ -52,7 +53,9 @@ class Hierarchy:
             coarser = self._coarsened(A, level, modes) if level.n > COARSEST else None
             if coarser is None:
                 break
-            level.P, level.R, A, modes = coarser
+            level.P, A, modes = coarser
+            level.R = Restriction(level.P)
+            del coarser
         self.coarse = Coarse(A.to_scipy().tocsc())
         self._free_bounds = [level.bound for level in self.levels]
         self.set_bounds()
@@ -67,10 +70,8 @@ class Hierarchy:
         level.bound = SAFETY * largest_eigenvalue(level)
         return level
 
-    def _coarsened(
-        self, A: BlockMatrix, level: Level, modes: Array
-    ) -> tuple[BlockMatrix, BlockMatrix, BlockMatrix, Array] | None:
-        """Return the prolongator, its transpose, the coarse matrix and its modes; None where aggregates do not help."""
+    def _coarsened(self, A: BlockMatrix, level: Level, modes: Array) -> tuple[BlockMatrix, BlockMatrix, Array] | None:
+        """Return the prolongator, the coarse matrix and its modes; None where aggregates do not help."""
         from pyamg.aggregation.aggregate import standard_aggregation
         from pyamg.aggregation.tentative import fit_candidates
 
@@ -87,6 +88,7 @@ class Hierarchy:
         aggregate[member] = aggregates.indices
         tentative = np.zeros((n, size * n_modes))
         tentative[member] = T.data.reshape(len(member), -1)
+        del T
         omega = 4.0 / 3.0 / (level.bound / SAFETY)
         cols = (0,) * n_modes
         indptr = galerkin_kernels.count_prolongator(A.indptr, A.indices, aggregate)
@@ -96,11 +98,9 @@ class Hierarchy:
             A.indptr, A.indices, A.storage, A.exact, level.inverse, aggregate, tentative.ravel(), omega, indptr, blocks,
             A.rows, cols,
         )  # fmt: skip
-        del tentative, T
+        del tentative
         P = BlockMatrix(indptr, columns, blocks, A.rows, cols)
-        index = by_columns(P, n_coarse)
-        coarse = product(A, P, index)
-        return P, transposed(P, index), coarse, coarse_modes
+        return P, product(A, P, by_columns(P, n_coarse)), coarse_modes
 
     def __repr__(self) -> str:
         sizes = " -> ".join(str(level.n) for level in self.levels)
@@ -165,14 +165,6 @@ def by_columns(P: BlockMatrix, n: int) -> tuple[Indices, Indices, Indices]:
     numbers = np.arange(len(P.indices), dtype=np.int32)
     found = csr_matrix((numbers, P.indices, P.indptr), shape=(len(P.indptr) - 1, n)).tocsc()
     return found.indptr, found.indices, found.data
-
-
-def transposed(P: BlockMatrix, index: tuple[Indices, Indices, Indices]) -> BlockMatrix:
-    """Return ``P.T``; `index` from `by_columns`."""
-    start, origin, slot = index
-    turned = np.empty_like(P.data)
-    galerkin_kernels.transpose_blocks(slot, P.data, turned, P.rows, P.cols)
-    return BlockMatrix(start, origin, turned, P.cols, P.rows)
 
 
 def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Indices, Indices, Indices]) -> BlockMatrix:

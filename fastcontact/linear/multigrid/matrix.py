@@ -9,7 +9,6 @@ once for both triangles (see `symmetric_storage_kernels`).
 from __future__ import annotations
 
 import contextlib
-import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -92,8 +91,8 @@ class BlockMatrix:
     def diagonal_blocks(self) -> Array:
         """Return the diagonal blocks (n_rows, size, size) of a square matrix, in double precision."""
         size = len(self.rows)
-        parts = [self.diagonal_part(part).astype(float) for part in self.exact]
-        return np.asarray(sum(parts)).reshape(-1, size, size)
+        parts = [self.diagonal_part(part).astype(float, copy=False) for part in self.exact]
+        return np.asarray(sum(parts[1:], parts[0])).reshape(-1, size, size)
 
     def diagonal_part(self, part: Values) -> Values:
         """Return the diagonal blocks (n_rows * size * size,) of a square matrix, from the high or the low part."""
@@ -120,10 +119,10 @@ class BlockMatrix:
 
 def diagonal_blocks(indptr: Indices, indices: Indices, data: Values, size: int) -> Values:
     """Return the diagonal blocks (n * size * size,) of a square matrix in canonical format, zero where there is none."""
-    row = np.repeat(np.arange(len(indptr) - 1, dtype=np.int32), np.diff(indptr))
-    own, out = np.flatnonzero(indices == row), np.zeros((len(indptr) - 1, size * size), data.dtype)
-    out[row[own]] = data.reshape(-1, size * size)[own]
-    return out.ravel()
+    out = np.zeros((len(indptr) - 1) * size * size, data.dtype)
+    pattern = (part.astype(np.int32, copy=False) for part in (indptr, indices))
+    split_matrix_kernels.diagonal_blocks(*pattern, data.reshape(-1), size * size, out)
+    return out
 
 
 def block_matrix(K: bsr_array) -> BlockMatrix:
@@ -163,7 +162,9 @@ class ScaledMatrix:
         if precision == "double":
             self.scaled = block_matrix(K)
             return
-        self.unit = float(0.5 ** np.round(np.log2(K.diagonal().max())))
+        size = range(K.blocksize[0])
+        largest = block_matrix(K).diagonal_blocks()[:, size, size].max()
+        self.unit = float(0.5 ** np.round(np.log2(largest)))
         self.scaled = _split(K, self.unit, release)
 
     def change(self, precision: str) -> None:
@@ -213,27 +214,44 @@ class ScaledMatrix:
 def _split(K: bsr_array, unit: float, release: bool) -> BlockMatrix:
     """Return ``unit K``, split into high and low parts; see `ScaledMatrix` for `release`."""
     indptr, indices = (part.astype(np.int32, copy=False) for part in (K.indptr, K.indices))
-    square = K.blocksize[0] ** 2
-    storage = symmetric_storage(indptr, indices)
-    stored = len(indices) if storage is ALL else len(storage[2])
-    numbers, owner = K.data.reshape(-1), K.data if K.data.base is None else K.data.base
-    high = np.empty(stored * square, np.float32)
-    in_place = release and owner.size == numbers.size and owner.flags.owndata and owner.flags.c_contiguous
-    low = numbers.view(np.float32)[: len(high)] if in_place else np.empty_like(high)
-    widest = int(np.diff(indptr).max(initial=0))
-    for first, end in _rows_in_turn(indptr, storage):
-        symmetric_storage_kernels.split_rows(
-            first, end, widest, indptr, indices, storage, unit, numbers, square, high, low
-        )  # fmt: skip
-    if in_place:
-        # Every number was read before a low part overwrote it. K must have no numbers then: these are none any more.
+    size, numbers = K.blocksize[0], K.data if K.data.base is None else K.data.base
+    if release and numbers.size == K.data.size and numbers.flags.owndata and numbers.flags.c_contiguous:
+        # Every number is read before another overwrites it. K must have no numbers then: these are none any more.
         K.indptr, K.indices, K.data = np.zeros_like(indptr), indices[:0], np.empty((0, *K.blocksize))
-        del numbers, low
+    else:
+        numbers = K.data.copy()
+    storage = symmetric_storage(indptr, indices)
+    n = numbers.size
+    if storage is not ALL:
+        _keep_stored(indptr, indices, storage, numbers.reshape(-1), size * size)
+        n = len(storage[2]) * size * size
         with contextlib.suppress(ValueError):  # another array uses the memory, all of which stays then
-            owner.resize(((len(high) + 1) // 2,))
-        low = owner.reshape(-1).view(np.float32)[: len(high)]
-    size = (0,) * K.blocksize[0]
-    return BlockMatrix(indptr, indices, high, size, size, low, storage)
+            numbers.resize((n,))
+    high = np.empty(n, np.float32)
+    _halve(unit, numbers.reshape(-1)[:n], high)
+    with contextlib.suppress(ValueError):
+        numbers.resize(((n + 1) // 2,))
+    low = numbers.reshape(-1).view(np.float32)[:n]
+    return BlockMatrix(indptr, indices, high, (0,) * size, (0,) * size, low, storage)
+
+
+def _keep_stored(indptr: Indices, indices: Indices, storage: Storage, numbers: Values, square: int) -> None:
+    """Move the stored blocks, of `square` numbers, to the beginning of the numbers of all blocks."""
+    start, widest = storage[0], int(np.diff(indptr).max(initial=0))
+    end, n = 0, len(indptr) - 1
+    while end < n:  # rows whose stored blocks lie before what is still read: on all threads, or else one chunk
+        first = end
+        behind = int(np.searchsorted(start, indptr[first], side="right")) - 1
+        end = max(behind, min(n, first + symmetric_storage_kernels.CHUNK))
+        symmetric_storage_kernels.store_rows(first, end, widest, indptr, indices, storage, numbers, square, numbers)
+
+
+def _halve(unit: float, numbers: Values, high: Values) -> None:
+    """Fill the high parts (n,) of ``unit numbers``; the low parts take the place of the first half of the numbers."""
+    end, n, low = 0, len(numbers), numbers.view(np.float32)[: len(numbers)]
+    while end < n:
+        first, end = end, min(n, max(2 * end, end + split_matrix_kernels.CHUNK))
+        split_matrix_kernels.split(first, end, unit, numbers, high, low)
 
 
 def symmetric_storage(indptr: Indices, indices: Indices) -> Storage:
@@ -253,14 +271,3 @@ def symmetric_storage(indptr: Indices, indices: Indices) -> Storage:
     storage = start, upper, columns, length
     symmetric_storage_kernels.missing(indptr, indices, storage, count)
     return ALL if count.any() else storage
-
-
-def _rows_in_turn(indptr: Indices, storage: Storage) -> list[tuple[int, int]]:
-    """Return ranges of rows for `split_rows`: low parts of each overwrite nothing that a later one reads."""
-    n, start = len(indptr) - 1, indptr if storage is ALL else storage[0]
-    ends = [0, min(n, symmetric_storage_kernels.CHUNK)]
-    while ends[-1] < n:
-        last = ends[-1]
-        more = int(np.searchsorted(start, 2 * int(indptr[last]), side="right")) - 1
-        ends.append(max(more, min(n, last + symmetric_storage_kernels.CHUNK)))
-    return list(itertools.pairwise(ends))

@@ -5,8 +5,38 @@ Together both parts have 48 of the 53 bits of double precision. Kernels take num
 split, (numbers,) where they are not.
 """
 
-from fastcontact._jit.decorators import kernel
+import numpy as np
+from numba import prange
+
+from fastcontact._jit.decorators import kernel, parallel_kernel
 from fastcontact.linear.multigrid.symmetric_storage_kernels import entry_of, part_of, place_of
+
+# Numbers that one thread takes at a time.
+CHUNK = 4096
+
+
+@parallel_kernel
+def split(first, end, factor, numbers, high, low):
+    """Fill the parts of ``factor`` times numbers `first` to ``end - 1``.
+
+    `low` may be in the place of the beginning of `numbers` where ``end <= 2 first``, or where there is one chunk.
+    """
+    for c in prange((end - first + CHUNK - 1) // CHUNK):
+        for k in range(first + c * CHUNK, min(end, first + (c + 1) * CHUNK)):
+            number = factor * numbers[k]
+            high[k] = number
+            low[k] = number - np.float64(high[k])
+
+
+@kernel
+def diagonal_blocks(indptr, indices, data, square, out):
+    """Copy the diagonal blocks, of `square` numbers, to `out` (n_rows * square,), where a row has one."""
+    for i in range(indptr.shape[0] - 1):
+        for k in range(indptr[i], indptr[i + 1]):
+            if indices[k] == i:
+                for e in range(square):
+                    out[i * square + e] = data[k * square + e]
+                break
 
 
 @kernel

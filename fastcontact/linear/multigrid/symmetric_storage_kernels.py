@@ -126,32 +126,30 @@ def missing(indptr, indices, storage, found):
 
 
 @kernel
-def _split_row(i, indptr, indices, storage, factor, numbers, square, row, high, low):
-    """Copy a row's numbers first: low parts may overwrite them."""
+def _store_row(i, indptr, indices, storage, numbers, square, row, out):
+    """Copy a row's numbers first: what is stored may overwrite them."""
     part, begin = part_of(storage, i), indptr[i]
     for e in range((indptr[i + 1] - begin) * square):
-        row[e] = factor * numbers[begin * square + e]
+        row[e] = numbers[begin * square + e]
     for k in range(begin, indptr[i + 1]):
-        if part[0] <= indices[k] < i and part[1] > 0:
+        if part[0] <= indices[k] < i:
             continue
         at = place_of(storage, part, i, indices[k], k)[0]
         for e in range(square):
-            number = row[(k - begin) * square + e]
-            high[at * square + e] = number
-            low[at * square + e] = number - np.float64(high[at * square + e])
+            out[at * square + e] = row[(k - begin) * square + e]
 
 
 @parallel_kernel
-def split_rows(first, end, widest, indptr, indices, storage, factor, numbers, square, high, low):
-    """Fill the high and low parts of ``factor`` times the stored blocks of rows `first` to ``end - 1``.
+def store_rows(first, end, widest, indptr, indices, storage, numbers, square, out):
+    """Fill the stored blocks of rows `first` to ``end - 1`` into `out`, from `numbers`, `square` for each of all blocks.
 
-    `numbers` are those of all blocks, `square` in each; rows have up to `widest` blocks. `low` may be in the place of the
-    beginning of `numbers` where ``start[end] <= 2 indptr[first]``, or with one chunk.
+    Rows have up to `widest` blocks. `out` may be the beginning of `numbers` where ``start[end] <= indptr[first]``, or where
+    there is one chunk.
     """
     for c in prange((end - first + CHUNK - 1) // CHUNK):
         row = np.empty(widest * square)
         for i in range(first + c * CHUNK, min(end, first + (c + 1) * CHUNK)):
-            _split_row(i, indptr, indices, storage, factor, numbers, square, row, high, low)
+            _store_row(i, indptr, indices, storage, numbers, square, row, out)
 
 
 @parallel_kernel

@@ -12,7 +12,7 @@ from fastcontact._jit import decorators
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.linear import choice as linear
 from fastcontact.linear.multigrid import matrix as matrices
-from fastcontact.linear.multigrid import symmetric_storage_kernels
+from fastcontact.linear.multigrid import split_matrix_kernels
 from fastcontact.linear.multigrid.matrix import ALL, ScaledMatrix, symmetric_storage
 
 EXACT = 2.0**-47  # of split numbers, in units of the largest number of a row
@@ -32,27 +32,30 @@ def matrix(n, size, scale=1.0, seed=0):
     return bsr_array(bsr_array(scale * full, blocksize=(size, size)))
 
 
-def split(K, factor, in_place=False):
-    """Return the high and low parts of all blocks of a matrix."""
-    numbers = K.data.reshape(-1).copy()
-    high, low = np.empty((2, numbers.size), np.float32)
-    if in_place:
-        low = numbers.view(np.float32)[: numbers.size]
-    widest, square = int(np.diff(K.indptr).max()), K.blocksize[0] ** 2
-    for first, end in matrices._rows_in_turn(K.indptr, ALL):
-        symmetric_storage_kernels.split_rows(
-            first, end, widest, K.indptr, K.indices, ALL, factor, numbers, square, high, low
-        )  # fmt: skip
-    return high, low
-
-
-def test_the_parts_are_the_nearest_number_and_the_rest():
-    K = matrix(300, 2)
-    numbers = K.data.ravel()
-    high, low = split(K, 0.25)
+@pytest.mark.parametrize("n", [11, 5000, 20_001])
+def test_the_parts_are_the_nearest_number_and_the_rest(n):
+    numbers = np.random.default_rng(1).normal(size=n) * 10.0 ** np.random.default_rng(2).uniform(-12, 3, n)
+    high, low = np.empty((2, n), np.float32)
+    split_matrix_kernels.split(0, n, 0.25, numbers, high, low)
     np.testing.assert_array_equal(high, (0.25 * numbers).astype(np.float32))
     np.testing.assert_array_equal(low, (0.25 * numbers - high).astype(np.float32))
-    np.testing.assert_allclose(4.0 * (high.astype(float) + low), numbers, rtol=2.0**-47)
+    np.testing.assert_allclose(4.0 * (high.astype(float) + low), numbers, rtol=2.0**-48)
+    in_place = numbers.copy()
+    matrices._halve(0.25, in_place, high)
+    np.testing.assert_array_equal(in_place.view(np.float32)[:n], low)
+
+
+@pytest.mark.parametrize(("n", "size", "shortest"), [(7, 1, 1024), (600, 2, 100), (1300, 1, 200)])
+def test_stored_blocks_may_take_the_place_of_all(n, size, shortest, monkeypatch):
+    monkeypatch.setattr(matrices, "SHORTEST", shortest)
+    K = matrix(n, size)
+    storage, square = symmetric_storage(K.indptr, K.indices), size * size
+    start, _, columns, _ = storage
+    found = K.data.reshape(-1).copy()
+    matrices._keep_stored(K.indptr, K.indices, storage, found, square)
+    dense = K.toarray().reshape(n, size, n, size)
+    rows = np.repeat(np.arange(n), np.diff(start))
+    np.testing.assert_array_equal(found[: len(columns) * square].reshape(-1, size, size), dense[rows, :, columns])
 
 
 @pytest.mark.parametrize("release", [False, True])
@@ -85,13 +88,6 @@ def test_products_are_those_of_the_matrix(n, size, precision, release):
     np.testing.assert_allclose(given.restored().toarray(), dense, rtol=EXACT)
     given.change("double" if precision == "single" else "single")
     np.testing.assert_allclose(given.restored().toarray(), dense, rtol=2 * EXACT)
-
-
-@pytest.mark.parametrize("n", [40, 3000])
-def test_low_parts_may_take_the_place_of_the_numbers(n):
-    K = matrix(n, 2)
-    for found, expected in zip(split(K, 1.0, in_place=True), split(K, 1.0), strict=True):
-        np.testing.assert_array_equal(found, expected)
 
 
 def test_a_matrix_that_is_released_gives_its_memory_away():
