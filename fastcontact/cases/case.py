@@ -128,7 +128,7 @@ def _case_of_deck(path: Path) -> Case:
 
 
 def files_of_case(path: str | Path) -> list[Path]:
-    """Return a case file and the files of meshes that it names, or a deck and what it includes.
+    """Return a case file and the files of meshes and fields that it names, or a deck and what it includes.
 
     Raises CaseError or FileError if one cannot be read.
     """
@@ -138,10 +138,10 @@ def files_of_case(path: str | Path) -> list[Path]:
     found, waiting = [path], [_parsed(path)[1]]
     while waiting:
         for key, value in waiting.pop().items():
-            if key == "file" and isinstance(value, str):
-                found.append(path.parent / value)
-            tables = value if isinstance(value, list) else [value]
-            waiting += [table for table in tables if isinstance(table, dict)]
+            several = value if isinstance(value, list) else [value]
+            if key == "file":
+                found += [path.parent / name for name in several if isinstance(name, str)]
+            waiting += [table for table in several if isinstance(table, dict)]
     return found
 
 
