@@ -50,6 +50,7 @@ _NAMES = {
         "ModelError",
     ),
     "mesh.files.med": ("read_med_field",),
+    "mesh.files.mesh_fields": ("read_field",),
     "mesh.files.mesh_files": ("read_mesh", "write_mesh"),
     "mesh.from_libraries": ("from_gmsh", "from_meshio", "from_pyvista"),
     "mesh.mesh": ("Mesh",),

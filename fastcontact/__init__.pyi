@@ -32,6 +32,7 @@ from fastcontact.errors import ModelError as ModelError
 from fastcontact.mesh import generate as generate
 from fastcontact.mesh import topology as topology
 from fastcontact.mesh.files.med import read_med_field as read_med_field
+from fastcontact.mesh.files.mesh_fields import read_field as read_field
 from fastcontact.mesh.files.mesh_files import read_mesh as read_mesh
 from fastcontact.mesh.files.mesh_files import write_mesh as write_mesh
 from fastcontact.mesh.from_libraries import from_gmsh as from_gmsh

@@ -214,6 +214,7 @@ def prepare(
         columns=not all(pair.eliminable for pair in pairs.values()),
     )  # fmt: skip
     field = model.material_field()
+    solver.contrast = field.contrast
     sides = material_sides(mesh, field.distinct)
     K = stiffness(mesh, model.kinematics, field.moduli, field.loops, None, field.treatment)
     doubtful = too_stiff(K, model.springs)

@@ -66,7 +66,7 @@ def _slope_triangles(ax: Any, quantity: str, all_series: Sequence[Series]) -> No
         right = left * 1.7
         top = bottom * 1.7**slope
         ax.fill([left, right, right], [bottom, bottom, top], facecolor="0.85", edgecolor="0.4", lw=0.8)
-        ax.annotate(f"{slope:g}", (right * 1.05, math.sqrt(bottom * top)), fontsize=8, va="center")
+        ax.annotate(f"{slope:g}", (right / 1.03, math.sqrt(bottom * top)), fontsize=8, ha="right", va="center")
         ax.annotate("1", (math.sqrt(left * right), bottom / 1.12), fontsize=8, ha="center", va="top")
         left *= 2.1
 

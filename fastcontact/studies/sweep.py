@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from math import prod
@@ -23,7 +22,7 @@ from fastcontact.studies.levels import make_mesh, recipe
 from fastcontact.studies.progress import told
 from fastcontact.studies.quantities import of_theory
 from fastcontact.studies.report import of_case
-from fastcontact.studies.settings import one_combination, settings
+from fastcontact.studies.settings import data_of, one_combination, settings
 from fastcontact.studies.sweep_figures import label_of
 from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
 from fastcontact.studies.sweep_report import Sweep
@@ -105,7 +104,7 @@ def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: 
         return ()
     low, high = min(numbers), max(numbers)
     x = np.geomspace(low, high, CURVE) if low > 0 else np.linspace(low, high, CURVE)
-    data = tomllib.loads(case.text)
+    data = data_of(case)
     linked = data.get("study", {}).get("parameters", {})
     curves = []
     for choice in itertools.product(*(own for _, own in others)):
@@ -131,7 +130,7 @@ def _theory_at(
 
 
 def _job(case: Case, choice: dict[str, Value], element: str | None, formulation: str | None, level: int | None) -> Job:
-    data = tomllib.loads(case.text)
+    data = data_of(case)
     linked = data.get("study", {}).get("parameters", {})
     for parameter, value in choice.items():
         data = substituted(data, parameter, value, linked)

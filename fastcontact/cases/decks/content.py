@@ -163,6 +163,15 @@ class Equation:
 
 
 @dataclass(frozen=True)
+class Pin:
+    """Nodes, one or those of a set, that have the displacement of a further one, or each that of one of a further set."""
+
+    place: Place
+    first: str
+    second: str
+
+
+@dataclass(frozen=True)
 class Link:
     """A reference node with nodes that follow it (rigid, kinematic) or whose mean motion it follows (distributing)."""
 
@@ -240,6 +249,7 @@ class Content:
     sector_ends: list[SectorEnds] = field(default_factory=list)
     sectors: list[Sectors] = field(default_factory=list)
     equations: list[Equation] = field(default_factory=list)
+    pins: list[Pin] = field(default_factory=list)
     links: list[Link] = field(default_factory=list)
     axes: list[Axes] = field(default_factory=list)
     pretensions: list[PretensionSection] = field(default_factory=list)

@@ -49,6 +49,7 @@ OF_MODELS: dict[str, Callable[[Content, Block], None]] = {
     "CYCLIC SYMMETRY MODEL": cyclic_symmetry.cyclic_symmetry_model,
     "TIE": connections.tie,
     "EQUATION": connections.equation,
+    "MPC": connections.multi_point,
     "RIGID BODY": connections.rigid_body,
     "TRANSFORM": connections.transform,
 }

@@ -142,7 +142,7 @@ class Hierarchy:
     def cycle(self, number: int = 0) -> None:
         """Improve by one V-cycle: from ``levels[number].b`` to ``levels[number].x``, starting at zero."""
         level = self.levels[number]
-        if level.P is None or level.R is None:
+        if level.P is None:
             self.coarse.solve(level.b, level.x)
             return
         factors = self._factors[number]
@@ -152,7 +152,7 @@ class Hierarchy:
             level.relax(level.r, *factor)
         level.residual()
         below = self.levels[number + 1]
-        level.R.multiply(level.r, below.b)
+        level.restrict(below.b)
         self.cycle(number + 1)
         level.correct(below.x)
         for factor in factors:

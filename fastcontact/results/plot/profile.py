@@ -108,7 +108,9 @@ def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) ->
     farthest = float(np.abs(contact.place).max(initial=0.0))
     reach = 1.35 * max([closed, *radii]) or 1.02 * farthest or 1.0
     reach = min(reach, 1.02 * max(farthest, *radii, 1e-300)) if closed else reach
-    low = contact.place.min(initial=0.0)
+    low, nearest = contact.place.min(initial=0.0), float(np.abs(contact.place).min(initial=np.inf))
+    if nearest > 0.2 * reach and not curves:  # a ring: nothing is to be seen between its axis and its bore
+        return nearest - 0.05 * (reach - nearest), reach
     return (max(-reach, 1.02 * float(low)) if low < 0 else 0.0), reach
 
 

@@ -118,7 +118,8 @@ def _draw(panel: Panel, ax: Any) -> None:
             ax.set_ylim(sorted((0.9 * low, 1.1 * low)))
     if panel.x_end is not None:
         ax.set_xlim(panel.x_start, panel.x_end or None)
-        ax.set_ylim(bottom=0.0)
+        top = float(ax.dataLim.y1)
+        ax.set_ylim(0.0, 1.08 * top if 0.0 < top < float("inf") else None)
     if panel.grid:
         ax.grid(which="major", alpha=panel.grid)
     if panel.minor_grid:

@@ -95,10 +95,11 @@ def test_contact_in_detail(problem, tmp_path):
     assert main(["bench", "contact", "--problem", problem, "--dofs", "1500", "--json", str(path), "-q"]) == 0
     found = json.loads(path.read_text())
     two_dimensions = {"superlu"} if problem == "forma04c" else set()
-    measured = {"problem", "n_dofs", "linear", "cold_step", "twenty_steps", "peak_bytes", "threads"}
+    measured = {"problem", "n_dofs", "linear", "cold_step", "twenty_steps", "from_assembly", "peak_bytes", "threads"}
     assert set(found) == measured | two_dimensions
     assert set(found["linear"]) == {"cpu_s", "iterations", "setup_cpu_s"}
     assert set(found["cold_step"]) == {"cpu_s", "ratio_to_linear"}
+    assert set(found["from_assembly"]) == {"linear_cpu_s", "cold_step_cpu_s", "ratio_to_linear"}
     assert set(found["twenty_steps"]) == {"cpu_s", "ratio_to_linear", "setups", "linear_iterations"}
     assert 750 < found["n_dofs"] < 4000
     assert found["linear"]["setup_cpu_s"] < found["linear"]["cpu_s"]
