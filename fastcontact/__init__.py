@@ -80,7 +80,9 @@ def __getattr__(name: str) -> Any:
     elif name in _MODULES:
         value = importlib.import_module(f"{__name__}.{_MODULES[name]}")
     else:
-        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+        from fastcontact.errors import no_attribute
+
+        raise no_attribute(__name__, name, __all__)
     globals()[name] = value
     return value
 

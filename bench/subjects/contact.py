@@ -1,7 +1,8 @@
 """A cold contact step and 20 steps, in linear solutions L of the same mesh, solver and tolerance without contact.
 
-All three include the preparation of the linear solver (hierarchy or factors) and leave out mesh and assembly. For L
-the contact is dropped: supports and prescribed displacements alone hold both bodies. ``sphere-on-block`` is solved by
+All three include the preparation of the linear solver (hierarchy or factors) and leave out mesh and assembly; "from_assembly"
+is a cold step over L with assembly in both. For L the contact is dropped: supports and prescribed displacements alone hold
+both bodies. ``sphere-on-block`` is solved by
 multigrid, ``forma04c`` by what "auto" chooses, both node-to-segment with converged geometry; the latter is compared with
 one plain factorisation of the same matrix, too: by SuperLU (minimum degree of A + A.T, symmetric mode), or by CHOLMOD where
 that solves it.
@@ -13,6 +14,8 @@ import numpy as np
 from scipy.sparse import bsr_array, csr_array
 from scipy.sparse.linalg import splu
 from suite.timing import peak_bytes
+from suite.whole import cold_step, in_turn
+from suite.whole import linear_solution as linear_solution_of
 
 import fastcontact as fc
 from fastcontact._jit import decorators as _jit
@@ -139,7 +142,8 @@ def detailed(problem, dofs, solver=None, tolerance=TOLERANCE):
     make, name = PROBLEMS[problem]
     name = solver or name
     figures(make(min(dofs, 1_500)), name, tolerance)
-    found = figures(make(dofs), name, tolerance)
+    model = make(dofs)
+    found = {**figures(model, name, tolerance), "from_assembly": from_assembly(model, name, tolerance)}
     return {"problem": problem, **found, "peak_bytes": peak_bytes(), "threads": _jit.threads()}
 
 
@@ -171,6 +175,18 @@ def figures(model, name, tolerance):
             "linear_iterations": counters.iterations - before,
         },
     }  # fmt: skip
+
+
+def from_assembly(model, name, tolerance):
+    """Return a linear solution and a cold step, both from assembly on, the least CPU seconds of two each."""
+    given = {"geometry": tolerance, "linear": tolerance}
+    works = {
+        "linear": lambda: linear_solution_of(model, name, **given),
+        "step": lambda: cold_step(model, name, **given) and None,
+    }
+    seconds = in_turn(works, 2)[1]
+    ratio = seconds["step"] / seconds["linear"]
+    return {"linear_cpu_s": seconds["linear"], "cold_step_cpu_s": seconds["step"], "ratio_to_linear": ratio}
 
 
 def against_factorisation(problem, cold, twenty):

@@ -104,6 +104,17 @@ class MaterialField:
         return found
 
     @cached_property
+    def contrast(self) -> float:
+        """Largest ratio of what is added to the softest stiffness of a material in other directions, at least 1 [-].
+
+        That is ``nu / (1 - 2 nu)`` for isotropic materials, which become incompressible as it grows: the eigenvalues of the
+        moduli for normal strains are then ``3 lambda + 2 mu`` and ``2 mu``.
+        """
+        normal = 2 if self.kinematics == "plane_stress" else 3
+        values = np.linalg.eigvalsh(self.moduli[:, :normal, :normal])
+        return max(1.0, float(((values[:, -1] / values[:, 0]).max() - 1.0) / 3.0))
+
+    @cached_property
     def compliance(self) -> Array:
         """Compliances (n_moduli, n_components, n_components) [1 / pressure], see `Material.compliance_at`."""
         found = np.zeros_like(self.moduli)

@@ -142,6 +142,9 @@ class LinearSolver(Protocol):
         small `tolerance` is [-].
     gave_up : str
         Why another way of solving replaced this one; empty where none did.
+    contrast : float
+        By how much some deformations of a cell are stiffer than others: errors of displacements may exceed residuals by so
+        much, and iterations that need not end with exact solutions go on by so much further [-].
     """
 
     tolerance: float
@@ -149,6 +152,7 @@ class LinearSolver(Protocol):
     asked: float | None = None
     error: float = 0.0
     gave_up: str = ""
+    contrast: float = 1.0
 
     @property
     def iterative(self) -> bool:

@@ -130,8 +130,12 @@ def test_left_solutions_and_extrapolated_starts_end_where_the_direct_solver_does
         ({"multipliers": "standard"}, 5.5),
         ({"ratio": 1e4}, 3.5),
         ({"ratio": 1e8}, 3.5),
+        ({"ratio": 1e-2}, 6.0),
+        ({"ratio": 1e-4}, 8.0),
         ({"nu": 0.45}, 3.5),
         ({"nu": 0.49}, 3.5),
+        ({"nu": 0.499}, 3.5),
+        ({"nu": 0.4999}, 3.5),
         ({"element": "tet4"}, 3.5),
         ({"element": "tet10", "divisions": 6}, 4.0),
         ({"element": "hex20", "divisions": 6}, 4.0),
@@ -152,4 +156,4 @@ def test_iterations_under_whole_interfaces_are_a_few_times_those_without_contact
 def test_signs_of_loose_solutions_do_not_change_the_active_set_to_and_fro():
     robustness = suite("subjects").load("robustness")
     found = robustness.figures(robustness.blocks(12, nu=0.499))
-    assert found["step"]["iterations"] <= 4 * found["linear"]["iterations"]
+    assert found["step"]["iterations"] <= 2.5 * found["linear"]["iterations"]

@@ -21,6 +21,7 @@ from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.hierarchy import Hierarchy, Level
 from fastcontact.linear.multigrid.local_change import LocalChange, merged
 from fastcontact.linear.multigrid.matrix import BlockMatrix
+from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, composed, followers
 from fastcontact.linear.multigrid.symmetric_change import SymmetricChange
 from fastcontact.linear.springs import Springs
 
@@ -31,6 +32,8 @@ Nodes = NDArray[np.intp]
 SPECTRUM_CHANGED = 2.0
 # Largest eigenvalue of the finest level, beside its diagonal, from which it counts as wide; 3 to 4 on well-shaped hexahedra.
 WIDE = 6.0
+# Nodes that equations make so many times as stiff need more than the smoother and the coarser levels of K.
+MUCH = 4.0
 
 
 class ConstrainedHierarchy:
@@ -60,6 +63,7 @@ class ConstrainedHierarchy:
         `springs` are added to the matrix of the hierarchy; only with equations.
         """
         self._undo()
+        self.stiffening = 0.0
         if elimination is None or not len(elimination.pivots):
             self.hierarchy.coarse.set(None)
             self.hierarchy.set_bounds()
@@ -77,7 +81,7 @@ class ConstrainedHierarchy:
         kind = top.b.dtype
         rounded = elimination.weights.astype(kind)
         top.eliminated = replace(elimination, weights=rounded, force_weights=rounded)
-        changes = [SymmetricChange.of_equations(self.A, elimination)]
+        changes = [SymmetricChange.of_equations(self.A, elimination.pivots, elimination.weights)]
         if springs is not None:
             top.springs = springs.scaled(1.0, kind)
             changes.append(SymmetricChange.of_springs(springs, len(self.A.rows)))
@@ -85,8 +89,10 @@ class ConstrainedHierarchy:
             self.hierarchy.coarse.set(csc_array(sum(change.on_finest() for change in changes)))
             return
         diagonals = [change.diagonal() for change in changes]
-        self.stiffening = self._stiffening(diagonals[0])
+        stiffened = self._stiffened(diagonals[0], elimination)
         self._change_diagonal(top, merged(*diagonals))
+        if len(stiffened):
+            changes = self._turned_round(elimination, springs, stiffened, diagonals[1:])
         change = merged(*(change.on_coarse(top.P) for change in changes))
         for level in self.hierarchy.levels[1:]:
             if level.P is None:
@@ -102,12 +108,41 @@ class ConstrainedHierarchy:
         self._kept.clear()
         for level in self.hierarchy.levels:
             level.eliminated = level.change = level.springs = None
+            level.followers = level.free_motions = None
 
-    def _stiffening(self, change: LocalChange) -> float:
+    def _stiffened(self, change: LocalChange, elimination: Elimination) -> Nodes:
+        """Return the nodes without pivots that equations stiffen by much, and set `stiffening`."""
         size = change.size
         of_all = self.hierarchy.levels[0].diagonal.reshape(-1, size * size)[change.nodes]
         own, more = (np.einsum("kii->k", part.reshape(-1, size, size)) for part in (of_all, change.diagonal()))
-        return float(np.divide(more, own, out=np.zeros(len(more)), where=own > 0.0).max(initial=0.0))
+        by = np.divide(more, own, out=np.zeros(len(more)), where=own > 0.0)
+        self.stiffening = float(by.max(initial=0.0))
+        return change.nodes[(by > MUCH) & ~np.isin(change.nodes, elimination.pivots // size)]
+
+    def _turned_round(
+        self, elimination: Elimination, springs: Springs | None, stiffened: Nodes, of_springs: list[LocalChange]
+    ) -> list[SymmetricChange]:
+        """Let coarser levels see stiffened nodes follow the pivots; return the changes there. See `stiffened_nodes`."""
+        top, size = self.hierarchy.levels[0], len(self.A.rows)
+        top.free_motions = FreeMotions(elimination.weights, stiffened, self._own_inverses(stiffened, of_springs))
+        following = followers(elimination, stiffened, size)
+        rounded = following.weights.astype(top.b.dtype)
+        top.followers = replace(following, weights=rounded, force_weights=rounded)
+        changes = [SymmetricChange.of_equations(self.A, *composed(elimination, following))]
+        if springs is not None:
+            changes.append(SymmetricChange.of_springs(springs.under(following.pivots, following.weights), size))
+        return changes
+
+    def _own_inverses(self, nodes: Nodes, of_springs: list[LocalChange]) -> Array:
+        """Return the inverses (k, size, size) of finest diagonal blocks of some nodes, with springs, without equations."""
+        size = len(self.A.rows)
+        blocks = np.zeros((self.hierarchy.n // size, size**2))
+        blocks[nodes] = self.hierarchy.levels[0].diagonal.reshape(-1, size**2)[nodes]
+        for change in of_springs:
+            blocks[change.nodes] += change.diagonal().reshape(-1, size**2)
+        inverses = np.empty(len(nodes) * size**2)
+        cycle_kernels.invert_blocks(blocks[nodes].ravel(), size, inverses)
+        return inverses.reshape(-1, size, size)
 
     def _change_diagonal(self, level: Level, change: LocalChange) -> None:
         """Add the diagonal blocks of a change to those of a level, and remember what the inverses were."""

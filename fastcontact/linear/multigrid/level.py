@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.matrix import BlockMatrix
+from fastcontact.linear.multigrid.restriction import Restriction
+from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions
 from fastcontact.linear.springs import Springs
 
 Values = NDArray[Any]
@@ -27,8 +29,10 @@ class Level:
         Diagonal blocks, and their inverses as the smoother takes them.
     bound : float
         Upper bound of the eigenvalues of ``D^-1 A``.
-    P, R : BlockMatrix or None
-        Prolongator and its transpose; None on the coarsest level.
+    P : BlockMatrix or None
+        Prolongator; None on the coarsest level.
+    R : Restriction or None
+        Its transpose.
     eliminated : Elimination or None
         Equations, on the finest level: weights in the precision of the cycle, the same for forces.
     change : tuple of ndarray, or None
@@ -36,6 +40,10 @@ class Level:
         the change on them as `indptr`, `indices` and `data` of a `BlockMatrix`.
     springs : Springs or None
         Springs on the finest level, under the equations.
+    followers : Elimination or None
+        Unknowns that follow the eliminated ones in corrections from coarser levels, on the finest level.
+    free_motions : FreeMotions or None
+        What the smoother adds at nodes that equations stiffen by much, on the finest level.
     b, x, r, d : ndarray (n,)
         Right-hand side, iterate, residual and step of the cycle.
     """
@@ -45,10 +53,12 @@ class Level:
     inverse: Values
     bound: float
     P: BlockMatrix | None = None
-    R: BlockMatrix | None = None
+    R: Restriction | None = None
     eliminated: Elimination | None = None
     change: tuple[Values, ...] | None = None
     springs: Springs | None = None
+    followers: Elimination | None = None
+    free_motions: FreeMotions | None = None
     b: Values = field(init=False)
     x: Values = field(init=False)
     r: Values = field(init=False)
@@ -67,6 +77,8 @@ class Level:
         """Make a Chebyshev step: see `cycle_kernels.relax`."""
         kind = r.dtype.type
         cycle_kernels.relax(self.inverse, r, kind(first), kind(second), self.d, self.x, self.A.rows, begin)
+        if self.free_motions is not None:
+            self.free_motions.correct(r, second, self.d, self.x)
         if self.eliminated is not None:
             self.eliminated.complete(self.x)
 
@@ -85,10 +97,23 @@ class Level:
             numbers, indptr, indices, data = self.change
             cycle_kernels.subtract_rows(numbers, indptr, indices, (data,), x, r, self.A.rows)
 
+    def restrict(self, coarse: Values) -> None:
+        """Fill the right-hand side of the next coarser level with the residual `r`, which is lost."""
+        assert self.R is not None
+        if self.followers is not None:
+            self.followers.move_forces(self.r)
+        self.R.multiply(self.r, coarse)
+
     def correct(self, coarse: Values) -> None:
         """Add the correction of the next coarser level."""
         assert self.P is not None
-        self.P.combine(1.0, coarse, 1.0, self.x, self.x)
+        if self.followers is None:
+            self.P.combine(1.0, coarse, 1.0, self.x, self.x)
+        else:
+            own, W = self.followers.pivots, self.followers.weights
+            beside = self.x[own] - W @ self.x
+            self.P.combine(1.0, coarse, 1.0, self.x, self.x)
+            self.x[own] = W @ self.x + beside
         if self.eliminated is not None:
             self.eliminated.complete(self.x)
 

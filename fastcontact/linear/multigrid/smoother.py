@@ -45,6 +45,8 @@ def largest_eigenvalue(level: Level) -> float:
     kind = r.dtype.type
     for step in range(min(LANCZOS_STEPS, level.n)):
         cycle_kernels.relax(level.inverse, r, kind(0), kind(1), scratch, z, level.A.rows, True)
+        if level.free_motions is not None:
+            level.free_motions.correct(r, 1.0, scratch, z)
         if level.eliminated is not None:
             level.eliminated.complete(z)
         new = float(r @ z)

@@ -41,6 +41,8 @@ SLOWEST = 0.999
 WARM, WARM_LEAST, MOST_WARM = 0.05, 1e-3, 10
 # A nonsymmetric iteration whose residual does not fall to this part in so many iterations stands still for good.
 FALLS, STANDING = 0.99, 40
+# Materials with a smaller contrast are solved for as if they had none.
+MILD = 10.0
 # Where the smoother amplifies something, its bound of the spectrum is raised by this factor, so many times.
 RAISE, RAISES = 1.3, 4
 
@@ -59,6 +61,11 @@ class Multigrid:
     precision : {"single", "double"}
         Of the numbers inside the multigrid cycle; the iteration around it is in double precision.
 
+    Attributes
+    ----------
+    contrast : float
+        See `LinearSolver`.
+
     Raises
     ------
     ModelError
@@ -70,6 +77,7 @@ class Multigrid:
             raise ModelError(f"the precision of the multigrid cycle is 'single' or 'double', not '{precision}'")
         self.tolerance, self.precision = tolerance, precision
         self.counters = Counters()
+        self.contrast = 1.0
 
     @property
     def nbytes(self) -> int:
@@ -78,6 +86,7 @@ class Multigrid:
 
     def build(self, K: bsr_array, rigid_modes: Array, release: bool = False) -> None:
         """Build the hierarchy of K (n, n); see `LinearSolver.prepare`."""
+        check_threads()
         n = K.shape[0]
         self.K = ScaledMatrix(K, self.precision, release)
         self._modes = rigid_modes.astype(np.float32)  # if they are needed again: single precision is enough
@@ -89,7 +98,6 @@ class Multigrid:
         self.columns = FlexibilityColumns(n, self._solve_many, MOST_COLUMNS)
 
     def _build(self, rigid_modes: Array) -> None:
-        check_threads()
         self.hierarchy = Hierarchy(self.K.scaled, rigid_modes)
         self._constrained = ConstrainedHierarchy(self.hierarchy, self.K.scaled)
         # The equations that hold, and those that the hierarchy was changed for.
@@ -148,7 +156,7 @@ class Multigrid:
             cg.x[:] = 0.0 if guess is None else guess
             self._begin(f, elimination)
         self._solved = f
-        enough = max(self.tolerance, tolerance or 0.0) * scale
+        enough = self._enough(tolerance or 0.0) * scale
         made, raised, first = 0, 0, cg.norm
         while cg.norm > enough:
             if made >= MAX_ITERATIONS or raised > RAISES:
@@ -157,7 +165,9 @@ class Multigrid:
                     f"above {self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
                 )
             watch = monitor if made and made % WATCH_EVERY == 0 else None
-            error = cg.norm / scale * _amplification(cg.norm / first, made) if watch is not None else 0.0
+            error = (
+                self._contrast * cg.norm / scale * _amplification(cg.norm / first, made) if watch is not None else 0.0
+            )
             if watch is not None and watch(cg.x, self.multiplier(elimination, cg.x, f), error):
                 break
             if cg.step(self._multiply, self.precondition):
@@ -199,8 +209,9 @@ class Multigrid:
             self._residuals = ConjugateResiduals(len(f))
         self._solved = None
         iteration = self._residuals
-        enough = max(self.tolerance, tolerance) * self._scale(f, elimination)
+        scale = self._scale(f, elimination)
         self.constrain(elimination, springs)
+        enough = self._enough(tolerance) * scale
 
         def multiply(p: Array, q: Array) -> None:
             self.K.combine(1.0, p, 0.0, q, q)
@@ -287,6 +298,15 @@ class Multigrid:
             self.K.add_forces_of(elimination.pivots, elimination.offset, forces)
             square += self._cg.dot(forces, forces)
         return float(np.sqrt(square))
+
+    def _enough(self, tolerance: float) -> float:
+        """Return the relative residual to reach: `tolerance`, but not less than the solver's own."""
+        return max(self.tolerance, tolerance / self._contrast)
+
+    @property
+    def _contrast(self) -> float:
+        """By how much relative residuals flatter a solution: that of the softer body, beside pivots of a much stiffer one."""
+        return max(1.0, self._constrained.stiffening, self.contrast if self.contrast > MILD else 1.0)
 
     def _multiply(self, p: Array, q: Array) -> None:
         self.K.combine(1.0, p, 0.0, q, q)

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array
 
-from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import symmetric_change_kernels
 from fastcontact.linear.multigrid.local_change import LocalChange
 from fastcontact.linear.multigrid.matrix import BlockMatrix
@@ -22,6 +21,7 @@ from fastcontact.linear.springs import Springs
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
+Pivots = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,14 +40,13 @@ class SymmetricChange:
     size: int
 
     @classmethod
-    def of_equations(cls, A: BlockMatrix, elimination: Elimination) -> SymmetricChange:
-        """Return ``T.T A T - A`` for a symmetric A (n, n), where eliminated equations say ``u = T u``."""
-        pivots, m, size = elimination.pivots, len(elimination.pivots), len(A.rows)
-        shape = elimination.weights.shape
-        D = csr_array(elimination.weights + csr_array((np.full(m, -1.0), pivots, np.arange(m + 1)), shape=shape))
+    def of_equations(cls, A: BlockMatrix, pivots: Pivots, weights: csr_array) -> SymmetricChange:
+        """Return ``T.T A T - A`` for a symmetric A (n, n), where ``u = T u`` says ``u[pivots] = weights u``."""
+        m, size, shape = len(pivots), len(A.rows), weights.shape
+        D = csr_array(weights + csr_array((np.full(m, -1.0), pivots, np.arange(m + 1)), shape=shape))
         number, count = np.full(shape[1], -1, np.int32), np.empty(m, np.int32)
         number[pivots] = np.arange(m)
-        of_A = A.indptr, A.indices, A.exact, size
+        of_A = A.indptr, A.indices, A.storage, A.exact, size
         symmetric_change_kernels.count_stiffness_rows(pivots, number, D.indptr, D.indices, *of_A, count)
         low = _pointers(count)
         columns, values = np.empty(low[-1], np.int32), np.empty(low[-1])

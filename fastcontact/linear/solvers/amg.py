@@ -30,8 +30,9 @@ log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
 # Unknowns up to which a factorisation replaces multigrid, by the number of components of a displacement.
 FACTORS_UP_TO = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
-# Equations that stiffen a node by more than this take multigrid hundreds of iterations.
-STIFFENED = 300.0
+# Equations that stiffen a node by more than this leave the softer body too little of multigrid's tolerance; coupled ones,
+# whose weights are nearly right only, take hundreds of iterations from the second on.
+STIFFENED, STIFFENED_COUPLED = 3e4, 6.0
 # Where forces stay out of balance, the tolerance is lowered down to this; round-off leaves little below it.
 TIGHT = 1e-12
 
@@ -130,7 +131,8 @@ class Amg(Multigrid, LinearSolver):
             If multigrid would need hundreds of iterations and factors can take over.
         """
         super().constrain(elimination, springs)
-        if self._constrained.stiffening > STIFFENED and self._may_factorise:
+        coupled = elimination is not None and elimination.coupled is not None
+        if self._constrained.stiffening > (STIFFENED_COUPLED if coupled else STIFFENED) and self._may_factorise:
             raise StallError(
                 f"contact makes nodes {self._constrained.stiffening:.1e} times as stiff as they are, where the secondary "
                 "side is much stiffer than the primary one: let the softer body be the secondary side"

@@ -181,3 +181,14 @@ def test_functions_that_return_no_axes_are_refused(axes, words):
 def test_what_is_no_material_is_refused():
     with pytest.raises(fc.ModelError, match="must be a Material, not the float"):
         fc.Model(fc.generate.block(divisions=(2, 2)), "plane_strain").add_material(210.0)
+
+
+@pytest.mark.parametrize(
+    ("nu", "kinematics", "expected"),
+    [(0.3, "3d", 1.0), (0.4999, "3d", 2499.5), (0.49, "axisymmetric", 24.5), (0.4999, "plane_stress", 1.0)],
+)
+def test_contrast_of_a_material_is_that_of_change_of_volume_to_shear(nu, kinematics, expected):
+    mesh = MESHES["hex8"]() if kinematics == "3d" else plane_patch("quad4")
+    model = fc.Model(mesh, kinematics=kinematics)
+    model.add_material(fc.LinearElastic(E=7.0, nu=nu))
+    assert model.material_field().contrast == pytest.approx(expected)

@@ -58,7 +58,10 @@ def changes(size, rng):
     A, dense = symmetric_blocks(size, rng)
     elimination, T = equations(size, rng)
     R, stiffness = sparse((70, N_NODES * size), 0.03, rng), rng.random(70)
-    ours = SymmetricChange.of_equations(A, elimination), SymmetricChange.of_springs(Springs(R, stiffness), size)
+    ours = (
+        SymmetricChange.of_equations(A, elimination.pivots, elimination.weights),
+        SymmetricChange.of_springs(Springs(R, stiffness), size),
+    )
     return ours, (T.T @ dense @ T - dense, R.T @ (stiffness[:, None] * R.toarray()))
 
 

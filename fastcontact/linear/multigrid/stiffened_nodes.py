@@ -1,0 +1,114 @@
+"""Nodes that equations tie to a much stiffer body: what the smoother and coarser levels need there.
+
+Equations let the unknowns of one side, the pivots, follow those of the other. Where the pivots' side is much stiffer, nodes
+of the other side become as stiff as that, and two things go wrong:
+
+- Their motions that move no pivot are as soft as their own body, while the smoother takes them for stiff. `FreeMotions`
+  corrects these by the stiffness of their body alone.
+- Aggregates that they share with softer neighbours would move the stiff body: such coarse motions cost far too much energy,
+  and coarse levels correct neither side. Their corrections therefore see it the other way round: the unknowns of stiffened
+  nodes follow the pivots, ``u = S u`` (`followers`), and the pivots then follow them as ever, ``u = T u``. Coarse matrices
+  are Galerkin products with ``T S P`` (`composed`).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import bsr_array, coo_array, csc_array, csr_array, diags_array, vstack
+from scipy.sparse.linalg import splu
+
+from fastcontact.linear.elimination.elimination import Elimination
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+# Equations that repeat each other on the stiffened nodes are told apart by so much of their own compliance.
+REPEATED = 1e-6
+# Unknowns follow where translations of their side move the pivots by at least this part of them.
+LEAST = 0.3
+
+
+class FreeMotions:
+    """Corrections of motions of stiffened nodes that move no pivot.
+
+    With the weights W of the pivots on these nodes and the diagonal blocks D of their body's own stiffness, the correction
+    for a residual r is ``D^-1 r - D^-1 W.T (W D^-1 W.T)^-1 W D^-1 r``: what D gives under ``W u = 0``.
+
+    Parameters
+    ----------
+    weights : csr_array (m, n)
+        Of the pivots.
+    nodes : ndarray of int (k,)
+        Those stiffened, without pivots of their own.
+    inverse : ndarray (k, size, size)
+        Inverses of the diagonal blocks of these nodes, as they are without equations.
+    """
+
+    def __init__(self, weights: csr_array, nodes: Indices, inverse: Array) -> None:
+        size, k = inverse.shape[1], len(nodes)
+        self._at = (nodes[:, None] * size + np.arange(size)).ravel()
+        self._yielding = csr_array(bsr_array((inverse, np.arange(k), np.arange(k + 1))))
+        W = csr_array(weights[:, self._at])
+        W = W[np.diff(W.indptr) > 0]
+        self._moves = csr_array(self._yielding @ W.T)
+        compliance = csr_array(W @ self._moves)
+        shifted = compliance + diags_array(REPEATED * compliance.diagonal(), format="csr")
+        self._factors = splu(csc_array(shifted), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+
+    def correct(self, r: NDArray[Any], factor: float, step: NDArray[Any], x: NDArray[Any]) -> None:
+        """Add `factor` times the correction for the residual r (n,) to the last `step` (n,) and to x (n,)."""
+        own = r[self._at].astype(float)
+        found = self._yielding @ own - self._moves @ self._factors.solve(self._moves.T @ own)
+        found = (factor * found).astype(x.dtype)
+        step[self._at] += found
+        x[self._at] += found
+
+
+def followers(elimination: Elimination, nodes: Indices, size: int) -> Elimination:
+    """Return how the unknowns of stiffened nodes follow the pivots, S.
+
+    Each follows the mean of the equations it is part of, weighted with its share in them. The other unknowns of its own side
+    are taken to move as it does, so that translations of both sides together stay what they are.
+
+    Parameters
+    ----------
+    elimination : Elimination
+        T, with sparse weights (m, n).
+    nodes : ndarray of int (k,)
+        Those stiffened, without pivots of their own.
+    size : int
+        Unknowns of a node.
+    """
+    pivots, W = elimination.pivots, coo_array(elimination.weights)
+    m, n = W.shape
+    opposite, stiffened = np.ones(n // size, bool), np.zeros(n // size, bool)
+    opposite[pivots // size], stiffened[nodes] = False, True
+    other, along = opposite[W.col // size], W.col % size
+    through = stiffened[W.col // size] & (along == (pivots % size)[W.row]) & (W.data > 0.0)
+    unknowns, place = np.unique(W.col[through], return_inverse=True)
+    share = csr_array((W.data[through], (place, W.row[through])), shape=(len(unknowns), m))
+    # What the opposite side moves each pivot by, if all of it moves by one along each direction.
+    together = csr_array((W.data[other], (W.row[other], along[other])), shape=(m, size))
+    moved = np.asarray((share @ together).toarray())
+    enough = moved[np.arange(len(unknowns)), unknowns % size] >= LEAST * np.asarray(share.sum(axis=1))
+    unknowns, share, moved = unknowns[enough], csr_array(share[enough]), moved[enough]
+    own = csr_array((-W.data[~other], (W.row[~other], W.col[~other])), shape=(m, n))
+    own = own + csr_array((np.ones(m), pivots, np.arange(m + 1)), shape=(m, n))
+    beside = unknowns[:, None] // size * size + np.arange(size)
+    at, direction = np.nonzero(~np.isin(beside, unknowns))
+    across = csr_array((moved[at, direction], (at, beside[at, direction])), shape=(len(unknowns), n))
+    by = moved[np.arange(len(unknowns)), unknowns % size]
+    weights = csr_array(diags_array(1.0 / by, format="csr") @ (share @ own - across))
+    return Elimination(unknowns, weights, np.zeros(len(unknowns)), weights, csr_array((0, 0)))
+
+
+def composed(elimination: Elimination, following: Elimination) -> tuple[Indices, csr_array]:
+    """Return which unknowns T S changes, and the weights (m + q, n) of what they become; see `followers`."""
+    T, S = elimination.weights, following.weights
+    through = csr_array(T[:, following.pivots])
+    kept = np.ones(T.shape[1])
+    kept[following.pivots] = 0.0
+    pivots = np.concatenate([elimination.pivots, following.pivots])
+    return pivots, csr_array(vstack([T @ diags_array(kept) + through @ S, S], format="csr"))
