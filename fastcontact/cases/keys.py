@@ -37,7 +37,7 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         },
         (),
     ),
-    "support": ({"group": str, **AXES, "normal": NUMBER, "ramp": list}, ("group",)),
+    "support": ({"group": str, **AXES, "normal": NUMBER, "axes": (list, dict), "ramp": list}, ("group",)),
     "pressure": ({"group": str, "value": PLACE, "ramp": list}, ("group", "value")),
     "traction": ({"group": str, **AXES, "ramp": list}, ("group",)),
     "body_force": ({"groups": (list, str), **AXES, "ramp": list}, ()),

@@ -93,11 +93,13 @@ def _prescribing(model: Model, asked: Asked) -> tuple[list[Support], list[int]]:
     """Return the supports on a group, and the numbers of relations that prescribe its displacement along normals."""
     group, only = asked[1], "xyz".find(str(asked[2])) if len(asked) == 3 else None
     supports = [s for s in model.supports if s.group == group and only in (None, s.component)]
-    normal = f"the displacement normal prescribed on '{group}'"
-    along = [number for number, relation in enumerate(model.relations) if relation.name == normal and only is None]
+    kinds = ("normal", "x", "y", "z") if only is None else (str(asked[2]),)
+    names = [f"the displacement {kind} prescribed on '{group}'" for kind in kinds]
+    wanted = {*(name for name in names if "normal" in name.split()[2]), *(f"{name} along axes" for name in names)}
+    along = [number for number, relation in enumerate(model.relations) if relation.name in wanted]
     if not (supports or along):
-        names = list(dict.fromkeys(s.group for s in model.supports))
-        raise ModelError(unknown("group whose displacement is prescribed", ", ".join(map(str, asked[1:])), names))
+        known = list(dict.fromkeys(s.group for s in model.supports))
+        raise ModelError(unknown("group whose displacement is prescribed", ", ".join(map(str, asked[1:])), known))
     return supports, along
 
 
