@@ -35,8 +35,8 @@ class ModelSupports(ModelContact):
     def fix(self, group: str, components: str, *, axes: SupportAxes = None) -> None:
         """Hold displacement components (``"x"``, ``"y"``, ``"xy"``, in 3D also ``"z"``) of a group's nodes at zero.
 
-        ``"normal"``: those along the normals of a group of facets. With `axes`, vectors (dim,) or (2, 3) or (3, 3) [-] or a
-        function, components are along these, see `prescribe`.
+        ``"normal"``: those along the normals of a group of facets. With `axes` (k, 3) [-]
+        components are along these, see `prescribe`.
         """
         if not components:
             raise ModelError(f"fix('{group}', ...) names no component: give for example 'x' or 'xy'")
@@ -61,9 +61,9 @@ class ModelSupports(ModelContact):
 
         A component is a number, or a function from reference positions (n, dim) [length] to displacements (n,) [length].
         `normal` is the displacement out of the body along the mean normal of the facets at each node, for groups of facets.
-        With `axes`, vectors (2,), (2, 3) or (3, 3) [-] or a function, as of materials, x, y and z are along the first, second and
-        third of them:
-        ``axes=(1, 1)`` in the plane, ``axes=fc.CylindricalAxes()`` for radial, circumferential and axial components.
+        With `axes` (k, 3) [-], vectors in rows or a function as those of materials, in the plane also one vector of two
+        numbers, x, y and z are along the first, second and third of them: ``axes=fc.CylindricalAxes()`` stands for radial,
+        circumferential and axial components.
         """
         if axes is not None:
             if normal is not None:
