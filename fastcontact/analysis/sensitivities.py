@@ -19,8 +19,8 @@ from fastcontact._jit import parallel
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.sensitivity.adjoint import Adjoint, Change, Gradient
 from fastcontact.analysis.sensitivity.moving_contact import REMEDY, MovingContact
-from fastcontact.analysis.sensitivity.parameters import change_by
-from fastcontact.analysis.sensitivity.quantities import with_gradient
+from fastcontact.analysis.sensitivity.parameters import change_by, check_parameter
+from fastcontact.analysis.sensitivity.quantities import check_quantity, with_gradient
 from fastcontact.analysis.sensitivity.settled_step import checked_margin, settled_step
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
@@ -80,9 +80,10 @@ def sensitivities(
     step : StepResult
         The last one that `solve` returned, or that a result file holds, with its `restart`.
     quantity : sequence
-        ``("displacement", point, "y")``, of a point by its number [length]; ``("reaction", group, "y")``, the sum of the
-        forces of supports on a group [force]; ``("contact_force", pair, "y")``, on the secondary side [force];
-        ``("pressure_max", pair)``, at the node where it is largest now, or ``("pressure", pair, point)`` [pressure].
+        ``("displacement", point, "y")``, of a point by its number, or by a group that holds it alone [length];
+        ``("reaction", group, "y")``, the sum of the forces of supports on a group [force]; ``("contact_force", pair, "y")``,
+        on the secondary side [force]; ``("pressure_max", pair)``, at the node where it is largest now, or
+        ``("pressure", pair, point)`` [pressure].
     parameters : sequence of sequences
         ``("E", material)`` [pressure] and ``("nu", material)`` [-] of a `LinearElastic`, by a group that it was given to or
         by its number in the order of the model; ``("load", group)``, the factor of all loads on a group, or of the force on a
@@ -106,11 +107,19 @@ def sensitivities(
         facets, so that there is one derivative to either side.
     """
     asked = [tuple(parameter) for parameter in parameters]
+    check_asked(model, quantity, parameters)
     problem, contact = settled_step(model, step, ramp_of(ramp), criteria or Criteria(), linear_solver)
     nearest = checked_margin(contact, margin) if problem.pairs else 1.0
     contact, gradient = with_gradient(contact, step, tuple(quantity))
     values, solutions = _derivatives(contact, gradient, [change_by(contact, parameter) for parameter in asked])
     return Sensitivities(gradient.value, dict(zip(asked, values.tolist(), strict=True)), nearest, solutions)
+
+
+def check_asked(model: Model, quantity: Sequence[str | int], parameters: Sequence[Sequence[str | int]]) -> None:
+    """Raise ModelError or MeshError if a model has no such quantity or parameter, see `sensitivities`."""
+    check_quantity(model, tuple(quantity))
+    for parameter in parameters:
+        check_parameter(model, tuple(parameter))
 
 
 def _derivatives(contact: MovingContact, gradient: Gradient, changes: Sequence[Change]) -> tuple[Array, int]:

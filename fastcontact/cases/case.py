@@ -12,7 +12,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.cases.checks import CHECK, Check, read_check
 from fastcontact.cases.decks.blocks import files_of_deck
 from fastcontact.cases.decks.deck import Deck, read_deck
-from fastcontact.cases.keys import NUMBER, RAMP, SOLVE, STUDY, TOP, UNITS, called, check_keys, tables
+from fastcontact.cases.keys import NUMBER, RAMP, SENSITIVITY, SOLVE, STUDY, TOP, UNITS, at, called, check_keys, tables
 from fastcontact.cases.model_tables import build_model, points
 from fastcontact.cases.shipped import case_path, shipped_cases
 from fastcontact.errors import CaseError, unknown
@@ -27,6 +27,8 @@ from fastcontact.model.ramp import Ramp, linear_ramp
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import known_units, units_of_results
 
+# A quantity or a parameter of sensitivities.
+Asked = tuple[str | int, ...]
 # Suffix of input decks of Abaqus and CalculiX.
 DECK = ".inp"
 
@@ -57,6 +59,8 @@ class Case:
         Approach of the theory by contact pair, where it was given [length].
     folder : pathlib.Path
         In which the files lie that the case names, absolute.
+    sensitivities : list of (tuple, list of tuple)
+        Quantities and their parameters, see `fastcontact.sensitivities`.
     deck : Deck, optional
         The input deck of which the case was made.
     """
@@ -76,6 +80,7 @@ class Case:
     units: dict[str, str] = field(default_factory=dict)
     approach: dict[str, float] = field(default_factory=dict)
     folder: Path = Path()
+    sensitivities: list[tuple[Asked, list[Asked]]] = field(default_factory=list)
     deck: Deck | None = None
 
     def finished(self, step: StepResult) -> StepResult:
@@ -213,6 +218,7 @@ def build_case(
         units=known_units(data.get("units", {})),
         approach=approach,
         folder=Path(folder).resolve(),
+        sensitivities=_sensitivities(model, data),
     )
 
 
@@ -234,6 +240,29 @@ def _checks(data: dict[str, Any], probes: Mapping[str, int], theories: Mapping[s
         check_keys(f"check[{i}]", entry, CHECK)
         checks.append(read_check(f"check[{i}]", entry, probes, _pairs(data), theories, str(data["kinematics"])))
     return checks
+
+
+def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Asked, list[Asked]]]:
+    from fastcontact.analysis.sensitivities import check_asked  # half of the solver
+
+    found = []
+    for i, entry in enumerate(tables("sensitivity", data.get("sensitivity", []))):
+        where = f"sensitivity[{i}]"
+        check_keys(where, entry, SENSITIVITY)
+        for key in SENSITIVITY:
+            if key not in entry:
+                raise CaseError(f"{where} needs '{key}'")
+        rows = [entry["quantity"], *entry["by"]]
+        if not all(isinstance(row, list) and all(type(word) in (str, int) for word in row) for row in rows):
+            raise CaseError(
+                f"{where}: 'quantity' must be a list such as [\"pressure_max\", \"PAIR\"], and 'by' a list of lists such as "
+                '[["E", "GROUP"]]'
+            )
+        quantity, *by = (tuple(row) for row in rows)
+        with at(where):
+            check_asked(model, quantity, by)
+        found.append((quantity, by))
+    return found
 
 
 def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:

@@ -37,7 +37,7 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         },
         (),
     ),
-    "support": ({"group": str, **AXES, "normal": NUMBER, "ramp": list}, ("group",)),
+    "support": ({"group": str, **AXES, "normal": NUMBER, "axes": (list, dict), "ramp": list}, ("group",)),
     "pressure": ({"group": str, "value": PLACE, "ramp": list}, ("group", "value")),
     "traction": ({"group": str, **AXES, "ramp": list}, ("group",)),
     "body_force": ({"groups": (list, str), **AXES, "ramp": list}, ()),
@@ -129,6 +129,7 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
 SURFACE = {"file": str, "group": str, "flip": bool, "crease": NUMBER}
 # How a rigid obstacle turns.
 ROTATION: dict[str, Any] = {"angle": NUMBER, "centre": list, "axis": list, "ramp": list}
+SENSITIVITY: dict[str, Any] = {"quantity": list, "by": list}
 FIELD: dict[str, Any] = {"file": str, "field": str, "over": str, "instant": NUMBER}
 # Studies of this case; `fastcontact.studies.settings` reads them.
 STUDY: dict[str, Any] = {
@@ -142,7 +143,7 @@ TOP: dict[str, Any] = {
     "title": str,
     "kinematics": str,
     **dict.fromkeys(("units", "mesh", "contact", "obstacle", "ramp", "solve", "probes", "theory", "study"), dict),
-    **dict.fromkeys((*LISTS, "check"), list),
+    **dict.fromkeys((*LISTS, "check", "sensitivity"), list),
 }
 
 

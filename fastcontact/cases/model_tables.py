@@ -68,6 +68,10 @@ def _add_temperature(model: Model, **given: Any) -> None:
         model.add_temperature_file(**given)
 
 
+def _add_support(model: Model, axes: Any = None, **given: Any) -> None:
+    model.prescribe(axes=_axes("support", axes), **given)
+
+
 def _add_initial_stress(model: Model, axes: Any = None, **given: Any) -> None:
     model.add_initial_stress(axes=_axes("initial_stress", axes), **given)
 
@@ -110,7 +114,7 @@ _NEEDED: dict[type[Material], tuple[str, ...]] = {
 # By kind of table, in the order in which they are added to the model.
 _ADD: dict[str, Callable[..., None]] = {
     "material": _add_material,
-    "support": Model.prescribe,
+    "support": _add_support,
     "pressure": Model.add_pressure,
     "traction": Model.add_traction,
     "body_force": Model.add_body_force,

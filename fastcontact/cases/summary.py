@@ -11,8 +11,10 @@ import numpy as np
 
 from fastcontact._version import __version__
 from fastcontact.analysis.contact_answers import contact_answers
-from fastcontact.cases.case import Case
+from fastcontact.analysis.sensitivities import sensitivities
+from fastcontact.cases.case import Asked, Case
 from fastcontact.cases.checks import at_point, evaluated
+from fastcontact.errors import ModelError
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.units import units_of_results, valued, with_unit
 
@@ -56,12 +58,25 @@ def summarise(
             for pair, theories in case.theories.items()
             if pair in last.contact and all(hasattr(theories["theory"], name) for name in COMPARED)
         },
+        "sensitivities": [_sensitivity(case, last, *asked) for asked in case.sensitivities],
         "regularised": last.iterations.get("regularised"),
         "checks": [evaluated(check, last, case.probes, case.theories) for check in case.checks],
         "timings": dict(timings),
         "versions": versions(),
         "warnings": list(warnings),
     }
+
+
+def _sensitivity(case: Case, last: StepResult, quantity: Asked, by: Sequence[Asked]) -> dict[str, Any]:
+    """Return derivatives of a quantity, or why there are none in this state."""
+    try:
+        found = sensitivities(
+            case.model, last, quantity, by, ramp=case.ramp, criteria=case.criteria, linear_solver=case.linear_solver
+        )
+    except ModelError as error:
+        return {"quantity": list(quantity), "refused": str(error)}
+    derivatives = [{"by": list(parameter), "value": value} for parameter, value in found.derivatives.items()]
+    return {"quantity": list(quantity), "value": found.value, "margin": found.margin, "derivatives": derivatives}
 
 
 def of_step(step: StepResult) -> dict[str, Any]:
@@ -177,6 +192,8 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
         found.append(_regularised_line(summary["regularised"], unit))
     for name, theory in summary["theory"].items():
         found += _theory_lines(name, theory)
+    for found_here in summary["sensitivities"]:
+        found += _sensitivity_lines(found_here)
     for check in summary["checks"]:
         found += [_check_line(check, unit), *_why(check)]
     return found
@@ -243,6 +260,14 @@ def _theory_lines(pair: str, theory: Mapping[str, Any]) -> list[str]:
         + (f", radius {values['deviation']['radius']:+.2%}" if values["deviation"]["radius"] is not None else "")
         for key, values in theory.items()
     ]
+
+
+def _sensitivity_lines(told: Mapping[str, Any]) -> list[str]:
+    quantity = " ".join(map(str, told["quantity"]))
+    if "refused" in told:
+        return [f"  no sensitivities of {quantity}: {told['refused']}"]
+    changes = ", ".join(f"{' '.join(map(str, own['by']))} {own['value']:.6g}" for own in told["derivatives"])
+    return [f"  sensitivities of {quantity}, now {told['value']:.6g}: by {changes}"]
 
 
 def _check_line(check: Mapping[str, Any], unit: Mapping[str, str]) -> str:

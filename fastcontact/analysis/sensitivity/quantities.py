@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fastcontact.analysis.sensitivity.adjoint import Gradient
 from fastcontact.analysis.sensitivity.moving_contact import MovingContact
 from fastcontact.errors import ModelError, unknown
+from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
 
 Array = NDArray[np.float64]
@@ -23,48 +24,62 @@ FORMS = {
 }
 
 
-def with_gradient(contact: MovingContact, step: StepResult, asked: Asked) -> tuple[MovingContact, Gradient]:
-    """Return the gradient of a quantity, and the contact whose samples hold what it needs.
-
-    ModelError if there is no such quantity.
-    """
+def check_quantity(model: Model, asked: Asked) -> None:
+    """Raise ModelError or MeshError if there is no such quantity of a model."""
     kind = str(asked[0]) if asked else ""
     if kind not in FORMS:
         raise ModelError(unknown("quantity", kind, FORMS))
     if len(asked) != FORMS[kind].count(",") + 1:
         raise ModelError(f"the quantity {asked} must have the form {FORMS[kind]}")
-    none = Gradient(0.0, np.zeros(len(contact.u)), np.zeros(len(contact.active)))
     if kind == "displacement":
-        dof = _dof(contact, asked)
+        _point(model, asked[1])
+    elif kind == "reaction":
+        model.mesh.points_of(str(asked[1]))
+    elif asked[1] not in [pair.name for pair in model.contact]:
+        raise ModelError(unknown("contact pair", str(asked[1]), [pair.name for pair in model.contact]))
+    if kind == "pressure":
+        _point(model, asked[2])
+    if kind in ("displacement", "reaction", "contact_force"):
+        _axis(model, asked)
+
+
+def with_gradient(contact: MovingContact, step: StepResult, asked: Asked) -> tuple[MovingContact, Gradient]:
+    """Return the gradient of a quantity that `check_quantity` has found, and the contact whose samples it needs.
+
+    ModelError if it has no sensitivities in this state.
+    """
+    none = Gradient(0.0, np.zeros(len(contact.u)), np.zeros(len(contact.active)))
+    if asked[0] == "displacement":
+        model = contact.problem.model
+        dof = _point(model, asked[1]) * model.mesh.dim + _axis(model, asked)
         none.displacement[dof] = 1.0
         return contact, replace(none, value=float(contact.u[dof]))
-    if kind == "reaction":
+    if asked[0] == "reaction":
         return contact, _reaction(contact, none, asked)
-    name = str(asked[1])
-    if name not in contact.problem.pairs:
-        raise ModelError(unknown("contact pair", name, list(contact.problem.pairs)))
-    if kind == "contact_force":
+    if asked[0] == "contact_force":
         return contact, _contact_force(contact, none, step, asked)
     return _pressure(contact, none, step, asked)
 
 
-def _axis(contact: MovingContact, asked: Asked) -> int:
-    axes = "xyz"[: contact.problem.model.mesh.dim]
+def _axis(model: Model, asked: Asked) -> int:
+    axes = "xyz"[: model.mesh.dim]
     if asked[-1] not in list(axes):
         raise ModelError(unknown(f"component of the quantity {asked}", str(asked[-1]), list(axes)))
     return axes.index(str(asked[-1]))
 
 
-def _dof(contact: MovingContact, asked: Asked) -> int:
-    mesh = contact.problem.model.mesh
-    if not (isinstance(asked[1], int) and 0 <= asked[1] < mesh.n_points):
-        raise ModelError(f"the quantity {asked} needs a point of the mesh by its number, 0 to {mesh.n_points - 1}")
-    return asked[1] * mesh.dim + _axis(contact, asked)
+def _point(model: Model, place: str | int) -> int:
+    """Return a point, by its number or the name of a group that holds it alone."""
+    if isinstance(place, str):
+        return int(model.mesh.point(place))
+    if not 0 <= place < model.mesh.n_points:
+        raise ModelError(f"point {place} is not in the mesh of {model.mesh.n_points} points (numbers from 0)")
+    return place
 
 
 def _reaction(contact: MovingContact, none: Gradient, asked: Asked) -> Gradient:
     model = contact.problem.model
-    axis, points = _axis(contact, asked), model.mesh.points_of(str(asked[1]))
+    axis, points = _axis(model, asked), model.mesh.points_of(str(asked[1]))
     if model.springs:
         raise ModelError(
             "reactions of a model with springs have no sensitivities: ask for a displacement or a contact force"
@@ -80,7 +95,7 @@ def _reaction(contact: MovingContact, none: Gradient, asked: Asked) -> Gradient:
 
 
 def _contact_force(contact: MovingContact, none: Gradient, step: StepResult, asked: Asked) -> Gradient:
-    found, axis = step.contact[str(asked[1])], _axis(contact, asked)
+    found, axis = step.contact[str(asked[1])], _axis(contact.problem.model, asked)
     others = [name for name in contact.problem.pairs if name != asked[1]]
     nodes = np.setdiff1d(found.points, found.primary_points)
     for name in others:
@@ -103,9 +118,10 @@ def _pressure(contact: MovingContact, none: Gradient, step: StepResult, asked: A
     name, found = str(asked[1]), step.contact[str(asked[1])]
     place = int(found.pressure.argmax())
     if asked[0] == "pressure":
-        places = np.flatnonzero(found.points == asked[2])
+        point = _point(contact.problem.model, asked[2])
+        places = np.flatnonzero(found.points == point)
         if not len(places):
-            raise ModelError(f"point {asked[2]} is no node of the secondary side of contact '{name}'")
+            raise ModelError(f"point {point} is no node of the secondary side of contact '{name}'")
         place = int(places[0])
     if not found.active[place]:
         raise ModelError(f"point {found.points[place]} of contact '{name}' is open: its pressure is zero")

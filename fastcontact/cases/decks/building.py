@@ -200,7 +200,7 @@ class Building:
             letter = "xyz"[axis]
             group = self._point_group("support", points)
             if any(value for _, value in table):
-                self.model.prescribe(group, ramp=table, **{letter: 1.0})
+                self.model.prescribe(group, ramp=table, **_along(axis))
             else:
                 self.model.fix(group, letter)
         if mesh.dim == 2 and self.found.rotations:

@@ -6,12 +6,13 @@ A `Value` is a number, or a function from reference positions (n, dim) [length] 
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.elasticity.loads import Value, axes_of, check_value, evaluated
+from fastcontact.elasticity.material_axes import Axes, checked_axes, frames
 from fastcontact.elasticity.relations import Relation
 from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
 from fastcontact.errors import ModelError
@@ -23,31 +24,52 @@ from fastcontact.model.relation_rows import NORMAL, along, normals_of
 
 Array = NDArray[np.float64]
 log = logging.getLogger("fastcontact")
+# Vectors or a function as those of materials; in the plane the first vector alone will do.
+SupportAxes = Axes | Sequence[float]
 
 
 class ModelSupports(ModelContact):
     """A model with supports."""
 
     @typed(ModelError)
-    def fix(self, group: str, components: str) -> None:
+    def fix(self, group: str, components: str, *, axes: SupportAxes = None) -> None:
         """Hold displacement components (``"x"``, ``"y"``, ``"xy"``, in 3D also ``"z"``) of a group's nodes at zero.
 
-        ``"normal"``: those along the normals of a group of facets.
+        ``"normal"``: those along the normals of a group of facets. With `axes` (k, 3) [-]
+        components are along these, see `prescribe`.
         """
         if not components:
             raise ModelError(f"fix('{group}', ...) names no component: give for example 'x' or 'xy'")
-        if components == NORMAL:
+        if axes is not None:
+            self._along_axes(group, dict.fromkeys(components, 0.0), axes, None)
+        elif components == NORMAL:
             self.prescribe(group, normal=0.0)
         else:
             self._support(group, dict.fromkeys(components, 0.0), None)
 
     @typed(ModelError)
-    def prescribe(self, group: str, *, normal: Value | None = None, ramp: History = None, **components: Value) -> None:
+    def prescribe(
+        self,
+        group: str,
+        *,
+        normal: Value | None = None,
+        axes: SupportAxes = None,
+        ramp: History = None,
+        **components: Value,
+    ) -> None:
         """Prescribe displacement components of all nodes of a group, e.g. ``y=-2.0`` [length], times the ramp.
 
         A component is a number, or a function from reference positions (n, dim) [length] to displacements (n,) [length].
         `normal` is the displacement out of the body along the mean normal of the facets at each node, for groups of facets.
+        With `axes` (k, 3) [-], vectors in rows or a function as those of materials, in the plane also one vector of two
+        numbers, x, y and z are along the first, second and third of them: ``axes=fc.CylindricalAxes()`` stands for radial,
+        circumferential and axial components.
         """
+        if axes is not None:
+            if normal is not None:
+                raise ModelError(f"the support of '{group}' is along its normals or along axes: name one of them")
+            self._along_axes(group, components, axes, ramp)
+            return
         if normal is not None:
             name = f"the displacement normal prescribed on '{group}'"
             check_value(name, normal)
@@ -57,6 +79,27 @@ class ModelSupports(ModelContact):
             self.relations.append(Relation(name, along(nodes, directions, self.n_dofs), values, table))
         if components or normal is None:
             self._support(group, components, ramp)
+
+    def _along_axes(self, group: str, components: Mapping[str, Value], axes: SupportAxes, ramp: History) -> None:
+        """Prescribe displacements along axes of the user's, by relations."""
+        dim, name = self.mesh.dim, f"the support of '{group}'"
+        nodes = self.mesh.points_of(group).astype(np.intp)
+        if not len(nodes):
+            raise ModelError(f"group '{group}' is empty: no displacement can be prescribed on it")
+        places = self.mesh.points[nodes]
+        try:
+            own = frames(checked_axes(axes), places, self.kinematics)
+        except ModelError as error:
+            raise ModelError(str(error).replace("a material", name).replace("the middle of a cell", "a node")) from None
+        for axis, value in axes_of(f"prescribe('{group}')", components, dim).items():
+            what = f"the displacement {'xyz'[axis]} prescribed on '{group}'"
+            check_value(what, value)
+            direction = own[:, axis]
+            if dim == 2 and np.abs(direction[:, 2]).max() > ON_AXIS:
+                raise ModelError(f"{name}: its axes leave the plane, where nothing moves")
+            rows = along(nodes, np.ascontiguousarray(direction[:, :dim]), self.n_dofs)
+            table = table_of(ramp, f"the ramp of {what}")
+            self.relations.append(Relation(f"{what} along axes", rows, evaluated(value, places, what), table))
 
     def _support(self, group: str, components: Mapping[str, Value], ramp: History) -> None:
         if not len(self.mesh.points_of(group)):

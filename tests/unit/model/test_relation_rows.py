@@ -237,3 +237,84 @@ translation = [10.0, 0.0]
     for found, expected in zip(case.model.relations, model.relations, strict=True):
         assert (found.rows != expected.rows).nnz == 0
         np.testing.assert_array_equal(found.value, expected.value)
+
+
+# ----------------------------------------------------------------------------- supports along axes
+@pytest.mark.parametrize("element", ["tri3", "quad8", "tet10", "hex8"])
+def test_supports_along_axes_turn_with_the_body(element):
+    dim = 2 if element.startswith(("tri", "quad")) else 3
+    mesh, Q = block(dim, element), turn(dim)
+    held, moved = sides(dim)
+    straight, turned = model_of(mesh), model_of(mesh.replace(points=mesh.points @ Q.T))
+    axes = tuple(Q[:, 0].tolist()) if dim == 2 else tuple(tuple(row) for row in Q.T.tolist())
+    for group, axis in held.items():
+        straight.fix(group, axis)
+        turned.fix(group, axis, axes=axes)
+    last_axis = "xyz"[dim - 1]
+    straight.prescribe(moved, ramp=[(0.0, 0.0), (1.0, 1.0)], **{last_axis: lambda x: -0.02 - 0.01 * x[:, 0]})
+    turned.prescribe(
+        moved, axes=axes, ramp=[(0.0, 0.0), (1.0, 1.0)], **{last_axis: lambda x: -0.02 - 0.01 * (x @ Q)[:, 0]}
+    )
+    one, other = last(straight), last(turned)
+    assert other.displacement @ Q == pytest.approx(one.displacement, abs=1e-12)
+    assert other.reaction @ Q == pytest.approx(one.reaction, abs=1e-8)
+
+
+def test_a_ring_held_round_about_is_lames():
+    """All ends held along the circumference, the bore widened along the radius: plane strain, Lame."""
+    mesh = fc.generate.block((1.0, 1.0), (6, 8), "quad8")
+    radius, angle = 1.0 + mesh.points[:, 0], 0.3 + 0.9 * mesh.points[:, 1]
+    mesh = mesh.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
+    model, round_about = model_of(mesh), fc.CylindricalAxes()
+    for end in ("BOTTOM", "TOP"):
+        model.fix(end, "y", axes=round_about)
+    model.prescribe("LEFT", x=0.01, axes=round_about)
+    step = last(model)
+    # u = A r + B / r without stress outside: A / (1 - 2 nu) = B / 4.
+    b = 0.01 / (1.0 + (1.0 - 2.0 * NU) / 4.0)
+    exact = b / radius + (1.0 - 2.0 * NU) * b / 4.0 * radius
+    unit = mesh.points / radius[:, None]
+    assert np.einsum("nd,nd->n", step.displacement, unit) == pytest.approx(exact, rel=2e-4)
+    found = fc.sensitivities(
+        model, step, ("displacement", mesh.point("TOP_RIGHT"), "y"), [("prescribed", "LEFT")], ramp=2
+    )
+    assert found.derivatives["prescribed", "LEFT"] == pytest.approx(found.value, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda m: m.fix("LEFT", "x", axes=(0.0, 0.0)), "the axes of the support of 'LEFT'"),
+        (lambda m: m.prescribe("LEFT", normal=0.0, axes=(1.0, 1.0)), "along its normals or along axes"),
+        (lambda m: m.fix("LEFT", "x", axes=((0.0, 1.0, 1.0), (1.0, 0.0, 0.0))), "its axes leave the plane"),
+        (lambda m: m.fix("BOTTOM", "x", axes=fc.CylindricalAxes()), "a node at .* lies on the line"),
+        (lambda m: m.fix("LEFT", "z", axes=(1.0, 1.0)), "z"),
+        (lambda m: m.fix("NOWHERE", "x", axes=(1.0, 1.0)), "unknown group 'NOWHERE'"),
+    ],
+)
+def test_axes_that_cannot_be(call, said):
+    with pytest.raises(fc.FastcontactError, match=said):
+        call(model_of(block(2)))
+
+
+def test_axes_in_a_case_file():
+    data = """
+kinematics = "plane_stress"
+[[material]]
+E = 1000.0
+nu = 0.3
+[[support]]
+group = "LEFT"
+x = 0.0
+axes = [1.0, 1.0]
+[[support]]
+group = "RIGHT"
+y = 0.1
+axes = {origin = [-1.0, -1.0, 0.0]}
+"""
+    case = build_case({**tomllib.loads(data), "mesh": {"generator": "block"}}, name="axes", folder=".", text=data)
+    names = [relation.name for relation in case.model.relations]
+    assert names == [
+        "the displacement x prescribed on 'LEFT' along axes",
+        "the displacement y prescribed on 'RIGHT' along axes",
+    ]
