@@ -19,7 +19,7 @@ class StatusLine:
     def __init__(self, width: int, show: bool) -> None:
         self._width, self._show = width, show
         self._started = time.perf_counter()
-        self._compiled = False
+        self._told = False
 
     def __enter__(self: Line) -> Line:
         compiling.listeners.append(self._compiling)
@@ -30,8 +30,8 @@ class StatusLine:
         self.close()
 
     def _compiling(self) -> None:
-        if not self._compiled:
-            self._compiled = True
+        if not self._told:
+            self._told = True
             self.draw(compiling.TEXT)
 
     def draw(self, text: str) -> None:
@@ -53,6 +53,7 @@ class Progress(StatusLine):
     def __init__(self, total: int, show: bool, done: int = 0) -> None:
         super().__init__(WIDTH + 54, show)
         self._total, self._before = total, done
+        self._compiled = compiling.count
 
     def step(self, step: StepResult) -> None:
         """Redraw after a step."""
@@ -65,8 +66,8 @@ class Progress(StatusLine):
 
     def _left(self, index: int) -> str:
         """Return the time left after a step; nothing where it was the one for which kernels were compiled."""
-        if self._compiled:  # the steps that follow are no measure of that one
-            self._compiled, self._before, self._started = False, index, time.perf_counter()
+        if self._compiled != compiling.count:  # it is no measure of the steps that follow
+            self._compiled, self._before, self._started = compiling.count, index, time.perf_counter()
             return ""
         each = (time.perf_counter() - self._started) / max(index - self._before, 1)
         return f", {each * (self._total - index):.0f} s left"

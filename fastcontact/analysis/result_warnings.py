@@ -55,7 +55,6 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
             continue
         found += _deep(pair, contact, state.u) + _lost(pair, contact, name in state.touched, loaded)
         found += _unresolved(name, pair, contact) + _too_fast(name, pair, state)
-    found += problem.doubtful
     return found + seam_warnings(problem, last) + _unsettled(state) + _loose(problem, last)
 
 

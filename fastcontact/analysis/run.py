@@ -166,6 +166,9 @@ def _marched(
     for text in doubtful if last is None else ():
         warn(text)
     problem = prepared(locked_before(model, last))
+    for text in problem.doubtful if last is None else ():  # now: it may be the reason for an error to come
+        warn(text)
+    doubtful += problem.doubtful
     state = problem.initial_state() if last is None else restart.put_back(problem, last, touched)
     begin, before = problem.ramp.table[0][0], 0
     if last is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from fastcontact.studies.fit import Limit, step_orders
 from fastcontact.studies.settings import Combination
@@ -86,7 +86,7 @@ class Level:
     h: float
     n_dofs: int
     values: dict[str, float]
-    profile: dict[str, list[float]]
+    profile: dict[str, list[float]] = field(repr=False)
     seconds: float
     warnings: tuple[str, ...]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from numpy.typing import NDArray
@@ -40,7 +40,7 @@ class Point:
     theory: dict[str, float]
     reference: dict[str, float]
     equal_force: dict[str, float]
-    profile: dict[str, list[float]]
+    profile: dict[str, list[float]] = field(repr=False)
     seconds: float
     warnings: tuple[str, ...]
 

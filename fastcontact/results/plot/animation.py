@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import os
 import subprocess
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +30,26 @@ SUFFIXES = (".gif", ".mp4", ".mkv", ".webm")
 RESOLUTION = 90
 
 
+@dataclass(frozen=True)
+class MovingPicture:
+    """A moving picture in a file, which notebooks show.
+
+    Attributes
+    ----------
+    path : pathlib.Path
+    """
+
+    path: Path
+
+    def _repr_html_(self) -> str:
+        """Return the picture in a page that needs no file."""
+        inside = base64.b64encode(self.path.read_bytes()).decode()
+        kind = self.path.suffix[1:].lower()
+        if kind == "gif":
+            return f"<img src='data:image/gif;base64,{inside}'>"
+        return f"<video controls loop src='data:video/{kind};base64,{inside}'></video>"
+
+
 @typed(FastcontactError)
 def animate(
     mesh: Mesh,
@@ -41,7 +63,7 @@ def animate(
     title: str = "",
     units: Units = UNKNOWN,
     view: tuple[float, float] = (25.0, -60.0),
-) -> None:
+) -> MovingPicture:
     """Write the deformed shape at all load steps as a moving picture; its colours and axes stand still.
 
     Parameters
@@ -56,6 +78,11 @@ def animate(
         How fast it goes [1/s].
     title : str
         Title of every picture, below which the load factor stands.
+
+    Returns
+    -------
+    MovingPicture
+        Which shows itself where it ends a cell of a notebook.
 
     Raises
     ------
@@ -85,6 +112,7 @@ def animate(
             for axis, low, high in zip("xyz", *box, strict=False):
                 getattr(axes, f"set_{axis}lim")(low, high)
             writer.grab_frame()
+    return MovingPicture(target)
 
 
 def writer_of(path: Path, pictures_per_second: int) -> Any:

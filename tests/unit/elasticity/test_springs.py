@@ -1,5 +1,6 @@
 """Springs at nodes and between them: exact solutions, held motions, reactions, messages."""
 
+import contextlib
 import tomllib
 
 import numpy as np
@@ -265,3 +266,43 @@ def test_case_files_know_springs():
     np.testing.assert_allclose(step.displacement[case.mesh.points_of("BOTTOM"), 1], -0.2, rtol=1e-9)
     with pytest.raises(fc.CaseError, match=r"spring\[0\]\.stiffness"):
         build_case({**data, "spring": [{"group": "BOTTOM", "stiffness": 1.0}]}, name="springs", mesh=mesh)
+
+
+@pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress", "axisymmetric"])
+def test_the_stiffness_of_the_ground_has_no_limit(kinematics):
+    """It adds to the diagonal alone: a spring of any stiffness is a support."""
+    held, hung = block_on_springs(1e30, kinematics), block_on_springs(1.0, kinematics)
+    hung.springs.clear()
+    for corner in ("BOTTOM_LEFT", "BOTTOM_RIGHT"):
+        hung.fix(corner, "y")
+    for model in (held, hung):
+        model.fix("LEFT", "x")
+    np.testing.assert_allclose(last(held).displacement, last(hung).displacement, rtol=1e-10, atol=1e-15)
+
+
+@pytest.mark.parametrize("how", ["oblique", "points", "groups", "axial"])
+def test_springs_that_cost_digits_are_told_and_those_that_leave_none_refused(how):
+    def model(stiffness):
+        found = block_on_springs()
+        found.fix("LEFT", "x")
+        if how == "oblique":
+            found.add_spring("TOP_RIGHT", axial=stiffness, direction=(1.0, 2.0))
+        elif how == "points":
+            found.add_spring("TOP_RIGHT", "BOTTOM_RIGHT", y=stiffness)
+        elif how == "axial":
+            found.add_spring("TOP_RIGHT", "BOTTOM_LEFT", axial=stiffness)
+        else:
+            found.add_spring("TOP", "BOTTOM", y=stiffness)
+        return found
+
+    assert not last(model(10.0 * E)).warnings
+    with pytest.warns(fc.FastcontactWarning, match=r"times as stiff as the body .* lose up to \d+ of 16 digits"):
+        step = last(model(1e7 * E))
+    assert len(step.warnings) == 1  # the result file keeps it
+    with pytest.warns(fc.FastcontactWarning, match="times as stiff"), contextlib.suppress(fc.ConvergenceError):
+        last(model(1e9 * E))  # told before round-off keeps forces out of balance
+    for stiffness, left in ((1e13 * E, r"\d of 16 digits"), (1e30 * E, "no digit")):
+        with pytest.raises(
+            fc.ModelError, match=f"the spring .* times as stiff .*: {left} would be left of results; take"
+        ):
+            last(model(stiffness))

@@ -1,5 +1,6 @@
 """Pictures of fields, sections and contact surfaces: the numbers that they show, and where."""
 
+import base64
 import dataclasses
 import io
 import os
@@ -336,7 +337,10 @@ def test_an_animation_has_a_picture_a_step_on_axes_that_stand_still(dim, tmp_pat
     mesh = block((1.0, 1.0), (3, 3), "quad4") if dim == 2 else box((1.0, 1.0, 1.0), (2, 2, 2), "hex8")
     steps = [step_of(mesh, values=k * (1.0 + mesh.points[:, 0]), displacement=0.2 * k * mesh.points) for k in (1, 2, 3)]
     path = tmp_path / "a.gif"
-    fc.plot.animate(mesh, steps, path, title="three")
+    shown = fc.plot.animate(mesh, steps, path, title="three")
+    assert shown.path == path
+    inside = re.search(r"data:image/gif;base64,([^']+)'", shown._repr_html_())
+    assert base64.b64decode(inside[1]) == path.read_bytes()  # what a notebook shows
     pictures = list(frames(path))
     assert len(pictures) == 3
     assert len({picture.shape for picture in pictures}) == 1
@@ -482,7 +486,8 @@ def test_an_animation_hands_every_picture_to_ffmpeg(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", f"{folder}{os.pathsep}{os.environ['PATH']}")
     mesh = block((1.0, 1.0), (2, 2), "quad4")
     steps = [step_of(mesh, values=k * mesh.points[:, 0], displacement=0.1 * k * mesh.points) for k in (1, 2, 3)]
-    fc.plot.animate(mesh, steps, tmp_path / "a.mp4", mirrored=True)
+    shown = fc.plot.animate(mesh, steps, tmp_path / "a.mp4", mirrored=True)
+    assert "<video controls loop src='data:video/mp4;base64," in shown._repr_html_()
     width, height = re.search(r"-s (\d+)x(\d+)", (folder / "ffmpeg.asked").read_text()).groups()
     assert (tmp_path / "a.mp4").stat().st_size == 3 * 4 * int(width) * int(height)
 

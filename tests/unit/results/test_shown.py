@@ -1,5 +1,6 @@
 """What notebooks and terminals show of results, meshes, models, studies and pictures: short, and right."""
 
+import contextlib
 import io
 import os
 import pickle
@@ -153,11 +154,12 @@ def test_progress_is_written_where_it_is_asked_for(model, capsys):
     assert "nodes in contact" in told
 
 
-def test_time_left_is_told_by_steps_for_which_nothing_was_compiled(model, capsys):
-    steps = fc.solve(model, 3)
-    with Progress(3, show=True) as line:
-        for listener in tuple(compiling.listeners):
-            listener()
+@pytest.mark.parametrize("listening", [True, False])
+def test_time_left_is_told_by_steps_for_which_nothing_was_compiled(listening, model, capsys):
+    """Also on a line that does not tell of compiling itself, as on a terminal, where the command does."""
+    steps, line = fc.solve(model, 3), Progress(3, show=True)
+    with line if listening else contextlib.nullcontext():
+        compiling.notify()
         for step in steps:
             line.step(step)
     first, *others = (text for text in capsys.readouterr().err.split("\r") if "step " in text)

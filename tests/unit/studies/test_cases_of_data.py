@@ -50,6 +50,8 @@ def test_a_case_of_data_can_be_studied():
     sweep = fc.parameter_sweep(case, {"material[0].E": [1000.0, 2000.0]}, workers=1)
     soft, stiff = (point.values["force"] for point in sweep.points)
     assert stiff == pytest.approx(2.0 * soft, rel=1e-6)
+    assert len(repr(study.series[0].levels)) < 2000  # profiles of nodes are no part of it
+    assert "profile" not in repr(sweep.points[0])
     adaptive = fc.adaptive_study(case, "force", 0.5, max_rounds=1)
     assert adaptive.rounds[0].values["force"] == pytest.approx(soft, rel=1e-6)
     assert read_again(case.text).describe() == case.model.describe()
