@@ -92,7 +92,7 @@ def sphere(dofs: int) -> fc.Model:
 def bytes_per_iteration(solver: Amg) -> int:
     """Return what one iteration must read of matrices at least: K once, levels and prolongators as the cycle does."""
     own = 2 * smoother.DEGREE * sum(level.A.nbytes + level.inverse.nbytes for level in solver.hierarchy.levels[:-1])
-    across = sum(A.nbytes for level in solver.hierarchy.levels for A in (level.P, level.R) if A is not None)
+    across = 2 * sum(level.P.nbytes for level in solver.hierarchy.levels if level.P is not None)
     K = solver.K.scaled
     return K.nbytes + (0 if K.low is None else K.low.nbytes) + own + across
 

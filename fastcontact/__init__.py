@@ -33,6 +33,7 @@ _NAMES = {
     "analysis.contact_answers": ("ContactAnswers", "contact_answers", "contact_history", "contact_moment", "wear"),
     "analysis.criteria": ("Criteria",),
     "analysis.run": ("solve", "solve_steps"),
+    "analysis.sensitivities": ("Sensitivities", "sensitivities"),
     "cases.decks.deck": ("Deck", "read_deck"),
     "elasticity.anisotropic_materials": ("Anisotropic", "Orthotropic"),
     "elasticity.material_axes": ("CylindricalAxes",),
@@ -49,6 +50,7 @@ _NAMES = {
         "ModelError",
     ),
     "mesh.files.med": ("read_med_field",),
+    "mesh.files.mesh_fields": ("read_field",),
     "mesh.files.mesh_files": ("read_mesh", "write_mesh"),
     "mesh.from_libraries": ("from_gmsh", "from_meshio", "from_pyvista"),
     "mesh.mesh": ("Mesh",),
@@ -78,7 +80,9 @@ def __getattr__(name: str) -> Any:
     elif name in _MODULES:
         value = importlib.import_module(f"{__name__}.{_MODULES[name]}")
     else:
-        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+        from fastcontact.errors import no_attribute
+
+        raise no_attribute(__name__, name, __all__)
     globals()[name] = value
     return value
 

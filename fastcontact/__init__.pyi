@@ -10,6 +10,8 @@ from fastcontact.analysis.contact_answers import wear as wear
 from fastcontact.analysis.criteria import Criteria as Criteria
 from fastcontact.analysis.run import solve as solve
 from fastcontact.analysis.run import solve_steps as solve_steps
+from fastcontact.analysis.sensitivities import Sensitivities as Sensitivities
+from fastcontact.analysis.sensitivities import sensitivities as sensitivities
 from fastcontact.cases.decks.deck import Deck as Deck
 from fastcontact.cases.decks.deck import read_deck as read_deck
 from fastcontact.contact import obstacles as obstacles
@@ -30,6 +32,7 @@ from fastcontact.errors import ModelError as ModelError
 from fastcontact.mesh import generate as generate
 from fastcontact.mesh import topology as topology
 from fastcontact.mesh.files.med import read_med_field as read_med_field
+from fastcontact.mesh.files.mesh_fields import read_field as read_field
 from fastcontact.mesh.files.mesh_files import read_mesh as read_mesh
 from fastcontact.mesh.files.mesh_files import write_mesh as write_mesh
 from fastcontact.mesh.from_libraries import from_gmsh as from_gmsh

@@ -74,6 +74,15 @@ def warn(text: str) -> None:
 LONGEST_NAME = 120
 
 
+def no_attribute(module: str, name: str, known: Iterable[str]) -> AttributeError:
+    """Return the error for a name that a module does not have, with the nearest ones."""
+    text = f"module '{module}' has no attribute '{name}'"
+    if name.startswith("_"):  # what tools look for
+        return AttributeError(text)
+    near = difflib.get_close_matches(name.casefold(), known, n=3, cutoff=0.5)
+    return AttributeError(text + (": did you mean " + " or ".join(map(repr, near)) + "?" if near else ""))
+
+
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     """Return the message for an unknown name: the name, and the nearest known names or, if none is near, the first ones."""
     names, name = sorted(known), str(name)

@@ -7,16 +7,16 @@ from collections.abc import Callable
 
 TEXT = "compiling kernels: once, for some seconds; they are kept for later runs"
 log = logging.getLogger("fastcontact")
-# Called as the first kernel of this process is compiled; one that is read from the disk cache is not.
+# Called as a kernel is compiled; one that is read from the disk cache is not.
 listeners: list[Callable[[], None]] = []
 _told = False
 
 
 def notify() -> None:
-    """Tell all listeners, and the log at level INFO, once in a process."""
+    """Tell all listeners, and once in a process the log at level INFO."""
     global _told
     if not _told:
         _told = True
         log.info(TEXT)
-        for listener in tuple(listeners):
-            listener()
+    for listener in tuple(listeners):
+        listener()

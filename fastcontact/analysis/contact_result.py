@@ -178,10 +178,22 @@ def _closed(
     forces, excluded = part.normal_forces(multiplier), pair.options.excluded_nodes(pair.secondary)
     over_side, shares = part.nodal.over_whole_side(forces), part.nodal.shares(forces)
     closed = _closed_nodes(pair, part, active, gap, over_side, at) & ~excluded
-    may_pull = part.equality is not None
-    closed, pressure = carried(closed, over_side, shares, part.nodal.nodal_areas, pair.secondary, may_pull)
+    closed, pressure = _carried(pair, part, closed, over_side, shares)
     own = part.nodal.pressure(forces) * part.nodal.covered
     return _Closed(closed, pressure, np.where(excluded, 0.0, over_side), own)
+
+
+def nodal_pressure(pair: Formulation, part: Constraints, multiplier: Array, closed: Mask) -> Array:
+    """Return the pressures (n_nodes,) that results tell for multipliers (m,) [force] and `closed` nodes [pressure]."""
+    assert part.nodal is not None
+    forces = part.normal_forces(multiplier)
+    return _carried(pair, part, closed, part.nodal.over_whole_side(forces), part.nodal.shares(forces))[1]
+
+
+def _carried(pair: Formulation, part: Constraints, closed: Mask, nodal: Array, shares: Array) -> tuple[Mask, Array]:
+    """Return `carried` for a pair."""
+    assert part.nodal is not None
+    return carried(closed, nodal, shares, part.nodal.nodal_areas, pair.secondary, part.equality is not None)
 
 
 def _closed_nodes(

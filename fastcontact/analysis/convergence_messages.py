@@ -27,7 +27,7 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
     return (
         f"the contact geometry did not settle in {limit} updates: the displacement still changes by "
         f"{last['displacement_change']:.1e} of its largest component, most at "
-        f"{_named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. Allow more "
+        f"{named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. Allow more "
         f"(max_geometry_updates), use more load steps, a finer mesh on the primary side, {_smoother(problem)}a "
         f"fixed number of updates, or accept larger changes (Criteria.geometry = {problem.criteria.geometry:g})"
     )
@@ -43,7 +43,7 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
         )
     count = int((solution.active != solution.wanted).sum())
     many = "1 constraint still changes" if count == 1 else f"{count} constraints still change"
-    what = f"{many}, at {_named_nodes(problem, nodes)}" if count else "sliding constraints still turn"
+    what = f"{many}, at {named_nodes(problem, nodes)}" if count else "sliding constraints still turn"
     other = ", the direct linear solver" if problem.solver.iterative else ""
     return (
         f"the active set did not settle in {solution.iterations} iterations: {what}. Use more load steps{other} or more "
@@ -87,7 +87,7 @@ def _most_moved(problem: Problem, change: Array) -> Nodes:
     return {name: points[np.argsort(-size[points], kind="stable")[:3]].tolist() for name, points in sides.items()}
 
 
-def _named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
+def named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
     """Return nodes by contact pair in words, with the places of the first three."""
     texts = []
     for name, points in nodes.items():

@@ -22,7 +22,7 @@ from fastcontact.elasticity.constrained_system import System
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.material_sides import MaterialSides, material_sides
-from fastcontact.elasticity.springs import stiffened
+from fastcontact.elasticity.springs import stiffened, too_stiff
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.linear import choice
@@ -91,6 +91,8 @@ class Problem:
         Rigid obstacles that forces move.
     prescribed, forces : dict of ramp table to ndarray (n_points + n_driven, dim)
         By history, displacements [length] and nodal forces [force] at multiplier 1.
+    doubtful : tuple of str
+        Warnings about the stiffness.
     """
 
     model: Model
@@ -107,6 +109,7 @@ class Problem:
     force_driven: ForceDrivenObstacles
     prescribed: ByRamp
     forces: ByRamp
+    doubtful: tuple[str, ...] = ()
 
     @cached_property
     def material_of_cells(self) -> NDArray[np.int32]:
@@ -214,6 +217,7 @@ def prepare(
     solver.contrast = field.contrast
     sides = material_sides(mesh, field.distinct)
     K = stiffness(mesh, model.kinematics, field.moduli, field.loops, None, field.treatment)
+    doubtful = too_stiff(K, model.springs)
     K = stiffened(K, model.springs)
     system = System(
         driven.stiffness(K),
@@ -231,6 +235,7 @@ def prepare(
         SurfaceDofs(system, contact_dofs, involved) if pairs and bodies is None and solver.condenses
         else ActiveDofs(system, contact_dofs),
         contact_dofs, driven, driven.prescribed(prescribed), driven.forces(_forces(model)),
+        tuple(doubtful),
     )  # fmt: skip
 
 
@@ -249,7 +254,8 @@ def _prepare_solver(
     matrix = system.matrix if bodies is None else bodies.with_springs(system.matrix)
     if bodies is not None:
         involved = np.union1d(involved, bodies.dofs)
-    kept = solver.prepare(matrix, system.unknowns_of(modes), involved, release=True)
+    modes = system.unknowns_of(modes)  # and those of all displacements are gone
+    kept = solver.prepare(matrix, modes, involved, release=True)
     if matrix is system.matrix:
         system.keep(kept)
     return involved

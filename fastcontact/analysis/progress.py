@@ -19,6 +19,7 @@ class StatusLine:
     def __init__(self, width: int, show: bool) -> None:
         self._width, self._show = width, show
         self._started = time.perf_counter()
+        self._compiled = False
 
     def __enter__(self: Line) -> Line:
         compiling.listeners.append(self._compiling)
@@ -29,7 +30,9 @@ class StatusLine:
         self.close()
 
     def _compiling(self) -> None:
-        self.draw(compiling.TEXT)
+        if not self._compiled:
+            self._compiled = True
+            self.draw(compiling.TEXT)
 
     def draw(self, text: str) -> None:
         """Replace the line."""
@@ -55,8 +58,15 @@ class Progress(StatusLine):
         """Redraw after a step."""
         if not self._show:
             return
-        each = (time.perf_counter() - self._started) / max(step.index - self._before, 1)
         bar = "#" * round(WIDTH * step.index / self._total)
         closed = sum(int(contact.active.sum()) for contact in step.contact.values())
-        left = each * (self._total - step.index)
-        self.draw(f"[{bar:<{WIDTH}}] step {step.index}/{self._total}, {closed} nodes in contact, {left:.0f} s left")
+        nodes = "1 node" if closed == 1 else f"{closed} nodes"
+        self.draw(f"[{bar:<{WIDTH}}] step {step.index}/{self._total}, {nodes} in contact{self._left(step.index)}")
+
+    def _left(self, index: int) -> str:
+        """Return the time left after a step; nothing where it was the one for which kernels were compiled."""
+        if self._compiled:  # the steps that follow are no measure of that one
+            self._compiled, self._before, self._started = False, index, time.perf_counter()
+            return ""
+        each = (time.perf_counter() - self._started) / max(index - self._before, 1)
+        return f", {each * (self._total - index):.0f} s left"

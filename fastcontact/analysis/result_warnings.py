@@ -30,6 +30,10 @@ DEEP = 0.01
 STRAIN = 0.1
 # Rotation [radian] beyond which they are: half its square is the strain that they leave out.
 ROTATION = 0.3
+# Steps to take in the place of one; more of them are no remedy, but the sign of a wrong coefficient.
+MANY_STEPS = 1000
+# Worn depth by the size of the model, likewise.
+WORN = 0.1
 # Elements across the radius of a contact that resolve its pressure.
 ACROSS = 4
 # Change of the displacement by the last of a fixed number of geometry updates, relative to its largest component.
@@ -51,6 +55,7 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
             continue
         found += _deep(pair, contact, state.u) + _lost(pair, contact, name in state.touched, loaded)
         found += _unresolved(name, pair, contact) + _too_fast(name, pair, state)
+    found += problem.doubtful
     return found + seam_warnings(problem, last) + _unsettled(state) + _loose(problem, last)
 
 
@@ -71,6 +76,13 @@ def _too_fast(name: str, pair: Formulation, state: State) -> list[str]:
     many = too_fast(pair, state.worn[name]) if name in state.worn else 0.0
     if many <= 1.0:
         return []
+    depth, size = float(state.worn[name].depth.max()), float(np.ptp(pair.points, axis=0).max())
+    if many > MANY_STEPS or depth > WORN * size:
+        return [
+            f"contact '{name}' wears off {depth:.3g}, {depth / size:.2g} times the size of the model, in steps "
+            f"{many:.2g} times as long as pressures can follow: is its wear Archard's coefficient by the hardness, in the "
+            "unit of one over pressure?"
+        ]
     return [
         f"contact '{name}' wears so much in a load step that pressures may waver from node to node and depths are too large: "
         f"take {math.ceil(many)} times as many steps, or larger elements"

@@ -11,7 +11,7 @@ is needed, raise ModelError.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fastcontact.analytic._half_space import VonMisesMaximum
 from fastcontact.analytic._inputs import Bodies
@@ -50,6 +50,7 @@ from fastcontact.analytic.punches import (
     spence_stick_ratio,
 )
 from fastcontact.analytic.receding import RecedingLayer, receding_layer
+from fastcontact.errors import no_attribute
 
 THEORIES: dict[str, Callable[..., Any]] = {
     factory.__name__: factory
@@ -69,6 +70,12 @@ __all__ = [
     "persson_limit_angle", "persson_pin", "power_law_punch", "press_fit_cylinders", "press_fit_spheres",
     "receding_layer", "spence_stick_ratio", "thick_cylinder", "thick_sphere",
 ]  # fmt: skip
+
+
+if not TYPE_CHECKING:  # to whom all names are known
+
+    def __getattr__(name: str) -> object:
+        raise no_attribute("fastcontact.analytic", name, __all__)
 
 
 def __dir__() -> list[str]:

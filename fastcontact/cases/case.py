@@ -14,7 +14,7 @@ from fastcontact.cases.decks.blocks import files_of_deck
 from fastcontact.cases.decks.deck import Deck, read_deck
 from fastcontact.cases.keys import NUMBER, RAMP, SOLVE, STUDY, TOP, UNITS, called, check_keys, tables
 from fastcontact.cases.model_tables import build_model, points
-from fastcontact.cases.shipped import case_path
+from fastcontact.cases.shipped import case_path, shipped_cases
 from fastcontact.errors import CaseError, unknown
 from fastcontact.linear.choice import check_tolerance
 from fastcontact.mesh import generate
@@ -25,7 +25,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, linear_ramp
 from fastcontact.results.step import StepResult
-from fastcontact.results.units import units_of_results
+from fastcontact.results.units import known_units, units_of_results
 
 # Suffix of input decks of Abaqus and CalculiX.
 DECK = ".inp"
@@ -121,14 +121,14 @@ def _case_of_deck(path: Path) -> Case:
         linear_solver="auto",
         linear_tolerance=1e-10,
         probes={},
-        units=_units({}),
+        units=known_units({}),
         folder=path.parent.resolve(),
         deck=deck,
     )
 
 
 def files_of_case(path: str | Path) -> list[Path]:
-    """Return a case file and the files of meshes that it names, or a deck and what it includes.
+    """Return a case file and the files of meshes and fields that it names, or a deck and what it includes.
 
     Raises CaseError or FileError if one cannot be read.
     """
@@ -138,10 +138,10 @@ def files_of_case(path: str | Path) -> list[Path]:
     found, waiting = [path], [_parsed(path)[1]]
     while waiting:
         for key, value in waiting.pop().items():
-            if key == "file" and isinstance(value, str):
-                found.append(path.parent / value)
-            tables = value if isinstance(value, list) else [value]
-            waiting += [table for table in tables if isinstance(table, dict)]
+            several = value if isinstance(value, list) else [value]
+            if key == "file":
+                found += [path.parent / name for name in several if isinstance(name, str)]
+            waiting += [table for table in several if isinstance(table, dict)]
     return found
 
 
@@ -166,7 +166,8 @@ def _unreadable(path: Path, error: Exception) -> str:
     if path.is_dir():
         return "it is a folder; name a file in it"
     if not path.exists():
-        return "it does not exist"
+        ready = f"; the ready case of this name needs no path: '{path.stem}'" if path.stem in shipped_cases() else ""
+        return f"it does not exist{ready}"
     if isinstance(error, OSError):
         return error.strerror or type(error).__name__
     return "it is no text in UTF-8; name a TOML file"
@@ -177,7 +178,8 @@ def build_case(
 ) -> Case:
     """Build a case from the parsed data of a case file, as `tomllib` returns them.
 
-    Its mesh file lies relative to `folder`; a `mesh` replaces the one that ``[mesh]`` names. Result files keep the `text`.
+    Its mesh file lies relative to `folder`; a `mesh` replaces the one that ``[mesh]`` names. Result files keep the `text`;
+    studies take it too, or make one of the data.
     Raises CaseError if a key is unknown or a value wrong, FastcontactError if the mesh or the model is wrong.
     """
     check_keys("", data, TOP)
@@ -198,7 +200,7 @@ def build_case(
     return Case(
         name=name,
         title=data.get("title", name),
-        text=text,
+        text=text or _text(data),
         mesh=model.mesh,
         model=model,
         ramp=ramp,
@@ -207,26 +209,30 @@ def build_case(
         linear_tolerance=tolerance,
         probes=probes,
         theories=theories,
-        checks=_checks(data, probes, theories, mesh.dim),
-        units=_units(data),
+        checks=_checks(data, probes, theories),
+        units=known_units(data.get("units", {})),
         approach=approach,
         folder=Path(folder).resolve(),
     )
+
+
+def _text(data: dict[str, Any]) -> str:
+    """Return data as the text of a case file, from which studies make their cases; empty where TOML cannot say it."""
+    try:
+        return toml_text.written(data)
+    except ValueError:
+        return ""
 
 
 def _pairs(data: dict[str, Any]) -> dict[str, Any]:
     return {**data.get("contact", {}), **data.get("obstacle", {})}
 
 
-def _units(data: dict[str, Any]) -> dict[str, str]:
-    return {"length": "-", "force": "-", "pressure": "-", **data.get("units", {})}
-
-
-def _checks(data: dict[str, Any], probes: Mapping[str, int], theories: Mapping[str, Any], dim: int) -> list[Check]:
+def _checks(data: dict[str, Any], probes: Mapping[str, int], theories: Mapping[str, Any]) -> list[Check]:
     checks = []
     for i, entry in enumerate(tables("check", data.get("check", []))):
         check_keys(f"check[{i}]", entry, CHECK)
-        checks.append(read_check(f"check[{i}]", entry, probes, _pairs(data), theories, dim))
+        checks.append(read_check(f"check[{i}]", entry, probes, _pairs(data), theories, str(data["kinematics"])))
     return checks
 
 
@@ -305,7 +311,7 @@ def described(data: dict[str, Any]) -> dict[str, Any]:
     theories, approach = _theories(data)
     return {
         "title": data.get("title", ""),
-        "units": units_of_results(_units(data), str(data.get("kinematics", ""))),
+        "units": units_of_results(data.get("units", {}), str(data.get("kinematics", ""))),
         "theories": theories,
         "approach": approach,
         "ramp": _ramp(data.get("ramp", {})).table,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
+from fastcontact.analysis.contact_answers import contact_moment
 from fastcontact.cases.keys import NUMBER
 from fastcontact.errors import CaseError, unknown
 from fastcontact.results.step import ContactResult, StepResult
@@ -22,9 +23,18 @@ CHECK: dict[str, Any] = {
     **dict.fromkeys(("value", "factor", "tolerance"), NUMBER),
 }
 # Quantities of a contact pair, and of a probe.
-LENGTHS = ("radius", "stick_radius", "displacement")
-OF_PAIRS = ("force", "pressure_max", "radius", "stick_radius")
-ONLY_IN_SPACE = ("stress.yz", "stress.xz", "displacement.z")
+LENGTHS = ("radius", "stick_radius", "displacement", "wear_max")
+MOMENTS = ("moment", "torque")
+OF_PAIRS = (
+    *("force", "pressure_max", "radius", "stick_radius", "torque", "wear_max"),
+    *(f"{kind}.{axis}" for kind in ("force", "moment") for axis in _AXES),
+)
+ONLY_IN_SPACE = ("stress.yz", "stress.xz", "displacement.z", "force.z", "moment.x", "moment.y")
+# Quantities of a pair that has an option, and what to do without.
+NEEDED = {
+    "torque": ("rotation", "only an obstacle with a 'rotation' has one"),
+    "wear_max": ("wear", "only a contact with the option 'wear' has one"),
+}
 OF_PROBES = ("pressure", "shear", "von_mises", *(f"stress.{c}" for c in STRESS), *(f"displacement.{a}" for a in _AXES))
 
 
@@ -36,8 +46,10 @@ class Check:
     ----------
     name, quantity : str
         `quantity` is ``"PROBE.pressure"``, ``"PROBE.shear"``, ``"PROBE.von_mises"``, ``"PROBE.stress.yy"`` or
-        ``"PROBE.displacement.x"``; or ``"PAIR.force"``, ``"PAIR.pressure_max"``, ``"PAIR.radius"`` or
-        ``"PAIR.stick_radius"``, radii in the middle of their brackets.
+        ``"PROBE.displacement.x"``; or ``"PAIR.force"`` and its component ``"PAIR.force.x"``, on the secondary side;
+        ``"PAIR.pressure_max"``; ``"PAIR.radius"`` or ``"PAIR.stick_radius"``, in the middle of their brackets;
+        ``"PAIR.moment.z"`` about the middle of the contact; ``"PAIR.torque"`` of a turning obstacle about its axis;
+        ``"PAIR.wear_max"``, the deepest wear.
     tolerance : float
         Of the relative deviation.
     theory : str
@@ -64,8 +76,10 @@ class Check:
 
     @property
     def unit(self) -> str:
-        """Kind of the number: ``"pressure"``, ``"force"`` or ``"length"``."""
+        """Kind of the number: ``"pressure"``, ``"force"``, ``"moment"`` or ``"length"``."""
         what = self.quantity.split(".")[1]
+        if what in MOMENTS:
+            return "moment"
         return "force" if what == "force" else "length" if what in LENGTHS else "pressure"
 
     def target(self, theory: Any) -> float:
@@ -89,12 +103,9 @@ def read_check(
     probes: Mapping[str, int],
     pairs: Mapping[str, Any],
     theories: Mapping[str, Any],
-    dim: int = 3,
+    kinematics: str = "3d",
 ) -> Check:
-    """Return the check that an entry of a case file with the right keys describes; raises CaseError for wrong values.
-
-    In the plane (`dim` 2) there are no components along z but the stress.
-    """
+    """Return the check that an entry of a case file with the right keys describes; raises CaseError for wrong values."""
     for key in ("quantity", "tolerance"):
         if key not in entry:
             raise CaseError(f"{where} needs '{key}'")
@@ -103,12 +114,10 @@ def read_check(
     owner, _, what = entry["quantity"].partition(".")
     if owner not in {**probes, **pairs}:
         raise CaseError(unknown(f"contact pair or probe in {where}.quantity", owner, [*probes, *pairs]))
-    allowed = OF_PROBES if owner in probes else OF_PAIRS
-    if dim == 2:
-        allowed = tuple(name for name in allowed if name not in ONLY_IN_SPACE)
-    if what not in allowed:
-        raise CaseError(unknown(f"quantity in {where}", what, allowed))
-    of = what if what in ("force", "radius", "stick_radius") else "pressure_max"
+    _check_quantity(where, what, OF_PROBES if owner in probes else OF_PAIRS, kinematics)
+    if owner in pairs and what in NEEDED and NEEDED[what][0] not in pairs[owner]:
+        raise CaseError(f"{where}: '{owner}' has no {what}: {NEEDED[what][1]}")
+    of = what.split(".")[0] if owner in pairs else "pressure_max"
     check = Check(
         name=entry.get("name", entry["quantity"]),
         quantity=entry["quantity"],
@@ -128,9 +137,19 @@ def read_check(
     return check
 
 
+def _check_quantity(where: str, what: str, allowed: Sequence[str], kinematics: str) -> None:
+    """Raise CaseError for a quantity that is not there: in the plane along z, but stresses and moments; of circles."""
+    if kinematics != "3d":
+        allowed = [name for name in allowed if name not in ONLY_IN_SPACE]
+    if kinematics == "axisymmetric":  # over the circle no moment is left, and no force along the radius
+        allowed = [name for name in allowed if name not in ("moment.z", "force.x")]
+    if what not in allowed:
+        raise CaseError(unknown(f"quantity in {where}", what, allowed))
+
+
 def _whole(what: str, theory: Mapping[str, Any]) -> float:
     """Return the factor that makes the force of a part of a contact that of the whole, 1 for other quantities."""
-    return 1.0 / float(theory.get("share", 1.0)) if what == "force" else 1.0
+    return 1.0 / float(theory.get("share", 1.0)) if what.split(".")[0] == "force" else 1.0
 
 
 def check_target(where: str, check: Check, theory: Any) -> None:
@@ -155,12 +174,23 @@ def measured(check: Check, step: StepResult, probes: Mapping[str, int]) -> float
     if owner in probes:
         return check.factor * _of_probe(step, probes[owner], what)
     contact = step.contact[owner]
-    if what == "force":
-        return check.factor * float(np.linalg.norm(contact.force))
-    if what == "pressure_max":
-        return check.factor * contact.pressure_max
-    inside, outside = contact.radius if what == "radius" else contact.stick_radius
-    return check.factor * (0.5 * (inside + outside) if math.isfinite(outside) else inside)
+    return check.factor * _of_pair(contact, what)
+
+
+def _of_pair(contact: ContactResult, what: str) -> float:
+    kind, _, axis = what.partition(".")
+    if kind == "force":
+        return float(contact.force[_AXES[axis]] if axis else np.linalg.norm(contact.force))
+    if kind == "moment":
+        return float(contact_moment(contact)[_AXES[axis] if len(contact.force) == 3 else 0])
+    if kind == "pressure_max":
+        return contact.pressure_max
+    if kind == "torque":
+        return math.nan if contact.torque is None else contact.torque
+    if kind == "wear_max":
+        return math.nan if contact.wear is None else float(contact.wear.max(initial=0.0))
+    inside, outside = contact.radius if kind == "radius" else contact.stick_radius
+    return 0.5 * (inside + outside) if math.isfinite(outside) else inside
 
 
 def _of_probe(step: StepResult, point: int, what: str) -> float:

@@ -129,6 +129,7 @@ LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
 SURFACE = {"file": str, "group": str, "flip": bool, "crease": NUMBER}
 # How a rigid obstacle turns.
 ROTATION: dict[str, Any] = {"angle": NUMBER, "centre": list, "axis": list, "ramp": list}
+FIELD: dict[str, Any] = {"file": str, "field": str, "over": str, "instant": NUMBER}
 # Studies of this case; `fastcontact.studies.settings` reads them.
 STUDY: dict[str, Any] = {
     "generator": str,

@@ -8,14 +8,17 @@ from pathlib import Path
 from reprlib import repr
 from typing import Any
 
-from fastcontact.cases.keys import AXES, LISTS, NUMBER, ROTATION, SURFACE, at, called, check_keys, tables
+import numpy as np
+
+from fastcontact.cases.keys import AXES, FIELD, LISTS, NUMBER, ROTATION, SURFACE, at, called, check_keys, tables
 from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.initial_states import COMPONENTS
 from fastcontact.elasticity.material_axes import CylindricalAxes
-from fastcontact.elasticity.materials import LinearElastic, Material, check_expansion
+from fastcontact.elasticity.materials import CONSTANTS, LinearElastic, Material, check_expansion
 from fastcontact.elasticity.varying_constants import Tabulated
 from fastcontact.errors import CaseError, unknown
+from fastcontact.mesh.files.mesh_fields import read_field
 from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.generate.cut import OPPOSITE, cut
 from fastcontact.mesh.generate.reference_points import with_reference_points
@@ -41,6 +44,7 @@ def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
                 and not isinstance(constants[key], (list, tuple))
                 and key != "axes"
                 and not callable(constants[key])
+                and not isinstance(constants[key], np.ndarray)
             ):
                 constants[key] = float(constants[key])
     for key in constants:
@@ -143,7 +147,8 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
                 if key not in entry:
                     raise CaseError(f"{where} needs '{key}'")
             with at(where):
-                add(model, **_arguments(where, _found(folder, _placed(where, entry))))
+                given = _from_files(where, entry, mesh, folder) if kind == "material" else entry
+                add(model, **_arguments(where, _found(folder, _placed(where, given))))
     for name, entry in data.get("contact", {}).items():
         if not isinstance(entry, dict):
             raise CaseError(f"'contact' needs a name for each pair: write [contact.NAME] above its keys, not '{name}'")
@@ -155,6 +160,27 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
     for name, entry in data.get("obstacle", {}).items():
         _add_obstacle(model, name, entry, folder)
     return model
+
+
+def _from_files(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> dict[str, Any]:
+    """Return a material with arrays in place of the constants that are fields of files."""
+
+    def read(name: str, value: Any) -> Any:
+        if not (isinstance(value, dict) and "file" in value):
+            return value
+        check_keys(name, value, FIELD)
+        if "field" not in value:
+            raise CaseError(f"'{name}' needs 'field', its name in the file")
+        return read_field(mesh, groups=entry.get("groups"), **_found(folder, value))
+
+    found = dict(entry)
+    for key in CONSTANTS:
+        value = entry.get(key)
+        if isinstance(value, list):
+            found[key] = [read(f"{where}.{key}[{i}]", member) for i, member in enumerate(value)]
+        elif value is not None:
+            found[key] = read(f"{where}.{key}", value)
+    return found
 
 
 def _placed(where: str, entry: dict[str, Any]) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from fastcontact.analysis.contact_answers import contact_answers
 from fastcontact.cases.case import Case
 from fastcontact.cases.checks import at_point, evaluated
 from fastcontact.results.step import ContactResult, StepResult
-from fastcontact.results.units import units_of_results
+from fastcontact.results.units import units_of_results, valued, with_unit
 
 # Numbers that a theory must have to be compared as a whole.
 COMPARED = ("force", "pressure_max", "radius")
@@ -156,71 +156,76 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     steps = summary["steps"]
     found = [
         f"{summary['title']}",
-        f"  {summary['mesh']['n_points']} points, {summary['n_dofs']} degrees of freedom, {len(steps)} load steps, "
+        f"  {summary['mesh']['n_points']} points, {summary['n_dofs']} degrees of freedom, {count(len(steps), 'load step')}, "
         f"{sum(s['active_set_iterations'] for s in steps)} active-set iterations, "
         f"{sum(s['geometry_updates'] for s in steps)} geometry updates",
     ]
     if parts := [len(s["substeps"]) for s in steps if "substeps" in s]:
-        many = "1 load step" if len(parts) == 1 else f"{len(parts)} load steps"
-        found.append(f"  {many} did not converge as a whole and went in {sum(parts)} parts")
+        found.append(f"  {count(len(parts), 'load step')} did not converge as a whole and went in {sum(parts)} parts")
     for name, contact in summary["contact"].items():
         found += _contact_lines(name, contact, unit)
     for name, section in steps[-1].get("pretension", {}).items():
         found.append(
-            f"  pretension '{name}': force {section['force']:.6g} {unit['force']}, shortened by {section['shortening']:.6g} "
-            f"{unit['length']}"
+            f"  pretension '{name}': force {valued(section['force'], unit, 'force', 6)}, shortened by "
+            + valued(section["shortening"], unit, "length", 6)
         )
     top = summary["von_mises_max"]
     where = ", ".join(f"{x:.4g}" for x in top["at"])
-    found.append(f"  largest von Mises stress {top['value']:.6g} {unit['pressure']} at ({where}) {unit['length']}")
+    largest = valued(top["value"], unit, "pressure", 6)
+    found.append(f"  largest von Mises stress {largest} at {with_unit(f'({where})', unit, 'length')}")
     if summary["regularised"]:
         found.append(_regularised_line(summary["regularised"], unit))
     for name, theory in summary["theory"].items():
         found += _theory_lines(name, theory)
     for check in summary["checks"]:
-        found += [_check_line(check, unit[check["unit"]]), *_why(check)]
+        found += [_check_line(check, unit), *_why(check)]
     return found
+
+
+def count(number: int, what: str) -> str:
+    """Return a number of things in words: "1 load step", "2 load steps"."""
+    return f"{number} {what}" + "s" * (number != 1)
 
 
 def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str]) -> list[str]:
     inside, outside = contact["radius"]
     found = [
-        f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force {contact['force']:.6g} "
-        f"{unit['force']}, largest pressure {contact['pressure_max']:.6g} {unit['pressure']}, "
-        + _edge(inside, outside, unit["length"])
+        f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force "
+        f"{valued(contact['force'], unit, 'force', 6)}, largest pressure "
+        f"{valued(contact['pressure_max'], unit, 'pressure', 6)}, {_edge(inside, outside, unit)}"
     ]
     if any(contact["obstacle_displacement"] or ()):
         moved = ", ".join(f"{value:.6g}" for value in contact["obstacle_displacement"])
-        found.append(f"  obstacle '{name}' stands ({moved}) {unit['length']} from its place at rest")
+        found.append(f"  obstacle '{name}' stands {with_unit(f'({moved})', unit, 'length')} from its place at rest")
     if "torque" in contact:
         found.append(
             f"  obstacle '{name}' has turned by {contact['obstacle_angle']:.6g} radian, with a torque of "
-            f"{contact['torque']:.6g} {unit['force']} {unit['length']}"
+            + valued(contact["torque"], unit, "moment", 6)
         )
     if "wear_max" in contact:
-        found.append(f"  contact '{name}' is worn by up to {contact['wear_max']:.4g} {unit['length']}")
+        found.append(f"  contact '{name}' is worn by up to {valued(contact['wear_max'], unit, 'length')}")
     if contact["penalty"] is not None:
         found.append(
-            f"  contact '{name}' penetrates by up to {contact['penetration']:.4g} {unit['length']}, with a penalty of "
-            f"{contact['penalty']:.4g} {unit['pressure']}/{unit['length']}"
+            f"  contact '{name}' penetrates by up to {valued(contact['penetration'], unit, 'length')}, with a penalty of "
+            + valued(contact["penalty"], unit, "penalty")
         )
     return found
 
 
-def _edge(inside: float | None, outside: float | None, unit: str) -> str:
+def _edge(inside: float | None, outside: float | None, unit: Mapping[str, str]) -> str:
     """Return the radius of a contact as text; `outside` is None where it reaches the end of the surface."""
     if inside is None:
         return "open"
-    return (
-        f"radius {inside:.4g} {unit}, to its end" if outside is None else f"radius {inside:.4g} to {outside:.4g} {unit}"
-    )
+    if outside is None:
+        return f"radius {valued(inside, unit, 'length')}, to its end"
+    return f"radius {inside:.4g} to {valued(outside, unit, 'length')}"
 
 
 def _regularised_line(told: Mapping[str, Any], unit: Mapping[str, str]) -> str:
     return (
         f"  held by contact alone: {'; '.join(told['motions'])}. Regularised by springs of "
-        f"{told['spring_stiffness']:.3g} {unit['force']}/{unit['length']}, which carry {told['relative_to_load']:.1e} "
-        "of the load in the end"
+        f"{valued(told['spring_stiffness'], unit, 'stiffness', 3)}, which carry {told['relative_to_load']:.1e} of the load "
+        "in the end"
     )
 
 
@@ -240,11 +245,12 @@ def _theory_lines(pair: str, theory: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _check_line(check: Mapping[str, Any], unit: str) -> str:
+def _check_line(check: Mapping[str, Any], unit: Mapping[str, str]) -> str:
     verdict = "within" if check["passed"] else "NOT within"
     owner = "the theory's" if check["of"] else "the documented"
+    found = valued(check["value"], unit, check["unit"], 6)
     text = (
-        f"  check {check['name']}: {check['value']:.6g} {unit} is {abs(check['deviation']):.3%} from {owner} "
+        f"  check {check['name']}: {found} is {abs(check['deviation']):.3%} from {owner} "
         f"{check['target']:.6g}, {verdict} {check['tolerance']:.3g}"
     )
     if check["distance_to_mesh_converged"] is not None:

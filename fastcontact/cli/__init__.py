@@ -7,6 +7,8 @@ import signal
 import sys
 from collections.abc import Sequence
 
+INTERRUPTED = 130  # as shells have it
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
@@ -16,13 +18,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         return run(argv)
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        return 130
+        return INTERRUPTED
 
 
 def entry_point() -> None:
     """Run the command line and exit with its code."""
     # Threads of BLAS spin between the small products here; loops of our own have those of Numba.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    code = main()
+    try:
+        code = main()
+    except SystemExit as asked:  # of --help and --version
+        code = int(asked.code or 0)
+    from fastcontact.cli._terminal import flushed
+
+    code = flushed(code)
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is left to say: a second Ctrl-C ends at once
+    if code == INTERRUPTED:
+        sys.unraisablehook = lambda found: None  # finalisers of what was left half made
     sys.exit(code)

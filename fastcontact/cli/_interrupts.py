@@ -11,6 +11,7 @@ import contextlib
 import signal
 import sys
 import threading
+import traceback
 from collections.abc import Iterator
 from types import FrameType
 
@@ -36,7 +37,7 @@ def interruptible() -> Iterator[None]:
             raise KeyboardInterrupt
 
     try:
-        with _lost_ones_come_again():
+        with _lost_ones_come_again(raised):
             signal.signal(signal.SIGINT, interrupt)
             yield
     except Exception as error:
@@ -49,19 +50,30 @@ def interruptible() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _lost_ones_come_again() -> Iterator[None]:
-    """Repeat an interruption that Python would print and forget."""
+def _lost_ones_come_again(raised: threading.Event) -> Iterator[None]:
+    """Repeat an interruption that Python would print and forget; once one was `raised`, finalisers have nothing to say."""
     before = sys.unraisablehook
 
     def lost(found: sys.UnraisableHookArgs) -> None:
         if issubclass(found.exc_type, KeyboardInterrupt):
             _again(signal.SIGINT)
-        else:
+        elif not raised.is_set():
             before(found)
 
     sys.unraisablehook = lost
     try:
         yield
+    finally:
+        sys.unraisablehook = before
+
+
+def forget(error: BaseException | None) -> None:
+    """Let go of what was being made when a command was interrupted: finalisers of half of it may fail, and say so."""
+    before, sys.unraisablehook = sys.unraisablehook, lambda found: None
+    try:
+        while error is not None:
+            traceback.clear_frames(error.__traceback__)
+            error = error.__context__
     finally:
         sys.unraisablehook = before
 

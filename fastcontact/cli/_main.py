@@ -14,13 +14,12 @@ import pkgutil
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Any
 
 from fastcontact._jit import compiling
 from fastcontact._version import __version__
 from fastcontact.cli._completion import SHELLS, PrintCompletion
-from fastcontact.cli._interrupts import interruptible
+from fastcontact.cli._interrupts import forget, interruptible
 from fastcontact.cli._terminal import add_loudness, encodable, printable, say
 from fastcontact.errors import ConvergenceError, FastcontactError, unknown
 
@@ -94,6 +93,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 1
     except KeyboardInterrupt as error:
         say("\n".join(["interrupted", *_notes(error)]), error=True)
+        forget(error)
         return 130  # as shells have it
 
 
@@ -103,8 +103,14 @@ def _run(given: list[str]) -> int:
     log.handlers[:] = [handler]
     log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
     if sys.stderr.isatty() and not (arguments.quiet or arguments.verbose):  # the log tells it with -v
-        compiling.listeners[:] = [partial(say, f"{compiling.TEXT} ...", error=True)]
+        compiling.listeners[:] = [_say_compiling]
     return int(arguments.run(arguments) or 0)
+
+
+def _say_compiling() -> None:
+    """Say once that kernels are being compiled."""
+    compiling.listeners.remove(_say_compiling)
+    say(f"{compiling.TEXT} ...", error=True)
 
 
 def _notes(error: BaseException) -> list[str]:

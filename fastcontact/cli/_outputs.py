@@ -99,7 +99,12 @@ def _target(path: str) -> Iterator[Path]:
     from fastcontact.mesh.files.paths import replacing
 
     if Path(path).is_char_device() or Path(path).is_fifo():
-        yield Path(path)
+        try:
+            yield Path(path)
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            raise FileError(f"'{path}' cannot be written ({error.strerror or error}): name another file") from error
         return
     with replacing(path) as temporary:
         yield temporary

@@ -9,9 +9,9 @@ from typing import Any
 
 from fastcontact.cli._executor import executor
 from fastcontact.cli._outputs import check_outputs, save, write_json, write_text
-from fastcontact.cli._progress import Runs
 from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError
+from fastcontact.studies.progress import Runs
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -7,8 +7,11 @@ part of a line (Boucher and Anderson, 2023). Characters that the terminal's enco
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from typing import Any, TextIO
+
+from fastcontact.errors import FileError
 
 
 def add_loudness(parser: argparse.ArgumentParser, default: Any) -> None:
@@ -22,9 +25,34 @@ def add_loudness(parser: argparse.ArgumentParser, default: Any) -> None:
 
 
 def say(text: object, *, error: bool = False) -> None:
-    """Print a text on standard output, or on standard error."""
+    """Print a text on standard output, or on standard error, of which nobody could be told that it cannot be written."""
     stream: TextIO = sys.stderr if error else sys.stdout
-    print(encodable(printable(str(text)), stream), file=stream)
+    try:
+        print(encodable(printable(str(text)), stream), file=stream)
+    except BrokenPipeError:
+        raise
+    except OSError as refused:
+        if not error:
+            raise FileError(_unwritten(refused)) from refused
+
+
+def flushed(code: int) -> int:
+    """Return an exit code when all that was printed is written; if it cannot be, say so in one line and return 1."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError as refused:
+        # Python would try once more as it ends, and tell it in words of its own.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if not code and not isinstance(refused, BrokenPipeError):
+            say(f"error: {_unwritten(refused)}", error=True)
+        return code or 1
+    return code
+
+
+def _unwritten(error: OSError) -> str:
+    """Return what is said where standard output leads to a full disk."""
+    return f"cannot write to standard output ({error.strerror}): send it elsewhere"
 
 
 def printable(text: str) -> str:

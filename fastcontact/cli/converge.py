@@ -6,9 +6,7 @@ import argparse
 import dataclasses
 import sys
 from functools import partial
-from typing import Any
 
-from fastcontact.analysis.progress import StatusLine
 from fastcontact.cli import _study
 from fastcontact.errors import CaseError
 
@@ -56,11 +54,6 @@ def _adaptive(options: argparse.Namespace) -> int:
     """Refine until the quantity is accurate, write the files of the options, print the table; 2 if it is not."""
     from fastcontact.studies.adaptive import adaptive_study
 
-    line = StatusLine(80, show=sys.stderr.isatty() and not options.quiet)
-
-    def on_round(found: Any) -> None:
-        line.draw(f"{found.n_dofs} degrees of freedom, estimated error {found.estimate:.1e}")
-
     study = adaptive_study(
         options.case,
         options.adaptive,
@@ -68,9 +61,8 @@ def _adaptive(options: argparse.Namespace) -> int:
         element=_only(options.elements, "element"),
         formulation=_only(options.formulations, "formulation"),
         max_dofs=options.max_dofs,
-        on_round=on_round,
+        progress=sys.stderr.isatty() and not options.quiet,
     )
-    line.close()
     if options.output:
         from fastcontact.results.writer import ResultWriter
 

@@ -66,6 +66,7 @@ def _print(table: Any) -> None:
 
 
 def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theories: dict[str, Any]) -> None:
+    from fastcontact.results.units import labelled
     from fastcontact.results.xmgrace import Curve, write_agr
 
     order = np.argsort(contact.place, kind="stable")
@@ -83,6 +84,6 @@ def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theorie
         curves,
         title=case["title"] or f"Contact '{contact.name}'",
         subtitle=f"load factor {step.load_factor:g}",
-        xlabel=f"distance from the {start} [{case['units']['length']}]",
-        ylabel=f"contact pressure [{case['units']['pressure']}]",
+        xlabel=labelled(f"distance from the {start}", case["units"], "length"),
+        ylabel=labelled("contact pressure", case["units"], "pressure"),
     )

@@ -51,14 +51,15 @@ def run(options: argparse.Namespace) -> int:
     """Solve, write, print the summary."""
     from fastcontact.cases import summary
     from fastcontact.cases.case import files_of_case, read_case
+    from fastcontact.cases.shipped import case_path
 
     started = time.perf_counter()
     if options.threads is not None:
         _set_threads(options.threads)
+    output = Path(options.output or f"{case_path(options.case).stem}.vtkhdf")
+    check_outputs(files_of_case(options.case), [output, options.json], [options.plot])
     with _warnings_shown() as early:
         case = read_case(options.case)
-    output = Path(options.output or f"{case.name}.vtkhdf")
-    check_outputs(files_of_case(options.case), [output, options.json], [options.plot])
     read = time.perf_counter()
     case.model.check(case.ramp)  # a wrong model must not replace the results of a right one
     with _warnings_shown() as caught:

@@ -194,8 +194,8 @@ def largest_rotation(points, cells, N, dN, displacement):
 
 
 @kernel
-def add_nodal(cells, extrapolation, at_points, total, count):
-    """Extrapolate quadrature values to the nodes of each cell and add them up per node, in place.
+def add_nodal(cells, extrapolation, at_points, low, high, total, count):
+    """Extrapolate quadrature values to the nodes `low` to ``high - 1`` of each cell and add them up per node, in place.
 
     `extrapolation` (n_nodes, n_q), `at_points` (n_cells, n_q, n_components); `total` (n_points, n_components) and
     `count` (n_points,) are added to.
@@ -204,6 +204,8 @@ def add_nodal(cells, extrapolation, at_points, total, count):
     for c in range(n_cells):
         for a in range(n_nodes):
             p = cells[c, a]
+            if p < low or p >= high:
+                continue
             count[p] += 1
             for i in range(at_points.shape[2]):
                 value = 0.0

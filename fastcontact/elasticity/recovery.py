@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact._jit import parallel
 from fastcontact.elasticity import dilatation, element_2d_kernels, element_kernels
 from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.initial_states import StressOffset
@@ -16,6 +19,8 @@ Array = NDArray[np.float64]
 Materials = dict[str, NDArray[np.int32]]
 # Memory for stresses at points while nodal ones are formed [bytes].
 BATCH = 16_000_000
+# Of so many cells one tells where the nodes of all lie.
+SAMPLED = 16
 
 
 def stress_at_points(
@@ -97,8 +102,17 @@ class NodalAverage:
 
         The matrix `extrapolation` (n_nodes, n_q) [-] leads from values at the points to values at the nodes.
         """
+        given = cells, extrapolation, values
+        into = self._total, self._count
         # For any dimension and number of components.
-        element_2d_kernels.add_nodal(cells, extrapolation, values, self._total, self._count)
+        parallel.shared(lambda part: element_2d_kernels.add_nodal(*given, *part, *into), self._parts(cells))
+
+    def _parts(self, cells: NDArray[np.int32]) -> list[tuple[int, int]]:
+        """Return ranges of nodes that have about equally many of the cells: each thread adds at its own nodes."""
+        some = np.sort(cells[::SAMPLED, 0])
+        count = len(parallel.portions(*cells.shape)) if len(some) else 1
+        ends = [0, *(int(some[k * len(some) // count]) for k in range(1, count)), len(self._count)]
+        return list(itertools.pairwise(ends))
 
     def result(self) -> Array:
         """Return the average (n_points, n_components) [pressure], once; zero where there is no cell."""

@@ -5,6 +5,7 @@ They add the positive semidefinite ``R.T diag(k) R`` to the stiffness. Springs a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -15,6 +16,9 @@ from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 from fastcontact.errors import ModelError
 
 Array = NDArray[np.float64]
+# Springs between nodes that are so many times stiffer than the bodies there: told, and refused.
+STIFF, STIFFEST = 1e5, 1e12
+DIGITS = 16  # of the numbers that are computed with
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +160,57 @@ def stiffened(K: bsr_array, springs: Sequence[Springs]) -> bsr_array:
     total = bsr_array(K + csr_array(R.T @ diags_array(k) @ R).tobsr(K.blocksize))
     total.sort_indices()
     return total
+
+
+def too_stiff(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
+    """Return a warning for each of the springs that costs digits, being so much stiffer than the bodies at its ends.
+
+    The sum of a body's stiffness and a spring's has the digits of the larger one, and the body's are what is left of them.
+    Springs along an axis to the ground add to the diagonal alone, which costs nothing: they are supports.
+
+    Parameters
+    ----------
+    K : bsr_array (n, n)
+        Stiffness without springs [force / length].
+    springs : sequence of Springs
+
+    Raises
+    ------
+    ModelError
+        If fewer than about four digits were left.
+    """
+    dim, texts = K.blocksize[0], []
+    for spring in springs:
+        ratio, body = _stiffer(spring, K.diagonal(), dim)
+        if ratio <= STIFF:
+            continue
+        told = f"{spring.name} is {ratio:.1e} times as stiff as the body at one of its ends ({body:.3g})"
+        instead = (
+            f"take {0.1 * STIFF * body:.0e} or less, or a relation (relate, relate_groups), which is rigid and exact"
+        )
+        lost = round(math.log10(ratio))
+        if ratio > STIFFEST:
+            left = "no digit" if lost >= DIGITS else f"{DIGITS - lost} of {DIGITS} digits"
+            raise ModelError(f"{told}: {left} would be left of results; {instead}")
+        texts.append(
+            f"{told}: results lose up to {lost} of {DIGITS} digits, and beside contact its force is off by as many times the "
+            f"criteria; {instead}"
+        )
+    return texts
+
+
+def _stiffer(spring: Springs, diagonal: Array, dim: int) -> tuple[float, float]:
+    """Return the largest ratio of a spring's stiffness to that of the softer body at its ends, and that stiffness."""
+    rows = spring.rows.tocoo()
+    row, node = rows.coords[0], rows.coords[1] // dim
+    ends, place = np.unique(np.stack([row, node]), axis=1, return_inverse=True)
+    body = np.bincount(place.ravel(), weights=rows.data**2 * diagonal[rows.coords[1]])
+    # Not springs that add to the diagonal alone, nor points that no body holds.
+    coupling = (np.diff(spring.rows.indptr)[ends[0]] > 1) & (body > 0.0)
+    if not coupling.any():
+        return 0.0, 0.0
+    ratio = spring.stiffness[ends[0][coupling]] / body[coupling]
+    return float(ratio.max()), float(body[coupling][ratio.argmax()])
 
 
 def ground_force(springs: Sequence[Springs], u: Array) -> Array:

@@ -61,9 +61,25 @@ def sparsity(mesh: Mesh) -> Sparsity:
     start = np.cumsum(sizes, dtype=np.int64)
     nodes = np.concatenate([np.empty(0, np.int32), *(b.ravel() for b in blocks.values())])
     first, cells = pattern_kernels.cells_at_nodes(start, nodes, mesh.n_points)
-    indptr, indices = pattern_kernels.neighbours(start, nodes, first, cells)
-    slots = {name: pattern_kernels.slots_of(block, indptr, indices) for name, block in blocks.items()}
-    return Sparsity(indptr, indices, slots)
+    given, parts = (start, nodes, first, cells), parallel.portions(mesh.n_points)
+    count = np.empty(mesh.n_points, np.int32)
+    parallel.shared(lambda part: pattern_kernels.count_neighbours(*given, *part, count), parts)
+    indptr = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
+    indices = np.empty(indptr[-1], np.int32)
+    parallel.shared(lambda part: pattern_kernels.neighbours(*given, *part, indptr, indices), parts)
+    return Sparsity(indptr, indices, {name: _slots(block, indptr, indices) for name, block in blocks.items()})
+
+
+def _slots(cells: NDArray[np.int32], indptr: NDArray[np.int32], indices: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the `slots` of `Sparsity` for one element."""
+    slots = np.empty((*cells.shape, cells.shape[1]), np.int32)
+
+    def find(part: tuple[int, int]) -> None:
+        rows = slice(*part)
+        pattern_kernels.find_slots(cells[rows], indptr, indices, slots[rows])
+
+    parallel.shared(find, parallel.portions(*cells.shape))
+    return slots
 
 
 def stiffness(

@@ -28,22 +28,24 @@ def cells_at_nodes(start, nodes, n_points):
 
 
 @kernel
-def neighbours(start, nodes, first, cells):
-    """Return (indptr, indices): sorted numbers of the nodes that share a cell with each node, itself included."""
-    n_points = first.shape[0] - 1
-    seen = np.full(n_points, -1, np.int32)
-    indptr = np.zeros(n_points + 1, np.int32)
-    for p in range(n_points):
-        count = 0
+def count_neighbours(start, nodes, first, cells, low, high, count):
+    """Fill `count` (n_points,), from `low` to ``high - 1``, with the number of nodes that share a cell with each node."""
+    seen = np.full(first.shape[0] - 1, -1, np.int32)
+    for p in range(low, high):
+        found = 0
         for k in range(first[p], first[p + 1]):
             for m in range(start[cells[k]], start[cells[k] + 1]):
                 if seen[nodes[m]] != p:
                     seen[nodes[m]] = p
-                    count += 1
-        indptr[p + 1] = indptr[p] + max(count, 1)  # a node without cells keeps its diagonal
-    indices = np.empty(indptr[-1], np.int32)
-    seen[:] = -1
-    for p in range(n_points):
+                    found += 1
+        count[p] = max(found, 1)  # a node without cells keeps its diagonal
+
+
+@kernel
+def neighbours(start, nodes, first, cells, low, high, indptr, indices):
+    """Fill the sorted numbers of the nodes that share a cell with each node from `low` to ``high - 1``, itself included."""
+    seen = np.full(first.shape[0] - 1, -1, np.int32)
+    for p in range(low, high):
         at = indptr[p]
         for k in range(first[p], first[p + 1]):
             for m in range(start[cells[k]], start[cells[k] + 1]):
@@ -54,14 +56,12 @@ def neighbours(start, nodes, first, cells):
         if at == indptr[p]:
             indices[at] = p
         indices[indptr[p] : indptr[p + 1]].sort()
-    return indptr, indices
 
 
 @kernel
-def slots_of(cells, indptr, indices):
-    """Return (n_cells, n_nodes, n_nodes) positions in `indices` of every node pair of every cell."""
+def find_slots(cells, indptr, indices, slots):
+    """Fill `slots` (n_cells, n_nodes, n_nodes): positions in `indices` of every node pair of every cell."""
     n_cells, n_nodes = cells.shape
-    slots = np.empty((n_cells, n_nodes, n_nodes), np.int32)
     for c in range(n_cells):
         for a in range(n_nodes):
             row = cells[c, a]
@@ -74,7 +74,6 @@ def slots_of(cells, indptr, indices):
                     else:
                         high = middle
                 slots[c, a, b] = low
-    return slots
 
 
 @kernel

@@ -16,7 +16,25 @@ def _near(i, indptr, indices, supported_nodes):
 
 
 @kernel
-def take_out(indptr, indices, data, supported, supported_nodes, kept, start, columns, taken):
+def count_taken(indptr, indices, data, supported, supported_nodes, kept, low, high, count):
+    """Fill `count` (n,) with the numbers that `take_out` moves from each row of block rows `low` to ``high - 1``."""
+    size = data.shape[1]
+    for i in range(low, high):
+        near = _near(i, indptr, indices, supported_nodes)
+        for a in range(size):
+            row, found = size * i + a, 0
+            for k in range(indptr[i] if near else indptr[i + 1], indptr[i + 1]):
+                j = indices[k]
+                for b in range(size):
+                    if supported[i, a] or supported[j, b]:
+                        stays = kept[row] if size * j + b == row else 0.0
+                        if data[k, a, b] != stays:
+                            found += 1
+            count[row] = found
+
+
+@kernel
+def take_out(indptr, indices, data, supported, supported_nodes, kept, low, high, start, columns, taken):
     """Move rows and columns of supports from `data` to (start, columns, taken), compressed rows of single numbers.
 
     Parameters
@@ -25,25 +43,37 @@ def take_out(indptr, indices, data, supported, supported_nodes, kept, start, col
         Which components have a support, and which nodes have one.
     kept : (n,)
         What stays on the diagonal.
+    low, high : int
+        Block rows `low` to ``high - 1`` are looked at.
     start : (n + 1,)
-        Filled with where rows begin.
-    columns, taken : (n_taken,) or (0,)
-        Filled; if they are empty, nothing is moved, and the numbers that would be are counted in `start`.
+        Where rows begin, see `count_taken`.
+    columns, taken : (n_taken,)
+        Filled.
     """
-    size, at, count_only = data.shape[1], 0, taken.shape[0] == 0
-    start[0] = 0
-    for i in range(indptr.shape[0] - 1):
+    size = data.shape[1]
+    for i in range(low, high):
         near = _near(i, indptr, indices, supported_nodes)
         for a in range(size):
             row = size * i + a
+            at = start[row]
             for k in range(indptr[i] if near else indptr[i + 1], indptr[i + 1]):
                 j = indices[k]
                 for b in range(size):
                     if supported[i, a] or supported[j, b]:
                         stays = kept[row] if size * j + b == row else 0.0
-                        change = data[k, a, b] - stays
-                        if change != 0.0:
-                            if not count_only:
-                                columns[at], taken[at], data[k, a, b] = size * j + b, change, stays
+                        if data[k, a, b] != stays:
+                            columns[at], taken[at], data[k, a, b] = size * j + b, data[k, a, b] - stays, stays
                             at += 1
-            start[row + 1] = at
+
+
+@kernel
+def diagonal(indptr, indices, data, out):
+    """Fill `out` (n,) with the diagonal of a matrix of square blocks (n_blocks, size, size)."""
+    size = data.shape[1]
+    for i in range(indptr.shape[0] - 1):
+        for a in range(size):
+            out[i * size + a] = 0.0
+        for k in range(indptr[i], indptr[i + 1]):
+            if indices[k] == i:
+                for a in range(size):
+                    out[i * size + a] += data[k, a, a]

@@ -63,16 +63,18 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
             else:
                 each = {key: value}
             for argument, member in each.items():
-                whose = f"the argument {argument} of {_called(name, args)}"
+                whose = f"the argument {argument} of {_called(call, name, args)}"
                 check_type(whose, member, types_of(call).get(key, Any), error)
         return call(*args, **kwargs)
 
     return checking
 
 
-def _called(name: str, args: tuple[Any, ...]) -> str:
-    """Return the name of a function, or of a method of the class that a user knows."""
+def _called(call: Callable[..., Any], name: str, args: tuple[Any, ...]) -> str:
+    """Return the name of a function, or of the class that a user knows, or of a method of it."""
     owner, _, method = name.rpartition(".")
+    if call.__name__ == "__init__" and args:
+        return type(args[0]).__name__
     return f"{type(args[0]).__name__}.{method}" if owner and args else name
 
 
@@ -237,7 +239,8 @@ def words(annotation: Any) -> str:
     if kind in (abc.Sequence, abc.Iterable, abc.Collection, list, tuple):
         return "a sequence" + (f" of {_plural(words(members[0]))}" if members else "")
     if kind in (abc.Mapping, dict):
-        return "a dictionary" + (f" of {_plural(words(members[1]))} by name" if members else "")
+        of = f" of {_plural(words(members[1]))}" if members and members[1] is not Any else ""
+        return f"a dictionary{of}" + (" by name" if members else "")
     if kind is abc.Callable:
         return "a function"
     name = str(getattr(kind, "__name__", kind))

@@ -93,7 +93,7 @@ class Mesh:
     def _checked_cells(name: str, block: ArrayLike, n_points: int) -> Indices:
         element = elements.get(name)
         conn = _read_only(_numbers(f"cells of {name}", block), np.int32)
-        if conn.size == 0:
+        if conn.shape[:1] == (0,):
             conn = conn.reshape(0, element.n_nodes)
         if conn.ndim != 2 or conn.shape[1] != element.n_nodes:
             raise MeshError(f"cells of {name} must have shape (n_cells, {element.n_nodes}), not {conn.shape}")

@@ -24,6 +24,8 @@ def sentences(model: Any) -> Iterator[str]:
     cells = " and ".join(f"{len(block)} {name}" for name, block in mesh.solids.items())
     article = "An" if model.kinematics == "axisymmetric" else "A"
     yield f"{article} {KINDS[model.kinematics]} of {mesh.n_points} points, {cells}: {model.n_dofs} degrees of freedom."
+    if named := [f"{kind} in {unit}" for kind, unit in model.units.items() if unit not in ("", "-")]:
+        yield f"Units: {', '.join(named)}."
     for material, groups in model.materials:
         where = "all solid cells" if groups is None else _listed(groups)
         locking = ", with a mean dilatation against locking" if material.averaged else ""

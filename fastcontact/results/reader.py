@@ -20,6 +20,7 @@ from fastcontact.mesh.files import toml_text
 from fastcontact.mesh.files.hdf5 import check_contents
 from fastcontact.mesh.files.packing import unpacked
 from fastcontact.mesh.files.paths import PathLike, existing_file
+from fastcontact.mesh.html_table import html_table
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import conversions, journal, layout
 from fastcontact.results.file_lock import is_being_written
@@ -162,6 +163,8 @@ class Results(Sequence[StepResult]):
         """Return a step by its position, from 0, or from the end if negative; a slice gives a list of steps."""
         if isinstance(number, slice):
             return [self._read_step(position) for position in range(*number.indices(self._n_steps))]
+        if not hasattr(number, "__index__"):
+            raise FileError(f"a step of '{self.path}' is a whole number, from 0, or a slice, not {number!r}")
         if not -self._n_steps <= number < self._n_steps:
             raise IndexError(f"'{self.path}' has {self._n_steps} steps, so there is no step at position {number}")
         return self._read_step(range(self._n_steps)[number])
@@ -177,6 +180,23 @@ class Results(Sequence[StepResult]):
     def __repr__(self) -> str:
         state = "complete" if self.complete else "incomplete"
         return f"Results('{self.path}': {self._n_steps} steps, {state}, {self.kinematics}, {self.mesh!r})"
+
+    def _repr_html_(self) -> str:
+        """Return a table of what the file holds, and the last step, for notebooks."""
+        reached = f"{self._n_steps}, to load factor {self.load_factors[-1]:.6g}" if self._n_steps else "none yet"
+        rows = [
+            ("steps", reached),
+            ("run", "complete" if self.complete else self.error or "incomplete"),
+            ("kinematics", self.kinematics),
+            (
+                "mesh",
+                f"{self.mesh.n_points} points, {', '.join(f'{len(b)} {name}' for name, b in self.mesh.cells.items())}",
+            ),
+            ("groups", ", ".join(self.mesh.group_names)),
+            *(("warning", text) for text in self.warnings),
+        ]
+        last = self[-1]._repr_html_() if self._n_steps and self._file else ""
+        return html_table(rows, (), str(self.path)) + last
 
     def close(self) -> None:
         """Close the file; the steps already read stay valid, no further ones can be read."""

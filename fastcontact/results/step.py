@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.errors import unknown
 from fastcontact.mesh.html_table import html_table
 from fastcontact.results.material_stress import MaterialStress
 
@@ -187,6 +188,13 @@ class ContactResult:
         return float(-self.gap[self.active].min(initial=0.0))
 
 
+class ContactsByName(dict[str, ContactResult]):
+    """Contact pairs by name, which tell the names that are there when asked for another one."""
+
+    def __missing__(self, name: object) -> ContactResult:
+        raise KeyError(unknown("contact pair", str(name), self))
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class StepResult:
     """State at the end of one load step.
@@ -240,6 +248,9 @@ class StepResult:
     cell_fields: dict[str, Array] = field(default_factory=dict)
     restart: dict[str, Any] | None = field(default=None, repr=False)
     material_stress: MaterialStress | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "contact", ContactsByName(self.contact))
 
     @property
     def shown(self) -> dict[str, str]:

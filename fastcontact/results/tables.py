@@ -166,7 +166,9 @@ def _table(columns: Mapping[str, NDArray[Any]]) -> Table:
 
 
 def _columns(table: Table) -> Columns:
-    return {name: table[name] for name in table.dtype.names or ()}
+    if not isinstance(table, np.ndarray) or table.dtype.names is None:
+        raise CaseError(f"a table is an array with named columns, as contact_table makes it, not of the {type(table)}")
+    return {name: table[name] for name in table.dtype.names}
 
 
 def _by_axis(prefix: str, vectors: NDArray[Any]) -> Columns:

@@ -5,18 +5,57 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 
-def units_of_results(units: Mapping[str, str], kinematics: str) -> dict[str, str]:
-    """Return the names of units for the results of a model: forces of plane models are those per unit of thickness.
+def known_units(units: Mapping[str, str]) -> dict[str, str]:
+    """Return the names of the units of length, force and pressure; empty where nobody named one, or named it by a dash.
 
-    A unit of force that is one per length already stays, and so do dashes, which stand for units that nobody named.
+    Examples
+    --------
+    >>> known_units({"length": "mm", "force": "-"})
+    {'length': 'mm', 'force': '', 'pressure': ''}
+    """
+    found = {"length": "", "force": "", "pressure": "", **units}
+    return {key: "" if name == "-" else name for key, name in found.items()}
+
+
+def units_of_results(units: Mapping[str, str], kinematics: str) -> dict[str, str]:
+    """Return the names of units for the results of a model, with those of moments, stiffnesses and penalties.
+
+    Forces of plane models are those per unit of thickness; a unit of force that is one per length already stays. Units
+    that nobody named stay empty.
 
     Examples
     --------
     >>> units_of_results({"length": "mm", "force": "N", "pressure": "MPa"}, "plane_strain")
-    {'length': 'mm', 'force': 'N/mm', 'pressure': 'MPa'}
+    {'length': 'mm', 'force': 'N/mm', 'pressure': 'MPa', 'penalty': 'MPa/mm', 'moment': 'N mm/mm', 'stiffness': 'N/mm^2'}
+    >>> units_of_results({"length": "m", "force": "N"}, "3d")
+    {'length': 'm', 'force': 'N', 'pressure': '', 'penalty': '', 'moment': 'N m', 'stiffness': 'N/m'}
     """
-    plane = kinematics in ("plane_strain", "plane_stress")
-    named = all(units.get(key) not in (None, "", "-") for key in ("length", "force"))
-    if plane and named and "/" not in units["force"]:
-        return {**units, "force": f"{units['force']}/{units['length']}"}
-    return {**units}
+    found = known_units(units)
+    length, force, pressure = found["length"], found["force"], found["pressure"]
+    found["penalty"] = f"{pressure}/{length}" if pressure and length else ""
+    if not (length and force):
+        return {**found, "moment": "", "stiffness": ""}
+    if kinematics not in ("plane_strain", "plane_stress") or "/" in force:
+        return {**found, "moment": f"{force} {length}", "stiffness": f"{force}/{length}"}
+    return {
+        **found,
+        "force": f"{force}/{length}",
+        "moment": f"{force} {length}/{length}",
+        "stiffness": f"{force}/{length}^2",
+    }
+
+
+def labelled(text: str, units: Mapping[str, str], quantity: str) -> str:
+    """Return the label of an axis or a column, with the unit of its quantity where that is known."""
+    unit = units.get(quantity, "")
+    return f"{text} [{unit}]" if unit and unit != "-" else text
+
+
+def valued(value: float, units: Mapping[str, str], quantity: str, digits: int = 4) -> str:
+    """Return a value as text with its unit, where that is known."""
+    return with_unit(f"{value:.{digits}g}", units, quantity)
+
+
+def with_unit(text: str, units: Mapping[str, str], quantity: str) -> str:
+    """Return one or several values, a text already, with their unit, where that is known."""
+    return f"{text} {units.get(quantity, '')}".removesuffix(" -").rstrip()

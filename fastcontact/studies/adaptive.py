@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.analysis.progress import StatusLine
 from fastcontact.cases.case import Case, build_case, read_case
 from fastcontact.errors import CaseError, FastcontactWarning, unknown
 from fastcontact.mesh import elements
@@ -44,6 +45,7 @@ def adaptive_study(
     max_dofs: int = 400_000,
     max_rounds: int = 25,
     on_round: Callable[[Round], None] | None = None,
+    progress: bool = False,
 ) -> AdaptiveStudy:
     """Refine the mesh of a case where its error is large, until a quantity is accurate enough.
 
@@ -64,6 +66,8 @@ def adaptive_study(
         Limits at which refinement stops in any case.
     on_round : callable, optional
         Called with every `Round`.
+    progress : bool
+        Write a line on standard error that is drawn anew after every round, on terminals and in notebooks.
 
     Returns
     -------
@@ -79,18 +83,20 @@ def adaptive_study(
     member = one_combination(chosen, element, formulation)
     forest, curves = _first_mesh(case, chosen, member)
     rounds: list[Round] = []
-    while True:
-        started = time.perf_counter()
-        linear, leaf = forest.mesh()
-        solved = _case_on(linear, curves, case, chosen, member)
-        last, error, this = _solved(solved, quantity, chosen.pair, rounds, started)
-        rounds.append(this)
-        if on_round is not None:
-            on_round(this)
-        reached = this.estimate <= tolerance
-        if reached or len(rounds) == max_rounds or this.n_dofs > 0.6 * max_dofs:
-            break
-        forest.refine(_marked(_indicator(solved, last, error, quantity, chosen.pair), leaf, forest.n_leaves))
+    with StatusLine(80, progress) as line:
+        while True:
+            started = time.perf_counter()
+            linear, leaf = forest.mesh()
+            solved = _case_on(linear, curves, case, chosen, member)
+            last, error, this = _solved(solved, quantity, chosen.pair, rounds, started)
+            rounds.append(this)
+            if on_round is not None:
+                on_round(this)
+            line.draw(f"{this.n_dofs} degrees of freedom, estimated error {this.estimate:.1e}")
+            reached = this.estimate <= tolerance
+            if reached or len(rounds) == max_rounds or this.n_dofs > 0.6 * max_dofs:
+                break
+            forest.refine(_marked(_indicator(solved, last, error, quantity, chosen.pair), leaf, forest.n_leaves))
     return AdaptiveStudy(
         **of_case(case), combination=str(member), quantity=quantity, tolerance=tolerance, reached=reached, rounds=rounds,
         case=solved, last=last, error=error)  # fmt: skip

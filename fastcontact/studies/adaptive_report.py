@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fastcontact.cases.case import Case
 from fastcontact.results.plot.patches import outlines
 from fastcontact.results.step import StepResult
+from fastcontact.results.units import labelled
 from fastcontact.studies.error_estimate import ErrorEstimate
 from fastcontact.studies.quantities import column, title, unit
 from fastcontact.studies.render import page
@@ -182,9 +183,9 @@ class AdaptiveStudy(Report):
         return Panel(heading, "degrees of freedom", label, curves, [asked], x_scale="plain log", y_scale="log")
 
     def _mesh_panel(self) -> Panel:
-        length = self.units["length"]
         heading = f"Last mesh: {self.rounds[-1].n_cells} cells, estimated error"
-        return Panel(heading, f"x [{length}]", f"y [{length}]", grid=0.0, draw=self._draw_mesh)
+        x, y = (labelled(axis, self.units, "length") for axis in "xy")
+        return Panel(heading, x, y, grid=0.0, draw=self._draw_mesh)
 
     def _draw_mesh(self, ax: Any) -> None:
         from matplotlib.collections import PolyCollection
@@ -198,4 +199,4 @@ class AdaptiveStudy(Report):
         ax.autoscale_view()
         ax.set_aspect("equal")
         bar = ax.figure.colorbar(drawn, ax=ax)
-        bar.set_label(f"energy norm [({self.units['force']} {self.units['length']})$^{{1/2}}$]")
+        bar.set_label("energy norm" + (f" [({work})$^{{1/2}}$]" if (work := self.units.get("moment")) else ""))

@@ -15,6 +15,7 @@ from fastcontact.studies.convergence_report import Study
 from fastcontact.studies.execute import Progress, Result, raise_first, run_all
 from fastcontact.studies.fit import Limit, fit_limit
 from fastcontact.studies.job import Job, fields_of, job_of
+from fastcontact.studies.progress import told
 from fastcontact.studies.quantities import EXACT_THEORIES, LABELS, of_theory
 from fastcontact.studies.report import of_case
 from fastcontact.studies.series import Level, Series
@@ -33,6 +34,7 @@ def convergence_study(
     workers: int | None = None,
     store: str | Path | None = None,
     on_progress: Callable[[Progress], None] | None = None,
+    progress: bool = False,
 ) -> Study:
     """Solve a case on finer and finer meshes; fit order and limit; separate model error from mesh error.
 
@@ -57,6 +59,8 @@ def convergence_study(
         Folder of finished runs: those found there are not run again; new ones are added.
     on_progress : callable, optional
         Called with a `Progress` after every run.
+    progress : bool
+        Write a line on standard error that is drawn anew after every run, on terminals and in notebooks.
 
     Returns
     -------
@@ -75,7 +79,8 @@ def convergence_study(
     check_runs(levels * len(members))
     check_levels(case, chosen, members, levels)
     jobs = [level_job(case, chosen, member, level) for level in range(levels) for member in members]
-    results = run_all(jobs, executor=executor, workers=workers, store=store, on_progress=on_progress)
+    with told(on_progress, progress) as told_to:
+        results = run_all(jobs, executor=executor, workers=workers, store=store, on_progress=told_to)
     return gathered(case, jobs, results, [*chosen.quantities, *quantities])
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.analytic.pressure_curve import pressure_curve
+from fastcontact.results.units import labelled
 from fastcontact.studies.quantities import title
 from fastcontact.studies.render.figure import Curve, Line, Panel, marker
 from fastcontact.studies.series import Series
@@ -40,7 +41,7 @@ def error_panel(all_series: Sequence[Series], quantity: str, units: Mapping[str,
             curves.append(Curve(h, factor * h**limit.order, ":", color=color))
     return Panel(
         f"Mesh error of the {title(quantity)}",
-        f"facet length at the contact h [{units['length']}]",
+        labelled("facet length at the contact h", units, "length"),
         "|value - limit| / limit",
         curves,
         x_scale="plain log",
@@ -65,7 +66,7 @@ def _slope_triangles(ax: Any, quantity: str, all_series: Sequence[Series]) -> No
         right = left * 1.7
         top = bottom * 1.7**slope
         ax.fill([left, right, right], [bottom, bottom, top], facecolor="0.85", edgecolor="0.4", lw=0.8)
-        ax.annotate(f"{slope:g}", (right * 1.05, math.sqrt(bottom * top)), fontsize=8, va="center")
+        ax.annotate(f"{slope:g}", (right / 1.03, math.sqrt(bottom * top)), fontsize=8, ha="right", va="center")
         ax.annotate("1", (math.sqrt(left * right), bottom / 1.12), fontsize=8, ha="center", va="top")
         left *= 2.1
 
@@ -88,8 +89,8 @@ def pressure_panel(series: Series, theory: Any, units: Mapping[str, str]) -> Pan
         curves.append(Curve(r[shown], pressure[shown], style, label, color, size=3))
     return Panel(
         f"Contact pressure, {series.combination}",
-        f"distance from the middle of the contact [{units['length']}]",
-        f"contact pressure [{units['pressure']}]",
+        labelled("distance from the middle of the contact", units, "length"),
+        labelled("contact pressure", units, "pressure"),
         [*curves, *_theory_curves(theory, series, low, reach)],
         x_end=reach,
         x_start=low,
@@ -133,7 +134,7 @@ def theory_panel(all_series: Sequence[Series], best: Series, quantity: str, unit
         lines.append(Line(100 * same.model, "tab:green", "--", 1.2, label))
     return Panel(
         f"Model and mesh error of the {title(quantity)}",
-        f"facet length at the contact h [{units['length']}]",
+        labelled("facet length at the contact h", units, "length"),
         "difference from theory [%]" if best.exact_theory else f"difference from theory {best.compared} [%]",
         curves,
         [*lines, Line(0.0, label="theory")],

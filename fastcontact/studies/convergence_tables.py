@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from fastcontact.results.units import labelled
 from fastcontact.studies.quantities import column, title
 from fastcontact.studies.render.table import Rows, finite, number, percent, with_error_bar
 from fastcontact.studies.sentences import sentences
@@ -24,7 +25,7 @@ COMBINATION = ("combination", "levels", "finest DOF")
 def level_rows(series: Series, units: Mapping[str, str], quantities: Sequence[str] = IN_TABLES) -> Rows:
     """Return header and rows of h, DOF, and of each quantity value, error against the limit, order from level to level."""
     names = [name for name in quantities if name in series.quantities]
-    header = ["level", f"h [{units['length']}]", "DOF"]
+    header = ["level", labelled("h", units, "length"), "DOF"]
     rows = [[str(level.number), number(level.h, 4), str(level.n_dofs)] for level in series.levels]
     for name in names:
         header += [column(name, name, units), "error", "order"]

@@ -63,6 +63,7 @@ RULES: dict[str, Callable[[str, Mapping[str, Any]], Rule]] = {
     "quarter-disc": _spheres,
     "cylinder-on-block": _cylinder,
     "block-on-block": lambda element, given: Rule(double=("divisions_lower", "divisions_upper")),
+    "block": lambda element, given: Rule(double=("divisions",)),
     "box": lambda element, given: Rule(double=("divisions",)),
     "rings": lambda element, given: Rule(double=("divisions_inner", "divisions_outer")),
     "graded-block": _half_space,

@@ -20,6 +20,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import quality
 from fastcontact.mesh.topology import bodies
 from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.units import labelled
 
 Array = NDArray[np.float64]
 # Theories about the very bodies that are modelled, not about half spaces or beams in their place.
@@ -251,11 +252,15 @@ def title(quantity: str) -> str:
 
 
 def unit(quantity: str, units: Mapping[str, str]) -> str:
-    """Return the name of a quantity's unit, empty for ratios."""
-    kind = LABELS[quantity][1] if quantity in LABELS else "length" if ".displacement." in quantity else "pressure"
-    return units[kind] if kind else ""
+    """Return the name of a quantity's unit; empty for ratios, and where it is not known."""
+    return units.get(_kind(quantity), "")
+
+
+def _kind(quantity: str) -> str:
+    """Return what a quantity is: a length, a force, a pressure; empty for ratios."""
+    return LABELS[quantity][1] if quantity in LABELS else "length" if ".displacement." in quantity else "pressure"
 
 
 def column(label: str, quantity: str, units: Mapping[str, str]) -> str:
-    """Return the header of a column or axis: a label and the unit of its quantity, ``[1]`` for ratios."""
-    return f"{label} [{unit(quantity, units) or '1'}]"
+    """Return the header of a column or axis: a label and the unit of its quantity where that is known, ``[1]`` for ratios."""
+    return labelled(label, units, kind) if (kind := _kind(quantity)) else f"{label} [1]"

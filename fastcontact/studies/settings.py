@@ -62,9 +62,23 @@ class Settings:
         return self.generator is not None and "" not in self.arguments
 
 
+def data_of(case: Case) -> dict[str, Any]:
+    """Return the data of a case file, of which studies make others; CaseError for a case of anything else."""
+    try:
+        data = tomllib.loads(case.text) if case.deck is None else {}
+    except ValueError:
+        data = {}
+    if "mesh" not in data:
+        kind = "an input deck" if case.deck is not None else "made of data that no case file can hold"
+        raise CaseError(
+            f"'{case.name}' is {kind}: studies change the mesh and the numbers of a case file (TOML), write one"
+        )
+    return data
+
+
 def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
     """Return the settings of a case's studies, checked; `data` replaces the parsed case file, e.g. with other values."""
-    data = tomllib.loads(case.text) if data is None else data
+    data = data_of(case) if data is None else data
     study = data.get("study", {})
     pair = study.get("contact") or next((own.name for own in case.model.contact), None)
     formulations = {pair.name: pair.formulation for pair in case.model.contact}

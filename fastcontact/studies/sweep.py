@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from math import prod
@@ -20,9 +19,10 @@ from fastcontact.studies.case_parameters import substituted
 from fastcontact.studies.execute import Progress, raise_first, run_all
 from fastcontact.studies.job import Job, fields_of, job_of
 from fastcontact.studies.levels import make_mesh, recipe
+from fastcontact.studies.progress import told
 from fastcontact.studies.quantities import of_theory
 from fastcontact.studies.report import of_case
-from fastcontact.studies.settings import one_combination, settings
+from fastcontact.studies.settings import data_of, one_combination, settings
 from fastcontact.studies.sweep_figures import label_of
 from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
 from fastcontact.studies.sweep_report import Sweep
@@ -45,6 +45,7 @@ def parameter_sweep(
     workers: int | None = None,
     store: str | Path | None = None,
     on_progress: Callable[[Progress], None] | None = None,
+    progress: bool = False,
 ) -> Sweep:
     """Solve a case for all combinations of some parameters' values.
 
@@ -60,7 +61,7 @@ def parameter_sweep(
     level : int, optional
         Refinement, as in `convergence_study`; by default 2 where ``[study]`` gives the meshes of level 0, otherwise the
         mesh of the case.
-    executor, workers, store, on_progress
+    executor, workers, store, on_progress, progress
         As in `convergence_study`.
 
     Returns
@@ -80,7 +81,8 @@ def parameter_sweep(
     jobs = [_job(case, choice, element, formulation, level) for choice in choices]
     # An unknown key would make every run fail.
     build_case(jobs[0].data, name=case.name, folder=case.folder, mesh=case.mesh)
-    results = run_all(jobs, executor=executor, workers=workers, store=store, on_progress=on_progress)
+    with told(on_progress, progress) as told_to:
+        results = run_all(jobs, executor=executor, workers=workers, store=store, on_progress=told_to)
     raise_first("no point of the sweep could be solved", jobs, results)
     runs = list(zip(choices, results, strict=True))
     return Sweep(
@@ -102,7 +104,7 @@ def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: 
         return ()
     low, high = min(numbers), max(numbers)
     x = np.geomspace(low, high, CURVE) if low > 0 else np.linspace(low, high, CURVE)
-    data = tomllib.loads(case.text)
+    data = data_of(case)
     linked = data.get("study", {}).get("parameters", {})
     curves = []
     for choice in itertools.product(*(own for _, own in others)):
@@ -128,7 +130,7 @@ def _theory_at(
 
 
 def _job(case: Case, choice: dict[str, Value], element: str | None, formulation: str | None, level: int | None) -> Job:
-    data = tomllib.loads(case.text)
+    data = data_of(case)
     linked = data.get("study", {}).get("parameters", {})
     for parameter, value in choice.items():
         data = substituted(data, parameter, value, linked)

@@ -120,16 +120,12 @@ class Panels:
             for other, (style, name) in styles.items():
                 ratios = [point.ratio(quantity, other) for point in points]
                 if np.isfinite(ratios).any() and (other, quantity) != ("equal_force", "force"):
-                    name = (
-                        f"to {name}"
-                        + (self._unmoved(quantity) if other == "theory" else "")
-                        + (f", {label}" if label else "")
-                    )
+                    name = f"to {name}" + (f"\n{label}" if label else "")
                     color = f"C{k if self.others else len(curves)}"
                     curves.append(Curve(x, ratios, f"{marker(k)}{style}", name, color=color))
         if not curves:
             return Panel(instead=f"no theory of the {title(quantity)}")
-        heading = f"{title(quantity)}: ratio to theory"
+        heading = f"{title(quantity)}: ratio to theory{self._unmoved(quantity)}"
         return self._panel(heading, "computed / theory [-]", curves, lines=[Line(1.0, width=0.8)])
 
     def _panel(self, heading: str, y_label: str, curves: list[Curve], **more: Any) -> Panel:

@@ -8,7 +8,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact import analytic, generate, obstacles, plot
-from fastcontact.cases import keys
+from fastcontact.cases import checks, keys
 from fastcontact.cli._main import parser
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.linear import choice as linear
@@ -61,6 +61,20 @@ def test_every_key_of_case_files_is_listed():
     page = text("reference/case-files.md")
     for key in {**keys.TOP, **keys.STUDY}:
         assert re.search(rf"[`\[]{key}[`\].]", page), key
+
+
+def test_every_mesh_maker_is_listed_with_its_keys():
+    for name, make in generate.GENERATORS.items():
+        (row,) = re.findall(rf"^\| `{name}` \| .* \| (.*) \| (.*) \|$", text("reference/generate.md"), re.MULTILINE)
+        assert re.findall(r"`(\w+)`", row[0]) == list(inspect.signature(make).parameters), name
+        assert row[1].split(", ") == make().group_names, name
+
+
+def test_every_quantity_of_checks_is_listed():
+    page = text("reference/case-files.md")
+    for name in (*checks.OF_PROBES, *checks.OF_PAIRS):
+        kind = name.split(".")[0]
+        assert re.search(rf"`{kind}(\.\w+)?`", page), name
 
 
 def test_every_option_of_contact_pairs_is_listed():

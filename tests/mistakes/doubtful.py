@@ -229,4 +229,25 @@ DOUBTS = [
             r"contact 'pair' penetrates by 0\.\d+, which is \d+\.\d% of the largest displacement: raise its penalty from 1000 to about \S+, or leave it out",
         ),
     ),
+    Doubt(
+        "a spring that is a thousand times too stiff",
+        lambda: block_on_block(divisions_upper=(8, 4)),
+        of(STEEL, BLOCKS, '[[spring]]\ngroup = "CONT_UPPER"\nto = "CONT_LOWER"\ny = 1e10\n'),
+        (
+            r"the spring between 'CONT_UPPER' and 'CONT_LOWER' is 1\.7e\+07 times as stiff as the body at one of its ends \(577\): results lose up to 7 of 16 digits, and beside contact its force is off by as many times the criteria; take 6e\+06 or less, or a relation \(relate, relate_groups\), which is rigid and exact",
+        ),
+    ),
+    Doubt(
+        "a coefficient of wear in another unit",
+        lambda: block((8.0, 2.0), (24, 6), origin=(-4.0, -2.0)),
+        of(
+            STEEL,
+            '[[support]]\ngroup = "BOTTOM"\nx = 0.0\ny = 0.0\n',
+            '[obstacle.drum]\nsecondary = "TOP"\nshape = { kind = "sphere", centre = [0.0, 5.0], R = 5.0 }\n',
+            "motion = { y = -0.2 }\nrotation = { angle = 0.1, centre = [0.0, 5.0] }\nwear = 1.0\n",
+        ),
+        (
+            r"contact 'drum' wears off \S+, \S+ times the size of the model, in steps \S+ times as long as pressures can follow: is its wear Archard's coefficient by the hardness, in the unit of one over pressure\?",
+        ),
+    ),
 ]

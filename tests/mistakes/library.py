@@ -770,6 +770,12 @@ LOADS = [
         fc.ModelError,
         r"stiffness",
     ),
+    Mistake(
+        "a spring as a rigid link",
+        lambda: fc.solve(with_load("add_spring", group="UPPER_TOP_LEFT", to="LOWER_BOTTOM_LEFT", y=1e30), 1),
+        fc.ModelError,
+        r"the spring between 'UPPER_TOP_LEFT' and 'LOWER_BOTTOM_LEFT' is 1\.\de\+27 times as stiff as the body at one of its ends \(\d+\): no digit would be left of results; take \de\+06 or less, or a relation \(relate, relate_groups\), which is rigid and exact",
+    ),
 ]
 
 
@@ -877,4 +883,9 @@ OPTIONS = [
 
 MISTAKES = [*MESH, *MATERIALS, *SUPPORTS, *CONTACT, *LOADS, *RAMP, *OPTIONS]
 # Warnings that only the solution can tell; all others come before any numerics.
-AFTER = ("a contact that is never reached", "a pair was forgotten", "bodies pulled apart by a force")
+AFTER = (
+    "a spring as a rigid link",
+    "a contact that is never reached",
+    "a pair was forgotten",
+    "bodies pulled apart by a force",
+)

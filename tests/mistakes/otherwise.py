@@ -35,7 +35,7 @@ OTHERWISE = {
         "nu above a half", "nu below -1", "E is negative", "a spring that pulls backwards",
     ),
     "a singular matrix, told as a pivot near zero at an equation number": (
-        "E is zero", "E of zero in a call", "no support at all", "one body free to slide", "a plate held at one point",
+        "a spring as a rigid link",        "E is zero", "E of zero in a call", "no support at all", "one body free to slide", "a plate held at one point",
         "nodes not merged, one part not held",
     ),
     "a solution full of numbers that are none, or the value is read as zero": (
@@ -149,6 +149,8 @@ OTHERWISE = {
     "nothing is said: linear kinematics are used outside their range": ("strains are large", "rotations are large"),
     "nothing is said: the pressure depends on the mesh more than on the bodies": ("the mesh does not resolve the contact",),
     "nothing is said: contact forces are too small": ("a penalty is too soft",),
+    "nothing is said: forces that are off by as much, or of a singular matrix": ("a spring that is a thousand times too stiff",),
+    "nothing is said: depths that are larger than the bodies": ("a coefficient of wear in another unit",),
     "the analysis runs to its end, and then nothing can be written": (
         "folder of the result missing", "result is a folder", "folder of the summary missing",
         "picture of no known kind", "report of a study into a missing folder", "the folder is write-protected",

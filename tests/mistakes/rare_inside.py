@@ -10,6 +10,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import h5py
+import meshio
 import numpy as np
 from library import blocks, lifted, solved
 from scipy.sparse import bsr_array, csr_array
@@ -18,6 +19,7 @@ import fastcontact as fc
 from fastcontact import generate
 from fastcontact.analysis.unsupported_bodies import UnsupportedBodies
 from fastcontact.cases.case import read_case
+from fastcontact.cases.keys import called
 from fastcontact.cli import _study, bench, cases
 from fastcontact.cli._outputs import check_outputs
 from fastcontact.contact.configuration import Configuration
@@ -27,8 +29,8 @@ from fastcontact.linear.elimination import pivot_order
 from fastcontact.linear.multigrid import solver
 from fastcontact.linear.solvers import amg
 from fastcontact.linear.solvers.direct import Direct
-from fastcontact.mesh.files import hdf5, med, meshio_content
-from fastcontact.mesh.generate import _triangulate
+from fastcontact.mesh.files import aster_mail, hdf5, med, meshio_content
+from fastcontact.mesh.generate import _check, _triangulate
 from fastcontact.mesh.generate.transform import renamed
 from fastcontact.results import reader
 from fastcontact.studies import convergence, levels, sweep
@@ -46,6 +48,22 @@ def refusing(number):
         raise OSError(number, os.strerror(number))
 
     return refuse
+
+
+def pair_of(size):
+    first, second = size
+    return float(first), float(second)
+
+
+def without_cells(folder):
+    (folder / "a.mail").write_text("TITRE\nFINSF\nCOOR_2D\n N1 0 0\nFINSF\nFIN\n")
+    fc.read_mesh(folder / "a.mail")
+
+
+def arrays_apart():
+    mesh = meshio.Mesh(np.eye(3), [("triangle", [[0, 1, 2]])])
+    mesh.cell_data = {"gmsh:physical": []}
+    fc.from_meshio(mesh)
 
 
 def out_of_balance(patch):
@@ -215,4 +233,13 @@ CALLS = [
     ("a sweep without a point", no_point, fc.MeshError, r"no point of the sweep could be solved; .*: the mesh is folded"),
     ("packed data larger than unpacked", packed_beyond_its_size, fc.errors.FileError, r"takes more room packed than it can hold: the file is damaged, write it anew"),
     ("a file name beyond all limits", name_too_long, fc.errors.FileError, r"cannot be written \(File name too long\): name another file"),
+    ("a table that a function cannot take", lambda: called("mesh", pair_of, {"size": 3}), fc.errors.CaseError, r"'mesh': size = 3 are not of the kinds that it takes \(cannot unpack"),
+    ("a table with a text for numbers", lambda: called("mesh", pair_of, {"size": "ab"}), fc.errors.CaseError, r"'mesh': size = 'ab' are not of the kinds that it takes \(could not convert"),
+    ("a size that is no number", lambda: _check.number("size", "x"), fc.MeshError, r"^size must be a number, not 'x'$"),
+    ("one size for two", lambda: _check.each(_check.number, "size", 1.0), fc.MeshError, r"^size must be two numbers, not 1\.0$"),
+    ("arrays of meshio that do not fit together", arrays_apart, fc.MeshError, r"the arrays of meshio's mesh do not fit together: list index out of range"),
+    ("a .mail file without cells", without_cells, fc.MeshError, r"a\.mail': the mesh has no cells: nothing can be computed on points alone"),
+    ("a .mail file that is gone", lambda: aster_mail.read(Path("gone.mail")), fc.errors.FileError, r"cannot read 'gone\.mail': .*No such file"),
+    ("a picture of no steps", lambda: fc.plot.history([], "pair"), fc.FastcontactError, r"there are no steps to draw"),
+    ("a picture of another contact", lambda: fc.plot.history(solved(blocks()), "pear"), fc.FastcontactError, r"unknown contact pair 'pear'.*did you mean 'pair'"),
 ]  # fmt: skip

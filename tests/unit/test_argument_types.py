@@ -33,6 +33,8 @@ def defaults(call, **given):
     return {p.name: p.default for p in known if p.default is not p.empty} | given
 
 
+STEPS = fc.solve(model(), 1)
+CONTACT, MESH = STEPS[0].contact["hertz"], model().mesh
 SIDES = {"name": "h", "secondary": "CONT1", "primary": "CONT2"}
 CALLS = {
     "LinearElastic": (fc.LinearElastic, {"E": 1.0, "nu": 0.3, "volumetric": "auto"}),
@@ -71,6 +73,16 @@ CALLS = {
     "Sphere": (fc.obstacles.Sphere, {"centre": (0.0, 0.0), "R": 1.0, "hollow": False}),
     "convergence_study": (fc.convergence_study, {"case": "none.toml", "levels": 2, "elements": None}),
     "parameter_sweep": (fc.parameter_sweep, {"case": "none.toml", "parameters": {"approach": [1.0]}}),
+    "read_deck": (fc.read_deck, {"path": "none.inp"}),
+    "write_csv": (fc.write_csv, {"path": "none.csv", "table": fc.contact_table(CONTACT), "units": None}),
+    "pressure_profile": (
+        fc.plot.pressure_profile,
+        {"contact": CONTACT, "theory": None, "other_theories": None, "units": {}, "title": "", "ax": None},
+    ),
+    "history": (fc.plot.history, {"steps": STEPS, "pair": "hertz", "approach": None, "share": 1.0, "title": ""}),
+    "contact_zones": (fc.plot.contact_zones, {"steps": STEPS, "pair": "hertz", "title": "", "units": {}, "ax": None}),
+    "deformed_shape": (fc.plot.deformed_shape, {"mesh": MESH, "step": STEPS[0], "field": "von_mises", "ax": None}),
+    "axis_stress": (fc.plot.axis_stress, {"mesh": MESH, "step": STEPS[0], "pair": "hertz", "ax": None}),
     "points_of": (fc.generate.half_spheres(size=25.0).points_of, {"group": "CONT1"}),
 }  # fmt: skip
 
@@ -101,6 +113,10 @@ def test_nothing_but_our_own_errors(name, tmp_path, monkeypatch):
         (lambda: model(False).add_contact(**SIDES, friction="0.3"), "friction of contact 'h' must be a number"),
         (lambda: fc.generate.half_spheres(size="2"), "size of half_spheres must be a number or None, not the string '2'"),
         (lambda: fc.solve("model"), "the argument model of solve must be a Model, not the string 'model'"),
+        (lambda: fc.Model("a.med", "3d"), "the argument mesh of Model must be a Mesh, not the string 'a.med'"),
+        (lambda: fc.plot.pressure_profile(CONTACT, theory=5), "a theory has a pressure, .* which 5 has not"),
+        (lambda: fc.plot.pressure_profile(CONTACT, ax="ax"), "drawn on axes of matplotlib, not on 'ax'"),
+        (lambda: fc.write_csv("a.csv", np.zeros(3)), "a table is an array with named columns"),
         (lambda: fc.generate.union(fc.generate.block(), 3), r"argument meshes\[1\] of union must be a Mesh, not the int 3"),
     ],
 )  # fmt: skip

@@ -14,6 +14,7 @@ from fastcontact.cases.decks.assembled import Assembled, assembled
 from fastcontact.cases.decks.blocks import Place, folded
 from fastcontact.cases.decks.conditions import Component, Conditions, Distributed, local_axes
 from fastcontact.cases.decks.content import Content, Material, Pair, Section, Step
+from fastcontact.cases.decks.cyclic_symmetry import add_sectors
 from fastcontact.cases.decks.initial_stresses import add_initial_stresses
 from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface
 from fastcontact.cases.decks.pretension import add_sections, cut_sections
@@ -69,6 +70,7 @@ class Building:
         self.links = relations_of(self.found, self.model.mesh)
         self.model.relations.extend(self.links)
         self.links += add_sections(self.model, self.found, conditions.locks)
+        self.links += add_sectors(self.model, self.found)
         self._forces(conditions)
         self._pressures(groups)
         self._body_forces(conditions)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from fastcontact.cases.decks.blocks import Block, Row, as_number, unquoted
-from fastcontact.cases.decks.content import Axes, Content, Equation, Link, Pair
+from fastcontact.cases.decks.content import Axes, Content, Equation, Link, Pair, Pin
+from fastcontact.cases.decks.cyclic_symmetry import sector_ends
 
 # Terms of an equation: more tie everything to everything.
 MOST_TERMS = 100_000
@@ -40,6 +41,9 @@ def clearance(content: Content, block: Block) -> None:
 
 def tie(content: Content, block: Block) -> None:
     """*TIE: sides that neither open nor slide."""
+    if "CYCLIC SYMMETRY" in block.parameters:
+        content.sector_ends.append(sector_ends(block))
+        return
     tolerance = block.get("POSITION TOLERANCE")
     value = as_number(block.place, tolerance) if tolerance else None
     adjust = block.choice("ADJUST", ("YES", "NO"))
@@ -80,6 +84,20 @@ def equation(content: Content, block: Block) -> None:
 
 def _term(row: Row, start: int) -> tuple[str, int, float]:
     return row.text(start), row.whole(start + 1), row.number(start + 2)
+
+
+def multi_point(content: Content, block: Block) -> None:
+    """*MPC: PIN and TIE give two nodes the same displacement, BEAM a rigid bar from the first node to the second."""
+    for row in block.rows:
+        kind, nodes = row.text(0).upper(), [unquoted(entry) for entry in row.entries[1:] if entry]
+        if kind not in ("PIN", "TIE", "BEAM"):
+            raise row.place.refuse(f"an MPC of type {kind[:40]} is not supported, only PIN, TIE and BEAM")
+        if len(nodes) != 2:
+            raise row.place.refuse(f"{kind} needs two nodes, the one that follows and the one that leads")
+        if kind == "BEAM":
+            content.links.append(Link(row.place, nodes[1], nodes[0], "nodes"))
+        else:
+            content.pins.append(Pin(row.place, nodes[0], nodes[1]))
 
 
 def rigid_body(content: Content, block: Block) -> None:

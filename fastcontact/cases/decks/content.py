@@ -136,11 +136,39 @@ class Pair:
 
 
 @dataclass(frozen=True)
+class SectorEnds:
+    """The two ends of a sector that repeats itself round an axis: their surfaces, by the name of the tie."""
+
+    place: Place
+    name: str
+    surfaces: tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Sectors:
+    """How many sectors make the whole round an axis, by two of its points, and the name of the tie of their ends."""
+
+    place: Place
+    count: int
+    tie: str
+    points: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Equation:
     """A linear equation: node, component and coefficient of each term."""
 
     place: Place
     terms: tuple[tuple[str, int, float], ...]
+
+
+@dataclass(frozen=True)
+class Pin:
+    """Nodes, one or those of a set, that have the displacement of a further one, or each that of one of a further set."""
+
+    place: Place
+    first: str
+    second: str
 
 
 @dataclass(frozen=True)
@@ -218,7 +246,10 @@ class Content:
     materials: dict[str, Material] = field(default_factory=dict)
     interactions: dict[str, Interaction] = field(default_factory=dict)
     pairs: list[Pair] = field(default_factory=list)
+    sector_ends: list[SectorEnds] = field(default_factory=list)
+    sectors: list[Sectors] = field(default_factory=list)
     equations: list[Equation] = field(default_factory=list)
+    pins: list[Pin] = field(default_factory=list)
     links: list[Link] = field(default_factory=list)
     axes: list[Axes] = field(default_factory=list)
     pretensions: list[PretensionSection] = field(default_factory=list)

@@ -20,7 +20,8 @@ from fastcontact.cases.decks.building import Building
 from fastcontact.cases.decks.content import Content
 from fastcontact.cases.decks.reading import read_content
 from fastcontact.elasticity import recovery
-from fastcontact.errors import MeshError, warn
+from fastcontact.errors import FileError, MeshError, warn
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.paths import PathLike, existing_file
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp
@@ -160,6 +161,7 @@ class Deck:
             return
 
 
+@typed(FileError)
 def read_deck(path: PathLike) -> Deck:
     """Read an input deck of Abaqus or CalculiX: static steps of linear elastic bodies in contact.
 

@@ -31,6 +31,7 @@ TRANSLATED = {
     "CONTACT PAIR": _keyword("INTERACTION; TYPE; ADJUST; SMALL SLIDING", "CPSET"),
     "COUPLING": _keyword("REF NODE; SURFACE", "CONSTRAINT NAME"),
     "CONDUCTIVITY": Keyword(anything=True),
+    "CYCLIC SYMMETRY MODEL": _keyword("N; TIE", "NGRAPH; CHECK; ELSET"),
     "DENSITY": _keyword(),
     "DISTRIBUTING": _keyword(),
     "DLOAD": _keyword("OP; AMPLITUDE"),
@@ -51,6 +52,7 @@ TRANSLATED = {
     "INSTANCE": _keyword("NAME; PART"),
     "KINEMATIC": _keyword(),
     "MATERIAL": _keyword("NAME"),
+    "MPC": _keyword(),
     "NODE": _keyword("NSET; SYSTEM"),
     "NSET": _keyword("NSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED"),
     "ORIENTATION": _keyword("NAME; SYSTEM"),
@@ -66,7 +68,7 @@ TRANSLATED = {
     "SURFACE BEHAVIOR": _keyword("PRESSURE-OVERCLOSURE; NO SEPARATION"),
     "SURFACE INTERACTION": _keyword("NAME"),
     "TEMPERATURE": _keyword("OP; AMPLITUDE"),
-    "TIE": _keyword("POSITION TOLERANCE; ADJUST", "NAME; TYPE; NO ROTATION"),
+    "TIE": _keyword("POSITION TOLERANCE; ADJUST; CYCLIC SYMMETRY; NAME", "TYPE; NO ROTATION"),
     "TRANSFORM": _keyword("NSET; TYPE"),
 }
 # Requests for output, all of which is in the results, and controls of convergence, which has criteria of its own.
@@ -102,9 +104,9 @@ REFUSED = {
     **dict.fromkeys(
         ("CFLUX", "DFLUX", "FILM", "RADIATE", "PHYSICAL CONSTANTS", "GAP CONDUCTANCE", "GAP HEAT GENERATION"), HEAT),
     **dict.fromkeys(
-        ("MPC", "CONTACT", "CONTACT INCLUSIONS", "CONTACT PROPERTY ASSIGNMENT",
+        ("CONTACT", "CONTACT INCLUSIONS", "CONTACT PROPERTY ASSIGNMENT",
          "BASE MOTION",
-         "CYCLIC SYMMETRY MODEL", "SUBMODEL", "MODEL CHANGE", "CHANGE FRICTION", "CHANGE CONTACT TYPE", "CONTACT CONTROLS",
+         "SUBMODEL", "MODEL CHANGE", "CHANGE FRICTION", "CHANGE CONTACT TYPE", "CONTACT CONTROLS",
          "CONTACT INITIALIZATION DATA", "CONTACT STABILIZATION", "SYSTEM", "DISTRIBUTION", "NGEN", "NFILL", "ELGEN", "NCOPY",
          "ELCOPY", "PARAMETER", "MATRIX INPUT", "SUPER ELEMENT", "USER ELEMENT", "DISTRIBUTING COUPLING",
          "KINEMATIC COUPLING",

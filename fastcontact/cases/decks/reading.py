@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
-from fastcontact.cases.decks import connections, geometry, pretension, properties, stepping, temperatures
+from fastcontact.cases.decks import (
+    connections,
+    cyclic_symmetry,
+    geometry,
+    pretension,
+    properties,
+    stepping,
+    temperatures,
+)
 from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Instance, Interaction, Material, Part, Step
 from fastcontact.cases.decks.keywords import OUTPUT, check
@@ -38,8 +46,10 @@ OF_MODELS: dict[str, Callable[[Content, Block], None]] = {
     "SPRING": properties.spring,
     "CONTACT PAIR": connections.contact_pair,
     "CLEARANCE": connections.clearance,
+    "CYCLIC SYMMETRY MODEL": cyclic_symmetry.cyclic_symmetry_model,
     "TIE": connections.tie,
     "EQUATION": connections.equation,
+    "MPC": connections.multi_point,
     "RIGID BODY": connections.rigid_body,
     "TRANSFORM": connections.transform,
 }

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.cases.decks.assembled import facet_points
-from fastcontact.cases.decks.content import Equation, Link
+from fastcontact.cases.decks.content import Equation, Link, Pin
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.elasticity.loads import Traction
 from fastcontact.elasticity.relations import Relation
@@ -33,6 +33,7 @@ def relations_of(found: DeckMesh, mesh: Mesh) -> list[Relation]:
     """Return the relations of all equations, rigid bodies and couplings."""
     content = found.made.content
     rows = [_equation(found, equation) for equation in content.equations]
+    rows += [row for pin in content.pins for row in _pinned(found, pin)]
     made = [relation("the equations of the deck", rows, mesh.points.shape)] if rows else []
     for link in content.links:
         rows = _distributing(found, mesh, link) if link.distributing else _rigid(found, link)
@@ -50,6 +51,19 @@ def _equation(found: DeckMesh, equation: Equation) -> list[Term]:
     if not any(coefficient for _, _, coefficient in terms):
         raise equation.place.refuse("all coefficients of the equation are zero")
     return terms
+
+
+def _pinned(found: DeckMesh, pin: Pin) -> list[list[Term]]:
+    """Return the equations by which nodes have the displacements of others."""
+    first, second = (found.made.nodes(name, pin.place) for name in (pin.first, pin.second))
+    if len(second) == 1:
+        second = second * len(first)
+    if len(first) != len(second) or set(zip(first, second, strict=True)) & set(zip(second, first, strict=True)):
+        raise pin.place.refuse(
+            f"'{pin.first}' and '{pin.second}' have {len(first)} and {len(second)} nodes: as many are needed, or one that "
+            "leads, each another one"
+        )
+    return [[(p, axis, 1.0), (q, axis, -1.0)] for p, q in zip(first, second, strict=True) for axis in range(found.dim)]
 
 
 def _points(found: DeckMesh, link: Link) -> list[int]:

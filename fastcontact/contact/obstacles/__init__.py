@@ -12,13 +12,14 @@ the last coordinate.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.contact.obstacles.meshed import MeshedSurface
 from fastcontact.contact.obstacles.shapes import Cylinder, FlatPunch, HalfSpace, Height, Sphere, cone, paraboloid
+from fastcontact.errors import no_attribute
 
 Array = NDArray[np.float64]
 
@@ -55,6 +56,12 @@ __all__ = [
     "cone",
     "paraboloid",
 ]
+
+
+if not TYPE_CHECKING:  # to whom all names are known
+
+    def __getattr__(name: str) -> object:
+        raise no_attribute("fastcontact.obstacles", name, __all__)
 
 
 def __dir__() -> list[str]:

@@ -64,8 +64,8 @@ def turn(beta, z, p):
         p[i] = z[i] + beta * p[i]
 
 
-@kernel
+@parallel_kernel
 def scaled(factor, a, b):
     """Fill `b` with ``factor a``, in the precision of b."""
-    for i in range(a.shape[0]):
+    for i in prange(a.shape[0]):
         b[i] = factor * a[i]

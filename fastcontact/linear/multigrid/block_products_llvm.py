@@ -28,7 +28,7 @@ def row_times(_context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         from numba.core import cgutils
 
-        row = _Row(context, builder, signature, args)
+        row = _Row(context, builder, signature, args, len(rows), len(cols))
         step = args[3].type(1)
         with cgutils.for_range_slice(builder, args[3], args[4], step, args[3].type, inc=True) as (k, _):
             row.add_block(k)
@@ -36,6 +36,66 @@ def row_times(_context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end
 
     sums = types.UniTuple(x.dtype, len(rows))
     return sums(indices, numbers, x, types.intp, types.intp, rows, cols), code
+
+
+def row_times_both_ways(
+    _context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end: Any, own: Any, factor: Any, y: Any, rows: Any
+) -> Any:
+    """Return the types of `block_products.row_times_both_ways`, and what writes it."""
+    from numba.core import types
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        from numba.core import cgutils
+
+        row = _RowBothWays(context, builder, signature, args, len(rows), len(rows))
+        step = args[3].type(1)
+        with cgutils.for_range_slice(builder, args[3], args[4], step, args[3].type, inc=True) as (k, _):
+            row.add_block(k)
+        return context.make_tuple(builder, signature.return_type, row.sums())
+
+    sums = types.UniTuple(x.dtype, len(rows))
+    return sums(indices, numbers, x, types.intp, types.intp, types.intp, x.dtype, y, rows), code
+
+
+def add_row_transposed(
+    _context: Any,
+    indices: Any,
+    numbers: Any,
+    begin: Any,
+    end: Any,
+    own: Any,
+    x: Any,
+    y: Any,
+    at: Any,
+    rows: Any,
+    cols: Any,
+) -> Any:
+    """Return the types of `block_products.add_row_transposed`, and what writes it."""
+    from numba.core import types
+
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        from numba.core import cgutils
+
+        write, m, n = _Writer(context, builder, x.dtype), len(rows), len(cols)
+        offset, step = args[2].type, args[2].type(1)
+        indices, vector, into = (write.start(signature.args[k], args[k]) for k in (0, 5, 6))
+        data, place = write.starts(signature.args[1], args[1]), builder.mul(args[4], offset(m))
+        own = [write.numbers([vector], place, r, 1) for r in range(m)]
+        with cgutils.for_range_slice(builder, args[2], args[3], step, offset, inc=True) as (k, _):
+            column = builder.load(builder.gep(indices, [k]))
+            column = column if column.type == offset else builder.sext(column, offset)
+            j, block = builder.add(args[7], builder.mul(column, offset(n))), builder.mul(k, offset(m * n))
+            for piece in _pieces(n):
+                total = write.zeros(piece.width)
+                for r in range(m):
+                    numbers = write.numbers(data, block, r * n + piece.column, piece.width)
+                    total = write.plus(total, numbers, write.everywhere(own[r], piece.width))
+                write.add(into, j, piece.column, piece.width, total)
+        return context.get_dummy_value()
+
+    return types.none(
+        indices, numbers, types.intp, types.intp, types.intp, x, y, types.intp, rows, cols
+    ), code  # fmt: skip
 
 
 def add_product(_context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, sizes: Any) -> Any:
@@ -111,9 +171,15 @@ class _Writer:
         return parts[0] if len(parts) == 1 else self.builder.fadd(*parts)
 
     def plus(self, total: Any, one: Any, other: Any) -> Any:
-        """Return a total and a product, which may be rounded at once."""
-        product = self.builder.fmul(one, other, flags=("contract",))
-        return self.builder.fadd(total, product, flags=("contract",))
+        """Return a total and a product, each rounded."""
+        product = self.builder.fmul(one, other)
+        return self.builder.fadd(total, product)
+
+    def add(self, start: Any, at: Any, column: int, width: int, vector: Any) -> None:
+        """Add a vector to numbers in memory."""
+        total = self.builder.fadd(self.numbers([start], at, column, width), vector)
+        align = 4 if str(self.real) == "float" else 8
+        self.builder.store(total, self.where(start, at, column, width), align=align)
 
     def everywhere(self, number: Any, width: int) -> Any:
         """Return a vector with the same number everywhere."""
@@ -151,12 +217,12 @@ class _Row(_Writer):
     the one behind, so that nothing is read beside the block.
     """
 
-    def __init__(self, context: Any, builder: Any, signature: Any, args: Any) -> None:
+    def __init__(self, context: Any, builder: Any, signature: Any, args: Any, m: int, n: int) -> None:
         from numba.core import cgutils
 
         super().__init__(context, builder, signature.args[2].dtype)
         self.offset = args[3].type
-        self.m, self.n = len(signature.args[5]), len(signature.args[6])
+        self.m, self.n = m, n
         self.indices, self.x = (self.start(signature.args[k], args[k]) for k in (0, 2))
         self.data = self.starts(signature.args[1], args[1])
         self.shifted = self.n == 3 and self.m > 1
@@ -178,9 +244,19 @@ class _Row(_Writer):
         behind = [self.shuffled(meets[0], [0, 0, 1, 2])] if self.shifted else meets
         for r in range(m):
             last = self.shifted and r == m - 1
-            for piece, total, x in zip(self.pieces, self.totals[r], behind if last else meets, strict=True):
+            for p, (piece, total, x) in enumerate(
+                zip(self.pieces, self.totals[r], behind if last else meets, strict=True)
+            ):
                 numbers = self.numbers(self.data, at, r * n + piece.column - last, piece.width)
                 builder.store(self.plus(builder.load(total), numbers, x), total)
+                self.met(r, p, numbers, last)
+        self.leave(j)
+
+    def met(self, r: int, p: int, numbers: Any, last: bool) -> None:
+        """Do what else is done with the numbers of row r and piece p of a block, and whether they begin one before it."""
+
+    def leave(self, j: Any) -> None:
+        """Do what is done at the end of a block whose first column is j."""
 
     def sums(self) -> list[Any]:
         """Return the sum of every row of the blocks."""
@@ -204,6 +280,36 @@ class _Row(_Writer):
         """Return three numbers of x and any fourth, without a look beyond them."""
         pair = self.shuffled(self.numbers([self.x], j, 0, 2), [0, 1, 0, 1])
         return [self.builder.insert_element(pair, self.numbers([self.x], j, 2, 1), self.lane(2))]
+
+
+class _RowBothWays(_Row):
+    """Writes the same, and what the transposed blocks make of the row's own part of x, added to y at their columns."""
+
+    def __init__(self, context: Any, builder: Any, signature: Any, args: Any, m: int, n: int) -> None:
+        super().__init__(context, builder, signature, args, m, n)
+        self.y = self.start(signature.args[7], args[7])
+        own = builder.mul(args[5], self.offset(n))
+        self.own = [builder.fmul(args[6], self.numbers([self.x], own, r, 1)) for r in range(m)]
+        self.added: list[Any] = []
+
+    def met(self, r: int, p: int, numbers: Any, last: bool) -> None:
+        """Add a row of the block times a number of x."""
+        if last:
+            numbers = self.shuffled(numbers, [1, 2, 3, 3])
+        width = self.pieces[p].width
+        if r == 0:
+            self.added.append(self.zeros(width))
+        self.added[p] = self.plus(self.added[p], numbers, self.everywhere(self.own[r], width))
+
+    def leave(self, j: Any) -> None:
+        """Add the sums to y; nothing beside them is touched."""
+        for piece, vector in zip(self.pieces, self.added, strict=True):
+            if piece.used == piece.width:
+                self.add(self.y, j, piece.column, piece.width, vector)
+            else:
+                self.add(self.y, j, piece.column, 2, self.shuffled(vector, [0, 1]))
+                self.add(self.y, j, piece.column + 2, 1, self.builder.extract_element(vector, self.lane(2)))
+        self.added = []
 
 
 def _pieces(n: int) -> list[Piece]:

@@ -57,19 +57,6 @@ def multiply(indptr, indices, numbers, x, factor, share, z, y, rows, cols):
         _multiply(c * CHUNK, min(n, (c + 1) * CHUNK), indptr, indices, numbers, x, factor, share, z, y, rows, cols)
 
 
-@parallel_kernel
-def row_sums(indptr, indices, data, x, rows, out):
-    """Fill `out` (n,) with ``|A| |x|``, A of square blocks: the size of the numbers that cancel each other in ``A x``."""
-    m = len(rows)
-    for i in prange(indptr.shape[0] - 1):
-        for a in range(m):
-            s = 0.0
-            for k in range(indptr[i], indptr[i + 1]):
-                for b in range(m):
-                    s += abs(data[(k * m + a) * m + b] * x[indices[k] * m + b])
-            out[i * m + a] = s
-
-
 @kernel
 def _relax(low, high, inverse, r, first, second, d, x, rows, begin):
     m = len(rows)

@@ -2,7 +2,8 @@
 """Set-up of a multigrid hierarchy: the graph of a matrix, smoothed prolongators and Galerkin products.
 
 Block matrices come as arrays, see `matrix.BlockMatrix`, block sizes m and n as tuples of zeros, `rows` and `cols`; numbers
-that may be split as a tuple, see `split_matrix_kernels`. Rows are computed one by one in a fixed order.
+that may be split as a tuple, see `split_matrix_kernels`; which blocks are stored as `storage`, see
+`symmetric_storage_kernels`. Rows are computed one by one in a fixed order.
 """
 
 import numpy as np
@@ -10,6 +11,7 @@ from numba import prange
 
 from fastcontact._jit.decorators import kernel, parallel_kernel
 from fastcontact.linear.multigrid.block_products import add_product, add_transposed
+from fastcontact.linear.multigrid.symmetric_storage_kernels import part_of, place_of
 
 # Block rows that one thread takes at a time; in Galerkin products the number of parts, each with its own work space.
 CHUNK = 512
@@ -17,37 +19,45 @@ PARTS = 8
 
 
 @kernel
-def graph(indptr, indices, data, size):
+def _near(i, indptr, indices, storage, data, square, found):
+    """Fill `found` with the columns of the blocks of row i that are not zero, but for the diagonal; return their number."""
+    part, count = part_of(storage, i), 0
+    for k in range(indptr[i], indptr[i + 1]):
+        if indices[k] == i:
+            continue
+        own = place_of(storage, part, i, indices[k], k)[0]
+        for e in range(own * square, (own + 1) * square):
+            if data[e] != 0.0:
+                found[count] = indices[k]
+                count += 1
+                break
+    return count
+
+
+@parallel_kernel
+def graph(indptr, indices, storage, data, size):
     """Return (start, neighbours) of the blocks that are not zero; the diagonal is left out.
 
     A row without neighbours is a node that no other moves with: all its unknowns are supported.
     """
     n = indptr.shape[0] - 1
-    start = np.zeros(n + 1, np.int32)
-    neighbours = np.empty(indices.shape[0], np.int32)
-    at = 0
-    square = size * size
+    start, widest = np.zeros(n + 1, np.int32), 0
     for i in range(n):
-        for k in range(indptr[i], indptr[i + 1]):
-            if indices[k] == i:
-                continue
-            for e in range(k * square, (k + 1) * square):
-                if data[e] != 0.0:
-                    neighbours[at] = indices[k]
-                    at += 1
-                    break
-        start[i + 1] = at
-    return start, neighbours[:at].copy()
-
-
-@parallel_kernel
-def transpose_blocks(slot, data, out, rows, cols):
-    """Fill `out` with the transposed blocks `slot` (n_blocks,) of `data`; blocks are rows x cols."""
-    m, n = len(rows), len(cols)
-    for k in prange(slot.shape[0]):
-        for a in range(m):
-            for b in range(n):
-                out[(k * n + b) * m + a] = data[(slot[k] * m + a) * n + b]
+        widest = max(widest, indptr[i + 1] - indptr[i])
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        found = np.empty(widest, np.int32)
+        for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
+            start[i + 1] = _near(i, indptr, indices, storage, data, size * size, found)
+    for i in range(n):
+        start[i + 1] += start[i]
+    neighbours = np.empty(start[n], np.int32)
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        found = np.empty(widest, np.int32)
+        for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
+            count = _near(i, indptr, indices, storage, data, size * size, found)
+            for e in range(count):
+                neighbours[start[i] + e] = found[e]
+    return start, neighbours
 
 
 @kernel
@@ -89,8 +99,24 @@ def count_prolongator(indptr, indices, aggregate):
 
 @kernel
 def _smooth_row(
-    i, indptr, indices, data, inverse, aggregate, tentative, omega, start, columns, out, found, sums, rows, cols
+    i,
+    indptr,
+    indices,
+    storage,
+    data,
+    inverse,
+    aggregate,
+    tentative,
+    omega,
+    start,
+    columns,
+    out,
+    found,
+    sums,
+    rows,
+    cols,
 ):
+    part = part_of(storage, i)
     m, n = len(rows), len(cols)
     count = _aggregates_of(i, indptr, indices, aggregate, found)
     for e in range(count * m * n):
@@ -102,7 +128,11 @@ def _smooth_row(
         at = 0
         while found[at] != aggregate[j]:
             at += 1
-        add_product(sums, at * m * n, data, k * m * m, tentative, j * m * n, (rows, rows, cols))
+        own, turned = place_of(storage, part, i, j, k)
+        if turned:
+            add_transposed(sums, at * m * n, data, own * m * m, tentative, j * m * n, (rows, rows, cols))
+        else:
+            add_product(sums, at * m * n, data, own * m * m, tentative, j * m * n, (rows, rows, cols))
     for at in range(count):
         base = (start[i] + at) * m * n
         columns[start[i] + at] = found[at]
@@ -111,12 +141,12 @@ def _smooth_row(
                 s = 0.0
                 for t in range(m):
                     s += inverse[(i * m + r) * m + t] * sums[(at * m + t) * n + c]
-                own = tentative[(i * m + r) * n + c] if found[at] == aggregate[i] else 0.0
-                out[base + r * n + c] = own - omega * s
+                first = tentative[(i * m + r) * n + c] if found[at] == aggregate[i] else 0.0
+                out[base + r * n + c] = first - omega * s
 
 
 @parallel_kernel
-def smooth_prolongator(indptr, indices, data, inverse, aggregate, tentative, omega, start, out, rows, cols):
+def smooth_prolongator(indptr, indices, storage, data, inverse, aggregate, tentative, omega, start, out, rows, cols):
     """Return the columns of ``(I - omega D^-1 A) T`` with the row pointers `start`, and fill its blocks into `out`.
 
     `tentative` (n_nodes * m * n,) is the block of T in each node's own aggregate; `aggregate` is -1 for nodes in none.
@@ -132,8 +162,8 @@ def smooth_prolongator(indptr, indices, data, inverse, aggregate, tentative, ome
         sums = np.empty((widest + 1) * m * len(cols))
         for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
             _smooth_row(
-                i, indptr, indices, data, inverse, aggregate, tentative, omega, start, columns, out, found, sums, rows,
-                cols,
+                i, indptr, indices, storage, data, inverse, aggregate, tentative, omega, start, columns, out, found, sums,
+                rows, cols,
             )  # fmt: skip
     return columns
 
@@ -176,8 +206,8 @@ def count_galerkin(indptr, indices, start, columns, tstart, torigin, count, near
 
 @kernel
 def _galerkin_row(
-    row, near, n_near, place, products, indptr, indices, data, start, columns, P, tstart, torigin, tslot, low, places,
-    out, rows, cols,
+    row, near, n_near, place, products, indptr, indices, storage, data, start, columns, P, tstart, torigin, tslot, low,
+    places, out, rows, cols,
 ):  # fmt: skip
     """Sum one row: first ``Z = A P_I`` for the fine nodes near it, then ``P.T Z``, transposed: A is symmetric."""
     m, n = len(rows), len(cols)
@@ -187,8 +217,13 @@ def _galerkin_row(
         products[e] = 0.0
     for e in range(tstart[row], tstart[row + 1]):
         i, own = torigin[e], tslot[e] * m * n
+        part = part_of(storage, i)
         for k in range(indptr[i], indptr[i + 1]):  # A_ji = A_ij.T
-            add_transposed(products, place[indices[k]] * m * n, data, k * m * m, P, own, (rows, rows, cols))
+            at, turned = place_of(storage, part, i, indices[k], k)
+            if turned:
+                add_product(products, place[indices[k]] * m * n, data, at * m * m, P, own, (rows, rows, cols))
+            else:
+                add_transposed(products, place[indices[k]] * m * n, data, at * m * m, P, own, (rows, rows, cols))
     for e in range(n_near):
         j, base = near[e], e * m * n
         for k in range(start[j], start[j + 1]):
@@ -198,7 +233,22 @@ def _galerkin_row(
 
 @parallel_kernel
 def galerkin(
-    indptr, indices, data, start, columns, P, tstart, torigin, tslot, low, largest, out_columns, out, rows, cols
+    indptr,
+    indices,
+    storage,
+    data,
+    start,
+    columns,
+    P,
+    tstart,
+    torigin,
+    tslot,
+    low,
+    largest,
+    out_columns,
+    out,
+    rows,
+    cols,
 ):
     """Fill the columns and blocks of ``P.T A P``, A symmetric; `low` are its row pointers, `out` holds zeros.
 
@@ -220,6 +270,6 @@ def galerkin(
                 places[found[e]] = e
                 out_columns[low[row] + e] = found[e]
             _galerkin_row(
-                row, near, n_near, place, products, indptr, indices, data, start, columns, P, tstart, torigin, tslot,
+                row, near, n_near, place, products, indptr, indices, storage, data, start, columns, P, tstart, torigin, tslot,
                 low[row], places, out, rows, cols,
             )  # fmt: skip

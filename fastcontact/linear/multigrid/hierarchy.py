@@ -11,6 +11,7 @@ rigid motions of each aggregate. Everything else is ours. `linear.solvers.pyamg`
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -19,7 +20,8 @@ from scipy.sparse import csr_matrix
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
 from fastcontact.linear.multigrid.coarse import Coarse
 from fastcontact.linear.multigrid.level import Level
-from fastcontact.linear.multigrid.matrix import BlockMatrix, diagonal_blocks
+from fastcontact.linear.multigrid.matrix import BlockMatrix
+from fastcontact.linear.multigrid.restriction import Restriction
 from fastcontact.linear.multigrid.smoother import DEGREE, SAFETY, chebyshev, largest_eigenvalue
 
 Array = NDArray[np.float64]
@@ -51,30 +53,30 @@ class Hierarchy:
             coarser = self._coarsened(A, level, modes) if level.n > COARSEST else None
             if coarser is None:
                 break
-            level.P, level.R, A, modes = coarser
+            level.P, A, modes = coarser
+            level.R = Restriction(level.P)
+            del coarser
         self.coarse = Coarse(A.to_scipy().tocsc())
         self._free_bounds = [level.bound for level in self.levels]
         self.set_bounds()
 
     def _level(self, A: BlockMatrix) -> Level:
         size = len(A.rows)
-        own = BlockMatrix(A.indptr, A.indices, A.data.astype(self.dtype, copy=False), A.rows, A.cols)
-        diagonal = diagonal_blocks(A.indptr, A.indices, own.data, size)
+        own = replace(A, data=A.data.astype(self.dtype, copy=False), low=None)
+        diagonal = own.diagonal_part(own.data)
         inverse = np.empty_like(diagonal)
         cycle_kernels.invert_blocks(diagonal, size, inverse)
         level = Level(own, diagonal, inverse, 1.0)
         level.bound = SAFETY * largest_eigenvalue(level)
         return level
 
-    def _coarsened(
-        self, A: BlockMatrix, level: Level, modes: Array
-    ) -> tuple[BlockMatrix, BlockMatrix, BlockMatrix, Array] | None:
-        """Return the prolongator, its transpose, the coarse matrix and its modes; None where aggregates do not help."""
+    def _coarsened(self, A: BlockMatrix, level: Level, modes: Array) -> tuple[BlockMatrix, BlockMatrix, Array] | None:
+        """Return the prolongator, the coarse matrix and its modes; None where aggregates do not help."""
         from pyamg.aggregation.aggregate import standard_aggregation
         from pyamg.aggregation.tentative import fit_candidates
 
         size, n = len(A.rows), len(A.indptr) - 1
-        start, near = galerkin_kernels.graph(A.indptr, A.indices, A.data, size)
+        start, near = galerkin_kernels.graph(A.indptr, A.indices, A.storage, A.data, size)
         ones = np.ones(len(near), np.int8)
         aggregates, _ = standard_aggregation(csr_matrix((ones, near, start), shape=(n, n)))
         n_coarse, n_modes = aggregates.shape[1], modes.shape[1]
@@ -86,19 +88,19 @@ class Hierarchy:
         aggregate[member] = aggregates.indices
         tentative = np.zeros((n, size * n_modes))
         tentative[member] = T.data.reshape(len(member), -1)
+        del T
         omega = 4.0 / 3.0 / (level.bound / SAFETY)
         cols = (0,) * n_modes
         indptr = galerkin_kernels.count_prolongator(A.indptr, A.indices, aggregate)
         # In the precision of the cycle from the start: the coarse matrix is then the exact product of what is used.
         blocks = np.empty(int(indptr[-1]) * size * n_modes, self.dtype)
         columns = galerkin_kernels.smooth_prolongator(
-            A.indptr, A.indices, A.exact, level.inverse, aggregate, tentative.ravel(), omega, indptr, blocks, A.rows, cols
+            A.indptr, A.indices, A.storage, A.exact, level.inverse, aggregate, tentative.ravel(), omega, indptr, blocks,
+            A.rows, cols,
         )  # fmt: skip
-        del tentative, T
+        del tentative
         P = BlockMatrix(indptr, columns, blocks, A.rows, cols)
-        index = by_columns(P, n_coarse)
-        coarse = product(A, P, index)
-        return P, transposed(P, index), coarse, coarse_modes
+        return P, product(A, P, by_columns(P, n_coarse)), coarse_modes
 
     def __repr__(self) -> str:
         sizes = " -> ".join(str(level.n) for level in self.levels)
@@ -107,7 +109,8 @@ class Hierarchy:
     @property
     def complexity(self) -> float:
         """Entries of the matrices of all levels over those of the finest."""
-        return sum(len(level.A.data) for level in self.levels) / len(self.levels[0].A.data)
+        entries = [len(level.A.indices) * len(level.A.rows) ** 2 for level in self.levels]
+        return sum(entries) / entries[0]
 
     @property
     def nbytes(self) -> int:
@@ -164,14 +167,6 @@ def by_columns(P: BlockMatrix, n: int) -> tuple[Indices, Indices, Indices]:
     return found.indptr, found.indices, found.data
 
 
-def transposed(P: BlockMatrix, index: tuple[Indices, Indices, Indices]) -> BlockMatrix:
-    """Return ``P.T``; `index` from `by_columns`."""
-    start, origin, slot = index
-    turned = np.empty_like(P.data)
-    galerkin_kernels.transpose_blocks(slot, P.data, turned, P.rows, P.cols)
-    return BlockMatrix(start, origin, turned, P.cols, P.rows)
-
-
 def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Indices, Indices, Indices]) -> BlockMatrix:
     """Return ``P.T A P`` for a symmetric A; `index` from `by_columns`."""
     n_coarse = len(index[0]) - 1
@@ -181,7 +176,7 @@ def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Indices, Indices, Indic
     columns = np.empty(indptr[-1], np.int32)
     out = np.zeros(int(indptr[-1]) * len(P.cols) ** 2)
     galerkin_kernels.galerkin(
-        A.indptr, A.indices, A.exact, P.indptr, P.indices, P.data, *index, indptr, int(near.max(initial=0)),
+        A.indptr, A.indices, A.storage, A.exact, P.indptr, P.indices, P.data, *index, indptr, int(near.max(initial=0)),
         columns, out, P.rows, P.cols,
     )  # fmt: skip
     return BlockMatrix(indptr, columns, out, P.cols, P.cols)

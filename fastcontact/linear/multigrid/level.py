@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.matrix import BlockMatrix
+from fastcontact.linear.multigrid.restriction import Restriction
 from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions
 from fastcontact.linear.springs import Springs
 
@@ -28,8 +29,10 @@ class Level:
         Diagonal blocks, and their inverses as the smoother takes them.
     bound : float
         Upper bound of the eigenvalues of ``D^-1 A``.
-    P, R : BlockMatrix or None
-        Prolongator and its transpose; None on the coarsest level.
+    P : BlockMatrix or None
+        Prolongator; None on the coarsest level.
+    R : Restriction or None
+        Its transpose.
     eliminated : Elimination or None
         Equations, on the finest level: weights in the precision of the cycle, the same for forces.
     change : tuple of ndarray, or None
@@ -50,7 +53,7 @@ class Level:
     inverse: Values
     bound: float
     P: BlockMatrix | None = None
-    R: BlockMatrix | None = None
+    R: Restriction | None = None
     eliminated: Elimination | None = None
     change: tuple[Values, ...] | None = None
     springs: Springs | None = None

@@ -2,7 +2,8 @@
 
 The multigrid cycle reads K in single precision, the iteration around it in double precision. Each number of K is therefore
 stored as two numbers in single precision, a high and a low part (see `split_matrix_kernels`): the cycle reads the high part,
-exact products add both. That takes 8 bytes a number in place of 12.
+exact products add both. That takes 8 bytes a number in place of 12. K is symmetric: most of its blocks are stored, and read,
+once for both triangles (see `symmetric_storage_kernels`).
 """
 
 from __future__ import annotations
@@ -15,11 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 
-from fastcontact.linear.multigrid import cycle_kernels, split_matrix_kernels
+from fastcontact.linear.multigrid import cycle_kernels, split_matrix_kernels, symmetric_storage_kernels
 
 Array = NDArray[np.float64]
 Values = NDArray[Any]
 Indices = NDArray[np.int32]
+Storage = tuple[Indices, Indices, Indices, int]
+
+# Every block is stored.
+ALL: Storage = (np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0, np.int32), 0)
+# Parts of the rows of a symmetric matrix, of so many rows at least: enough of them for many threads, and for what a part
+# writes to stay in the cache. More parts store more blocks twice.
+PARTS, SHORTEST = 32, 1024
 
 
 @dataclass(eq=False)
@@ -38,6 +46,9 @@ class BlockMatrix:
         Their lengths are the size of a block: compiled kernels know the length of a tuple.
     low : ndarray, optional
         Low parts, in single precision, where `data` are the high parts of a split matrix.
+    storage : tuple
+        Which blocks of the pattern `indptr`, `indices` are stored, and in what order, where the matrix is symmetric and not
+        all of them are: see `symmetric_storage_kernels`.
     """
 
     indptr: Indices
@@ -46,6 +57,7 @@ class BlockMatrix:
     rows: tuple[int, ...]
     cols: tuple[int, ...]
     low: Values | None = None
+    storage: Storage = ALL
 
     @property
     def exact(self) -> tuple[Values, ...]:
@@ -55,16 +67,23 @@ class BlockMatrix:
     @property
     def nbytes(self) -> int:
         """Memory without the low part [bytes]."""
-        return self.indptr.nbytes + self.indices.nbytes + self.data.nbytes
+        return (
+            self.indptr.nbytes + self.indices.nbytes + self.data.nbytes + sum(part.nbytes for part in self.storage[:3])
+        )
 
     def multiply(self, x: Values, y: Values) -> None:
         """Fill `y` with ``A x``."""
         self.combine(1.0, x, 0.0, y, y)
 
     def combine(self, factor: float, x: Values, share: float, z: Values, y: Values) -> None:
-        """Fill `y` with ``share z + factor A x``, in the precision of x."""
+        """Fill `y` with ``share z + factor A x``, in the precision of x; x and y are different arrays."""
         kind = x.dtype.type
         numbers = (self.data,) if x.dtype == self.data.dtype else self.exact
+        if self.storage is not ALL:
+            symmetric_storage_kernels.multiply(
+                self.storage, numbers, x, kind(factor), kind(share), z, y, self.rows
+            )  # fmt: skip
+            return
         cycle_kernels.multiply(
             self.indptr, self.indices, numbers, x, kind(factor), kind(share), z, y, self.rows, self.cols
         )  # fmt: skip
@@ -72,32 +91,38 @@ class BlockMatrix:
     def diagonal_blocks(self) -> Array:
         """Return the diagonal blocks (n_rows, size, size) of a square matrix, in double precision."""
         size = len(self.rows)
-        parts = [diagonal_blocks(self.indptr, self.indices, part, size) for part in self.exact]
-        return np.sum([part.astype(float) for part in parts], axis=0).reshape(-1, size, size)
+        parts = [self.diagonal_part(part).astype(float, copy=False) for part in self.exact]
+        return np.asarray(sum(parts[1:], parts[0])).reshape(-1, size, size)
+
+    def diagonal_part(self, part: Values) -> Values:
+        """Return the diagonal blocks (n_rows * size * size,) of a square matrix, from the high or the low part."""
+        size = len(self.rows)
+        if self.storage is ALL:
+            return diagonal_blocks(self.indptr, self.indices, part, size)
+        return part.reshape(-1, size * size)[self.storage[1] - 1].ravel()
 
     def row_sums(self, u: Array) -> Array:
         """Return ``|A| |u|``, shape (n,), of a square matrix, from its high part."""
         out = np.empty(len(u))
-        cycle_kernels.row_sums(self.indptr, self.indices, self.data, u, self.rows, out)
+        symmetric_storage_kernels.row_sums(
+            self.indptr, self.indices, self.storage, (self.data,), u, len(self.rows), out
+        )
         return out
 
     def to_scipy(self) -> bsr_array:
         """Return a square matrix as SciPy's, in double precision."""
-        size = len(self.rows)
-        data = self.exact[0].astype(float)
-        for part in self.exact[1:]:
-            data += part
-        return bsr_array(
-            (data.reshape(-1, size, size), self.indices, self.indptr), shape=2 * ((len(self.indptr) - 1) * size,)
-        )
+        size, n = len(self.rows), len(self.indptr) - 1
+        data = np.empty(len(self.indices) * size * size)
+        symmetric_storage_kernels.expand(self.indptr, self.indices, self.storage, self.exact, size, data)
+        return bsr_array((data.reshape(-1, size, size), self.indices, self.indptr), shape=2 * (n * size,))
 
 
 def diagonal_blocks(indptr: Indices, indices: Indices, data: Values, size: int) -> Values:
     """Return the diagonal blocks (n * size * size,) of a square matrix in canonical format, zero where there is none."""
-    row = np.repeat(np.arange(len(indptr) - 1, dtype=np.int32), np.diff(indptr))
-    own, out = np.flatnonzero(indices == row), np.zeros((len(indptr) - 1, size * size), data.dtype)
-    out[row[own]] = data.reshape(-1, size * size)[own]
-    return out.ravel()
+    out = np.zeros((len(indptr) - 1) * size * size, data.dtype)
+    pattern = (part.astype(np.int32, copy=False) for part in (indptr, indices))
+    split_matrix_kernels.diagonal_blocks(*pattern, data.reshape(-1), size * size, out)
+    return out
 
 
 def block_matrix(K: bsr_array) -> BlockMatrix:
@@ -137,10 +162,10 @@ class ScaledMatrix:
         if precision == "double":
             self.scaled = block_matrix(K)
             return
-        self.unit = float(0.5 ** np.round(np.log2(K.diagonal().max())))
-        indptr, indices, size = K.indptr, K.indices, (0,) * K.blocksize[0]
-        high, low = _split(K, self.unit, release)
-        self.scaled = BlockMatrix(indptr, indices, high, size, size, low)
+        size = range(K.blocksize[0])
+        largest = block_matrix(K).diagonal_blocks()[:, size, size].max()
+        self.unit = float(0.5 ** np.round(np.log2(largest)))
+        self.scaled = _split(K, self.unit, release)
 
     def change(self, precision: str) -> None:
         """Store the numbers for a cycle in another precision."""
@@ -164,13 +189,17 @@ class ScaledMatrix:
     def forces_at(self, dofs: NDArray[np.intp], u: Array, f: Array) -> Array:
         """Return ``(K u - f)[dofs]``, shape (m,) [force]."""
         A, out = self.scaled, np.empty(len(dofs))
-        split_matrix_kernels.forces_at(dofs, A.indptr, A.indices, A.exact, 1.0 / self.unit, len(A.rows), u, f, out)
+        split_matrix_kernels.forces_at(
+            dofs, A.indptr, A.indices, A.storage, A.exact, 1.0 / self.unit, len(A.rows), u, f, out
+        )  # fmt: skip
         return out
 
     def add_forces_of(self, dofs: NDArray[np.intp], values: Array, out: Array) -> None:
         """Add ``K[:, dofs] values`` to `out` (n,) [force]."""
         A = self.scaled
-        split_matrix_kernels.forces_of(dofs, values, A.indptr, A.indices, A.exact, 1.0 / self.unit, len(A.rows), out)
+        split_matrix_kernels.forces_of(
+            dofs, values, A.indptr, A.indices, A.storage, A.exact, 1.0 / self.unit, len(A.rows), out
+        )  # fmt: skip
 
     def diagonal(self) -> Array:
         """Return the diagonal (n,) [force / length]."""
@@ -182,18 +211,63 @@ class ScaledMatrix:
         return self.scaled.row_sums(u) / self.unit
 
 
-def _split(K: bsr_array, unit: float, release: bool) -> tuple[Values, Values]:
-    """Return the high and low parts of ``unit K``; see `ScaledMatrix` for `release`."""
-    n, numbers, owner = K.data.size, K.data.reshape(-1), K.data if K.data.base is None else K.data.base
+def _split(K: bsr_array, unit: float, release: bool) -> BlockMatrix:
+    """Return ``unit K``, split into high and low parts; see `ScaledMatrix` for `release`."""
+    indptr, indices = (part.astype(np.int32, copy=False) for part in (K.indptr, K.indices))
+    size, numbers = K.blocksize[0], K.data if K.data.base is None else K.data.base
+    if release and numbers.size == K.data.size and numbers.flags.owndata and numbers.flags.c_contiguous:
+        # Every number is read before another overwrites it. K must have no numbers then: these are none any more.
+        K.indptr, K.indices, K.data = np.zeros_like(indptr), indices[:0], np.empty((0, *K.blocksize))
+    else:
+        numbers = K.data.copy()
+    storage = symmetric_storage(indptr, indices)
+    n = numbers.size
+    if storage is not ALL:
+        _keep_stored(indptr, indices, storage, numbers.reshape(-1), size * size)
+        n = len(storage[2]) * size * size
+        with contextlib.suppress(ValueError):  # another array uses the memory, all of which stays then
+            numbers.resize((n,))
     high = np.empty(n, np.float32)
-    if not (release and owner.size == n and owner.flags.owndata and owner.flags.c_contiguous):
-        low = np.empty(n, np.float32)
-        split_matrix_kernels.split(unit, numbers, high, low)
-        return high, low
-    # Every number is read before a low part overwrites it. K must have no numbers then: these are none any more.
-    split_matrix_kernels.split(unit, numbers, high, numbers.view(np.float32)[:n])
-    K.indptr, K.indices, K.data = np.zeros_like(K.indptr), K.indices[:0], np.empty((0, *K.blocksize))
-    del numbers
-    with contextlib.suppress(ValueError):  # another array uses the memory, all of which stays then
-        owner.resize(((n + 1) // 2,))
-    return high, owner.reshape(-1).view(np.float32)[:n]
+    _halve(unit, numbers.reshape(-1)[:n], high)
+    with contextlib.suppress(ValueError):
+        numbers.resize(((n + 1) // 2,))
+    low = numbers.reshape(-1).view(np.float32)[:n]
+    return BlockMatrix(indptr, indices, high, (0,) * size, (0,) * size, low, storage)
+
+
+def _keep_stored(indptr: Indices, indices: Indices, storage: Storage, numbers: Values, square: int) -> None:
+    """Move the stored blocks, of `square` numbers, to the beginning of the numbers of all blocks."""
+    start, widest = storage[0], int(np.diff(indptr).max(initial=0))
+    end, n = 0, len(indptr) - 1
+    while end < n:  # rows whose stored blocks lie before what is still read: on all threads, or else one chunk
+        first = end
+        behind = int(np.searchsorted(start, indptr[first], side="right")) - 1
+        end = max(behind, min(n, first + symmetric_storage_kernels.CHUNK))
+        symmetric_storage_kernels.store_rows(first, end, widest, indptr, indices, storage, numbers, square, numbers)
+
+
+def _halve(unit: float, numbers: Values, high: Values) -> None:
+    """Fill the high parts (n,) of ``unit numbers``; the low parts take the place of the first half of the numbers."""
+    end, n, low = 0, len(numbers), numbers.view(np.float32)[: len(numbers)]
+    while end < n:
+        first, end = end, min(n, max(2 * end, end + split_matrix_kernels.CHUNK))
+        split_matrix_kernels.split(first, end, unit, numbers, high, low)
+
+
+def symmetric_storage(indptr: Indices, indices: Indices) -> Storage:
+    """Return how a symmetric matrix is stored.
+
+    That is `ALL` where the pattern is not sorted, or has no diagonal or a block without its transpose.
+    """
+    n = len(indptr) - 1
+    length = max(SHORTEST, -(-n // PARTS))
+    count = np.empty(n, np.int32)
+    symmetric_storage_kernels.count_stored(indptr, indices, length, count)
+    if count.min(initial=0) < 0:
+        return ALL
+    start = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
+    upper, columns = np.empty(n, np.int32), np.empty(start[-1], np.int32)
+    symmetric_storage_kernels.arrange(indptr, indices, start, upper, columns, length)
+    storage = start, upper, columns, length
+    symmetric_storage_kernels.missing(indptr, indices, storage, count)
+    return ALL if count.any() else storage

@@ -88,6 +88,7 @@ class Multigrid:
 
     def build(self, K: bsr_array, rigid_modes: Array, release: bool = False) -> None:
         """Build the hierarchy of K (n, n); see `LinearSolver.prepare`."""
+        check_threads()
         n = K.shape[0]
         self.K = ScaledMatrix(K, self.precision, release)
         self._modes = rigid_modes.astype(np.float32)  # if they are needed again: single precision is enough
@@ -99,7 +100,6 @@ class Multigrid:
         self.columns = FlexibilityColumns(n, self._solve_many, MOST_COLUMNS)
 
     def _build(self, rigid_modes: Array) -> None:
-        check_threads()
         self.hierarchy = Hierarchy(self.K.scaled, rigid_modes)
         self._constrained = ConstrainedHierarchy(self.hierarchy, self.K.scaled)
         # The equations that hold, and those that the hierarchy was changed for.

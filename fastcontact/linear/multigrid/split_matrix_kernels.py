@@ -6,44 +6,59 @@ split, (numbers,) where they are not.
 """
 
 import numpy as np
+from numba import prange
 
-from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact._jit.decorators import kernel, parallel_kernel
+from fastcontact.linear.multigrid.symmetric_storage_kernels import entry_of, part_of, place_of
+
+# Numbers that one thread takes at a time.
+CHUNK = 4096
 
 
-@inlined_kernel
-def entry(numbers, k):
-    """Return number `k` in double precision, split or not."""
-    if len(numbers) == 2:
-        return np.float64(numbers[0][k]) + np.float64(numbers[-1][k])
-    return np.float64(numbers[0][k])
+@parallel_kernel
+def split(first, end, factor, numbers, high, low):
+    """Fill the parts of ``factor`` times numbers `first` to ``end - 1``.
+
+    `low` may be in the place of the beginning of `numbers` where ``end <= 2 first``, or where there is one chunk.
+    """
+    for c in prange((end - first + CHUNK - 1) // CHUNK):
+        for k in range(first + c * CHUNK, min(end, first + (c + 1) * CHUNK)):
+            number = factor * numbers[k]
+            high[k] = number
+            low[k] = number - np.float64(high[k])
 
 
 @kernel
-def split(factor, numbers, high, low):
-    """Fill the parts (n,) of ``factor numbers``; `low` may be in the place of the beginning of `numbers`."""
-    for k in range(numbers.shape[0]):
-        number = factor * numbers[k]
-        high[k] = number
-        low[k] = number - np.float64(high[k])
+def diagonal_blocks(indptr, indices, data, square, out):
+    """Copy the diagonal blocks, of `square` numbers, to `out` (n_rows * square,), where a row has one."""
+    for i in range(indptr.shape[0] - 1):
+        for k in range(indptr[i], indptr[i + 1]):
+            if indices[k] == i:
+                for e in range(square):
+                    out[i * square + e] = data[k * square + e]
+                break
 
 
 @kernel
-def forces_at(dofs, indptr, indices, K, factor, size, u, f, out):
+def forces_at(dofs, indptr, indices, storage, K, factor, size, u, f, out):
     """Fill `out` (m,) with ``(factor K u - f)[dofs]``; the numbers of the block matrix K come as a tuple."""
     for p in range(dofs.shape[0]):
         i, a = dofs[p] // size, dofs[p] % size
-        s = 0.0
+        s, part = 0.0, part_of(storage, i)
         for k in range(indptr[i], indptr[i + 1]):
+            place = place_of(storage, part, i, indices[k], k)
             for b in range(size):
-                s += entry(K, (k * size + a) * size + b) * u[indices[k] * size + b]
+                s += entry_of(K, place, a, b, size) * u[indices[k] * size + b]
         out[p] = factor * s - f[dofs[p]]
 
 
 @kernel
-def forces_of(dofs, values, indptr, indices, K, factor, size, out):
+def forces_of(dofs, values, indptr, indices, storage, K, factor, size, out):
     """Add ``factor K[:, dofs] values`` for a symmetric K to `out` (n,)."""
     for p in range(dofs.shape[0]):
         i, a = dofs[p] // size, dofs[p] % size
+        part = part_of(storage, i)
         for k in range(indptr[i], indptr[i + 1]):
+            place = place_of(storage, part, i, indices[k], k)
             for b in range(size):
-                out[indices[k] * size + b] += factor * entry(K, (k * size + a) * size + b) * values[p]
+                out[indices[k] * size + b] += factor * entry_of(K, place, a, b, size) * values[p]

@@ -46,7 +46,7 @@ class SymmetricChange:
         D = csr_array(weights + csr_array((np.full(m, -1.0), pivots, np.arange(m + 1)), shape=shape))
         number, count = np.full(shape[1], -1, np.int32), np.empty(m, np.int32)
         number[pivots] = np.arange(m)
-        of_A = A.indptr, A.indices, A.exact, size
+        of_A = A.indptr, A.indices, A.storage, A.exact, size
         symmetric_change_kernels.count_stiffness_rows(pivots, number, D.indptr, D.indices, *of_A, count)
         low = _pointers(count)
         columns, values = np.empty(low[-1], np.int32), np.empty(low[-1])

@@ -10,23 +10,24 @@ from numba import prange
 
 from fastcontact._jit.decorators import kernel, parallel_kernel
 from fastcontact.linear.multigrid.block_products import add_product, add_transposed
-from fastcontact.linear.multigrid.split_matrix_kernels import entry
+from fastcontact.linear.multigrid.symmetric_storage_kernels import entry_of, part_of, place_of
 
 # Rows that one thread takes at a time.
 CHUNK = 64
 
 
 @kernel
-def count_stiffness_rows(pivots, number, indptr, indices, start, columns, numbers, size, count):
+def count_stiffness_rows(pivots, number, indptr, indices, start, columns, storage, numbers, size, count):
     """Fill `count` (m,) with the lengths of the rows of `stiffness_rows`; see there."""
     seen = np.full(number.shape[0], -1, np.int32)
     for p in range(pivots.shape[0]):
         i, a = pivots[p] // size, pivots[p] % size
-        found = 0
+        found, part = 0, part_of(storage, i)
         for k in range(start[i], start[i + 1]):
+            place = place_of(storage, part, i, columns[k], k)
             for b in range(size):
                 u = columns[k] * size + b
-                if entry(numbers, (k * size + a) * size + b) == 0.0:
+                if entry_of(numbers, place, a, b, size) == 0.0:
                     continue
                 if seen[u] != p:
                     seen[u] = p
@@ -40,7 +41,7 @@ def count_stiffness_rows(pivots, number, indptr, indices, start, columns, number
 
 
 @kernel
-def stiffness_rows(pivots, number, indptr, indices, data, start, columns, numbers, size, low, found, out):
+def stiffness_rows(pivots, number, indptr, indices, data, start, columns, storage, numbers, size, low, found, out):
     """Fill G = ``A[pivots] + A[pivots][:, pivots] D / 2``, A symmetric.
 
     Parameters
@@ -50,8 +51,8 @@ def stiffness_rows(pivots, number, indptr, indices, data, start, columns, number
         Number of each pivot, -1 elsewhere.
     indptr, indices, data : (m + 1,), (n_entries,), (n_entries,)
         D in compressed rows, one for each pivot.
-    start, columns, numbers
-        A, of blocks size x size; canonical.
+    start, columns, storage, numbers
+        A, of blocks size x size; canonical, see `symmetric_storage_kernels`.
     low : (m + 1,)
         Where the rows of G begin.
     found, out : (low[m],)
@@ -60,9 +61,11 @@ def stiffness_rows(pivots, number, indptr, indices, data, start, columns, number
     sums, seen = np.empty(number.shape[0]), np.full(number.shape[0], -1, np.int32)
     for p in range(pivots.shape[0]):
         i, a, at = pivots[p] // size, pivots[p] % size, low[p]
+        part = part_of(storage, i)
         for k in range(start[i], start[i + 1]):
+            place = place_of(storage, part, i, columns[k], k)
             for b in range(size):
-                u, stiffness = columns[k] * size + b, entry(numbers, (k * size + a) * size + b)
+                u, stiffness = columns[k] * size + b, entry_of(numbers, place, a, b, size)
                 if stiffness == 0.0:
                     continue
                 if seen[u] != p:

@@ -335,6 +335,61 @@ def read_field_points(path: PathLike, field: str) -> Array | None:
         return _read_points(_first_step(mesh), mesh)
 
 
+def read_med_cell_field(path: PathLike, field: str) -> tuple[Array, Array, Array]:
+    """Return a field of cells of a file of MED 3 or later: times, values and middles of its cells.
+
+    Times are (n_instants,) in the order of the file [-], values (n_instants, n_cells, n_components), NaN where there are
+    none [unit of the field], middles (n_cells, dim) [length].
+
+    FileError if the file cannot be read, has no such field, or the field is not given once a cell.
+    """
+    with opened(path) as file:
+        names = list(file["CHA"]) if "CHA" in file else []
+        if field not in names:
+            raise FileError(f"'{path}': {unknown('field', field, names)}")
+        group = file["CHA"][field]
+        name = decoded(bytes(attribute(group, "MAI")))
+        if f"ENS_MAA/{name}" not in file:
+            raise FileError(f"field '{field}' of '{path}' is on the mesh '{name}', which is in another file")
+        step = _first_step(file[f"ENS_MAA/{name}"])
+        points = _read_points(step, file[f"ENS_MAA/{name}"])
+        instants = sorted((e for e in group.values() if "PDT" in e.attrs and _cell_supports(e)), key=_order)
+        codes = sorted({code for entry in instants for code in _cell_supports(entry)})
+        if not instants:
+            raise FileError(f"field '{field}' of '{path}' has no values at cells in the layout of MED 3 or 4")
+        middles, parts, count = [], [], int(attribute(group, "NCO"))
+        for code in codes:
+            if code not in elements.BY_MED or code not in step.get("MAI", {}):
+                raise FileError(f"field '{field}' of '{path}' is on {code} cells, which its mesh does not have")
+            nodes = _read_nodes(step["MAI"][code], code)
+            if len(nodes) and (nodes.min() < 0 or nodes.max() >= len(points)):
+                raise FileError(f"a cell of '{path}' names a point that is not there: write the file anew")
+            middles.append(points[nodes].mean(axis=1))
+            check_size(f"field '{field}' of '{path}'", (len(instants), len(nodes), count), file)
+            parts.append(np.stack([_of_cells(file, entry, code, len(nodes), count, path) for entry in instants]))
+        times = np.array([attribute(entry, "PDT") for entry in instants], np.float64)
+        return times, np.concatenate(parts, axis=1), np.concatenate(middles)
+
+
+def _cell_supports(entry: Any) -> list[str]:
+    """Return the codes of the cells that a field has values at."""
+    return [key[4:] for key in entry if key.startswith("MAI.")]
+
+
+def _of_cells(file: Any, entry: Any, code: str, n_cells: int, n_components: int, path: PathLike) -> Array:
+    """Return a field (n_cells, n_components) at the cells of one kind at an instant, NaN where it is not given."""
+    support = entry.get(f"MAI.{code}")
+    if support is None:
+        return np.full((n_cells, n_components), np.nan)
+    for profile in support.values():
+        if int(attribute(profile, "NGA", 1)) != 1:
+            raise FileError(
+                f"a field of '{path}' has {int(attribute(profile, 'NGA'))} values in each cell, at integration points: "
+                "one a cell is needed"
+            )
+    return _read_instant(file, support, n_cells, n_components)
+
+
 def _field_size(file: Any, group: Any, instants: list[Any], n_components: int) -> int:
     """Return the number of points of the field's mesh, or of the field where the mesh is in another file."""
     name = decoded(bytes(attribute(group, "MAI")))

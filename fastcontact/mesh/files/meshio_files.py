@@ -112,6 +112,30 @@ def read_point_data(path: Path, field: str) -> tuple[NDArray[Any], NDArray[Any]]
     return found["field"], found["points"]
 
 
+def read_cell_data(path: Path, field: str) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the numbers (n_cells, ...) [unit of the field] of a field at cells, and their middles (n_cells, dim) [length].
+
+    FileError if meshio cannot read the file, or it has no such field.
+    """
+    file_format = _format(path, writing=False)
+    _check_before(path, file_format)
+    if file_format == "gmsh":
+        raise FileError(f"'{path}': fields of Gmsh files are not read: write the field to a .vtu or .med file")
+    found = read_in_process(path, file_format, field)
+    if "error" in found:
+        raise _refusal("read", path, found["error"])
+    if field not in found["cell_fields"]:
+        raise FileError(f"'{path}': {unknown('field of cells', field, found['cell_fields'])}")
+    values, points, blocks = found["cell_field"], found["points"], found["cells"]
+    fits = [part is not None and nodes is not None and len(part) == len(nodes)
+            for part, (_, _, nodes) in zip(values, blocks, strict=True)]  # fmt: skip
+    if points is None or not values or not all(fits):
+        raise FileError(f"field '{field}' of '{path}' has no number for each cell: write it anew")
+    if any(len(nodes) and (nodes.min() < 0 or nodes.max() >= len(points)) for _, _, nodes in blocks):
+        raise FileError(f"a cell of '{path}' names a point that is not there: write it anew")
+    return np.concatenate(values), np.concatenate([points[nodes].mean(axis=1) for _, _, nodes in blocks])
+
+
 def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
     """Return a mesh with its groups, the format, and the numbers of cells left out as vertices and as duplicates."""
     file_format = _format(path, writing=False)

@@ -89,19 +89,29 @@ def plain_content(path: Path, file_format: str, field: str = "") -> dict[str, An
     Found are ``points``, an array (n_points, 2 or 3) [length]; ``cells``, a list of kind, number of cells and connectivity
     (n_cells, n_nodes); ``cell_data`` and ``point_data``, the arrays that mean groups; ``cell_sets``, ``point_sets``,
     ``field_data``; ``said``, what meshio would have printed. Arrays that hold no numbers are None. If meshio cannot read
-    the file, only ``error``, the reason. With the name of a `field` at points also ``fields``, the names of all of them, and
-    ``field``, its numbers, None without any.
+    the file, only ``error``, the reason. With the name of a `field` also ``fields``, the names of all fields at points, and
+    ``field``, its numbers, None without any; ``cell_fields`` and ``cell_field``, a list of arrays, likewise for cells.
     """
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             found = library().read(path, file_format=file_format)
-            named = {"fields": list(found.point_data), "field": _numbers(found.point_data.get(field))} if field else {}
-            return {**plain_parts(found), **named, "said": said.getvalue()}
+            return {**plain_parts(found), **(_fields(found, field) if field else {}), "said": said.getvalue()}
     except MemoryError:
         return {"error": "it announces more than memory can hold"}
     except (Exception, SystemExit) as error:
         return {"error": (said.getvalue() if isinstance(error, SystemExit) else str(error)) or type(error).__name__}
+
+
+def _fields(found: Any, field: str) -> dict[str, Any]:
+    """Return the fields of a ``meshio.Mesh`` as `plain_content` tells."""
+    parts = found.cell_data.get(field)
+    return {
+        "fields": list(found.point_data),
+        "field": _numbers(found.point_data.get(field)),
+        "cell_fields": list(found.cell_data),
+        "cell_field": None if parts is None else [_numbers(part) for part in parts],
+    }
 
 
 def plain_parts(found: Any) -> dict[str, Any]:

@@ -7,7 +7,9 @@ named in case files and on the command line. An argument out of range raises Mes
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
+from fastcontact.errors import no_attribute
 from fastcontact.mesh.generate.blocks import block, block_on_block, cylinder_on_block
 from fastcontact.mesh.generate.box import box
 from fastcontact.mesh.generate.cut import cut
@@ -25,6 +27,7 @@ from fastcontact.mesh.mesh import Mesh
 GENERATORS: dict[str, Callable[..., Mesh]] = {
     "half-spheres": half_spheres,
     "quarter-disc": quarter_disc,
+    "block": block,
     "block-on-block": block_on_block,
     "cylinder-on-block": cylinder_on_block,
     "box": box,
@@ -42,6 +45,12 @@ __all__ = [
     "quarter_disc", "refined", "renamed", "rings", "sphere_octant", "sphere_on_block", "to_quadratic", "transformed",
     "union", "with_reference_points",
 ]  # fmt: skip
+
+
+if not TYPE_CHECKING:  # to whom all names are known
+
+    def __getattr__(name: str) -> object:
+        raise no_attribute("fastcontact.generate", name, __all__)
 
 
 def __dir__() -> list[str]:

@@ -5,6 +5,9 @@ Every function takes an optional ``ax`` and returns the axes it drew on; save wi
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from fastcontact.errors import no_attribute
 from fastcontact.results.plot._axes import UNITS
 from fastcontact.results.plot.animation import animate
 from fastcontact.results.plot.axis import axis_stress
@@ -19,6 +22,12 @@ __all__ = [
     "UNITS", "animate", "axis_stress", "contact_map", "contact_zones", "deformed_shape", "history", "pressure_profile",
     "section", "view",
 ]  # fmt: skip
+
+
+if not TYPE_CHECKING:  # to whom all names are known
+
+    def __getattr__(name: str) -> object:
+        raise no_attribute("fastcontact.plot", name, __all__)
 
 
 def __dir__() -> list[str]:

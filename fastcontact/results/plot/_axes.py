@@ -1,4 +1,4 @@
-"""Axes to draw on, and the names of units."""
+"""Axes to draw on."""
 
 from __future__ import annotations
 
@@ -20,16 +20,6 @@ Array = NDArray[np.float64]
 Units = Mapping[str, str]
 UNITS: Units = {"length": "mm", "force": "N", "pressure": "MPa"}
 UNKNOWN: Units = {}
-
-
-def labelled(text: str, units: Units, quantity: str) -> str:
-    """Return the label of an axis, with the unit of its quantity where that is known."""
-    return f"{text} [{units[quantity]}]" if units.get(quantity) else text
-
-
-def valued(value: float, units: Units, quantity: str, digits: int = 4) -> str:
-    """Return a value as text with its unit, where that is known."""
-    return f"{value:.{digits}g} {units.get(quantity, '')}".rstrip()
 
 
 def placed(place: Array, size: float) -> str:
@@ -76,10 +66,19 @@ class Panels(tuple[Any, ...]):
         return png(self[0].figure)
 
 
+def drawable(ax: Any) -> Any:
+    """Return axes that were given; FastcontactError if they are none."""
+    if not (hasattr(ax, "plot") and hasattr(ax, "figure")):
+        raise FastcontactError(
+            f"pictures are drawn on axes of matplotlib, not on {ax!r}: leave the argument out for new ones"
+        )
+    return ax
+
+
 def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None = None) -> Any:
     """Return `ax`, or new axes in a figure of their own, ``projection="3d"`` for solids."""
     if ax is not None:
-        return ax
+        return drawable(ax)
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure

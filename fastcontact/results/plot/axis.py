@@ -12,8 +12,9 @@ from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNKNOWN, Units, contacts_of, labelled, new_axes
+from fastcontact.results.plot._axes import UNKNOWN, Units, contacts_of, new_axes
 from fastcontact.results.step import StepResult
+from fastcontact.results.units import labelled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,10 +13,11 @@ from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, labelled, new_axes, valued
+from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, new_axes
 from fastcontact.results.plot.hiding import across
 from fastcontact.results.plot.patches import fill
 from fastcontact.results.step import ContactResult
+from fastcontact.results.units import labelled, valued
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -73,15 +74,17 @@ def contact_map(
     for ax, (values, caption) in zip(panels, fields, strict=False):
         ends = min(0.0, float(values.min(initial=0.0))), float(values.max(initial=0.0)) or 1.0
         drawn = fill(ax, blocks, flat, values, "viridis", ends)
-        ax.figure.colorbar(drawn, ax=ax, label=labelled(caption, units, "pressure"), shrink=0.75)
+        high = _limit(ax, flat, contact.active & ~np.array(everything))
+        ax.figure.colorbar(drawn, ax=ax, label=labelled(caption, units, "pressure"), shrink=0.75 * high)
         _nodes(ax, flat, contact, both)
         ax.set(xlabel=labelled(labels[0], units, "length"), ylabel=labelled(labels[1], units, "length"), aspect="equal")
         ax.set_title(
             f"{caption}, largest {valued(float(values.max(initial=0.0)), units, 'pressure')}", fontsize="medium"
         )
-        _limit(ax, flat, contact.active & ~np.array(everything))
     if both:
         _arrows(panels[1], flat, contact.shear @ basis.T, shear)
+    if axes is None:
+        panels[0].figure.set_figheight(1.6 + 3.0 * high)
     panels[0].figure.suptitle(title or f"Contact '{contact.name}'", fontsize="large")
     if contact.active.any():
         panels[0].legend(loc="upper right", fontsize=8)
@@ -154,8 +157,11 @@ def _arrows(ax: Any, flat: Array, shear: Array, size: Array) -> None:
     ax.quiver(*flat[here].T, *shear[here].T, color="white", width=0.004, pivot="tail")
 
 
-def _limit(ax: Any, flat: Array, closed: NDArray[np.bool_]) -> None:
-    """Show the closed part with a margin around it, or everything if nothing is closed."""
+def _limit(ax: Any, flat: Array, closed: NDArray[np.bool_]) -> float:
+    """Show the closed part with a margin around it, or everything if nothing is closed.
+
+    Return how high the picture is beside that of a square, 0.55 to 1 [-].
+    """
     kept = flat[closed] if closed.any() else flat
     low, high = kept.min(axis=0), kept.max(axis=0)
     margin = MARGIN * max(0.5 * float((high - low).max()), 0.02 * float(np.ptp(flat, axis=0).max()))
@@ -163,3 +169,5 @@ def _limit(ax: Any, flat: Array, closed: NDArray[np.bool_]) -> None:
     high = np.minimum(high + margin, flat.max(axis=0) + 0.05 * margin)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     ax.set_facecolor("0.9")
+    width, height = high - low
+    return float(np.clip(1.1 * height / max(width, 1e-300), 0.55, 1.0))

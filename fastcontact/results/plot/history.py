@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from fastcontact.analytic.pressure_curve import NAMES
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
-from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, contacts_of, labelled, new_axes
+from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, contacts_of, new_axes
 from fastcontact.results.step import StepResult
+from fastcontact.results.units import labelled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -75,9 +76,12 @@ def history(
     lower.set(xlabel=along, ylabel=labelled(size, units, "length"))
     for ax in axes:
         ax.grid(alpha=0.3)
-        if ax.get_legend_handles_labels()[0]:
-            ax.legend(fontsize=9)
-        ax.set_ylim(bottom=0.0)
+        entries = len(ax.get_legend_handles_labels()[0])
+        if entries:
+            ax.legend(fontsize=9, loc="upper left")
+        top = float(ax.dataLim.y1)
+        room = 0.12 * (entries + 0.3) if entries else 0.05  # for the legend above what is drawn
+        ax.set_ylim(0.0, (1.0 + room) * top if 0.0 < top < np.inf else None)
         ax.set_xlim(left=min(0.0, float(x.min())))
     return axes
 
@@ -135,5 +139,5 @@ def contact_zones(
     distance = labelled(f"distance from the {start}", units, "length")
     axes.set(xlabel="load factor (above: closed nodes)", ylabel=distance)
     axes.set_title(title or f"Contact '{pair}' over the load", pad=16, fontsize="medium")
-    axes.legend(loc="upper left", fontsize=8)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, fontsize=8)  # below: points are everywhere
     return axes

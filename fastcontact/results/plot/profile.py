@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import is_dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
-from fastcontact.results.plot._axes import UNKNOWN, Units, labelled, new_axes, valued
+from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes
 from fastcontact.results.step import ContactResult, half_width
+from fastcontact.results.units import labelled, valued
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -89,6 +91,11 @@ def _largest(curve: PressureCurve, units: Units) -> str:
 
 def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
     """Return what can be drawn of theories, by legend."""
+    for given in (theory, *others.values()):
+        if given is not None and not is_dataclass(given) and pressure_curve(given) is None:
+            raise FastcontactError(
+                f"a theory has a pressure, as those of fastcontact.analytic do, which {given!r} has not"
+            )
     found = {legend: pressure_curve(other) for legend, other in others.items()}
     own = pressure_curve(theory)
     return {**({own.name: own} if own is not None else {}), **{k: c for k, c in found.items() if c is not None}}
@@ -101,7 +108,9 @@ def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) ->
     farthest = float(np.abs(contact.place).max(initial=0.0))
     reach = 1.35 * max([closed, *radii]) or 1.02 * farthest or 1.0
     reach = min(reach, 1.02 * max(farthest, *radii, 1e-300)) if closed else reach
-    low = contact.place.min(initial=0.0)
+    low, nearest = contact.place.min(initial=0.0), float(np.abs(contact.place).min(initial=np.inf))
+    if nearest > 0.2 * reach and not curves:  # a ring: nothing is to be seen between its axis and its bore
+        return nearest - 0.05 * (reach - nearest), reach
     return (max(-reach, 1.02 * float(low)) if low < 0 else 0.0), reach
 
 

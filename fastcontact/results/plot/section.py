@@ -13,12 +13,13 @@ from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNKNOWN, Units, labelled, new_axes, part_shown, placed, valued
+from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes, part_shown, placed
 from fastcontact.results.plot.fields import Field, field_of
 from fastcontact.results.plot.hiding import across
 from fastcontact.results.plot.shape import scaled
 from fastcontact.results.plot.solid import MOST_EDGES
 from fastcontact.results.step import StepResult
+from fastcontact.results.units import labelled, valued
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

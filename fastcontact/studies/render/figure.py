@@ -118,12 +118,17 @@ def _draw(panel: Panel, ax: Any) -> None:
             ax.set_ylim(sorted((0.9 * low, 1.1 * low)))
     if panel.x_end is not None:
         ax.set_xlim(panel.x_start, panel.x_end or None)
-        ax.set_ylim(bottom=0.0)
+        top = float(ax.dataLim.y1)
+        ax.set_ylim(0.0, 1.08 * top if 0.0 < top < float("inf") else None)
     if panel.grid:
         ax.grid(which="major", alpha=panel.grid)
     if panel.minor_grid:
         ax.grid(which="minor", alpha=panel.minor_grid)
-    if ax.get_legend_handles_labels()[0]:
+    entries = len(ax.get_legend_handles_labels()[0])
+    if entries and any(curve.bars is not None for curve in panel.curves):  # matplotlib does not see them in the way
+        low, high = ax.get_ylim()
+        ax.set_ylim(low, high * (high / low) ** (0.02 * panel.legend_size * entries / 2.2))
+    if entries:
         ax.legend(fontsize=panel.legend_size)
 
 

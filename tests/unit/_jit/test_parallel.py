@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.sparse import bsr_array
 
 import fastcontact as fc
 from fastcontact import recovery
 from fastcontact._jit import decorators as _jit
 from fastcontact._jit import parallel
-from fastcontact.elasticity import stiffness
+from fastcontact.elasticity import constrained_system, stiffness
 
 
 @pytest.fixture
@@ -40,6 +41,22 @@ def test_every_point_has_an_owner_that_sees_all_its_cells(threads, count):
             low, high = parts[owner[point]]
             assert low <= having[0] <= having[-1] < high
             assert having[0] < begins[owner[point] + 1]  # nobody has an earlier one
+
+
+@pytest.mark.parametrize("count", [2, 7])
+def test_patterns_and_supports_taken_out_are_those_of_one_thread(threads, count):
+    mesh = fc.generate.box((1.0, 1.0, 1.0), (4, 3, 5), "hex8")
+    supported = np.random.default_rng(0).random(3 * mesh.n_points) < 0.2
+    data = np.random.default_rng(1).normal(size=(len(stiffness.sparsity(mesh).indices), 3, 3))
+    found = []
+    for number in (1, count):
+        threads(number)
+        pattern = stiffness.sparsity(mesh)
+        K = bsr_array((data.copy(), pattern.indices, pattern.indptr))
+        left, taken = constrained_system.supports_apart(K, supported)
+        found.append((pattern.indptr, pattern.indices, pattern.slots["hex8"], left.data, taken.indptr, taken.data))
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize("element", ["hex8", "tet4"])
@@ -87,8 +104,22 @@ def test_assembly_and_recovery_give_the_same_bits_for_any_number_of_threads(thre
         threads(count)
         K = stiffness.stiffness(mesh, kinematics, moduli, material)
         stress = recovery.stress_at_points(mesh, kinematics, moduli, material, u)
-        found.append((K.data.tobytes(), stress[element].tobytes()))
+        nodal = recovery.nodal_stress(mesh, kinematics, moduli, material, u)
+        found.append((K.data.tobytes(), stress[element].tobytes(), nodal.tobytes()))
     assert len(set(found)) == 1
+
+
+def test_every_node_belongs_to_one_part_of_a_nodal_average(threads):
+    cells = fc.generate.box((1.0, 1.0, 1.0), (24, 24, 24), "hex8").cells["hex8"]
+    for count in (1, 2, 4):
+        threads(count)
+        average = recovery.NodalAverage(25**3, 6)
+        parts = average._parts(cells)
+        assert len(parts) == count
+        assert [k for low, high in parts for k in range(low, high)] == list(range(25**3))
+        work = [((cells >= low) & (cells < high)).sum() for low, high in parts]
+        assert max(work) < 1.3 * min(work)
+        assert average._parts(cells[:0]) == [(0, 25**3)]
 
 
 @pytest.mark.parametrize("batch", [0, 1000, 10**9])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
+from fastcontact.cases.case import read_case
 from fastcontact.cases.shipped import case_path, shipped_case, shipped_cases
 from fastcontact.cli import main
 
@@ -131,3 +132,9 @@ def test_a_wheel_carries_the_cases_and_their_meshes(root):
         if "file" in mesh:
             assert (root / "data/cases" / mesh["file"]).resolve().parent == root / "data/meshes"
             assert carried["data/meshes"] == "fastcontact/data/meshes"
+
+
+def test_the_path_of_a_ready_case_tells_its_name_where_there_is_no_such_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(fc.CaseError, match="does not exist; the ready case of this name needs no path: 'forma04a'"):
+        read_case("data/cases/forma04a.toml")

@@ -142,6 +142,29 @@ def test_while_the_command_line_is_imported(monkeypatch, capsys):
     assert capsys.readouterr().err == "interrupted\n"
 
 
+def test_half_made_objects_have_nothing_to_say(capsys, monkeypatch):
+    """An object that was interrupted while it was made may fail when it is thrown away."""
+
+    class Half:
+        def __del__(self):
+            raise AttributeError("no attribute 'handle'")
+
+    def interrupted(options):
+        half = Half()
+        raise KeyboardInterrupt(id(half))
+
+    from fastcontact.cli import env
+
+    monkeypatch.setattr(env, "run", interrupted)
+    heard = []
+    monkeypatch.setattr(sys, "unraisablehook", heard.append)
+    assert main(["env"]) == 130
+    assert capsys.readouterr().err == "interrupted\n"
+    assert heard == []
+    Half()  # the hook is there again
+    assert len(heard) == 1
+
+
 COMMANDS = {
     "run": ["run", "forma04c", "-q", "-o", "out.vtkhdf"],
     "sweep": ["sweep", "forma04c", "--set", "approach=1:4:200", "--workers", "2", "-q"],

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import matplotlib as mpl
@@ -121,9 +124,6 @@ def test_names_of_files_steer_no_terminal(files, monkeypatch, capsys):
 
 
 def test_a_title_that_the_terminal_cannot_show_ends_no_run(files, monkeypatch):
-    import io
-    import sys
-
     stream = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
     monkeypatch.setattr(sys, "stdout", stream)
     case = files / "case.toml"
@@ -132,3 +132,66 @@ def test_a_title_that_the_terminal_cannot_show_ends_no_run(files, monkeypatch):
     assert main(["run", str(case), "-o", str(files / "other.vtkhdf")]) == 0
     stream.flush()
     assert b"Kugel \\u2300 \\xe4" in stream.buffer.getvalue()
+
+
+@pytest.mark.parametrize("option", ["--json", "-o", "--plot"])
+@pytest.mark.parametrize("text", ['"{}"', '["other.vtu", "{}"]', '["{}"]'])
+def test_files_of_fields_are_what_a_command_reads(text, option, files, monkeypatch, capsys):
+    """Also where a case names several in a list."""
+    monkeypatch.chdir(files)
+    Path("heat.vtu").write_text("<VTKFile>")
+    table = f'\n[[temperature]]\nfile = {text.format("heat.vtu")}\nfield = "T"\n'
+    Path("case.toml").write_text(Path("case.toml").read_text() + table)
+    assert main(["run", "case.toml", option, "heat.vtu"]) == 1
+    assert "'heat.vtu' is what this command reads" in capsys.readouterr().err
+    assert Path("heat.vtu").read_text() == "<VTKFile>"
+
+
+needs_full = pytest.mark.skipif(not Path("/dev/full").is_char_device(), reason="needs a device that is always full")
+
+
+@needs_full
+@pytest.mark.parametrize(
+    "command", [["run", "case.toml"], ["sweep", "case.toml", "--set", "material[0].nu=0.2,0.3", "--workers", "1"]]
+)
+@pytest.mark.parametrize("option", ["--json", "--html"])
+def test_a_device_that_is_full_is_told_in_one_line(command, option, files, monkeypatch, capsys):
+    if command[0] == "run" and option == "--html":
+        pytest.skip("runs have no report")
+    monkeypatch.chdir(files)
+    assert main([*command, option, "/dev/full", "-q"]) == 1
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said == "error: '/dev/full' cannot be written (No space left on device): name another file"
+
+
+@needs_full
+@pytest.mark.parametrize("command", [["info", "old.vtkhdf"], ["profile", "old.vtkhdf"], ["cases"]])
+@pytest.mark.parametrize("unbuffered", [False, True])
+def test_standard_output_on_a_full_disk_is_told_in_one_line(command, unbuffered, files):
+    """At once, or, as output waits for more, when the command ends."""
+    program = "from fastcontact.cli import entry_point; entry_point()"
+    with open("/dev/full", "w", encoding="ascii") as full:
+        done = subprocess.run(
+            [sys.executable, *["-u"] * unbuffered, "-c", program, *command],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+            cwd=files,
+        )
+    assert done.returncode == 1
+    said = "error: cannot write to standard output (No space left on device): send it elsewhere\n"
+    assert done.stderr == said
+
+
+@pytest.mark.parametrize("stream", ["stdout", "stderr"])
+def test_nobody_who_listens_changes_no_exit_code_to_good(stream, files, monkeypatch):
+    """A pipe whose reader has gone, and errors that nobody can read."""
+
+    class Gone(io.StringIO):
+        def write(self, text):
+            raise BrokenPipeError if stream == "stdout" else OSError(28, "No space left on device")
+
+    monkeypatch.chdir(files)
+    monkeypatch.setattr(sys, stream, Gone())
+    assert main(["info", "old.vtkhdf" if stream == "stdout" else "none.vtkhdf"]) == 1

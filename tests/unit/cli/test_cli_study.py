@@ -1,6 +1,7 @@
 """What commands of studies say on the way: progress on a terminal, interruptions, values of parameters."""
 
 import argparse
+import inspect
 import os
 import signal
 import subprocess
@@ -9,9 +10,10 @@ import time
 
 import pytest
 
+import fastcontact as fc
 from fastcontact.cli import _study, main, sweep
-from fastcontact.cli._progress import Runs
 from fastcontact.studies.execute import Progress
+from fastcontact.studies.progress import Runs, told
 
 
 @pytest.mark.parametrize(
@@ -151,3 +153,16 @@ def is_running(process):
             return file.read().rpartition(")")[2].split()[0] != "Z"
     except (FileNotFoundError, ProcessLookupError):
         return False
+
+
+def test_a_study_tells_its_runs_where_it_is_asked_to(capsys):
+    heard = []
+    for show in (False, True):
+        with told(heard.append, show) as ended:
+            ended(Progress("level 1", 1, 2, ("level 2",), 1.0, "", False))
+        shown = capsys.readouterr().err
+        assert ("the first runs" in shown) is show
+        assert ("1/2 level 1 done, 1 left" in shown) is show
+    assert [progress.label for progress in heard] == ["level 1"] * 2
+    for study in (fc.convergence_study, fc.parameter_sweep, fc.adaptive_study):
+        assert inspect.signature(study).parameters["progress"].default is False

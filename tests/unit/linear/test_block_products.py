@@ -15,6 +15,16 @@ def row_times(indices, numbers, x, begin, end, rows, cols):
 
 
 @kernel
+def row_times_both_ways(indices, numbers, x, begin, end, own, factor, y, rows):
+    return block_products.row_times_both_ways(indices, numbers, x, begin, end, own, factor, y, rows)
+
+
+@kernel
+def add_row_transposed(indices, numbers, begin, end, own, x, y, at, rows, cols):
+    block_products.add_row_transposed(indices, numbers, begin, end, own, x, y, at, rows, cols)
+
+
+@kernel
 def add_product(to, at, left, first, right, second, sizes):
     block_products.add_product(to, at, left, first, right, second, sizes)
 
@@ -52,6 +62,58 @@ def test_a_row_times_a_vector(m, n, precision, split):
             found, np.einsum("kmn,kn->m", blocks, x.astype(float).reshape(9, n)[indices[begin:end]]),
             rtol=0, atol=np.finfo(precision).eps * size,
         )  # fmt: skip
+
+
+@pytest.mark.parametrize(("precision", "split"), [(np.float32, False), (np.float64, False), (np.float64, True)])
+@pytest.mark.parametrize("m", range(1, 8))
+def test_a_row_and_its_transpose_times_a_vector(m, precision, split):
+    rng, rows = np.random.default_rng(m), (0,) * m
+    indices = rng.permutation(9).astype(np.int32)
+    x, y = rng.normal(size=(2, 9 * m)).astype(precision)
+    kind = np.float32 if split else precision
+    numbers = tuple(rng.normal(size=9 * m * m).astype(kind) for _ in range(1 + split))
+    bound = np.finfo(precision).eps * np.abs(np.asarray(numbers)).max() * np.abs(x).max() * 9 * m
+    factor = precision(-0.75)
+    for begin, end in ((0, 9), (0, 1), (8, 9), (3, 7), (4, 4)):
+        given = tuple(surrounded(part, begin * m * m, end * m * m) for part in numbers)
+        own = int(indices[begin - 1])  # a row beside the columns, or one of them
+        columns = np.repeat(np.arange(9), m)
+        met = np.where(np.isin(columns, indices[begin:end]) | (columns == own), x, np.nan).astype(precision)
+        into = np.where(np.isin(columns, indices[begin:end]), y, np.nan).astype(precision)
+        found, expected = into.copy(), into.copy()
+        sums = row_times_both_ways(indices, given, met, begin, end, own, factor, found, rows)
+        plain = block_products.row_times_both_ways_plain(indices, given, met, begin, end, own, factor, expected, rows)
+        np.testing.assert_allclose(sums, plain, rtol=0, atol=bound)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=bound)
+        blocks = np.sum([part.astype(float).reshape(9, m, m) for part in numbers], axis=0)[begin:end]
+        exact = np.full(9 * m, np.nan)
+        exact.reshape(9, m)[indices[begin:end]] = y.reshape(9, m)[indices[begin:end]] + np.einsum(
+            "kmn,m->kn", blocks, -0.75 * x.astype(float)[own * m : (own + 1) * m]
+        )
+        np.testing.assert_allclose(found, exact, rtol=0, atol=bound)
+
+
+@pytest.mark.parametrize("precision", [np.float32, np.float64])
+@pytest.mark.parametrize(("m", "n"), SIZES)
+def test_a_transposed_row_times_its_part_of_a_vector(m, n, precision):
+    rng, rows, cols = np.random.default_rng(m + 10 * n), (0,) * m, (0,) * n
+    indices = (20 + rng.permutation(9)).astype(np.int32)
+    x, y = rng.normal(size=4 * m).astype(precision), rng.normal(size=9 * n + 2).astype(precision)
+    numbers = rng.normal(size=9 * m * n).astype(precision)
+    at = 1 - 20 * n  # columns 20 to 28 lie in y behind its first number
+    for begin, end in ((0, 9), (8, 9), (3, 7), (4, 4)):
+        given = (surrounded(numbers, begin * m * n, end * m * n),)
+        places = 1 + n * (indices[begin:end, None] - 20) + np.arange(n)
+        into = np.full(len(y), np.nan, precision)
+        into[places] = y[places]
+        found, expected, exact = into.copy(), into.copy(), into.astype(float)
+        met = surrounded(x, 2 * m, 3 * m)
+        add_row_transposed(indices, given, begin, end, 2, met, found, at, rows, cols)
+        block_products.add_row_transposed_plain(indices, given, begin, end, 2, met, expected, at, rows, cols)
+        blocks = numbers.astype(float).reshape(9, m, n)[begin:end]
+        exact[places] += np.einsum("kmn,m->kn", blocks, x.astype(float)[2 * m : 3 * m])
+        for other in (expected, exact):
+            np.testing.assert_allclose(found, other, rtol=0, atol=np.finfo(precision).eps * 30 * m)
 
 
 @pytest.mark.parametrize("split", [False, True])

@@ -15,7 +15,7 @@ from fastcontact.errors import ModelError
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.krylov import krylov_kernels
 from fastcontact.linear.krylov.iterations import ConjugateGradients
-from fastcontact.linear.multigrid import cycle_kernels
+from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
 from fastcontact.linear.multigrid.coarse import Coarse
 from fastcontact.linear.multigrid.constrained_hierarchy import ConstrainedHierarchy
 from fastcontact.linear.multigrid.hierarchy import Hierarchy, by_columns, product
@@ -148,7 +148,21 @@ def test_galerkin_products_and_prolongators_are_those_of_scipy():
     P = scipy_of(top.P)
     expected = (P.T @ K @ P).toarray()
     assert np.abs(scipy_of(below.A).toarray() - expected).max() < 1e-12 * np.abs(expected).max()
-    assert np.abs((scipy_of(top.R) - P.T).toarray()).max() == 0.0
+    x, y = np.random.default_rng(0).normal(size=P.shape[0]), np.full(P.shape[1], np.nan)
+    top.R.multiply(x, y)
+    assert np.abs(y - P.T @ x).max() < 1e-13 * np.abs(P.T @ x).max()
+
+
+def test_the_graph_is_that_of_blocks_with_a_number():
+    A, rng = random_blocks(2, 2, 700, 700)
+    A.data[rng.random(len(A.data)) < 0.3] = 0.0
+    A.data[::5, 0, :] = 0.0
+    own = matrix_of(A)
+    start, near = galerkin_kernels.graph(own.indptr, own.indices, own.storage, own.data, 2)
+    rows = np.repeat(np.arange(700), np.diff(A.indptr))
+    there = (A.data != 0.0).any(axis=(1, 2)) & (A.indices != rows)
+    np.testing.assert_array_equal(near, A.indices[there])
+    np.testing.assert_array_equal(start, np.r_[0, np.cumsum(np.bincount(rows[there], minlength=700))])
 
 
 def test_rigid_motions_of_a_free_body_are_interpolated_without_error():
@@ -426,8 +440,10 @@ def test_the_loop_allocates_nothing_that_grows_with_the_problem():
 def test_memory_is_what_the_levels_hold():
     solver, f, _ = prepared()
     top = solver.hierarchy.levels[0]
-    blocks = len(top.A.indices)
-    assert top.A.nbytes == 4 * (9 * blocks + blocks + len(f) // 3 + 1)
+    nodes, stored = len(f) // 3, len(top.A.storage[2])
+    # Stored blocks with their columns, the pattern of all, where rows of both begin, and where upper triangles do.
+    assert top.A.nbytes == 4 * (9 * stored + stored + len(top.A.indices) + 2 * (nodes + 1) + nodes)
+    assert stored < 0.56 * len(top.A.indices)  # two parts
     assert solver.hierarchy.nbytes < 3.0 * top.A.nbytes  # small problems pay relatively more for prolongators
     assert solver.nbytes == pytest.approx(solver.hierarchy.nbytes + 5 * 8 * len(f), rel=1e-3)
 

@@ -8,10 +8,12 @@ from scipy.sparse import bsr_array
 from stepping import Stepping
 
 import fastcontact as fc
+from fastcontact._jit import decorators
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.linear import choice as linear
+from fastcontact.linear.multigrid import matrix as matrices
 from fastcontact.linear.multigrid import split_matrix_kernels
-from fastcontact.linear.multigrid.matrix import ScaledMatrix
+from fastcontact.linear.multigrid.matrix import ALL, ScaledMatrix, symmetric_storage
 
 EXACT = 2.0**-47  # of split numbers, in units of the largest number of a row
 
@@ -30,13 +32,30 @@ def matrix(n, size, scale=1.0, seed=0):
     return bsr_array(bsr_array(scale * full, blocksize=(size, size)))
 
 
-def test_the_parts_are_the_nearest_number_and_the_rest():
-    numbers = np.random.default_rng(1).normal(size=1001) * 10.0 ** np.random.default_rng(2).uniform(-12, 3, 1001)
-    high, low = np.empty((2, 1001), np.float32)
-    split_matrix_kernels.split(0.25, numbers, high, low)
+@pytest.mark.parametrize("n", [11, 5000, 20_001])
+def test_the_parts_are_the_nearest_number_and_the_rest(n):
+    numbers = np.random.default_rng(1).normal(size=n) * 10.0 ** np.random.default_rng(2).uniform(-12, 3, n)
+    high, low = np.empty((2, n), np.float32)
+    split_matrix_kernels.split(0, n, 0.25, numbers, high, low)
     np.testing.assert_array_equal(high, (0.25 * numbers).astype(np.float32))
     np.testing.assert_array_equal(low, (0.25 * numbers - high).astype(np.float32))
     np.testing.assert_allclose(4.0 * (high.astype(float) + low), numbers, rtol=2.0**-48)
+    in_place = numbers.copy()
+    matrices._halve(0.25, in_place, high)
+    np.testing.assert_array_equal(in_place.view(np.float32)[:n], low)
+
+
+@pytest.mark.parametrize(("n", "size", "shortest"), [(7, 1, 1024), (600, 2, 100), (1300, 1, 200)])
+def test_stored_blocks_may_take_the_place_of_all(n, size, shortest, monkeypatch):
+    monkeypatch.setattr(matrices, "SHORTEST", shortest)
+    K = matrix(n, size)
+    storage, square = symmetric_storage(K.indptr, K.indices), size * size
+    start, _, columns, _ = storage
+    found = K.data.reshape(-1).copy()
+    matrices._keep_stored(K.indptr, K.indices, storage, found, square)
+    dense = K.toarray().reshape(n, size, n, size)
+    rows = np.repeat(np.arange(n), np.diff(start))
+    np.testing.assert_array_equal(found[: len(columns) * square].reshape(-1, size, size), dense[rows, :, columns])
 
 
 @pytest.mark.parametrize("release", [False, True])
@@ -71,14 +90,6 @@ def test_products_are_those_of_the_matrix(n, size, precision, release):
     np.testing.assert_allclose(given.restored().toarray(), dense, rtol=2 * EXACT)
 
 
-def test_low_parts_may_take_the_place_of_the_numbers():
-    numbers = np.random.default_rng(1).normal(size=999)
-    expected, high, low = np.empty(999, np.float32), np.empty(999, np.float32), numbers.view(np.float32)[:999]
-    split_matrix_kernels.split(1.0, numbers.copy(), high, expected)
-    split_matrix_kernels.split(1.0, numbers, high, low)
-    np.testing.assert_array_equal(low, expected)
-
-
 def test_a_matrix_that_is_released_gives_its_memory_away():
     K = matrix(50, 3)
     K = bsr_array((K.data.copy(), K.indices, K.indptr), shape=K.shape)
@@ -89,9 +100,10 @@ def test_a_matrix_that_is_released_gives_its_memory_away():
     owner = given.scaled.low
     while isinstance(owner.base, np.ndarray):
         owner = owner.base
+    stored = 9 * (len(given.scaled.indices) + 50) // 2  # one of two triangles, and the diagonal
+    assert given.scaled.data.size == stored < 0.61 * n
     if sys.gettrace() is None:  # what measures coverage holds arrays, too
-        assert owner.nbytes <= 4 * n + 8
-    assert given.scaled.data.nbytes == 4 * n
+        assert owner.nbytes <= 4 * stored + 8
     np.testing.assert_allclose(given.restored().toarray(), dense, rtol=EXACT)
 
 
@@ -101,7 +113,70 @@ def test_numbers_that_somebody_else_holds_stay_where_they_are():
     given = ScaledMatrix(K, "single", release=True)
     np.testing.assert_allclose(given.restored().toarray(), dense, rtol=EXACT)
     owner = held if held.base is None else held.base
-    assert owner.nbytes == 8 * given.scaled.data.size  # no memory was taken from under it
+    assert owner.nbytes == 8 * 9 * len(given.scaled.indices)  # no memory was taken from under it
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 4])
+@pytest.mark.parametrize("length", [3, 7, 40])
+def test_blocks_stored_once_multiply_as_if_all_were(size, length, monkeypatch):
+    """Parts of few rows, the last one shorter, or one part."""
+    monkeypatch.setattr(matrices, "SHORTEST", length)
+    monkeypatch.setattr(matrices, "PARTS", 40)
+    K = matrix(40, size)
+    A, rng = ScaledMatrix(K, "single").scaled, np.random.default_rng(7)
+    dense = A.to_scipy().toarray()
+    np.testing.assert_allclose(dense, ScaledMatrix(K, "single").unit * K.toarray(), rtol=EXACT)
+    assert np.array_equal(dense, dense.T)
+    start, upper, columns, _ = A.storage
+    for i in range(40):
+        own, inside = columns[start[i] : start[i + 1]], range(i // length * length, (i // length + 1) * length)
+        row = K.indices[K.indptr[i] : K.indptr[i + 1]]
+        assert columns[upper[i] - 1] == i
+        assert sorted(own) == [j for j in row if j >= i or j not in inside]
+    assert len(columns) * size**2 == A.data.size == A.low.size
+    assert A.nbytes == 4 * (A.data.size + len(columns) + 2 * 41 + 40 + len(K.indices))
+    for kind, digits in ((np.float32, 1e-6), (np.float64, 1e-15)):
+        x, z = rng.normal(size=(2, 40 * size)).astype(kind)
+        y, factor = z.copy(), -0.5
+        A.combine(factor, x, 3.0, y, y)
+        scale = np.abs(dense) @ np.abs(x) + np.abs(z)
+        numbers = dense if kind is np.float64 else dense.astype(np.float32)
+        assert (np.abs(y - 3.0 * z - factor * numbers @ x.astype(float)) <= 40 * digits * scale).all()
+
+
+def test_blocks_stored_once_give_the_same_bits_on_any_number_of_threads(monkeypatch):
+    monkeypatch.setattr(matrices, "SHORTEST", 64)
+    A = ScaledMatrix(matrix(1500, 3), "single").scaled
+    x, found = np.random.default_rng(0).normal(size=4500), []
+    threads = decorators.threads()
+    try:
+        for count in {1, 2, threads}:
+            decorators.set_threads(min(count, threads))
+            found.append(np.empty(4500))
+            A.multiply(x, found[-1])
+    finally:
+        decorators.set_threads(threads)
+    assert all(np.array_equal(found[0], other) for other in found)
+
+
+def test_a_pattern_that_is_not_symmetric_is_stored_whole():
+    K = matrix(30, 2)
+    assert symmetric_storage(K.indptr, K.indices) is not ALL
+    asymmetric = K.indices.copy()
+    row = next(i for i in range(30) if K.indptr[i + 1] - K.indptr[i] < 29 and K.indices[K.indptr[i]] == 0 and i > 1)
+    absent = np.setdiff1d(np.arange(30), K.indices[K.indptr[row] : K.indptr[row + 1]])
+    asymmetric[K.indptr[row]] = absent[0]
+    asymmetric[K.indptr[row] : K.indptr[row + 1]].sort()
+    assert symmetric_storage(K.indptr, asymmetric) is ALL
+    unsorted = K.indices.copy()
+    unsorted[[0, 1]] = unsorted[[1, 0]]
+    assert symmetric_storage(K.indptr, unsorted) is ALL
+    # Equal numbers of rows and columns, none on the diagonal of the first two.
+    assert symmetric_storage(np.array([0, 1, 2], np.int32), np.array([1, 0], np.int32)) is ALL
+    wrong = bsr_array((K.data, asymmetric, K.indptr), shape=K.shape)
+    u = np.random.default_rng(0).normal(size=60)
+    given = ScaledMatrix(wrong, "single")
+    np.testing.assert_allclose(given @ u, wrong @ u, rtol=1e-12)
 
 
 def test_an_analysis_has_the_stiffness_that_its_solver_stores(forma04):

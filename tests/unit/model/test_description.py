@@ -44,6 +44,13 @@ def test_every_part_is_told():
         assert text in told
 
 
+def test_units_are_told_where_they_are_known():
+    model = blocks()
+    assert "Units" not in model.describe()
+    model.units = {"length": "mm", "force": "-", "pressure": "MPa"}
+    assert "Units: length in mm, pressure in MPa." in model.describe()
+
+
 def test_what_is_missing_is_told():
     told = fc.Model(fc.generate.box(), kinematics="3d").describe()
     assert "three dimensions" in told

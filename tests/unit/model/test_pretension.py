@@ -118,7 +118,7 @@ def test_a_case_file_cuts_its_mesh_and_the_summary_tells(tmp_path, capsys):
     (tmp_path / "bolt.toml").write_text(CASE)
     out, summary = str(tmp_path / "bolt.vtkhdf"), str(tmp_path / "s.json")
     assert main(["run", str(tmp_path / "bolt.toml"), "-o", out, "--json", summary]) == 0
-    assert "pretension 'bolt': force 3 -, shortened by 0.0058" in capsys.readouterr().out
+    assert "pretension 'bolt': force 3, shortened by 0.0058" in capsys.readouterr().out
     steps = json.loads((tmp_path / "s.json").read_text())["steps"]
     assert [step["pretension"]["bolt"]["force"] for step in steps] == pytest.approx([3.0, 3.0])
     kept = fc.open_results(tmp_path / "bolt.vtkhdf")

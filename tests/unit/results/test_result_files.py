@@ -17,6 +17,7 @@ import h5py
 import numpy as np
 import pytest
 
+import fastcontact as fc
 from fastcontact import topology
 from fastcontact.errors import FileError, ModelError
 from fastcontact.mesh import elements
@@ -780,3 +781,15 @@ def test_larger_fields_are_compressed_step_by_step(path: Path, monkeypatch: pyte
     with open_results(path) as results:
         for number, step in enumerate(results):
             assert_same(step, step_result(number), f"step {number}")
+
+
+@pytest.mark.parametrize("number", ["last", 1.5, None, (0, 1)])
+def test_a_step_that_is_no_number_is_told(number, tmp_path):
+    model = fc.Model(fc.generate.block(), "plane_strain")
+    with fc.ResultWriter(tmp_path / "empty.vtkhdf", model) as out:
+        pass
+    with (
+        fc.open_results(out.path) as results,
+        pytest.raises(fc.FileError, match="is a whole number, from 0, or a slice"),
+    ):
+        results[number]

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
+from fastcontact._jit import compiling
+from fastcontact.analysis.progress import Progress
 from fastcontact.mesh.html_table import html_table
 from fastcontact.results.steps import HEAD, SHOWN, Steps
 
@@ -149,6 +151,58 @@ def test_progress_is_written_where_it_is_asked_for(model, capsys):
     assert "step 1/2" in told
     assert "step 2/2" in told
     assert "nodes in contact" in told
+
+
+def test_time_left_is_told_by_steps_for_which_nothing_was_compiled(model, capsys):
+    steps = fc.solve(model, 3)
+    with Progress(3, show=True) as line:
+        for listener in tuple(compiling.listeners):
+            listener()
+        for step in steps:
+            line.step(step)
+    first, *others = (text for text in capsys.readouterr().err.split("\r") if "step " in text)
+    assert "left" not in first
+    assert len(others) == 2
+    assert all(" s left" in text for text in others)
+
+
+def test_every_line_of_progress_tells_that_kernels_are_compiled(capsys):
+    """Not only the first one of a process: a mesh may have needed a kernel before."""
+    for _ in range(2):
+        with Progress(3, show=True):
+            compiling.notify()
+            compiling.notify()
+        assert capsys.readouterr().err.count(compiling.TEXT) == 1
+
+
+def test_a_result_file_shows_a_table(model, tmp_path):
+    with fc.ResultWriter(tmp_path / "r.vtkhdf", model) as out:
+        assert "none yet" in fc.open_results(out.path)._repr_html_()
+        fc.solve(model, 2, on_step=out.write)
+    results = fc.open_results(tmp_path / "r.vtkhdf")
+    shown = results._repr_html_()
+    for text in ("2, to load factor 1", "complete", str(results.mesh.n_points), "largest pressure", "Step 2"):
+        assert text in shown
+    results.close()
+    assert "2, to load factor 1" in results._repr_html_()
+
+
+def test_names_that_are_near_are_told(model):
+    steps = fc.solve(model, 1)
+    (name,) = steps[0].contact
+    with pytest.raises(KeyError, match=f"unknown contact pair 'x': known are {name}"):
+        steps[0].contact["x"]
+    assert steps[0].contact.get("x") is None
+    for module, wrong, right in (
+        (fc, "sweep", "parameter_sweep"),
+        (fc.plot, "deformed", "deformed_shape"),
+        (fc.generate, "blok", "block"),
+        (fc.analytic, "hertz", "hertz_point"),
+        (fc.obstacles, "Spher", "Sphere"),
+    ):
+        with pytest.raises(AttributeError, match=f"did you mean .*'{right}'"):
+            getattr(module, wrong)
+        assert not hasattr(module, "__wrapped__")
 
 
 COMPILED = """

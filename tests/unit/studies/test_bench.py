@@ -10,7 +10,7 @@ from fastcontact.cli.bench import suite
 SUBJECTS = {"assembly", "contact", "io", "linear", "recovery", "search", "startup", "study"}
 
 
-TABLES = {"robustness"}
+TABLES = {"robustness", "threads"}
 
 
 def test_all_subjects_are_there():
@@ -34,6 +34,45 @@ def test_the_table_of_robustness(tmp_path, capsys):
 def test_the_table_tells_what_failed():
     failed = {"varied": "nu 0.5", "friction": 0.0, "n_dofs": 12, "failed": "no way"}
     assert suite("subjects").load("robustness").lines([failed])[1].endswith("failed: no way")
+
+
+def test_the_table_of_threads(tmp_path, capsys):
+    path = tmp_path / "run.json"
+    assert main(["bench", "threads", "--smallest", "--json", str(path)]) == 0
+    assert "serial part by Amdahl's law" in capsys.readouterr().out
+    (entry,) = json.loads(path.read_text())["tables"]["threads"]
+    one, two = entry["runs"]
+    assert (one["threads"], two["threads"]) == (1, 2)
+    assert one["efficiency"] == 1.0
+    assert two["efficiency"] == pytest.approx(one["wall_s"] / two["wall_s"] / 2)
+    assert one["iterations"] == two["iterations"] > 0
+    for run in entry["runs"]:
+        assert 0.0 < run["cold_wall_s"] < run["wall_s"]
+        assert "linear/multigrid/cycle_kernels.py/multiply" in run["stages"]
+    assert all(len(stage["wall_s"]) == 2 and stage["serial_s"] >= 0.0 for stage in entry["stages"])
+
+
+def test_the_serial_part_of_walls_on_some_threads():
+    amdahl = suite("subjects").load("threads").amdahl
+    assert amdahl([1, 2, 4], [1.0 + 8.0, 1.0 + 4.0, 1.0 + 2.0]) == pytest.approx((1.0, 8.0))
+    assert amdahl([1, 2, 4], [1.0, 2.0, 3.0]) == (2.0, 0.0)  # slower with each thread
+    assert amdahl([1, 2], [3.0, 1.0]) == pytest.approx((0.0, 2.8))  # more than twice as fast
+    assert amdahl([1], [3.0]) == (3.0, 0.0)
+
+
+def test_what_a_function_calls_outside_of_the_package_is_its_own():
+    """Own times by function and caller, as Python's profiler keeps them."""
+    ours, other, outer = ("/x/fastcontact/a/b.py", 1, "f"), ("/x/fastcontact/c.py", 1, "g"), ("/y/library.py", 1, "h")
+    inner, main_ = ("~", 0, "<built-in>"), ("/y/main.py", 1, "main")
+    stats = {
+        main_: (1, 1, 0.5, 9.0, {}),
+        ours: (1, 1, 1.0, 5.0, {main_: (1, 1, 1.0, 5.0)}),
+        other: (1, 1, 2.0, 3.0, {main_: (1, 1, 2.0, 3.0)}),
+        outer: (4, 4, 4.0, 4.4, {ours: (3, 3, 3.0, 3.3), other: (1, 1, 1.0, 1.1)}),
+        inner: (4, 4, 0.4, 0.4, {outer: (4, 4, 0.4, 0.4)}),
+    }
+    found = suite("subjects").load("threads").stages(stats)
+    assert found == pytest.approx({"a/b.py/f": 1.0 + 3.0 + 0.3, "c.py/g": 2.0 + 1.0 + 0.1, "other": 0.5})
 
 
 @pytest.mark.parametrize("name", sorted(SUBJECTS))
@@ -86,6 +125,7 @@ def test_scaling_pictures(tmp_path):
         (["serach"], "search"),
         (["search", "--dofs", "5"], "go together"),
         (["search", "--sizes", "0"], "positive"),
+        (["robustness", "--sizes", "500"], "leave --sizes out"),
         (["contact", "--problem", "sphere", "--dofs", "500"], "sphere-on-block"),
         (["search", "--compare", "absent.json"], "no stored run"),
     ],

@@ -21,6 +21,7 @@ from fastcontact.cases.case import read_case
 from fastcontact.cli._results import case_data
 from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh.files import meshio_process
+from fastcontact.mesh.files.blocks import Block, build_mesh
 from fastcontact.mesh.files.med import add_field, write_med_mesh
 from fastcontact.results.med import write_med_results
 
@@ -437,3 +438,15 @@ def test_a_case_text_in_results_that_is_too_large_is_not_parsed(results):
     with fc.open_results(results) as found:
         found.case_text = "a = 1\n" + "#" * (1 << 23)
         assert found._units() == {}
+
+
+@pytest.mark.parametrize("shape", [(8, 0), (1, 0), (0, 0, 8)])
+def test_cells_without_nodes_are_no_cells(shape):
+    """A block of eight cells of no node each has nothing in it, and is none of no cells either."""
+    if shape[0]:
+        with pytest.raises(MeshError, match=r"cells of hex8 must have shape \(n_cells, 8\), not \(\d, 0\)"):
+            fc.Mesh(np.zeros((8, 3)), {"hex8": np.empty(shape, int)})
+    else:
+        assert not fc.Mesh(np.zeros((8, 3)), {"hex8": np.empty(shape, int)}).cells
+    with pytest.raises(MeshError):
+        build_mesh(np.zeros((8, 3)), [Block("hex8", np.empty(shape, int))], {})

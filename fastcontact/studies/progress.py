@@ -1,8 +1,10 @@
-"""Progress of studies on a terminal: one line, drawn anew after every run or mesh."""
+"""Progress of studies on a terminal or in a notebook: one line, drawn anew after every run or mesh."""
 
 from __future__ import annotations
 
+import contextlib
 import time
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from fastcontact.analysis.progress import StatusLine
@@ -15,6 +17,10 @@ class Runs(StatusLine):
         super().__init__(100, show)
         self._stored = 0
 
+    def __enter__(self) -> Runs:
+        self.draw("the first runs")
+        return super().__enter__()
+
     def __call__(self, progress: Any) -> None:
         """Redraw after a run; `progress` is a `fastcontact.studies.execute.Progress`."""
         self._stored += progress.stored
@@ -23,3 +29,16 @@ class Runs(StatusLine):
         each, count = (time.perf_counter() - self._started) / max(solved, 1), len(progress.left)
         left = f", {count} left: about {each * count:.0f} s" if solved and count else ""
         self.draw(f"{progress.done}/{progress.total} {progress.label} {outcome}{left}")
+
+
+@contextlib.contextmanager
+def told(on_progress: Callable[[Any], None] | None, show: bool) -> Iterator[Callable[[Any], None]]:
+    """Yield what is called after every run: a function of the user's, and a line if `show`."""
+    with Runs(show) as line:
+
+        def ended(progress: Any) -> None:
+            line(progress)
+            if on_progress is not None:
+                on_progress(progress)
+
+        yield ended

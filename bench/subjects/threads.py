@@ -1,0 +1,187 @@
+"""Steps of a contact analysis on one, two, four ... threads, each in a process of its own.
+
+A sphere on a block, solved by multigrid, mesh left out, assembly included. A run is timed as it is, and once more under
+Python's profiler, which tells the wall time of every stage in the main thread. A stage is a function of the package with
+what it calls outside of it. From its wall times on N threads follows its serial part by Amdahl's law, ``t(N) = s + p / N``,
+s and p not negative, in least squares. Where the main thread waits for others, waiting is work of the stage that shares it.
+Memory that gets no faster with more threads counts as serial, too.
+"""
+
+from __future__ import annotations
+
+import cProfile
+import json
+import os
+import pstats
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+SIZES = (280_000,)
+SMALLEST = 1_500
+STEPS = 20
+BY_UNKNOWNS = True  # --sizes are numbers of unknowns
+# Stages that take this part of the run on all threads, or more, are told.
+TOLD = 0.01
+BENCH = Path(__file__).resolve().parents[1]
+
+
+def counts():
+    """Return the numbers of threads: powers of two, and all cores."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return sorted({*(2**k for k in range(cores.bit_length()) if 2**k <= cores), cores})
+
+
+def entries(smallest, tell, sizes=None):
+    """Return the figures, one entry a size: runs by number of threads, efficiency, and the serial part of each stage."""
+    steps, threads = (2, [1, 2]) if smallest else (STEPS, counts())
+    found = []
+    for size in [SMALLEST] if smallest else sizes or SIZES:
+        runs = []
+        for count in threads:
+            tell(f"{size} unknowns, {count} threads")
+            runs.append({"threads": count, **child(size, steps, count, False), **child(size, steps, count, True)})
+        found.append(entry(steps, runs))
+    return found
+
+
+def child(size, steps, threads, profiled):
+    """Run `alone` in a process with a number of threads and return what it measures."""
+    names = [f"{name}_NUM_THREADS" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA")]
+    path = os.pathsep.join([str(BENCH), str(BENCH.parent), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(
+        [sys.executable, __file__, str(size), str(steps), str(int(profiled))], stdout=subprocess.PIPE, text=True,
+        check=True, env={**os.environ, **dict.fromkeys(names, str(threads)), "PYTHONPATH": path},
+    )  # fmt: skip
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def alone(size, steps, profiled):
+    """Return the figures of one run in this process, warm: a small one runs first and loads the kernels."""
+    from suite.subjects import load
+    from suite.timing import peak_bytes
+
+    contact = load("contact")
+    _march(contact, contact.sphere_on_block(SMALLEST), 2)
+    model = contact.sphere_on_block(size)
+    if profiled:
+        profile = cProfile.Profile()
+        profile.runcall(_march, contact, model, steps)
+        return {"stages": stages(pstats.Stats(profile).stats)}
+    cpu = time.process_time()
+    cold, wall, iterations = _march(contact, model, steps)
+    return {
+        "n_dofs": model.n_dofs, "wall_s": wall, "cold_wall_s": cold, "cpu_s": time.process_time() - cpu,
+        "iterations": iterations, "peak_bytes": peak_bytes(),
+    }  # fmt: skip
+
+
+def _march(contact, model, count):
+    """Assemble and make all steps; return the wall time of the first step, assembly included, and of all, and iterations."""
+    begin, cold = time.perf_counter(), 0.0
+    problem = contact.started(model, "amg", count)
+    state = problem.initial_state()
+    for index, instant in enumerate(problem.ramp.instants, start=1):
+        state, _ = contact.load_step(problem, state, index, instant)
+        cold = cold or time.perf_counter() - begin
+    return cold, time.perf_counter() - begin, problem.solver.counters.iterations
+
+
+def stages(stats):
+    """Return the seconds of each function of the package, with what it calls outside of the package."""
+    found, shares = {}, {}
+    for function, (_, _, own, _, callers) in stats.items():
+        for name, share in _owners(function, callers, stats, shares).items():
+            found[name] = found.get(name, 0.0) + share * own
+    return found
+
+
+def _owners(function, callers, stats, shares):
+    """Return which functions of the package, in what shares, the own time of a function belongs to."""
+    name = _stage(function)
+    if name is not None:
+        return {name: 1.0}
+    if function not in shares:
+        shares[function] = {"other": 1.0}  # while it is looked for: functions that call themselves
+        total = sum(times[2] for times in callers.values())
+        found = {}
+        for caller, times in callers.items() if total > 0.0 else ():
+            for owner, share in _owners(caller, stats[caller][4], stats, shares).items():
+                found[owner] = found.get(owner, 0.0) + share * times[2] / total
+        shares[function] = found or {"other": 1.0}
+    return shares[function]
+
+
+def _stage(function):
+    """Return the name of a function of the package; None for others."""
+    file, _, name = function
+    parts = Path(file).parts
+    inside = len(parts) - 1 - parts[::-1].index("fastcontact") if "fastcontact" in parts else None
+    return None if inside is None or inside + 1 == len(parts) else "/".join((*parts[inside + 1 :], name))
+
+
+def entry(steps, runs):
+    """Return the figures of all runs of one size: efficiencies, and the serial part as a whole and of stages."""
+    one = runs[0]
+    for run in runs:
+        run["speed_up"] = one["wall_s"] / run["wall_s"]
+        run["efficiency"] = run["speed_up"] * one["threads"] / run["threads"]
+    threads = [run["threads"] for run in runs]
+    serial, shared = amdahl(threads, [run["wall_s"] for run in runs])
+    told = []
+    for name in {name for run in runs for name in run["stages"]}:
+        walls = [run["stages"].get(name, 0.0) for run in runs]
+        told.append({"stage": name, "wall_s": walls, "serial_s": amdahl(threads, walls)[0]})
+    last = sum(runs[-1]["stages"].values())
+    told = [stage for stage in told if stage["wall_s"][-1] > TOLD * last]
+    return {
+        "n_dofs": one["n_dofs"], "steps": steps, "runs": runs, "serial_share": serial / ((serial + shared) or 1.0),
+        "stages": sorted(told, key=lambda stage: -stage["serial_s"]),
+    }  # fmt: skip
+
+
+def amdahl(threads, walls):
+    """Return the serial and the shared seconds (s, p) of ``walls = s + p / threads`` in least squares, none negative."""
+    n, mean = len(walls), sum(walls) / len(walls)
+    inverse = [1.0 / count for count in threads]
+    middle = sum(inverse) / n
+    spread = sum((x - middle) ** 2 for x in inverse)
+    if spread == 0.0:
+        return mean, 0.0
+    shared = sum((x - middle) * wall for x, wall in zip(inverse, walls, strict=True)) / spread
+    serial = mean - shared * middle
+    if shared < 0.0:
+        return mean, 0.0
+    if serial < 0.0:
+        through = sum(x * wall for x, wall in zip(inverse, walls, strict=True)) / sum(x * x for x in inverse)
+        return 0.0, through
+    return serial, shared
+
+
+def lines(found):
+    """Return the table."""
+    table = []
+    for entry in found:
+        table.append(f"{entry['n_dofs']} unknowns, {entry['steps']} steps")
+        table.append(
+            f"{'threads':>8} {'wall s':>8} {'CPU s':>8} {'cold step s':>11} {'speed-up':>8} {'efficiency':>10} "
+            f"{'iterations':>10} {'peak bytes an unknown':>21}"
+        )
+        table += [
+            f"{run['threads']:>8} {run['wall_s']:>8.2f} {run['cpu_s']:>8.2f} {run['cold_wall_s']:>11.2f} "
+            f"{run['speed_up']:>8.2f} {run['efficiency']:>10.2f} {run['iterations']:>10} "
+            f"{run['peak_bytes'] / run['n_dofs']:>21.0f}"
+            for run in entry["runs"]
+        ]
+        table.append(f"serial part by Amdahl's law: {100 * entry['serial_share']:.1f} % of the run on one thread")
+        threads = " ".join(f"{'on ' + str(run['threads']):>8}" for run in entry["runs"])
+        table.append(f"{'serial s':>8} {threads}  stage, wall s (profiled)")
+        for stage in entry["stages"]:
+            walls = " ".join(f"{wall:>8.3f}" for wall in stage["wall_s"])
+            table.append(f"{stage['serial_s']:>8.3f} {walls}  {stage['stage']}")
+    return table
+
+
+if __name__ == "__main__":
+    print(json.dumps(alone(*(int(text) for text in sys.argv[1:]))))

@@ -1,0 +1,154 @@
+"""The adjoint solution of a settled load step.
+
+With y = (w, mu) for the unknowns and the multipliers, ``(J0 + E).T y = q``. J0 is the symmetric matrix of the step: stiffness
+and active constraints as the linear solver has them. E holds what pairing on the deformed configuration adds, and takes away
+the springs of bodies that contact alone holds. GMRES solves ``s + E.T J0^-T s = E.T J0^-T q`` for ``s = E.T y``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from fastcontact.analysis.sensitivity.moving_contact import MovingContact
+from fastcontact.errors import ConvergenceError
+
+Array = NDArray[np.float64]
+# What GMRES may leave of s, and how many solutions it may take.
+LEFT, SOLUTIONS = 1e-10, 200
+
+
+@dataclass(frozen=True, eq=False)
+class Gradient:
+    """A quantity at the end of a load step, and its derivatives.
+
+    Attributes
+    ----------
+    value : float
+    displacement : ndarray (n_dofs,)
+        By all displacements, contact kept [unit of the quantity / length].
+    multiplier : ndarray (k,)
+        By the multipliers of active constraints [unit of the quantity / force].
+    sample : ndarray, optional
+        By `Sample.all`, for what depends on where surfaces are paired; None for nothing.
+    reaction : ndarray (n_dofs,), optional
+        By the forces of supports [unit of the quantity / force]; None for nothing.
+    """
+
+    value: float
+    displacement: Array
+    multiplier: Array
+    sample: Array | None = None
+    reaction: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """What a parameter changes in the equations, displacements and multipliers held.
+
+    Attributes
+    ----------
+    out : ndarray (n_dofs,)
+        Internal minus external forces, those of contact left out [force / unit of the parameter].
+    lift : ndarray (n_dofs,)
+        Prescribed displacements [length / unit of the parameter].
+    sample : ndarray
+        `Sample.all`, by its own unit.
+    """
+
+    out: Array
+    lift: Array
+    sample: Array
+
+
+class Adjoint:
+    """The adjoint solution for a quantity.
+
+    Parameters
+    ----------
+    contact : MovingContact
+    gradient : Gradient
+    moving : csr_array
+        Derivative of `Sample.all` by where the surfaces are paired.
+    """
+
+    def __init__(self, contact: MovingContact, gradient: Gradient, moving: csr_array) -> None:
+        self._contact, self._gradient = contact, gradient
+        self._system, self._solver = contact.problem.system, contact.problem.solver
+        n, k = len(contact.u), len(contact.active)
+        self._force, self._gap = csr_array(moving[:n]), csr_array(moving[n : n + k])
+        self._moving, self._k = moving, k
+        self.solutions = 0
+        self._B, self._rows, self._C = csr_array((0, n)), csr_array((0, n)), None
+        if k:
+            constraints = contact.constraints
+            self._B = csr_array(constraints.B[contact.active])
+            self._rows = self._system.rows(self._B, np.zeros(k), np.zeros(n))[0]
+            compliance = constraints.normal_compliance
+            self._C = None if compliance is None else compliance.block(contact.active)
+        self._w, self._mu = self._solve()
+
+    def derivative(self, change: Change) -> float:
+        """Return the derivative of the quantity by a parameter."""
+        contact, gradient, n = self._contact, self._gradient, len(self._contact.u)
+        sample = change.sample + self._moving @ change.lift
+        out = change.out + self._system.K @ change.lift - sample[:n]
+        gap = sample[n : n + self._k] + self._B @ change.lift
+        found = gradient.displacement @ change.lift - self._w @ self._system.reduced(out) - self._mu @ gap
+        if gradient.sample is not None:
+            found += gradient.sample @ sample
+        if gradient.reaction is not None:
+            found += gradient.reaction @ out
+        assert len(contact.u) == n
+        return float(found)
+
+    def _right(self) -> tuple[Array, Array]:
+        """Return the derivatives of the quantity by all unknowns (n,) and by the multipliers (k,)."""
+        gradient = self._gradient
+        whole, multiplier = gradient.displacement.copy(), gradient.multiplier.copy()
+        if gradient.sample is not None:
+            whole += self._moving.T @ gradient.sample
+        if gradient.reaction is not None:
+            whole += self._system.K @ gradient.reaction - self._force.T @ gradient.reaction
+            multiplier -= self._B @ gradient.reaction
+        return self._system.reduced(whole), multiplier
+
+    def _solve(self) -> tuple[Array, Array]:
+        right, multiplier = self._right()
+        w, mu = self._kept(right, multiplier)
+        first = self._transposed(w, mu)
+        if not first.any():
+            return w, mu
+        none = np.zeros(self._k)
+
+        def product(s: Array) -> Array:
+            return s + self._transposed(*self._kept(s, none))
+
+        n = len(right)
+        s, info = gmres(LinearOperator((n, n), product), first, rtol=LEFT, atol=0.0, restart=SOLUTIONS, maxiter=1)
+        if info:
+            raise ConvergenceError(
+                f"the adjoint equations of the moving contact geometry are not solved after {self.solutions} solutions: "
+                "keep the pairing (Criteria(keep_pairing=True)), or take differences of two solutions"
+            )
+        return self._kept(right - s, multiplier)
+
+    def _kept(self, right: Array, multiplier: Array) -> tuple[Array, Array]:
+        """Return ``J0^-T`` of right-hand sides (n,) and (k,), by the linear solver as it is."""
+        self.solutions += 1
+        loaded = self._solver.load(np.ascontiguousarray(right))
+        w, force = loaded.solve(self._rows, -multiplier, self._C)
+        return w, -force
+
+    def _transposed(self, w: Array, mu: Array) -> Array:
+        """Return ``E.T y`` (n,)."""
+        system, bodies = self._system, self._contact.problem.unsupported_bodies
+        along = w if system.T is None else system.T @ w
+        found = system.reduced(self._gap.T @ mu - self._force.T @ along)
+        if bodies is not None:
+            found[bodies.dofs] -= bodies.stiffness * w[bodies.dofs]
+        return found

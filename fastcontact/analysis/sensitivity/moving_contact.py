@@ -1,0 +1,284 @@
+"""The forces and gaps of settled contact as functions of where the surfaces are paired, and their derivatives.
+
+Contact is paired on the deformed configuration: forces ``B.T multiplier`` and gaps ``gap0 + B u`` also depend on the
+displacement through B and gap0 (Wriggers, Computational Contact Mechanics, 2006, chapter 6). These derivatives are taken by
+central differences of the pairing alone, which is cheap and smooth; no load step is solved again for them. A point of a
+surface reaches only the constraints around it, so that points far from each other are moved at the same time (Curtis, Powell
+and Reid, J. Inst. Math. Appl. 13, 1974).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, eye_array
+
+from fastcontact.analysis.contact_result import nodal_pressure
+from fastcontact.analysis.iterate import Iterate, pair_surfaces
+from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.solution import Solution
+from fastcontact.analysis.state import State
+from fastcontact.contact.constraints import StackedConstraints
+from fastcontact.contact.surface import Surface
+from fastcontact.errors import ModelError
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+REMEDY = "Take another load a little off this one, or differences of two solutions to either side"
+# By how much points are moved, in units of the shortest edge: what central differences leave is then about 1e-10.
+MOVED = 1e-5
+# What differences to either side may differ by where they are smooth, relative to what turning a facet by an edge makes.
+SMOOTH = 1e-3
+# So many components are moved one by one.
+FEW = 60
+# What moving points together may be off by, relative to the largest number, before they are moved one by one.
+TOGETHER = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Contact at one place.
+
+    Attributes
+    ----------
+    force : ndarray (n_dofs,)
+        Nodal contact forces [force].
+    gap : ndarray (k,)
+        Gaps of the active constraints, compliance included [length].
+    pressure : ndarray (n_nodes,)
+        Nodal pressures of one pair, empty where none is asked for [pressure].
+    """
+
+    force: Array
+    gap: Array
+    pressure: Array
+
+    @property
+    def all(self) -> Array:
+        """All numbers, one behind the other."""
+        return np.concatenate([self.force, self.gap, self.pressure])
+
+
+@dataclass(frozen=True, eq=False)
+class MovingContact:
+    """The contact of a load step with its multipliers held, wherever its surfaces are paired.
+
+    Attributes
+    ----------
+    problem : Problem
+    state : State
+        At the beginning of the step.
+    load : StepLoad
+    instant : float
+        The pseudo-time of its end.
+    u : ndarray (n_dofs,)
+        Displacements of the step [length].
+    solution : Solution
+        Multipliers and active set of the step.
+    closed : ndarray of bool (n_nodes,), optional
+        The closed nodes of the contact pair whose pressures are asked for.
+    pair : str
+        That pair; empty for none.
+    """
+
+    problem: Problem
+    state: State
+    load: StepLoad
+    instant: float
+    u: Array
+    solution: Solution
+    closed: NDArray[np.bool_] | None = None
+    pair: str = ""
+
+    @cached_property
+    def constraints(self) -> StackedConstraints:
+        """The constraints where the bodies stand."""
+        return self.constraints_at(self.u)
+
+    @cached_property
+    def active(self) -> Indices:
+        """The active constraints (k,)."""
+        return np.flatnonzero(self.solution.active)
+
+    def constraints_at(self, u: Array) -> StackedConstraints:
+        """Return the constraints of surfaces paired at displacements u (n_dofs,) [length]."""
+        return pair_surfaces(self.problem, self.state, self.load, Iterate(u.copy(), {}, {}))
+
+    def at(self, u: Array) -> Sample:
+        """Return forces, gaps and pressures of surfaces paired at u (n_dofs,), the displacements kept [length]."""
+        found, multiplier = self.constraints_at(u), self.solution.multiplier
+        if len(found) != len(multiplier):
+            raise ModelError(
+                f"contact has {len(multiplier)} constraints, and {len(found)} as soon as nodes move: both sides have "
+                f"nodes in common places, where results have one derivative to either side. {REMEDY}"
+            )
+        gap = found.gap0 + found.B @ self.u
+        if found.normal_compliance is not None:
+            gap = gap + found.normal_compliance.apply(multiplier)
+        return Sample(found.force(multiplier), gap[self.active], self.pressure(multiplier, found))
+
+    def pressure(self, multiplier: Array, found: StackedConstraints | None = None) -> Array:
+        """Return the nodal pressures (n_nodes,) of the pair for multipliers (m,) [force] [pressure]."""
+        if not self.pair:
+            return np.empty(0)
+        found = found or self.constraints
+        assert self.closed is not None
+        own = multiplier[found.rows()[self.pair]]
+        return nodal_pressure(self.problem.pairs[self.pair], found.parts[self.pair], own, self.closed)
+
+    def along(self, changed: Callable[[float], MovingContact], by: float) -> Array:
+        """Return the derivative of `Sample.all` by a parameter; `changed` is the contact with it changed by a number."""
+        return np.asarray((changed(by).at(self.u).all - changed(-by).at(self.u).all) / (2.0 * by))
+
+    @cached_property
+    def step(self) -> float:
+        """By how much points are moved [length]."""
+        edges = [np.inf]
+        for block in (block for side in self._surfaces() for block in side.blocks):
+            corners = self.problem.model.mesh.points[block.facets]
+            edges.append(float(np.linalg.norm(np.ptp(corners, axis=1), axis=1).min()))
+        return MOVED * min(edges)
+
+    def _surfaces(self) -> list[Surface]:
+        pairs = self.problem.pairs.values()
+        return [side for pair in pairs for side in (pair.secondary, pair.primary) if isinstance(side, Surface)]
+
+    def derivatives(self) -> tuple[csr_array, csr_array]:
+        """Return the derivatives (n, n_dofs) of `Sample.all` by where the surfaces are paired, forward and backward.
+
+        Their mean is the derivative. Where they differ by more than the step, a point lies on the line between two facets.
+        """
+        n = len(self.u)
+        size = n + len(self.active) + (len(self.problem.pairs[self.pair].secondary.points) if self.pair else 0)
+        keep = self.problem.criteria.keep_pairing or not len(self.active)
+        dofs = np.empty(0, np.intp) if keep else self._moving_dofs()
+        if not len(dofs):
+            return csr_array((size, n)), csr_array((size, n))
+        if len(dofs) > FEW:
+            owner = self._reached()
+            found = self._differences(_apart(dofs, owner, self.problem.model.mesh.dim), owner)
+            if self._agrees(0.5 * (found[0] + found[1]), dofs):
+                return found
+        return self._differences([np.array([dof]) for dof in dofs], None)
+
+    def kinks(self, forward: csr_array, backward: csr_array) -> csr_array:
+        """Return half of what the two `derivatives` differ by where that is no matter of the step: where points lie on the
+        line between two facets.
+        """
+        apart, n = csr_array(0.5 * (forward - backward)), len(self.u)
+        force = float(np.abs(self.solution.multiplier).max(initial=0.0)) * MOVED / self.step
+        row = np.repeat(np.arange(apart.shape[0]), np.diff(apart.indptr))
+        # Pressures follow forces: where those have no kink, they have none.
+        size = np.where(row < n, force, np.where(row < n + len(self.active), 1.0, np.inf))
+        apart.data[np.abs(apart.data) <= SMOOTH * size] = 0.0
+        apart.eliminate_zeros()
+        return apart
+
+    def _moving_dofs(self) -> Indices:
+        """Return the displacement components that active constraints may depend on."""
+        dim, free = self.problem.model.mesh.dim, self.problem.contact_dofs
+        reached = np.unique(self._reached().nonzero()[1])
+        extra = free[free >= self.problem.model.n_dofs]
+        dofs = (reached[:, None] * dim + np.arange(dim)).ravel()
+        return np.concatenate([dofs, extra]).astype(np.intp)
+
+    @cached_property
+    def _involved(self) -> csr_array:
+        """Which points (n_points,) active constraints (k,) involve, 1 or 0."""
+        dim, B = self.problem.model.mesh.dim, csr_array(self.constraints.B[self.active])
+        keep = (B.indices < self.problem.model.n_dofs) & (B.data != 0.0)
+        row = np.repeat(np.arange(B.shape[0]), np.diff(B.indptr))[keep]
+        found = csr_array(
+            (np.ones(len(row)), (row, B.indices[keep] // dim)),
+            shape=(len(self.active), self.problem.model.mesh.n_points),
+        )
+        return _ones(found)
+
+    def _reached(self) -> csr_array:
+        """Return which points (n_points,) active constraints (k,) may depend on: those they involve, and those around."""
+        n = self.problem.model.mesh.n_points
+        near = eye_array(n, format="csr")
+        for side in self._surfaces():
+            local = csr_array(
+                (np.ones(len(side.points)), (side.points, np.arange(len(side.points)))), (n, len(side.points))
+            )
+            near = near + local @ side.near @ local.T
+        tied = [name for name, pair in self.problem.pairs.items() if pair.options.tied]
+        moves = np.ones(len(self.active))
+        for name in tied:  # paired once, before any load
+            rows = self.constraints.rows()[name]
+            moves[(self.active >= rows.start) & (self.active < rows.stop)] = 0.0
+        return _ones(csr_array((self._involved * moves[:, None]) @ near))
+
+    def _differences(self, together: list[Indices], owner: csr_array | None) -> tuple[csr_array, csr_array]:
+        base, n = self.at(self.u).all, len(self.u)
+        columns: list[list[csr_array]] = [[], []]
+        for dofs in together:
+            shift = np.zeros(n)
+            shift[dofs] = self.step
+            for side, sign in enumerate((1.0, -1.0)):
+                changed = sign * (self.at(self.u + sign * shift).all - base) / self.step
+                rows = np.flatnonzero(changed)
+                if owner is None or len(dofs) == 1:
+                    column = np.full(len(rows), dofs[0])
+                else:
+                    column = self._owners(rows, dofs, owner)
+                columns[side].append(csr_array((changed[rows], (rows, column)), shape=(len(base), n)))
+        forward, backward = (csr_array(sum(part[1:], part[0])) for part in columns)
+        return forward, backward
+
+    def _owners(self, rows: Indices, dofs: Indices, owner: csr_array) -> Indices:
+        """Return which of the components `dofs`, moved together, has changed each of the numbers `rows`."""
+        dim, n = self.problem.model.mesh.dim, len(self.u)
+        by_constraint = np.full(owner.shape[0], dofs[0])
+        by_point = np.full(self.problem.model.mesh.n_points, dofs[0])
+        moved = csr_array(owner[:, dofs // dim])
+        first = np.repeat(np.arange(owner.shape[0]), np.diff(moved.indptr))
+        by_constraint[first] = dofs[moved.indices]
+        for constraint in np.unique(first):
+            by_point[
+                self._involved.indices[self._involved.indptr[constraint] : self._involved.indptr[constraint + 1]]
+            ] = by_constraint[constraint]
+        nodes = self.problem.pairs[self.pair].secondary.points if self.pair else np.empty(0, np.intp)
+        everywhere = np.concatenate(
+            [np.repeat(by_point, dim), np.full(n - dim * len(by_point), dofs[0]), by_constraint, by_point[nodes]]
+        )
+        return everywhere[rows].astype(np.intp)
+
+    def _agrees(self, derivative: csr_array, dofs: Indices) -> bool:
+        """Return whether the derivative is that along a direction in which all points move at once."""
+        shift = np.zeros(len(self.u))
+        shift[dofs] = np.random.default_rng(0).uniform(-1.0, 1.0, len(dofs))
+        found = (self.at(self.u + self.step * shift).all - self.at(self.u - self.step * shift).all) / (2 * self.step)
+        n, k = len(self.u), len(self.active)
+        off = np.abs(found - derivative @ shift)
+        parts = (slice(0, n), slice(n, n + k), slice(n + k, None))
+        return all(off[p].max(initial=0.0) <= TOGETHER * np.abs(found[p]).max(initial=0.0) for p in parts)
+
+
+def _apart(dofs: Indices, reached: csr_array, dim: int) -> list[Indices]:
+    """Return the components in groups of which no two reach the same constraint, or constraints of common points."""
+    n_points = reached.shape[1]
+    points = np.unique(dofs[dofs < n_points * dim] // dim)
+    around = _ones(csr_array(reached.T @ reached))
+    further = _ones(csr_array(around @ around))
+    colour: dict[int, int] = {}
+    for point in points.tolist():
+        beside = further.indices[further.indptr[point] : further.indptr[point + 1]].tolist()
+        taken = {colour[other] for other in beside if other in colour}
+        colour[point] = next(c for c in range(len(points)) if c not in taken)
+    groups: list[Indices] = []
+    for c in range(max(colour.values(), default=-1) + 1):
+        own = np.array([p for p, found in colour.items() if found == c], np.intp)
+        groups += [own * dim + axis for axis in range(dim)]
+    return groups + [np.array([dof]) for dof in dofs[dofs >= n_points * dim]]
+
+
+def _ones(pattern: csr_array) -> csr_array:
+    pattern.eliminate_zeros()
+    pattern.data[:] = 1.0
+    return pattern

@@ -1,0 +1,113 @@
+"""The end of a load step found again, as equations that can be differentiated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.analysis import restart
+from fastcontact.analysis.convergence_messages import named_nodes, nearest_nodes
+from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.load_step import equilibrium, prepare_start, with_loads
+from fastcontact.analysis.locked_sections import locked_before
+from fastcontact.analysis.problem import Problem, prepare
+from fastcontact.analysis.sensitivity.moving_contact import REMEDY, MovingContact
+from fastcontact.analysis.solution import Equilibrium
+from fastcontact.errors import ModelError
+from fastcontact.model.model import Model
+from fastcontact.model.ramp import Ramp
+from fastcontact.results.step import StepResult
+
+Array = NDArray[np.float64]
+
+
+def settled_step(
+    model: Model, step: StepResult, ramp: Ramp, criteria: Criteria, linear_solver: str
+) -> tuple[Problem, MovingContact]:
+    """Return the problem, and the contact at the end of a step with its multipliers.
+
+    Raises
+    ------
+    ModelError
+        If the step is of another case, or depends on those before it.
+    """
+    _check_path(model, step, criteria)
+    case = restart.identity(model, ramp, criteria)
+    restart.check(step, case, model)
+    model.check(ramp)
+    problem = prepare(model, ramp, criteria, linear_solver=linear_solver)
+    touched = frozenset(name for name, found in step.contact.items() if found.active.any())
+    state, load = restart.put_back(problem, step, touched), problem.load_at(step.load_factor)
+    state = replace(state, obstacles=problem.obstacles_at(load, state.u))
+    loaded = with_loads(problem, load)
+    start, expected = prepare_start(problem, state, load, loaded)
+    settled, u, _ = equilibrium(problem, start, load, loaded, expected)
+    if settled is None:
+        none = np.empty(0)
+        solution = Equilibrium(u, none, none, np.empty(0, bool), np.empty(0, bool), 1)
+        return problem, MovingContact(problem, state, load, step.load_factor, u, solution)
+    return problem, MovingContact(problem, state, load, step.load_factor, u, settled.solution)
+
+
+def _check_path(model: Model, step: StepResult, criteria: Criteria) -> None:
+    for pair in model.contact:
+        for option, what in (("friction", "friction"), ("wear", "wear")):
+            if pair.options.get(option):
+                raise ModelError(
+                    f"contact '{pair.name}' has {what}: its results depend on all load steps, and sensitivities are those of "
+                    f"one. Take differences of two solutions, or leave out {option}"
+                )
+        if pair.options.get("kind") == "bilateral_once_closed":
+            raise ModelError(
+                f"contact '{pair.name}' never opens what was closed in earlier load steps: sensitivities are those of one "
+                "step. Take differences of two solutions"
+            )
+    if len(locked_before(model, step).relations) > len(model.relations):
+        raise ModelError(
+            "pretension sections are locked at a length that earlier load steps have found: sensitivities are those of one "
+            "step. Ask for them in the last step before the lock, or take differences of two solutions"
+        )
+    if criteria.geometry_updates is not None and not criteria.keep_pairing:
+        raise ModelError(
+            f"after a fixed number of geometry updates ({criteria.geometry_updates}) contact has not settled where the "
+            "bodies stand: leave out geometry_updates, or keep the pairing (keep_pairing)"
+        )
+
+
+def checked_margin(contact: MovingContact, least: float) -> float:
+    """Return how near the active set is to a change, see `Sensitivities.margin`.
+
+    Raises
+    ------
+    ModelError
+        If that is less than the `least` one.
+    """
+    constraints, solution = contact.constraints, contact.solution
+    size = float(np.abs(contact.u).max(initial=0.0))
+    gap = constraints.gap0 + constraints.B @ contact.u
+    near = np.full(len(constraints), np.inf)
+    for name, rows in constraints.rows().items():
+        active, usable = solution.active[rows], constraints.usable[rows]
+        # By area: a constraint that stands for a tiny one has a tiny force.
+        areas = constraints.parts[name].areas
+        force = solution.multiplier[rows] / (1.0 if areas is None else areas)
+        largest = float(np.abs(force).max(initial=0.0)) or 1.0
+        near[rows] = np.where(active, force / largest, np.where(usable, gap[rows] / size, np.inf))
+    if constraints.equality is not None:
+        near[constraints.equality] = np.inf
+    wrong = np.flatnonzero(~(near >= least))
+    if len(wrong):
+        nodes = nearest_nodes(contact.problem, constraints, wrong)
+        shown = float(np.abs(near[wrong]).max())
+        kind = (
+            "open" if solution.active[wrong].all() else "close" if not solution.active[wrong].any() else "open or close"
+        )
+        many = "1 constraint is" if len(wrong) == 1 else f"{len(wrong)} constraints are"
+        raise ModelError(
+            f"{many} about to {kind}, at {named_nodes(contact.problem, nodes)}: forces or gaps are "
+            f"{shown:.1e} of the largest, less than margin = {least:g}. There results have one derivative to either side. "
+            f"{REMEDY}"
+        )
+    return min(1.0, float(near.min(initial=1.0)))

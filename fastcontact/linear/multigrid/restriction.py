@@ -1,0 +1,46 @@
+"""From a level of the multigrid hierarchy to the next coarser one: products with the transpose of its prolongator."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.linear.multigrid import restriction_kernels
+from fastcontact.linear.multigrid.matrix import BlockMatrix
+
+Values = NDArray[Any]
+# Parts of the rows, of so many at least; each has work space of its own.
+PARTS, SHORTEST = 32, 1024
+
+
+class Restriction:
+    """The transpose of a prolongator P, which is not stored.
+
+    Parameters
+    ----------
+    P : BlockMatrix
+    """
+
+    def __init__(self, P: BlockMatrix) -> None:
+        self.P, n = P, len(P.indptr) - 1
+        count = min(PARTS, max(1, n // SHORTEST))
+        self._ends = np.linspace(0, n, count + 1).astype(np.int64)
+        self._first, self._last = np.empty(count, np.int64), np.empty(count, np.int64)
+        restriction_kernels.reach(P.indptr, P.indices, self._ends, self._first, self._last)
+        widths = np.concatenate([[0], np.cumsum(self._last - self._first)])
+        self._begin = widths[:-1]
+        self._work = np.empty(int(widths[-1]) * len(P.cols), P.data.dtype)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory without P [bytes]."""
+        return self._work.nbytes
+
+    def multiply(self, x: Values, y: Values) -> None:
+        """Fill `y` with ``P.T x``."""
+        P = self.P
+        restriction_kernels.multiply_transposed(
+            P.indptr, P.indices, P.data, self._ends, self._first, self._last, self._begin, x, self._work, y, P.rows, P.cols
+        )  # fmt: skip

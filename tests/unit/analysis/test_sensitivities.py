@@ -1,0 +1,409 @@
+"""Sensitivities against differences of whole solutions, in every formulation, dimension and kind of parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+
+TIGHT = fc.Criteria(relative=1e-10)
+Make = Callable[..., fc.Model]
+# By name of a change: the parameter, where it stands, and how far solutions lie apart.
+Changes = Mapping[str, tuple[tuple, float, float]]
+STEEL: Changes = {"E": (("E", 0), 1000.0, 0.1), "nu": (("nu", 0), 0.3, 3e-5)}
+
+
+def measured(model: fc.Model, step: fc.StepResult, quantity: tuple, node: int) -> float:
+    """Return the quantity from the results as users read them."""
+    kind, place = quantity[0], quantity[1]
+    axis = "xyz".find(str(quantity[-1]))
+    if kind == "displacement":
+        return float(step.displacement[place, axis])
+    if kind == "reaction":
+        return float(step.reaction[model.mesh.points_of(place), axis].sum())
+    if kind == "contact_force":
+        return float(step.contact[place].force[axis])
+    return float(step.contact[place].pressure[node])
+
+
+def compare(make: Make, quantity: tuple, changes: Changes, *, within: float = 1e-6, **options) -> fc.Sensitivities:
+    """Compare sensitivities with differences of fourth order, each of four solutions."""
+    model, solve = make(), {"criteria": TIGHT, **options}
+    step = fc.solve(model, 1, **solve)[-1]
+    found = fc.sensitivities(model, step, quantity, [own for own, _, _ in changes.values()], ramp=1, **solve)
+    node = 0
+    if quantity[0].startswith("pressure"):
+        contact = step.contact[quantity[1]]
+        node = int(
+            contact.pressure.argmax() if len(quantity) == 2 else np.flatnonzero(contact.points == quantity[2])[0]
+        )
+    assert found.value == pytest.approx(measured(model, step, quantity, node), rel=1e-9)
+    for name, (parameter, at, by) in changes.items():
+        values = []
+        for place in (-2, -1, 1, 2):
+            other = make(**{name: at + place * by})
+            values.append(measured(other, fc.solve(other, 1, **solve)[-1], quantity, node))
+        difference = (8.0 * (values[2] - values[1]) - (values[3] - values[0])) / (12.0 * by)
+        assert found.derivatives[parameter] == pytest.approx(difference, rel=within), (quantity, parameter)
+    return found
+
+
+def two_blocks(element: str = "quad4", kinematics: str = "plane_strain", press: bool = False, **options) -> Make:
+    """A block on a wider one, their nodes in different places."""
+    mesh = fc.generate.block_on_block(
+        element,
+        size_lower=(4.0, 2.0),
+        size_upper=(2.2, 1.5),
+        divisions_lower=(8, 4),
+        divisions_upper=(5, 3),
+        shift=0.83,
+    )
+
+    def make(E=1000.0, nu=0.3, load=1.0, moved=1.0, clearance=0.0):
+        model = fc.Model(mesh, kinematics=kinematics)
+        model.add_material(fc.LinearElastic(E=E, nu=nu), "LOWER")
+        model.add_material(fc.LinearElastic(E=2500.0, nu=0.22), "UPPER")
+        model.fix("LOWER_BOTTOM", "xy")
+        if press:
+            model.fix("UPPER_TOP_LEFT", "x")  # it may turn: contact alone holds it
+            model.add_pressure("UPPER_TOP", lambda x: load * (10.0 + 3.0 * x[:, 0]))
+        else:
+            model.prescribe("UPPER_TOP", x=0.01, y=-0.05 * moved)
+        own = dict(options) if options.get("kind") == "tied" else {"clearance": clearance, **options}
+        model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", **own)
+        return model
+
+    return make
+
+
+MOVED: Changes = {**STEEL, "moved": (("prescribed", "UPPER_TOP", "y"), 1.0, 1e-4)}
+CLEAR = (("clearance", "c"), 0.0, 1e-5)
+
+
+@pytest.mark.parametrize("element", ["quad4", "tri6"])
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
+def test_every_formulation_between_bodies(formulation, element):
+    make = two_blocks(element, formulation=formulation, **({"multipliers": "dual"} if formulation == "mortar" else {}))
+    compare(make, ("contact_force", "c", "y"), {**MOVED, "clearance": CLEAR})
+    found = compare(make, ("pressure_max", "c"), {**MOVED, "clearance": CLEAR})
+    assert 1 < found.solutions < 20  # the geometry moves
+
+
+def test_axisymmetric_spheres():
+    mesh = fc.generate.half_spheres(size=5.0)
+
+    def make(E=20_000.0, nu=0.3, moved=1.0):
+        model = fc.Model(mesh, kinematics="axisymmetric")
+        model.add_material(fc.LinearElastic(E=E, nu=nu), "SPHHAU")
+        model.add_material(fc.LinearElastic(E=30_000.0, nu=0.2), "SPHBAS")
+        model.fix("A1A2", "x")
+        model.prescribe("A2B2", y=-moved)
+        model.prescribe("A1B1", y=1.0)
+        model.add_contact("hertz", secondary="CONT1", primary="CONT2")
+        return model
+
+    changes = {
+        "E": (("E", "SPHHAU"), 20_000.0, 2.0),
+        "nu": (("nu", "SPHHAU"), 0.3, 3e-5),
+        "moved": (("prescribed", "A2B2"), 1.0, 1e-4),
+    }
+    for quantity in (("reaction", "A2B2", "y"), ("pressure_max", "hertz")):
+        compare(make, quantity, changes)
+
+
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+def test_in_space_with_factors_and_with_a_hierarchy(solver):
+    lower = fc.generate.box((4.0, 4.0, 2.0), (4, 4, 2))
+    upper = fc.generate.transformed(fc.generate.box((2.2, 2.4, 1.5), (3, 3, 2)), translate=(0.83, 0.72, 2.0))
+    mesh = fc.generate.union(
+        fc.generate.renamed(lower, lambda name: "L" + name), fc.generate.renamed(upper, lambda name: "U" + name)
+    )
+
+    def make(E=1000.0, nu=0.3, moved=1.0, clearance=0.0):
+        model = fc.Model(mesh, kinematics="3d")
+        model.add_material(fc.LinearElastic(E=E, nu=nu), "LBOX")
+        model.add_material(fc.LinearElastic(E=2500.0, nu=0.22), "UBOX")
+        model.fix("LZMIN", "xyz")
+        model.prescribe("UZMAX", x=0.01, y=0.004, z=-0.05 * moved)
+        model.add_contact("c", secondary="UZMIN", primary="LZMAX", clearance=clearance)
+        return model
+
+    changes = {**STEEL, "moved": (("prescribed", "UZMAX", "z"), 1.0, 1e-4), "clearance": CLEAR}
+    compare(make, ("contact_force", "c", "z"), changes, linear_solver=solver)
+    compare(make, ("pressure_max", "c"), changes, linear_solver=solver)
+
+
+def test_points_that_are_moved_together_give_what_each_gives_alone(monkeypatch):
+    from fastcontact.analysis.sensitivity import moving_contact
+
+    model = two_blocks()()
+    step = fc.solve(model, 1, criteria=TIGHT)[-1]
+
+    def found():
+        return fc.sensitivities(model, step, ("pressure_max", "c"), [("E", 0), ("nu", 1)], ramp=1, criteria=TIGHT)
+
+    monkeypatch.setattr(moving_contact, "FEW", 0)
+    together = found()
+    monkeypatch.setattr(moving_contact, "FEW", 10**9)
+    alone = found()
+    for parameter, value in alone.derivatives.items():
+        assert together.derivatives[parameter] == pytest.approx(value, rel=1e-9)
+
+
+def test_bodies_held_by_contact_alone():
+    loaded = {**STEEL, "load": (("load", "UPPER_TOP"), 1.0, 1e-4)}
+    make = two_blocks(press=True)
+    corner = int(make().mesh.points_of("UPPER_TOP_RIGHT")[0])
+    compare(make, ("pressure_max", "c"), loaded)
+    compare(make, ("displacement", corner, "y"), {**loaded, "clearance": CLEAR})
+
+
+@pytest.mark.filterwarnings("ignore:contact 'c' penetrates by")
+@pytest.mark.parametrize("options", [{"kind": "tied"}, {"kind": "bilateral"}, {"penalty": 1e5}], ids=str)
+def test_other_kinds_of_contact(options):
+    compare(two_blocks(**options), ("reaction", "UPPER_TOP", "y"), MOVED)
+    compare(two_blocks("tri6", "plane_stress", **options), ("contact_force", "c", "y"), MOVED)
+
+
+def test_pairing_that_is_kept_takes_one_solution():
+    criteria = fc.Criteria(relative=1e-10, keep_pairing=True)
+    found = compare(two_blocks(), ("pressure_max", "c"), MOVED, criteria=criteria)
+    assert found.solutions == 1
+    moving = compare(two_blocks(), ("pressure_max", "c"), MOVED)
+    by = ("prescribed", "UPPER_TOP", "y")
+    assert abs(found.derivatives[by] / moving.derivatives[by] - 1.0) > 1e-3  # what the moving geometry makes
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+@pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric", "3d"])
+def test_rigid_obstacles_that_are_moved_and_pushed(kinematics, formulation):
+    dim = 3 if kinematics == "3d" else 2
+    up, top, bottom = ("z", "ZMAX", "ZMIN") if dim == 3 else ("y", "TOP", "BOTTOM")
+    mesh = fc.generate.box((10.0, 10.0, 5.0), (6, 6, 3)) if dim == 3 else fc.generate.block((10.0, 5.0), (16, 8))
+    centre = {"plane_strain": (4.3, 13.0), "axisymmetric": (0.0, 13.0), "3d": (3.3, 4.1, 13.0)}[kinematics]
+
+    def make(pushed=False, E=1000.0, nu=0.3, motion=1.0, force=1.0):
+        model = fc.Model(mesh, kinematics=kinematics)
+        model.add_material(fc.LinearElastic(E=E, nu=nu))
+        model.fix(bottom, "xyz"[:dim])
+        driving = {"force": {up: -60.0 * force}} if pushed else {"motion": {up: -0.3 * motion}}
+        ball = fc.obstacles.Sphere(centre=centre, R=8.0)
+        model.add_obstacle("ball", secondary=top, obstacle=ball, formulation=formulation, **driving)
+        return model
+
+    moved = {**STEEL, "motion": (("motion", "ball"), 1.0, 1e-6)}
+    compare(make, ("contact_force", "ball", up), moved)
+
+    def pushed(**changes):
+        return make(True, **changes)
+
+    compare(pushed, ("pressure_max", "ball"), {**STEEL, "force": (("load", "ball"), 1.0, 1e-5)}, within=2e-6)
+
+
+def test_heat_normals_and_the_other_constants():
+    mesh = fc.generate.rings("quad8", divisions_inner=(3, 7), divisions_outer=(3, 9))
+
+    def make(E=2e5, nu=0.3, moved=1.0):
+        model = fc.Model(mesh, kinematics="plane_strain")
+        model.add_material(fc.LinearElastic(E=E, nu=nu, expansion=1e-5), "INNER")
+        model.add_material(fc.LinearElastic(E=1.5e5, nu=0.25, expansion=1.2e-5), "OUTER")
+        model.fix("SYMMETRY_X", "x")
+        model.fix("SYMMETRY_Y", "y")
+        model.add_temperature(100.0, groups="INNER")
+        model.prescribe("BORE", normal=-0.01 * moved)
+        model.add_contact("c", secondary="CONT_INNER", primary="CONT_OUTER", clearance=-0.02)
+        return model
+
+    changes = {
+        "E": (("E", "INNER"), 2e5, 200.0),
+        "nu": (("nu", "INNER"), 0.3, 3e-4),
+        "moved": (("prescribed", "BORE"), 1.0, 1e-2),
+    }
+    compare(make, ("pressure_max", "c"), changes)
+
+
+def asked(model: fc.Model, quantity=("pressure_max", "c"), parameters=(("E", 0),), criteria=TIGHT, **options):
+    step = fc.solve(model, 1, criteria=criteria)[-1]
+    return fc.sensitivities(model, step, quantity, parameters, ramp=1, criteria=criteria, **options)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "text"),
+    [
+        (("presure", "c"), "unknown quantity 'presure': did you mean 'pressure'"),
+        (("pressure_max", "d"), "unknown contact pair 'd'"),
+        (("pressure_max",), r"must have the form \(\"pressure_max\", pair\)"),
+        (("pressure", "c", 0), "point 0 is no node of the secondary side of contact 'c'"),
+        (("displacement", 10**6, "y"), "needs a point of the mesh by its number, 0 to"),
+        (("displacement", 0, "w"), "unknown component"),
+        (("reaction", "CONT_UPPER", "x"), "no support acts along x on group 'CONT_UPPER'"),
+    ],
+)
+def test_quantities_that_are_none(quantity, text):
+    with pytest.raises(fc.ModelError, match=text):
+        asked(two_blocks()(), quantity)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "text"),
+    [
+        (("G", 0), "unknown parameter 'G'"),
+        (("E",), r"must have the form \(\"E\", material\)"),
+        (("E", "STEEL"), "unknown material 'STEEL'"),
+        (("load", "UPPER_TOP"), "unknown group with a load, or obstacle with a force, 'UPPER_TOP'"),
+        (("prescribed", "UPPER_LEFT"), "unknown group whose displacement is prescribed 'UPPER_LEFT'"),
+        (("motion", "c"), "unknown rigid obstacle with a motion 'c'"),
+        (("clearance", "d"), "unknown contact pair 'd'"),
+    ],
+)
+def test_parameters_that_are_none(parameter, text):
+    with pytest.raises(fc.ModelError, match=text):
+        asked(two_blocks()(), parameters=[parameter])
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"friction": 0.2}, "contact 'c' has friction: its results depend on all load steps"),
+        ({"kind": "bilateral_once_closed"}, "never opens what was closed in earlier load steps"),
+    ],
+)
+def test_what_depends_on_the_path_is_refused(options, text):
+    with pytest.raises(fc.ModelError, match=text):
+        asked(two_blocks(**options)())
+
+
+def test_other_refusals():
+    with pytest.raises(fc.ModelError, match="is tied: it keeps its gaps"):
+        asked(two_blocks(kind="tied")(), ("contact_force", "c", "y"), [("clearance", "c")])
+    fixed = fc.Criteria(geometry_updates=2)
+    with pytest.raises(fc.ModelError, match="after a fixed number of geometry updates"):
+        asked(two_blocks()(), criteria=fixed)
+    varying = two_blocks()()
+    varying.materials.clear()
+    varying.add_material(fc.LinearElastic(E=lambda x: 1000.0 + x[:, 0], nu=0.3))
+    with pytest.raises(fc.ModelError, match="one that varies or has axes has no sensitivity by that"):
+        asked(varying)
+    model = two_blocks()()
+    step = fc.solve(model, 1, criteria=TIGHT)[-1]
+    model.fix("UPPER_LEFT", "x")
+    with pytest.raises(fc.ModelError, match="the steps so far belong to another case"):
+        fc.sensitivities(model, step, ("pressure_max", "c"), [("E", 0)], ramp=1, criteria=TIGHT)
+
+
+def test_a_constraint_about_to_change_is_named():
+    mesh = fc.generate.block((4.0, 1.0), (4, 1))
+
+    def model(depth):
+        made = fc.Model(mesh, kinematics="plane_strain")
+        made.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+        made.prescribe("TOP", x=0.0, y=lambda x: np.where(x[:, 0] < 3.5, -0.01, depth))
+        plane = fc.obstacles.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
+        made.add_obstacle("plane", secondary="BOTTOM", obstacle=plane, formulation="node_to_segment")
+        return made
+
+    whole = fc.solve(model(-0.01), 1)[-1].contact["plane"]
+    assert whole.active.all()
+    low, high = 0.0, 0.1  # where the last node lifts off
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        closed = fc.solve(model(middle), 1)[-1].contact["plane"].active.all()
+        low, high = (middle, high) if closed else (low, middle)
+    with pytest.raises(
+        fc.ModelError, match=r"1 constraint is about to (open|close), at points 8 \[4\. 0\.\] of contact 'plane'"
+    ):
+        asked(model(low), ("pressure_max", "plane"))
+    assert asked(model(low - 1e-3), ("pressure_max", "plane")).margin > 1e-6
+
+
+def test_nodes_between_two_facets_are_named():
+    mesh = fc.generate.half_spheres(size=6.0)
+    model = fc.Model(mesh, kinematics="axisymmetric")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3), "SPHHAU")
+    model.add_material(fc.LinearElastic(E=30_000.0, nu=0.2), "SPHBAS")
+    model.fix("A1A2", "x")
+    model.prescribe("A2B2", y=-1.0)
+    model.prescribe("A1B1", y=1.0)
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="mortar")
+    with pytest.raises(fc.ModelError, match=r"lie opposite nodes of the other side|as soon as nodes move"):
+        asked(model, ("pressure_max", "hertz"))
+
+
+def test_the_value_of_a_result_file_is_enough(tmp_path):
+    model = two_blocks()()
+    with fc.ResultWriter(tmp_path / "c.vtkhdf", model) as out:
+        step = fc.solve(model, 1, criteria=TIGHT, on_step=out.write)[-1]
+    read = fc.open_results(tmp_path / "c.vtkhdf")[-1]
+    found = [
+        fc.sensitivities(model, own, ("pressure_max", "c"), [("E", 0)], ramp=1, criteria=TIGHT).derivatives["E", 0]
+        for own in (step, read)
+    ]
+    assert found[0] == pytest.approx(found[1], rel=1e-9)
+
+
+def test_bolts_before_and_after_their_lock():
+    mesh = fc.generate.block((1.0, 2.0), (2, 4)).with_facet_group(
+        "CUT", lambda x: np.abs(x[:, 1] - 1.0) < 1e-9, between=True
+    )
+    mesh = fc.generate.cut(mesh, "CUT")
+    model = fc.Model(mesh, "plane_stress")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    for end in ("BOTTOM", "TOP"):
+        model.fix(end, "xy")
+    model.add_pretension("bolt", "CUT", force=3.0, locked_from=1.0, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)])
+    point = int(np.argmax(mesh.points[:, 1] * (mesh.points[:, 1] < 0.6)))  # half a length from the bottom
+    first = fc.solve(model, [1.0])[-1]
+    found = fc.sensitivities(model, first, ("displacement", point, "y"), [("E", 0)], ramp=[1.0, 2.0])
+    assert found.derivatives["E", 0] == pytest.approx(-3.0 * 0.5 / 1000.0**2, rel=1e-9)
+    second = fc.solve(model, [1.0, 2.0])[-1]
+    with pytest.raises(fc.ModelError, match="pretension sections are locked"):
+        fc.sensitivities(model, second, ("displacement", point, "y"), [("E", 0)], ramp=[1.0, 2.0])
+
+
+def test_quantities_that_cannot_be_told():
+    springy = two_blocks()()
+    springy.add_spring("UPPER_LEFT", x=1.0)
+    with pytest.raises(fc.ModelError, match="reactions of a model with springs"):
+        asked(springy, ("reaction", "UPPER_TOP", "y"))
+    mesh = fc.generate.block((10.0, 5.0), (8, 4))
+    model = fc.Model(mesh, kinematics="axisymmetric")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("BOTTOM", "xy")
+    ball = fc.obstacles.Sphere(centre=(0.0, 13.0), R=8.0)
+    model.add_obstacle("ball", secondary="TOP", obstacle=ball, motion={"y": -0.3}, formulation="node_to_segment")
+    rim = int(mesh.points_of("TOP_RIGHT")[0])
+    with pytest.raises(fc.ModelError, match=f"point {rim} of contact 'ball' is open: its pressure is zero"):
+        asked(model, ("pressure", "ball", rim))
+    pole = int(mesh.points_of("TOP_LEFT")[0])
+    step = fc.solve(model, 1, criteria=TIGHT)[-1]
+    at = int(np.flatnonzero(step.contact["ball"].points == pole)[0])
+    assert asked(model, ("pressure", "ball", pole)).value == pytest.approx(step.contact["ball"].pressure[at], rel=1e-9)
+    assert not asked(model, parameters=[], quantity=("pressure", "ball", pole)).derivatives
+
+
+def test_nodes_of_two_pairs_are_named():
+    mesh = fc.generate.block((10.0, 5.0), (8, 4))
+    model = fc.Model(mesh, kinematics="plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.prescribe("RIGHT", x=-0.05, y=0.0)
+    for name, side, normal in (("floor", "BOTTOM", (0.0, 1.0)), ("wall", "LEFT", (1.0, 0.0))):
+        plane = fc.obstacles.HalfSpace(point=(0.0, 0.0), normal=normal)
+        model.add_obstacle(name, secondary=side, obstacle=plane, formulation="node_to_segment")
+    corner = int(mesh.points_of("BOTTOM_LEFT")[0])
+    with pytest.raises(
+        fc.ModelError, match=f"point {corner} carries forces of both contact 'wall' and contact 'floor'"
+    ):
+        asked(model, ("contact_force", "wall", "x"), margin=0.0)
+
+
+def test_equations_that_are_not_solved_are_told(monkeypatch):
+    from fastcontact.analysis.sensitivity import adjoint
+
+    monkeypatch.setattr(adjoint, "SOLUTIONS", 2)
+    with pytest.raises(
+        fc.ConvergenceError, match="adjoint equations of the moving contact geometry are not solved after"
+    ):
+        asked(two_blocks()())
