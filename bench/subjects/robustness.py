@@ -19,6 +19,8 @@ from fastcontact.errors import FastcontactError
 SIZES = (20,)
 MESHES = (12, 20, 28, 40)
 FRICTION = 0.3
+# Contact pressure over depth, in Young's moduli over the length of a cell.
+PENALTY = 100.0
 # Runs of which the fastest counts.
 REPEATS = 2
 HEAD = (
@@ -28,12 +30,14 @@ HEAD = (
 
 
 def blocks(
-    divisions=20, friction=0.0, multipliers="dual", curvature=0.0, ratio=1.0, nu=0.3, stretch=1.0, element="hex8", push=0.01
+    divisions=20, friction=0.0, multipliers="dual", curvature=0.0, ratio=1.0, nu=0.3, stretch=1.0, element="hex8", push=0.01,
+    **options
 ):  # fmt: skip
     """Return the model.
 
     `ratio` is Young's modulus of the lower block, the primary side, over that of the upper one; `stretch` the length of cells
     over their width; the surface of the upper block rises with `curvature` times the square of the distance from a corner.
+    Further `options` are those of the contact pair.
     """
 
     def block(count, z, name):
@@ -49,9 +53,27 @@ def blocks(
     model.add_material(fc.LinearElastic(E=1.0, nu=nu), groups=["UPPER_BOX"])
     model.fix("LOWER_ZMIN", "xyz")
     model.prescribe("UPPER_ZMAX", x=push if friction else 0.0, y=0.0, z=-0.01)
-    options = {"formulation": "mortar", "multipliers": multipliers, "friction": friction}
-    model.add_contact("c", secondary="UPPER_ZMIN", primary="LOWER_ZMAX", **options)
+    options = options or {"formulation": "mortar", "multipliers": multipliers}
+    model.add_contact("c", secondary="UPPER_ZMIN", primary="LOWER_ZMAX", friction=friction, **options)
     return model
+
+
+def on_obstacle(divisions=20, friction=0.0, ball=False, push=0.004, **options):
+    """Return a block pressed upon a rigid wall, or a rigid ball, and with friction pushed along it."""
+    mesh = fc.generate.box((1.0, 1.0, 0.5), (divisions, divisions, divisions // 2), "hex8")
+    model = fc.Model(mesh, kinematics="3d")
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    model.prescribe("ZMAX", x=push if friction else 0.0, y=0.0, z=-0.01)
+    wall = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    obstacle = fc.obstacles.Sphere((0.5, 0.5, -1.0), 1.0) if ball else wall
+    model.add_obstacle("c", secondary="ZMIN", obstacle=obstacle, friction=friction, **options)
+    return model
+
+
+def made(given):
+    """Return the model of a variation."""
+    given = dict(given)
+    return (on_obstacle if given.pop("obstacle", False) else blocks)(**given)
 
 
 def variations(divisions):
@@ -66,6 +88,13 @@ def variations(divisions):
     of_cells = {"tet4": divisions, "tet10": divisions // 2, "hex20": divisions * 3 // 5}
     rows += [(element, {"element": element, "divisions": n}) for element, n in of_cells.items()]
     rows += [("standard multipliers", {"multipliers": "standard"})]
+    on = {"obstacle": True, "divisions": divisions * 6 // 5}
+    rows += [("rigid wall", on), ("rigid ball", {**on, "ball": True})]
+    rows += [("penalty", {"penalty": PENALTY}), ("continuous", {"formulation": "continuous"})]
+    rows += [
+        ("rigid wall, penalty", {**on, "penalty": PENALTY}),
+        ("rigid wall, continuous", {**on, "formulation": "continuous"}),
+    ]
     rows = [(text, {"divisions": divisions, **given, "friction": mu}) for text, given in rows for mu in (0.0, FRICTION)]
     rows[2:2] = [("friction", {"divisions": divisions, "friction": mu}) for mu in (0.1, 0.2, 0.5, 1.0)]
     return rows
@@ -82,7 +111,7 @@ def entries(smallest, tell):
             {
                 "varied": text,
                 "friction": given["friction"],
-                **figures(blocks(**given), repeats=1 if smallest else REPEATS),
+                **figures(made(given), repeats=1 if smallest else REPEATS),
             }
         )
     return found

@@ -14,12 +14,17 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, lstsq
 from scipy.sparse import csr_array
 
-from fastcontact.errors import ConvergenceError
+from fastcontact.errors import ContactError, ConvergenceError
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 # Right-hand sides at a time: whole columns of K^-1 are long, and only short parts of them are kept.
 CHUNK = 32
+# Constraints whose full compliance is formed and factorised, at most: 3.2 GB a copy, and minutes; with friction, where
+# Newton's method factorises it several times for each pairing and it is not symmetric, ten seconds each.
+MOST_ROWS, MOST_ROWS_WITH_FRICTION = 20_000, 6_000
+# Formulations whose constraints no solver needs columns of the inverse for.
+CHEAP = 'formulation="mortar" with multipliers="dual", against rigid obstacles formulation="node_to_segment", and no penalty'
 
 
 class TooManyColumnsError(ConvergenceError):
@@ -28,7 +33,24 @@ class TooManyColumnsError(ConvergenceError):
     def __init__(self, count: int) -> None:
         super().__init__(
             f"the contact needs {count} columns of the inverse stiffness, a solution each, since its constraints cannot be "
-            'eliminated: use formulation="mortar" with multipliers="dual" and no penalty, or the direct solver'
+            f"eliminated: use {CHEAP}, or the direct solver"
+        )
+
+
+def check_rows(count: int, most: int | None = None) -> None:
+    """Refuse a full compliance of so many constraints.
+
+    Raises
+    ------
+    ContactError
+        If it would take hours.
+    """
+    most = MOST_ROWS if most is None else most
+    if count > most:
+        raise ContactError(
+            f"the contact needs the full compliance of {count} constraints, {8e-9 * count**2:.1f} GB that are factorised "
+            f"again and again (at most {most} are), since they give way by themselves or cannot be eliminated: use {CHEAP}, "
+            "or a coarser or smaller secondary side"
         )
 
 
@@ -67,6 +89,7 @@ class FlexibilityColumns:
 
     def of_rows(self, R: csr_array) -> Array:
         """Return ``R K^-1 R.T`` (m, m) [length / force] for sparse rows R (m, n)."""
+        check_rows(R.shape[0])
         used = R.data != 0.0
         place = self._places(R.indices[used])
         starts = np.concatenate([[0], np.cumsum(used)])[R.indptr]

@@ -153,6 +153,26 @@ def test_iterations_under_whole_interfaces_are_a_few_times_those_without_contact
     assert found["residual"] < 1e-6
 
 
+@pytest.mark.filterwarnings("ignore:Young's moduli")
+@pytest.mark.parametrize("given", [{"curvature": 0.02}, {"nu": 0.499}])
+def test_iterations_beside_a_stiff_secondary_side_that_touches_in_part_or_is_nearly_incompressible(given):
+    robustness = suite("subjects").load("robustness")
+    found = robustness.figures(robustness.blocks(16, ratio=1e-3, **given))
+    assert not found["gave_up"]
+    assert found["step"]["iterations"] <= 4 * found["linear"]["iterations"]
+    assert found["residual"] < 1e-6
+
+
+@pytest.mark.parametrize("ball", [False, True])
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_iterations_on_rigid_obstacles_are_a_few_times_those_without_contact(ball, friction):
+    robustness = suite("subjects").load("robustness")
+    found = robustness.figures(robustness.on_obstacle(12, friction, ball))
+    assert not found["gave_up"]
+    assert found["step"]["iterations"] <= 3.5 * found["linear"]["iterations"]
+    assert found["residual"] < 1e-6
+
+
 def test_signs_of_loose_solutions_do_not_change_the_active_set_to_and_fro():
     robustness = suite("subjects").load("robustness")
     found = robustness.figures(robustness.blocks(12, nu=0.499))

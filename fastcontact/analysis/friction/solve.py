@@ -21,6 +21,7 @@ from fastcontact.analysis.friction import dense, eliminated
 from fastcontact.analysis.friction.slip_directions import aligning, idle, own_compliance
 from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium
 from fastcontact.contact.constraints import Constraints
+from fastcontact.linear.flexibility import MOST_ROWS_WITH_FRICTION, check_rows
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
 log = logging.getLogger("fastcontact")
@@ -103,6 +104,7 @@ def _among(
     """Solve with the `chosen` constraints (m,) alone; gaps and slips of the others are what the displacement leaves."""
     rows = np.flatnonzero(chosen)
     k, m = len(constraints.tangents), len(constraints)
+    check_rows((1 + k) * len(rows), MOST_ROWS_WITH_FRICTION)
     R = csr_array(vstack([matrix[rows] for matrix in (constraints.B, *constraints.tangents)], format="csr"))
     at_rest = constraints.gaps_at_rest()
     free, F = loaded.flexibility(R)

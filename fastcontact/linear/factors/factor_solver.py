@@ -11,7 +11,7 @@ from scipy.sparse import bsr_array, csc_array, csr_array
 
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
 from fastcontact.linear.factors.known_loads import KnownLoads
-from fastcontact.linear.flexibility import FlexibilityColumns, multipliers, solve_multipliers, symmetric
+from fastcontact.linear.flexibility import FlexibilityColumns, check_rows, multipliers, solve_multipliers, symmetric
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 
 log = logging.getLogger("fastcontact")
@@ -229,6 +229,7 @@ class CondensedProblem:
         """See `Loaded`."""
         if B.shape[0] == 0:
             return self._free, np.empty(0)
+        check_rows(B.shape[0])
         moved = B @ self._inverse
         multiplier = solve_multipliers(symmetric(B @ moved.T), c - B @ self._free, C)
         return self._free + multiplier @ moved, multiplier

@@ -32,6 +32,8 @@ MAX_ITERATIONS, MAX_NONSYMMETRIC = 1000, 300
 MOST_COLUMNS = 300
 # Iterations between two calls of a monitor.
 WATCH_EVERY = 2
+# Iterations before the first call where contrasts are large: fewer tell too little of the errors of what is soft.
+WATCH_CONTRAST_FROM = 6
 # Equations with the same pivots whose weights differ by less than this share a hierarchy.
 ALIKE = 0.02
 # Residuals that fall by less are taken to fall by this.
@@ -41,7 +43,7 @@ SLOWEST = 0.999
 WARM, WARM_LEAST, MOST_WARM = 0.05, 1e-3, 10
 # A nonsymmetric iteration whose residual does not fall to this part in so many iterations stands still for good.
 FALLS, STANDING = 0.99, 40
-# Materials with a smaller contrast are solved for as if they had none.
+# Smaller contrasts of materials are taken for none.
 MILD = 10.0
 # Where the smoother amplifies something, its bound of the spectrum is raised by this factor, so many times.
 RAISE, RAISES = 1.3, 4
@@ -158,13 +160,14 @@ class Multigrid:
         self._solved = f
         enough = self._enough(tolerance or 0.0) * scale
         made, raised, first = 0, 0, cg.norm
+        watched_from = WATCH_EVERY if self._contrast <= MILD else WATCH_CONTRAST_FROM
         while cg.norm > enough:
             if made >= MAX_ITERATIONS or raised > RAISES:
                 raise StallError(
                     f"conjugate gradients stand at a relative residual of {cg.norm / scale:.1e} after {made} iterations, "
                     f"above {self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
                 )
-            watch = monitor if made and made % WATCH_EVERY == 0 else None
+            watch = monitor if made >= watched_from and made % WATCH_EVERY == 0 else None
             error = (
                 self._contrast * cg.norm / scale * _amplification(cg.norm / first, made) if watch is not None else 0.0
             )
@@ -305,8 +308,8 @@ class Multigrid:
 
     @property
     def _contrast(self) -> float:
-        """By how much relative residuals flatter a solution: that of the softer body, beside pivots of a much stiffer one."""
-        return max(1.0, self._constrained.stiffening, self.contrast if self.contrast > MILD else 1.0)
+        """By how much relative residuals flatter a solution: that of the softer body beside stiffer pivots, of shear."""
+        return max(1.0, self._constrained.stiffening) * (self.contrast if self.contrast > MILD else 1.0)
 
     def _multiply(self, p: Array, q: Array) -> None:
         self.K.combine(1.0, p, 0.0, q, q)

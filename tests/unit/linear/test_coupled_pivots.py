@@ -177,3 +177,16 @@ def test_auto_knows_which_constraints_multigrid_cannot_eliminate():
         (("multipliers", "standard"),), (("multipliers", "dual"),), (("multipliers", "dual"), ("penalty", 100.0)),
     )}  # fmt: skip
     assert list(solver.values()) == ["amg", "amg", "direct"]
+
+
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_a_full_compliance_that_would_take_hours_is_refused_with_the_alternative(solver, friction, monkeypatch):
+    model = pressed(5, formulation="continuous", friction=friction)
+    monkeypatch.setattr("fastcontact.linear.flexibility.MOST_ROWS", 100)
+    monkeypatch.setattr("fastcontact.analysis.friction.solve.MOST_ROWS_WITH_FRICTION", 100)
+    expected = (
+        r"full compliance of \d+ constraints, .*GB .*multipliers=\"dual\", against rigid obstacles .*node_to_segment"
+    )
+    with pytest.raises(fc.ContactError, match=expected):
+        solved(model, solver)
