@@ -57,10 +57,11 @@ class Criteria:
                     f"the convergence criterion {name} = {getattr(self, name)} must be positive and at most {LOOSEST}: "
                     "beyond that nothing has converged"
                 )
-        if self.geometry_updates is not None and self.geometry_updates < 0:
+        updates = self.geometry_updates
+        if updates is not None and (updates < 0 or int(updates) != updates):
             raise ModelError(f"geometry_updates = {self.geometry_updates} must be None or a whole number >= 0")
         for name, least in (("max_geometry_updates", 0), ("max_active_set_iterations", 1)):
-            if getattr(self, name) < least:
+            if getattr(self, name) < least or int(getattr(self, name)) != getattr(self, name):
                 raise ModelError(f"{name} = {getattr(self, name)} must be a whole number >= {least}")
         if self.absolute is not None and not self.absolute >= 0:
             raise ModelError(f"the convergence criterion absolute = {self.absolute} must be a force >= 0, or None")
