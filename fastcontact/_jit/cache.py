@@ -31,9 +31,12 @@ def _keeps_names(folder: str) -> bool:
     return bool(os.stat(folder).st_mode & stat.S_ISVTX) or _is_own(folder)
 
 
-def watch_files(kernel: Any, function: Callable[..., Any]) -> Any:
-    """Return a kernel, made from a function, with all files of the kernels that it may call in the stamp of its cache."""
-    files: set[str] = set()
+def watch_files(kernel: Any, function: Callable[..., Any], decorators: str) -> Any:
+    """Return a kernel, made from a function, with all files that its machine code depends on in the stamp of its cache.
+
+    They are those of the kernels that it may call, and the file of `decorators`, which say how it is compiled.
+    """
+    files = {decorators}
     _gather(function, files)
     cache_file = getattr(getattr(kernel, "_cache", None), "_cache_file", None)  # none where kernels are not compiled
     if cache_file is not None:

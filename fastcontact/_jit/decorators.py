@@ -1,4 +1,4 @@
-"""How kernels are compiled: disk cache, arithmetic as written, threads.
+"""How kernels are compiled: disk cache, safe subset of fast arithmetic, threads.
 
 Kernels compile at their first call, never at import. Where no folder is writable for the cache, they compile
 in every process instead, and one line in the log says so.
@@ -20,12 +20,8 @@ from fastcontact.errors import FastcontactError
 
 log = logging.getLogger("fastcontact")
 
-# Arithmetic is done as written, products and sums not fused to one rounding either. A kernel that others call is compiled
-# once by itself and once as a part of each of them, and optimised differently there; which of the copies runs depends on
-# what was compiled or loaded before. Only where each operation has one result do all of them give the same bits.
-AS_WRITTEN: set[str] = set()
-# What vectors may do in a kernel that neither calls another nor is called by one: of that there is one copy.
-ANY_ORDER = {"contract", "reassoc"}
+# Contraction to fused multiply-add only: NaN, infinities and the order of sums stay as written.
+FASTMATH = {"contract"}
 
 _cache_reported = False
 
@@ -62,9 +58,9 @@ def parallel_kernel(function: Callable[..., Any]) -> Any:
 def summing_kernel(function: Callable[..., Any]) -> Any:
     """Like `kernel`, for long sums of products, which vectors take in an order of their own: the same in every run.
 
-    Only where the last bits may differ between processors, as they do in BLAS, and no other kernel calls it, or is called.
+    Only where the last bits may differ between processors, as they do in BLAS.
     """
-    return _compile(function, parallel=False, fastmath=ANY_ORDER)
+    return _compile(function, parallel=False, fastmath=FASTMATH | {"reassoc"})
 
 
 def inlined_kernel(function: Callable[..., Any]) -> Any:
@@ -80,13 +76,13 @@ def innermost_kernel(function: Callable[..., Any]) -> Any:
     return _compile(function, parallel=False, forceinline=True)
 
 
-def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = AS_WRITTEN, **inlining: Any) -> Any:
+def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = FASTMATH, **inlining: Any) -> Any:
     options: dict[str, Any] = {"fastmath": fastmath, "parallel": parallel, "nogil": True, "error_model": "numpy"}
     options |= inlining
     try:
         cached = numba.njit(cache=True, **options)(function)
         if cache.is_trusted(cached):
-            return cache.watch_files(cached, function)
+            return cache.watch_files(cached, function, __file__)
         reason = f"others may write to the folder of compiled kernels, {cached.stats.cache_path}"
     except RuntimeError as error:  # numba: "cannot cache function ...: no locator available for file ..."
         if "cannot cache" not in str(error):

@@ -15,6 +15,7 @@ from fastcontact.elasticity.material_axes import Axes, checked_axes
 from fastcontact.elasticity.materials import Constant, Material, check_density, check_expansion, check_positive
 from fastcontact.elasticity.varying_constants import Varying, wrapped
 from fastcontact.errors import ModelError
+from fastcontact.mesh.argument_types import check_type
 
 Array = NDArray[np.float64]
 NAMES = ("12", "13", "23")
@@ -74,6 +75,8 @@ class Orthotropic(Material):
     incompatible_modes: bool = False
 
     def __post_init__(self) -> None:
+        for name in ("E", "nu", "G"):
+            check_type(f"{name} of Orthotropic", getattr(self, name), Any, ModelError)
         for name in ("E", "nu", "G"):
             object.__setattr__(self, name, _three(name, getattr(self, name)))
         for value, number in zip(self.E, "123", strict=True):
@@ -185,8 +188,9 @@ class Anisotropic(Material):
     incompatible_modes: bool = False
 
     def __post_init__(self) -> None:
+        check_type("D of Anisotropic", self.D, Any, ModelError)
         try:
-            D = np.asarray(self.D, float)
+            D = np.empty(0) if np.iscomplexobj(self.D) else np.asarray(self.D, float)
         except (TypeError, ValueError):
             D = np.empty(0)
         if D.shape != (6, 6) or not np.isfinite(D).all():

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import ModelError
+from fastcontact.mesh.argument_types import check_type
 
 Array = NDArray[np.float64]
 Axes = Sequence[Sequence[float]] | Callable[[Array], Array] | None
@@ -39,6 +40,7 @@ class CylindricalAxes:
 
     def __post_init__(self) -> None:
         for name in ("origin", "direction"):
+            check_type(f"{name} of CylindricalAxes", getattr(self, name), Any, ModelError)
             found = _vectors(getattr(self, name), f"the {name} of cylindrical axes")
             if found.shape != (3,):
                 raise ModelError(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fastcontact.elasticity.loads import check_number, evaluated
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -21,6 +22,7 @@ Rows = Mapping[str, NDArray[np.intp]]
 AXES = ("x", "y", "z", "radius")
 
 
+@typed(ModelError)
 @dataclass(frozen=True)
 class Tabulated:
     """A function of one coordinate, by a table: straight between its places, constant before the first and after the last.

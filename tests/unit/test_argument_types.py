@@ -178,3 +178,42 @@ def test_what_is_no_wrong_type_stays_python_s():
 def test_only_public_names_are_listed():
     for namespace in (fc, fc.analytic, fc.generate, fc.obstacles, fc.plot):
         assert set(dir(namespace)) <= {*namespace.__all__, "__version__"}, namespace
+
+
+def masked(values):
+    values = np.asarray(values, float)
+    return np.ma.array(values, mask=np.arange(values.size).reshape(values.shape) == 1)
+
+
+TRIANGLE = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
+MASKED = {
+    "points": lambda m: fc.Mesh(m(TRIANGLE), {"tri3": [[0, 1, 2]]}),
+    "cells": lambda m: fc.Mesh(TRIANGLE, {"tri3": m([[0, 1, 2]])}),
+    "groups of cells": lambda m: fc.Mesh(TRIANGLE, {"tri3": [[0, 1, 2]]}, {"A": m([0, 0])}),
+    "groups of points": lambda m: fc.Mesh(TRIANGLE, {"tri3": [[0, 1, 2]]}, {}, {"A": m([0, 1])}),
+    "modulus": lambda m: fc.LinearElastic(E=m([1.0, 2.0]), nu=0.3),
+    "moduli": lambda m: fc.Anisotropic(D=m(np.eye(6))),
+    "moduli along axes": lambda m: fc.Orthotropic(E=m([1.0, 1.0, 1.0]), nu=(0.1, 0.1, 0.1), G=(1.0, 1.0, 1.0)),
+    "axes": lambda m: fc.CylindricalAxes(origin=m([0.0, 0.0, 0.0])),
+    "table": lambda m: fc.Tabulated("y", m([[0.0, 1.0], [1.0, 2.0]])),
+    "temperature": lambda m: model().add_temperature(m(np.ones(model().mesh.n_points))),
+    "size": lambda m: fc.generate.block(size=m([1.0, 1.0])),
+    "plane": lambda m: fc.obstacles.HalfSpace(point=m([0.0, 0.0]), normal=(0.0, 1.0)),
+    "ramp": lambda m: fc.Ramp(instants=m([0.5, 1.0])),
+}
+
+
+@pytest.mark.parametrize("what", MASKED)
+def test_masks_are_not_lost_without_a_word(what):
+    """NumPy hands on what lies behind a mask as if it were valid; a mask that hides nothing changes nothing."""
+    with pytest.raises(
+        fc.FastcontactError, match="has entries that are masked, and masks are not kept: fill them first"
+    ):
+        MASKED[what](masked)
+    MASKED[what](lambda values: np.ma.array(values, mask=False))
+
+
+@pytest.mark.parametrize("what", ["moduli", "table", "temperature", "modulus", "points", "ramp"])
+def test_imaginary_parts_are_not_lost_without_a_word(what):
+    with pytest.raises(fc.FastcontactError, match=r"must be|must hold"):
+        MASKED[what](lambda values: np.asarray(values, float) + 1j)

@@ -94,7 +94,7 @@ class Adjoint:
 
     def derivative(self, change: Change) -> float:
         """Return the derivative of the quantity by a parameter."""
-        contact, gradient, n = self._contact, self._gradient, len(self._contact.u)
+        gradient, n = self._gradient, len(self._contact.u)
         sample = change.sample + self._moving @ change.lift
         out = change.out + self._system.K @ change.lift - sample[:n]
         gap = sample[n : n + self._k] + self._B @ change.lift

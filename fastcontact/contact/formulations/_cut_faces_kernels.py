@@ -28,7 +28,9 @@ def planes(corners, n_corners, origin, axes):
         _plane(corners[i], n_corners, origin[i], axes[i])
 
 
-@kernel
+# Not a kernel of its own: of those the process that compiles them runs another copy than later ones, in which products and
+# sums may be fused otherwise. Tangents that differ in the last bit then move all results of a contact in theirs.
+@innermost_kernel
 def _plane(corners, count, origin, axes):
     origin[:] = 0.0
     for k in range(count):

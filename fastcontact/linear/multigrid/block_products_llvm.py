@@ -171,9 +171,9 @@ class _Writer:
         return parts[0] if len(parts) == 1 else self.builder.fadd(*parts)
 
     def plus(self, total: Any, one: Any, other: Any) -> Any:
-        """Return a total and a product, each rounded."""
-        product = self.builder.fmul(one, other)
-        return self.builder.fadd(total, product)
+        """Return a total and a product, which may be rounded at once."""
+        product = self.builder.fmul(one, other, flags=("contract",))
+        return self.builder.fadd(total, product, flags=("contract",))
 
     def add(self, start: Any, at: Any, column: int, width: int, vector: Any) -> None:
         """Add a vector to numbers in memory."""

@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 class ModelInitialStates(ModelLoads):
     """A model with temperatures, initial stresses and strains."""
 
+    @typed(ModelError)
     def add_temperature(
         self,
         value: Value | Array,

@@ -74,3 +74,12 @@ def test_a_cache_that_others_may_write_to_is_not_used(written, inside, mode, use
     )
     assert done.stdout.split() == ["2.0", "1" if used else "0"]
     assert ("others may write to the folder of compiled kernels" in done.stderr) != used
+
+
+def test_the_cache_notices_changes_of_how_kernels_are_compiled(written):
+    """What a kernel is compiled with stands in the file of the decorators."""
+    question = (
+        "import os, callee; from fastcontact._jit import decorators; callee.part(1.0); found = os.stat(decorators.__file__); "
+        "print((found.st_mtime, found.st_size) in callee.part._cache._cache_file._source_stamp)"
+    )
+    assert answers(written, question) == ["True"]
