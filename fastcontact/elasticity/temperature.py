@@ -119,10 +119,7 @@ def histories(
 
 def checked_times(times: Sequence[float], count: int) -> tuple[float, ...]:
     """Return the load factors of the instants of a history; ModelError unless they are `count`, at least two, and ascend."""
-    try:
-        found = np.asarray(times, float)
-    except (TypeError, ValueError):
-        raise ModelError(f"the times of the temperature must be numbers, not {times!r}") from None
+    found = np.asarray(times, float)
     if found.shape != (count,) or count < 2:
         raise ModelError(
             f"the temperature has {count} instants, but {found.size} times: give the load factor of each, at least two"

@@ -81,3 +81,44 @@ def test_forces_on_the_primary_side_have_a_row_for_each_point(tmp_path):
         pytest.raises(fc.FileError, match=r"primary_force_vectors has shape \(3, 2\), but \(2, 2\) is needed"),
     ):
         out.write(dataclasses.replace(step, contact={**step.contact, name: wrong}))
+
+
+def ring():
+    """An axisymmetric block."""
+    model = fc.Model(block((1.0, 1.0), (2, 2), "quad4"), "axisymmetric")
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3, density=1.0))
+    return model
+
+
+def test_loads_that_a_body_of_revolution_cannot_have():
+    with pytest.raises(
+        fc.ModelError, match="has a radial component x: in axisymmetry it acts along the axis, y, alone"
+    ):
+        ring().add_gravity(x=9.81)
+    with pytest.raises(fc.ModelError, match=r"is not that of the axisymmetry: its direction is \(0, 1, 0\)"):
+        ring().add_centrifugal(3.0, direction=(0.0, 0.0, 1.0))
+
+
+@pytest.mark.parametrize("radius", [0.0, -1.0])
+def test_a_force_is_spread_over_a_positive_radius(radius):
+    with pytest.raises(fc.ModelError, match=rf"the radius of the force on 'ZMAX' = {radius:g} must be positive"):
+        cube().add_force("ZMAX", z=-1.0, at=(0.5, 0.5, 1.0), radius=radius)
+
+
+def test_a_force_is_spread_over_points():
+    with pytest.raises(fc.MeshError, match=r"'none'.*the group is empty"):
+        cube().add_force("none", z=-1.0, at=(0.5, 0.5, 1.0))
+
+
+@pytest.mark.parametrize("centre", [(0.0, 0.0, 0.0), (np.inf, 0.0), ("left", 0.0)])
+def test_an_obstacle_turns_about_a_place(centre):
+    wall = fc.obstacles.HalfSpace(point=(0.0, 1.0), normal=(0.0, -1.0))
+    model = fc.Model(block(), "plane_strain")
+    with pytest.raises(fc.ModelError, match=r"centre .* must be 2 finite numbers, not"):
+        model.add_obstacle("wall", "TOP", wall, rotation={"centre": centre, "angle": 0.1})
+
+
+def test_a_table_along_z_needs_a_solid():
+    model = fc.Model(block(), "plane_strain")
+    with pytest.raises(fc.ModelError, match="a table is along z, but the mesh is plane: take x, y or radius"):
+        model.add_material(fc.LinearElastic(E=fc.Tabulated("z", [(0.0, 1.0), (1.0, 2.0)]), nu=0.3))

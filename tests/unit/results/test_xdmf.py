@@ -15,6 +15,7 @@ from test_result_files import CELL_DATA, MESH, ResultWriter, expected_point_data
 from fastcontact.errors import FileError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.results import layout
 from fastcontact.results.step import StepResult
 from fastcontact.results.xdmf import write_xdmf
 
@@ -203,3 +204,13 @@ def test_every_solid_has_its_code(tmp_path: Path, name: str) -> None:
     sequence = values_of(item, tmp_path).reshape(2, -1)
     assert sequence[:, 0].tolist() == [codes[name]] * 2
     np.testing.assert_array_equal(sequence[:, 1:], mesh.cells[name])
+
+
+def test_an_element_without_a_code_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(layout.XDMF_TYPES, elements.get("hex8").vtk)
+    mesh = row_of(["hex8"])
+    with ResultWriter(tmp_path / "r.vtkhdf", mesh, kinematics="3d") as out:
+        out.write(solid_step(mesh))
+    with pytest.raises(FileError, match=r"XDMF cannot show '.*r\.vtkhdf' with hex8: open the \.vtkhdf file itself"):
+        write_xdmf(tmp_path / "r.vtkhdf", tmp_path / "r.xdmf")
+    assert not (tmp_path / "r.xdmf").exists()

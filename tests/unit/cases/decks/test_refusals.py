@@ -4,6 +4,7 @@ import pytest
 from deck_text import CONTACT, MATERIAL, NODES, STEP, WHOLE, deck_of
 
 import fastcontact as fc
+from fastcontact.cases.decks import building
 
 FLAT = """*Node
 1, 0., 0.
@@ -259,3 +260,11 @@ def test_what_was_changed_is_read_as_it_was(tmp_path):
         + STEP.replace("roof", "i.roof")
     )
     assert len(deck_of(tmp_path, whole).points_of("held")) == 4
+
+
+def test_histories_with_too_many_corners(tmp_path, monkeypatch):
+    monkeypatch.setattr(building, "LONGEST_RAMP", 2)
+    amplitude = "*Amplitude, name=up\n0., 0., 0.2, 1., 0.4, 0.5, 1., 1.\n"
+    text = amplitude + instead("*Cload\n", "*Cload, amplitude=up\n", FLAT)
+    with pytest.raises(fc.CaseError, match=r"^deck\.inp, line \d+, .*the histories have \d+ corners, more than 2"):
+        deck_of(tmp_path, text).model.check(fc.linear_ramp(1))
