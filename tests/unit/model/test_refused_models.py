@@ -115,7 +115,7 @@ def test_an_obstacle_turns_about_a_place(centre):
     wall = fc.obstacles.HalfSpace(point=(0.0, 1.0), normal=(0.0, -1.0))
     model = fc.Model(block(), "plane_strain")
     with pytest.raises(fc.ModelError, match=r"centre .* must be 2 finite numbers, not"):
-        model.add_obstacle("wall", "TOP", wall, rotation={"centre": centre, "angle": 0.1})
+        model.add_obstacle("wall", secondary="TOP", obstacle=wall, rotation={"centre": centre, "angle": 0.1})
 
 
 def test_a_table_along_z_needs_a_solid():
