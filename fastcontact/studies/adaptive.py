@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -83,16 +84,11 @@ def adaptive_study(
     member = one_combination(chosen, element, formulation)
     forest, curves = _first_mesh(case, chosen, member)
     rounds: list[Round] = []
-    with StatusLine(80, progress) as line:
+    with _telling(on_round, progress) as tell:
         while True:
-            started = time.perf_counter()
-            linear, leaf = forest.mesh()
-            solved = _case_on(linear, curves, case, chosen, member)
-            last, error, this = _solved(solved, quantity, chosen.pair, rounds, started)
+            leaf, solved, last, error, this = _round(forest, curves, case, chosen, member, quantity, rounds)
             rounds.append(this)
-            if on_round is not None:
-                on_round(this)
-            line.draw(f"{this.n_dofs} degrees of freedom, estimated error {this.estimate:.1e}")
+            tell(this)
             reached = this.estimate <= tolerance
             if reached or len(rounds) == max_rounds or this.n_dofs > 0.6 * max_dofs:
                 break
@@ -100,6 +96,30 @@ def adaptive_study(
     return AdaptiveStudy(
         **of_case(case), combination=str(member), quantity=quantity, tolerance=tolerance, reached=reached, rounds=rounds,
         case=solved, last=last, error=error)  # fmt: skip
+
+
+@contextmanager
+def _telling(on_round: Callable[[Round], None] | None, progress: bool) -> Iterator[Callable[[Round], None]]:
+    """Give a function that tells of a round whoever asked for it."""
+    with StatusLine(80, progress) as line:
+
+        def tell(this: Round) -> None:
+            if on_round is not None:
+                on_round(this)
+            line.draw(f"{this.n_dofs} degrees of freedom, estimated error {this.estimate:.1e}")
+
+        yield tell
+
+
+def _round(
+    forest: Forest, curves: Sequence[Any], case: Case, chosen: Settings, member: Combination, quantity: str,
+    before: Sequence[Round],
+) -> tuple[Any, Case, StepResult, ErrorEstimate, Round]:  # fmt: skip
+    """Return the leaves of the forest that are cells, the case on that mesh, and what `_solved` returns for it."""
+    started = time.perf_counter()
+    linear, leaf = forest.mesh()
+    solved = _case_on(linear, curves, case, chosen, member)
+    return leaf, solved, *_solved(solved, quantity, chosen.pair, before, started)
 
 
 def _checked(case: Case | str | Path, tolerance: float) -> Case:

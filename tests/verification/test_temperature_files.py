@@ -271,7 +271,7 @@ def test_a_history_must_cover_the_analysis(folder):
         model.add_temperature(np.zeros((2, 15)), times=[0, 1], ramp=[(0, 0), (1, 1)])
     with pytest.raises(fc.ModelError, match="must be an array"):
         model.add_temperature(3.0, times=[0, 1])
-    with pytest.raises(fc.ModelError, match="must be numbers"):
+    with pytest.raises(fc.ModelError, match="must be a sequence of numbers"):
         model.add_temperature(np.zeros((2, 15)), times=["a", "b"])
 
 

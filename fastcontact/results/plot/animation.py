@@ -96,10 +96,9 @@ def animate(
     if pictures_per_second < 1:
         raise FastcontactError(f"pictures_per_second = {pictures_per_second}: one or more a second can be shown")
     target = checked_target(path)
-    first = new_axes(None, _size(mesh, mirrored), "3d" if mesh.dim == 3 else None)
+    figure = new_axes(None, _size(mesh, mirrored), "3d" if mesh.dim == 3 else None).figure
     writer = writer_of(target, pictures_per_second)
     colours, box = _over_all(mesh, steps, field, scale, mirrored)
-    figure = first.figure
     with _failure_of_ffmpeg(target), replacing(target) as temporary, writer.saving(figure, temporary, RESOLUTION):
         for step in steps:
             figure.clear()
@@ -109,10 +108,15 @@ def animate(
                 mesh, step, field=field, scale=scale, mirrored=mirrored, limits=colours, title=heading, units=units,
                 view=view, ax=axes,
             )  # fmt: skip
-            for axis, low, high in zip("xyz", *box, strict=False):
-                getattr(axes, f"set_{axis}lim")(low, high)
+            _show(axes, box)
             writer.grab_frame()
     return MovingPicture(target)
+
+
+def _show(axes: Any, box: Any) -> None:
+    """Let axes show the part of space that all pictures show."""
+    for axis, low, high in zip("xyz", *box, strict=False):
+        getattr(axes, f"set_{axis}lim")(low, high)
 
 
 def writer_of(path: Path, pictures_per_second: int) -> Any:

@@ -107,7 +107,7 @@ def test_numbers_of_other_kinds_are_numbers():
         assert fc.LinearElastic(E=number, nu=0.3).E == 1000.0
     with pytest.raises(fc.errors.ModelError, match="E = True must be a positive number"):
         fc.LinearElastic(E=True, nu=0.3)
-    with pytest.raises(fc.errors.ModelError, match="must be pairs"):
+    with pytest.raises(fc.errors.ModelError, match="must be a sequence of sequences of numbers"):
         fc.Tabulated("x", [(0.0, "1.0")])
 
 
