@@ -88,6 +88,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except FastcontactError as error:
         say(f"error: {error}", error=True)
+        forget(error)  # a study that was stopped tells it by such an error
         return 1
     except BrokenPipeError:
         return 1
