@@ -140,6 +140,8 @@ class _Writer:
 
         self.context, self.builder = context, builder
         self.real, self.lane = context.get_value_type(kind), ir.IntType(32)
+        triple, _, features = context.codegen().magic_tuple()
+        self.fused = "+fma" in features.split(",") or triple.startswith(("aarch64", "arm64"))
 
     def start(self, kind: Any, array: Any) -> Any:
         """Return the address of the first number of an array."""
@@ -171,9 +173,20 @@ class _Writer:
         return parts[0] if len(parts) == 1 else self.builder.fadd(*parts)
 
     def plus(self, total: Any, one: Any, other: Any) -> Any:
-        """Return a total and a product, which may be rounded at once."""
-        product = self.builder.fmul(one, other, flags=("contract",))
-        return self.builder.fadd(total, product, flags=("contract",))
+        """Return a total and a product, rounded at once wherever the processor does that, and nowhere else.
+
+        Left to the compiler, it would depend on the code around it, and copies of a kernel would differ in the last bit.
+        """
+        if not self.fused:
+            return self.builder.fadd(total, self.builder.fmul(one, other))
+        from llvmlite import ir
+
+        kind = total.type
+        letter = "f32" if self.real == ir.FloatType() else "f64"
+        name = f"llvm.fma.{letter}" if kind == self.real else f"llvm.fma.v{kind.count}{letter}"
+        module = self.builder.module
+        known = module.globals.get(name) or ir.Function(module, ir.FunctionType(kind, [kind] * 3), name)
+        return self.builder.call(known, [one, other, total])
 
     def add(self, start: Any, at: Any, column: int, width: int, vector: Any) -> None:
         """Add a vector to numbers in memory."""
