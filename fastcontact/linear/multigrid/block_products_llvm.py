@@ -26,13 +26,7 @@ def row_times(_context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end
     from numba.core import types
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        from numba.core import cgutils
-
-        row = _Row(context, builder, signature, args, len(rows), len(cols))
-        step = args[3].type(1)
-        with cgutils.for_range_slice(builder, args[3], args[4], step, args[3].type, inc=True) as (k, _):
-            row.add_block(k)
-        return context.make_tuple(builder, signature.return_type, row.sums())
+        return _all_blocks(_Row(context, builder, signature, args, len(rows), len(cols)), signature, args)
 
     sums = types.UniTuple(x.dtype, len(rows))
     return sums(indices, numbers, x, types.intp, types.intp, rows, cols), code
@@ -45,16 +39,20 @@ def row_times_both_ways(
     from numba.core import types
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        from numba.core import cgutils
-
-        row = _RowBothWays(context, builder, signature, args, len(rows), len(rows))
-        step = args[3].type(1)
-        with cgutils.for_range_slice(builder, args[3], args[4], step, args[3].type, inc=True) as (k, _):
-            row.add_block(k)
-        return context.make_tuple(builder, signature.return_type, row.sums())
+        return _all_blocks(_RowBothWays(context, builder, signature, args, len(rows), len(rows)), signature, args)
 
     sums = types.UniTuple(x.dtype, len(rows))
     return sums(indices, numbers, x, types.intp, types.intp, types.intp, x.dtype, y, rows), code
+
+
+def _all_blocks(row: _Row, signature: Any, args: Any) -> Any:
+    """Write the loop over the blocks of a row, from ``args[3]`` to ``args[4]``, and return its sums."""
+    from numba.core import cgutils
+
+    step = args[3].type(1)
+    with cgutils.for_range_slice(row.builder, args[3], args[4], step, args[3].type, inc=True) as (k, _):
+        row.add_block(k)
+    return row.context.make_tuple(row.builder, signature.return_type, row.sums())
 
 
 def add_row_transposed(
