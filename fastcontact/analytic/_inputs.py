@@ -23,7 +23,7 @@ def number(name: str, value: object) -> float:
 
 
 def array(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    """Return `values` (...) [unit of the quantity] as an array of floats (...) [unit of the quantity], or raise ModelError."""
+    """Return `values` (...) [unit of the quantity] as floats (...) [unit of the quantity], or raise ModelError."""
     if is_masked(values):
         raise ModelError(f"{name} {REFUSAL}")
     try:
