@@ -3,12 +3,14 @@
 
 Positions and normals of a facet are polynomials of its reference coordinates, with coefficients (n_facets, m, 3) of the terms
 in `search.facet_tables`; facets with fewer nodes than the widest kind have zeros at the end.
+
+What is called in the loops is put in the place of each call: of a copy compiled by itself, sums and products might be fused in
+another way, and a process that compiles would find other last digits than one that does not.
 """
 
 import numpy as np
 
-from fastcontact._jit.decorators import kernel
-from fastcontact.contact.search.projection_3d_kernels import component
+from fastcontact._jit.decorators import innermost_kernel, kernel
 from fastcontact.contact.search.straight_3d_kernels import cross, dot, minus, unit
 
 MAX_ITERATIONS = 15
@@ -57,7 +59,7 @@ def angles(nodes, beside, begin, end, out):
             out[f, a] = np.arctan2(np.sqrt(dot(sine, sine)), dot(p, q))
 
 
-@kernel
+@innermost_kernel
 def _row(nodes, f, a):
     return nodes[f, a, 0], nodes[f, a, 1], nodes[f, a, 2]
 
@@ -78,21 +80,42 @@ def coefficients(values, to_terms, first, begin, end, out):
             out[first + f, k, 0], out[first + f, k, 1], out[first + f, k, 2] = p, q, r
 
 
-@kernel
+@innermost_kernel
+def _component(terms, f, d, s, t):
+    """Return one component of the polynomials of facet `f` at (s, t), and its derivatives."""
+    m = terms.shape[1]
+    a, b = terms[f, 1, d], terms[f, 2, d]
+    x, xs, xt = terms[f, 0, d] + a * s + b * t, a, b
+    if m >= 4:
+        a = terms[f, 3, d]
+        x, xs, xt = x + a * s * t, xs + a * t, xt + a * s
+    if m >= 6:
+        a, b = terms[f, 4, d], terms[f, 5, d]
+        x, xs, xt = x + a * s * s + b * t * t, xs + 2.0 * a * s, xt + 2.0 * b * t
+    if m >= 8:
+        a, b = terms[f, 6, d], terms[f, 7, d]
+        x, xs, xt = x + (a * s + b * t) * s * t, xs + (2.0 * a * s + b * t) * t, xt + (a * s + 2.0 * b * t) * s
+    if m >= 9:
+        a = terms[f, 8, d]
+        x, xs, xt = x + a * s * s * t * t, xs + 2.0 * a * s * t * t, xt + 2.0 * a * s * s * t
+    return x, xs, xt
+
+
+@innermost_kernel
 def _place(terms, f, s, t):
     """Return the value of the polynomials of facet `f` at (s, t), and their derivatives."""
-    x, xs, xt, _, _, _ = component(terms, f, 0, s, t)
-    y, ys, yt, _, _, _ = component(terms, f, 1, s, t)
-    z, zs, zt, _, _, _ = component(terms, f, 2, s, t)
+    x, xs, xt = _component(terms, f, 0, s, t)
+    y, ys, yt = _component(terms, f, 1, s, t)
+    z, zs, zt = _component(terms, f, 2, s, t)
     return (x, y, z), (xs, ys, zs), (xt, yt, zt)
 
 
-@kernel
+@innermost_kernel
 def _plus(a, factor, b):
     return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
 
-@kernel
+@innermost_kernel
 def _newton(point, terms, directions, f, s, t, height):
     """Solve ``X(s, t) + height n(s, t) = point`` on the extended facet `f`; return (s, t) and whether it converged."""
     for _ in range(MAX_ITERATIONS):
@@ -114,14 +137,14 @@ def _newton(point, terms, directions, f, s, t, height):
     return s, t, False
 
 
-@kernel
+@innermost_kernel
 def beyond(triangle, s, t):
     """Return how far reference coordinates lie outside a facet, in facet lengths; 0 inside."""
     outside = max(-s, -t, s + t - 1.0) if triangle else 0.5 * (max(abs(s), abs(t)) - 1.0)
     return max(outside, 0.0)
 
 
-@kernel
+@innermost_kernel
 def inside(triangle, s, t):
     """Return reference coordinates moved into a facet."""
     if triangle:
@@ -131,7 +154,7 @@ def inside(triangle, s, t):
     return min(max(s, -1.0), 1.0), min(max(t, -1.0), 1.0)
 
 
-@kernel
+@innermost_kernel
 def _beside(point, terms, directions, triangular, neighbours, f, height):
     """Return which facet next to `f` the projection leaves least, where on it, and by how much; infinite if on none."""
     start, numbers = neighbours
