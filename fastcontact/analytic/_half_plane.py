@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastcontact.analytic._half_space import below_surface
+from fastcontact.analytic._inputs import array
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -19,7 +20,7 @@ ComplexArray = NDArray[np.complex128]
 
 def _roots(x: ArrayLike, y: ArrayLike, b: float) -> tuple[Array, ComplexArray, ComplexArray, ComplexArray]:
     """Return depth, k, w and w - k (...) [-], all over b."""
-    across, depth = np.broadcast_arrays(np.asarray(x, dtype=np.float64) / b, below_surface(y, b) / b)
+    across, depth = np.broadcast_arrays(array("x", x) / b, below_surface(y, b) / b)
     k = depth + 1j * across
     square = np.empty(k.shape, dtype=np.complex128)
     square.real = (1.0 - across) * (1.0 + across) + depth**2

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastcontact.analytic._inputs import array
 from fastcontact.errors import ModelError
 
 Array = NDArray[np.float64]
@@ -22,7 +23,7 @@ _FAR = 4.0
 
 def below_surface(z: ArrayLike, a: float) -> Array:
     """Return the depth -z (...) [length] of `z` (...) [length]; rounded coordinates above the surface count as on it."""
-    depth = -np.asarray(z, dtype=np.float64)
+    depth = -array("z", z)
     if depth.size and depth.min() < -1e-9 * a:
         raise ModelError(f"a point lies {-depth.min():g} above the surface: the body is z <= 0 (y <= 0 in the plane)")
     return np.maximum(depth, 0.0)
@@ -30,7 +31,7 @@ def below_surface(z: ArrayLike, a: float) -> Array:
 
 def _spheroidal(r: ArrayLike, z: ArrayLike, a: float) -> tuple[Array, Array]:
     """Return s and t of points; s - i t is the square root of ((r^2 + z^2 - a^2) - 2 i a |z|)/a^2."""
-    radial, depth = np.broadcast_arrays(np.abs(np.asarray(r, dtype=np.float64)) / a, below_surface(z, a) / a)
+    radial, depth = np.broadcast_arrays(np.abs(array("r", r)) / a, below_surface(z, a) / a)
     square = np.empty(radial.shape, dtype=np.complex128)
     # (r - a)(r + a) rather than r^2 - a^2: the edge of the contact is where digits matter.
     square.real = (radial - 1.0) * (radial + 1.0) + depth**2
@@ -75,7 +76,7 @@ def displacement(r: ArrayLike, z: ArrayLike, a: float, p0: float, E: float, nu: 
     z points out of the body. The radial one is r times the hoop strain; the axial one is (z P - 2 (1 - nu) V)/(2 G) with the
     potential V of the pressure and P = -dV/d|z| (Johnson 1985, eq. 3.2-3.6 without shear tractions).
     """
-    radial, height = np.broadcast_arrays(np.asarray(r, dtype=np.float64), -below_surface(z, a))
+    radial, height = np.broadcast_arrays(array("r", r), -below_surface(z, a))
     s, t = _spheroidal(r, z, a)
     q0, q1, q2 = _legendre(s)
     V = p0 * a / 3.0 * (q0 + 0.5 * q2 * (3.0 * t**2 - 1.0))

@@ -6,7 +6,11 @@ import math
 import numbers
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from fastcontact.errors import ModelError, unknown
+from fastcontact.masks import REFUSAL, is_masked
 
 PLANE = ("plane_strain", "plane_stress")
 
@@ -16,6 +20,19 @@ def number(name: str, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
         raise ModelError(f"{name} is {value!r}: it must be a finite number")
     return float(value)
+
+
+def array(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Return `values` (...) [unit of the quantity] as floats (...) [unit of the quantity], or raise ModelError."""
+    if is_masked(values):
+        raise ModelError(f"{name} {REFUSAL}")
+    try:
+        found = np.asarray(values)
+    except ValueError:  # rows of several lengths
+        found = np.empty(0, object)
+    if found.dtype.kind not in "biuf":
+        raise ModelError(f"{name} must be a number or an array of real numbers, not {type(values).__name__}")
+    return found.astype(np.float64, copy=False)
 
 
 def positive(name: str, value: object, *, infinite: bool = False) -> float:

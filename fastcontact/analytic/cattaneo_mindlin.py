@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._inputs import not_negative, number, poisson, positive
+from fastcontact.analytic._inputs import array, not_negative, number, poisson, positive
 from fastcontact.analytic.hertz_line import HertzLine, hertz_line
 from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
 from fastcontact.errors import FastcontactWarning, ModelError
@@ -68,9 +68,9 @@ class _PartialSlip:
         """Return a quantity of the present force from the function that gives it for a first load."""
         return of_first_load(self.tangential_force_peak) - 2.0 * of_first_load(self._reversal)
 
-    def _traction(self, position: ArrayLike) -> Array:
+    def _traction(self, name: str, position: ArrayLike) -> Array:
         """Return f p0 [sqrt(1 - x^2/a^2) - (c/a) sqrt(1 - x^2/c^2)] of the present force, each root where it is real."""
-        x2, a = np.asarray(position, dtype=np.float64) ** 2, self.normal.radius
+        x2, a = array(name, position) ** 2, self.normal.radius
 
         def of_first_load(load: float) -> Array:
             roots = np.sqrt(np.maximum(a**2 - x2, 0.0)) - np.sqrt(np.maximum(self._zone(load) ** 2 - x2, 0.0))
@@ -94,7 +94,7 @@ class CattaneoMindlinLine(_PartialSlip):
 
     def traction(self, x: ArrayLike) -> Array:
         """Return the shear traction (...) [pressure] along the force at `x` (...) [length] (Johnson 1985, section 7.2a)."""
-        return self._traction(x)
+        return self._traction("x", x)
 
     def slip(self, x: ArrayLike) -> Array:
         """Return the slip (...) [length] of the surfaces on each other at `x` (...) [length], in the direction of the force.
@@ -121,7 +121,7 @@ class CattaneoMindlinLine(_PartialSlip):
 
     def _slip(self, c: float, x: ArrayLike) -> Array:
         a = self.normal.radius
-        distance = np.abs(np.asarray(x, dtype=np.float64))
+        distance = np.abs(array("x", x))
         beyond = np.clip(distance, c, a)
         root = beyond * np.sqrt((beyond - c) * (beyond + c))
         hyperbolic = c**2 * np.arccosh(beyond / c) if c > 0.0 else 0.0
@@ -166,7 +166,7 @@ class CattaneoMindlinSphere(_PartialSlip):
 
     def traction(self, r: ArrayLike) -> Array:
         """Return the shear traction (...) [pressure] along the force at `r` (...) [length] (Johnson 1985, section 7.2b)."""
-        return self._traction(r)
+        return self._traction("r", r)
 
 
 def _checked(normal: HertzLine | HertzPoint, friction: float, tangential_force: float) -> tuple[float, float]:

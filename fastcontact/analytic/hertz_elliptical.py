@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._inputs import Bodies, effective_radius, exactly_one
+from fastcontact.analytic._inputs import Bodies, array, effective_radius, exactly_one
 from fastcontact.errors import ModelError
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ class HertzElliptical:
 
         Johnson (1985), eq. 3.58.
         """
-        x, y = np.asarray(x, dtype=np.float64) / self.radius_x, np.asarray(y, dtype=np.float64) / self.radius_y
+        x, y = array("x", x) / self.radius_x, array("y", y) / self.radius_y
         return self.pressure_max * np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))
 
 

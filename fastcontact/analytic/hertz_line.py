@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastcontact.analytic import _half_plane
 from fastcontact.analytic._half_space import VonMisesMaximum, von_mises
-from fastcontact.analytic._inputs import Bodies, effective_radius, exactly_one, plane_kinematics, poisson
+from fastcontact.analytic._inputs import Bodies, array, effective_radius, exactly_one, plane_kinematics, poisson
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ class HertzLine:
 
     def pressure(self, x: ArrayLike) -> Array:
         """Return the contact pressure (...) [pressure] at `x` (...) [length], zero outside (Johnson 1985, eq. 4.44)."""
-        inside = 1.0 - (np.asarray(x, dtype=np.float64) / self.radius) ** 2
+        inside = 1.0 - (array("x", x) / self.radius) ** 2
         return self.pressure_max * np.sqrt(np.maximum(inside, 0.0))
 
     def stress(self, x: ArrayLike, y: ArrayLike, nu: float | None = None) -> Array:
@@ -64,11 +64,11 @@ class HertzLine:
 
     def stress_on_axis(self, depth: ArrayLike, nu: float | None = None) -> Array:
         """Return the stresses (..., 4) [pressure] on the axis at `depth` (...) [length], >= 0 (Johnson 1985, eqs 4.46)."""
-        return self.stress(np.zeros_like(np.asarray(depth, dtype=np.float64)), np.negative(depth), nu)
+        return self.stress(np.zeros_like(places := array("depth", depth)), -places, nu)
 
     def surface_stress(self, x: ArrayLike, nu: float | None = None) -> Array:
         """Return the stresses (..., 4) [pressure] of the surface at `x` (...) [length]: xx = yy = -pressure."""
-        return self.stress(x, np.zeros_like(np.asarray(x, dtype=np.float64)), nu)
+        return self.stress(x, np.zeros_like(array("x", x)), nu)
 
     def von_mises(self, x: ArrayLike, y: ArrayLike, nu: float | None = None) -> Array:
         """Return the equivalent stress (...) [pressure] at points `x` (...) [length], `y` (...) [length]."""
@@ -85,7 +85,7 @@ class HertzLine:
 
     def surface_displacement(self, x: ArrayLike, *, body: int = 1) -> Array:
         """Return the displacements (..., 2) [length] of the surface at `x` (...) [length], measured from the point (0, 0)."""
-        return self.displacement(x, np.zeros_like(np.asarray(x, dtype=np.float64)), body=body)
+        return self.displacement(x, np.zeros_like(array("x", x)), body=body)
 
     def von_mises_maximum(self, nu: float | None = None) -> VonMisesMaximum:
         """Return the largest equivalent stress on the axis and its depth.

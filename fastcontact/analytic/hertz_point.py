@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastcontact.analytic import _half_space
 from fastcontact.analytic._half_space import VonMisesMaximum, von_mises
-from fastcontact.analytic._inputs import Bodies, effective_radius, exactly_one, poisson
+from fastcontact.analytic._inputs import Bodies, array, effective_radius, exactly_one, poisson
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ class HertzPoint:
 
     def pressure(self, r: ArrayLike) -> Array:
         """Return the contact pressure (...) [pressure] at `r` (...) [length], zero outside (Johnson 1985, eq. 3.39)."""
-        inside = 1.0 - (np.asarray(r, dtype=np.float64) / self.radius) ** 2
+        inside = 1.0 - (array("r", r) / self.radius) ** 2
         return self.pressure_max * np.sqrt(np.maximum(inside, 0.0))
 
     def stress(self, r: ArrayLike, z: ArrayLike, nu: float | None = None) -> Array:
@@ -62,11 +62,11 @@ class HertzPoint:
 
     def stress_on_axis(self, depth: ArrayLike, nu: float | None = None) -> Array:
         """Return the stresses (..., 4) [pressure] on the axis at `depth` (...) [length], >= 0 (Johnson 1985, eq. 3.45)."""
-        return self.stress(np.zeros_like(np.asarray(depth, dtype=np.float64)), np.negative(depth), nu)
+        return self.stress(np.zeros_like(places := array("depth", depth)), -places, nu)
 
     def surface_stress(self, r: ArrayLike, nu: float | None = None) -> Array:
         """Return the stresses (..., 4) [pressure] of the surface at `r` (...) [length] (Johnson 1985, eqs 3.43 and 3.44)."""
-        return self.stress(r, np.zeros_like(np.asarray(r, dtype=np.float64)), nu)
+        return self.stress(r, np.zeros_like(array("r", r)), nu)
 
     def von_mises(self, r: ArrayLike, z: ArrayLike, nu: float | None = None) -> Array:
         """Return the equivalent stress (...) [pressure] at points `r` (...) [length], `z` (...) [length]."""
@@ -82,7 +82,7 @@ class HertzPoint:
 
     def surface_displacement(self, r: ArrayLike, *, body: int = 1) -> Array:
         """Return the displacements (..., 2) [length] of the surface at `r` (...) [length] (Johnson 1985, eqs 3.41, 3.42)."""
-        return self.displacement(r, np.zeros_like(np.asarray(r, dtype=np.float64)), body=body)
+        return self.displacement(r, np.zeros_like(array("r", r)), body=body)
 
     def von_mises_maximum(self, nu: float | None = None) -> VonMisesMaximum:
         """Return the largest equivalent stress on the axis and its depth.

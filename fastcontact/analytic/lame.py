@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._inputs import not_negative, number, plane_kinematics, poisson, positive
+from fastcontact.analytic._inputs import array, not_negative, number, plane_kinematics, poisson, positive
 from fastcontact.errors import ModelError
 
 Array = NDArray[np.float64]
@@ -87,7 +87,7 @@ class LameShell:
 
     def _fields(self, r: ArrayLike) -> tuple[Array, int, float, Array]:
         """Return radii, m, C and D/r^m."""
-        radii = np.asarray(r, dtype=np.float64)
+        radii = array("r", r)
         slack = 1e-9 * self.outer_radius  # mesh coordinates are rounded
         wrong = (radii < self.inner_radius - slack) | (radii > self.outer_radius + slack)
         if wrong.any():

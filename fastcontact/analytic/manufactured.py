@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._inputs import one_of, poisson, positive
+from fastcontact.analytic._inputs import array, one_of, poisson, positive
 from fastcontact.analytic.hertz_line import HertzLine, hertz_line
 from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
 from fastcontact.errors import ModelError
@@ -82,20 +82,21 @@ class HertzBox:
 
         It is (x^2 + y^2)/(2 R) over the top.
         """
-        return (np.asarray(x, dtype=np.float64) ** 2 + np.asarray(y, dtype=np.float64) ** 2) / (2.0 * self.R)
+        return (array("x", x) ** 2 + array("y", y) ** 2) / (2.0 * self.R)
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return the gap (n,) [length] under the parabola and its downward normals (n, dim) [-], as rigid obstacles do.
 
         At `points` (n, dim) [length]. The problem is linear: the gap is vertical, not at right angles to the parabola.
         """
+        points = array("points", points)
         normal = np.zeros_like(points)
         normal[:, -1] = -1.0
         return self.obstacle(*points[:, :-1].T) - points[:, -1], normal
 
     def pressure(self, x: ArrayLike, y: ArrayLike = 0.0) -> Array:
         """Return the exact contact pressure (...) [pressure] at `x` (...) [length], in 3D also `y` (...) [length]."""
-        return self.hertz.pressure(np.hypot(x, y))
+        return self.hertz.pressure(np.hypot(array("x", x), array("y", y)))
 
     def displacement(self, points: ArrayLike) -> Array:
         """Return the exact displacements (..., dim) [length] at `points` (..., dim) [length], zero at the origin."""
@@ -121,15 +122,15 @@ class HertzBox:
 
     def _in_plane(self, points: ArrayLike) -> tuple[tuple[Array, Array], tuple[Array, ...]]:
         """Return (distance from the axis, height), and the direction that leads there in the coordinates of the top."""
-        array = np.asarray(points, dtype=np.float64)
-        if array.ndim == 0 or array.shape[-1] != self.dim:
-            raise ModelError(f"points has shape {array.shape}: it must be (..., {self.dim})")
+        places = array("points", points)
+        if places.ndim == 0 or places.shape[-1] != self.dim:
+            raise ModelError(f"points has shape {places.shape}: it must be (..., {self.dim})")
         if self.dim == 2:
-            return (array[..., 0], array[..., 1]), (np.ones(array.shape[:-1]),)
-        r = np.hypot(array[..., 0], array[..., 1])
-        along_x = np.divide(array[..., 0], r, out=np.ones_like(r), where=r > 0)
-        along_y = np.divide(array[..., 1], r, out=np.zeros_like(r), where=r > 0)
-        return (r, array[..., 2]), (along_x, along_y)
+            return (places[..., 0], places[..., 1]), (np.ones(places.shape[:-1]),)
+        r = np.hypot(places[..., 0], places[..., 1])
+        along_x = np.divide(places[..., 0], r, out=np.ones_like(r), where=r > 0)
+        along_y = np.divide(places[..., 1], r, out=np.zeros_like(r), where=r > 0)
+        return (r, places[..., 2]), (along_x, along_y)
 
 
 def hertz_box(

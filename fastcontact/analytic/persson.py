@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._inputs import exactly_one, not_negative, plane_kinematics, poisson, positive
+from fastcontact.analytic._inputs import array, exactly_one, not_negative, plane_kinematics, poisson, positive
 from fastcontact.errors import ModelError
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ class PerssonPin:
         Persson (1964); Ciavarella and Decuzzi (2001), for like materials.
         """
         b = _half_tangent(self.contact_angle)
-        y = np.tan(0.5 * np.radians(np.asarray(angle, dtype=np.float64)))
+        y = np.tan(0.5 * np.radians(array("angle", angle)))
         root, hypotenuse = np.sqrt(np.maximum(b**2 - y**2, 0.0)), math.hypot(1.0, b)
         first = 2.0 / math.pi * root / (hypotenuse * (1.0 + y**2))
         second = np.arctanh(root / hypotenuse) / (math.pi * b**2 * (1.0 + b**2))

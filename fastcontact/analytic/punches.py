@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._inputs import exactly_one, number, poisson, positive
+from fastcontact.analytic._inputs import array, exactly_one, number, poisson, positive
 from fastcontact.errors import ModelError
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ class FlatPunch:
         F/(2 pi a sqrt(a^2 - r^2)) (Johnson 1985, eq. 3.34); a bonded punch has no such form and raises ModelError.
         """
         self._frictionless("pressure")
-        inside = self.radius**2 - np.asarray(r, dtype=np.float64) ** 2
+        inside = self.radius**2 - array("r", r) ** 2
         with np.errstate(divide="ignore"):
             value = self.force / (2.0 * math.pi * self.radius * np.sqrt(np.maximum(inside, 0.0)))
         return np.where(inside < 0.0, 0.0, value)
@@ -56,7 +56,7 @@ class FlatPunch:
         Johnson (1985), eq. 3.38; a bonded punch has no such form and raises ModelError.
         """
         self._frictionless("normal displacement")
-        ratio = self.radius / np.maximum(np.abs(np.asarray(r, dtype=np.float64)), self.radius)
+        ratio = self.radius / np.maximum(np.abs(array("r", r)), self.radius)
         return -2.0 * self.approach / math.pi * np.arcsin(ratio)
 
     def _frictionless(self, what: str) -> None:
@@ -107,7 +107,7 @@ class PowerLawPunch:
         from scipy.special import hyp2f1
 
         n, a = self.exponent, self.radius
-        inside = np.maximum(1.0 - (np.asarray(r, dtype=np.float64) / a) ** 2, 0.0)
+        inside = np.maximum(1.0 - (array("r", r) / a) ** 2, 0.0)
         scale = self.E_star * self.approach * n / (math.pi * a)
         shape = np.sqrt(inside) * hyp2f1(1.0 - 0.5 * n, 1.0, 1.5, inside)
         return scale * np.where((inside == 1.0) & (n <= 1.0), math.inf, shape)
@@ -117,7 +117,7 @@ class PowerLawPunch:
         from scipy.special import hyp2f1
 
         n, a = self.exponent, self.radius
-        distance = np.abs(np.asarray(r, dtype=np.float64))
+        distance = np.abs(array("r", r))
         ratio = a / np.maximum(distance, a)
         profile = ratio / (n + 1.0) * hyp2f1(0.5, 0.5 * (n + 1.0), 0.5 * (n + 3.0), ratio**2)
         outside = 2.0 * self.approach / math.pi * (np.arcsin(ratio) - profile)
@@ -294,12 +294,12 @@ class FlatPunch2D:
         It pulls the surface outward; without bond it is zero.
         """
         amplitude, phase = self._polar(x)
-        inside = np.abs(np.asarray(x, dtype=np.float64)) < self.half_width
+        inside = np.abs(array("x", x)) < self.half_width
         return np.where(inside, np.where(inside, amplitude, 0.0) * np.sin(phase), 0.0)
 
     def _polar(self, x: ArrayLike) -> tuple[Array, Array]:
         """Return amplitude and phase of pressure + i shear."""
-        position = np.asarray(x, dtype=np.float64) / self.half_width
+        position = array("x", x) / self.half_width
         inside = np.abs(position) < 1.0
         t = np.where(inside, position, 0.0)
         hardness = 3.0 - 4.0 * self.nu if self.bonded else 1.0

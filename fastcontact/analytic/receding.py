@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.analytic._inputs import Bodies, not_negative, plane_kinematics, positive
+from fastcontact.analytic._inputs import Bodies, array, not_negative, plane_kinematics, positive
 from fastcontact.errors import ModelError
 
 Array = NDArray[np.float64]
@@ -51,7 +51,7 @@ class RecedingLayer:
 
     def pressure(self, x: ArrayLike) -> Array:
         """Return the contact pressure (...) [pressure] at positions `x` (...) [length], zero outside."""
-        position = np.abs(np.asarray(x, dtype=np.float64)) / self.radius
+        position = np.abs(array("x", x)) / self.radius
         theta = np.arccos(np.minimum(position, 1.0))
         # The coefficients sum to zero: with cos(2 k theta) - 1 in its place there is no 0/0 at the edge.
         terms = sum((b * np.sin(k * theta) ** 2 for k, b in enumerate(self.series)), np.zeros_like(theta))

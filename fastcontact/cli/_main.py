@@ -49,6 +49,13 @@ class Parser(argparse.ArgumentParser):
             message = unknown(wrong["kind"].lower(), wrong["given"], _NAME.findall(wrong["known"]))
         raise FastcontactError(f"{message}; see '{self.prog} --help'")
 
+    def print_help(self, file: Any = None) -> None:
+        """Print the help; argparse would not tell that it cannot be written."""
+        if file is None:
+            say(self.format_help().rstrip("\n"))
+        else:
+            super().print_help(file)
+
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Refuse a flag that this command does not know, and offer the nearest; argparse would ask the parser above."""
         found, rest = super().parse_known_args(args, namespace)
@@ -58,10 +65,19 @@ class Parser(argparse.ArgumentParser):
         return found, rest
 
 
+class PrintVersion(argparse.Action):
+    """``--version``: print it, and end; argparse would not tell that it cannot be written."""
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option_string: Any = None) -> None:
+        """Print the version."""
+        say(f"fastcontact {__version__}")
+        parser.exit()
+
+
 def parser(command: str | None = None) -> argparse.ArgumentParser:
     """Return the parser with every sub-command of this package, with arguments only for `command` if it is one of them."""
     top = Parser(prog="fastcontact", description="Elastic contact by finite elements, fast.")
-    top.add_argument("--version", action="version", version=f"fastcontact {__version__}")
+    top.add_argument("--version", action=PrintVersion, nargs=0, help="show program's version number and exit")
     top.add_argument(
         "--print-completion", metavar="SHELL", choices=SHELLS, action=PrintCompletion,
         help=f"print what makes a shell complete commands and options: {', '.join(SHELLS)}",

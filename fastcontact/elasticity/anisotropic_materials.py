@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -75,7 +76,7 @@ class Orthotropic(Material):
     incompatible_modes: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("E", "nu", "G"):
+        for name in ("E", "nu", "G", "axes", "density", "expansion"):
             check_type(f"{name} of Orthotropic", getattr(self, name), Any, ModelError)
         for name in ("E", "nu", "G"):
             object.__setattr__(self, name, _three(name, getattr(self, name)))
@@ -119,6 +120,8 @@ class Orthotropic(Material):
         expansion : float, callable, ndarray (n,) or three of them, optional
             Coefficients of thermal expansion [1 / temperature].
         """
+        check_type("nu_across of a transversely isotropic material", nu_across, float, ModelError)
+        check_type("E_across of a transversely isotropic material", E_across, float | Array, ModelError)
         if not nu_across > -1.0:
             raise ModelError(f"Poisson's ratio nu_across = {nu_across} must be above -1")
         G_across = E_across / (2.0 * (1.0 + nu_across))
@@ -188,7 +191,8 @@ class Anisotropic(Material):
     incompatible_modes: bool = False
 
     def __post_init__(self) -> None:
-        check_type("D of Anisotropic", self.D, Any, ModelError)
+        for name in ("D", "axes", "density", "expansion"):
+            check_type(f"{name} of Anisotropic", getattr(self, name), Any, ModelError)
         try:
             D = np.empty(0) if np.iscomplexobj(self.D) else np.asarray(self.D, float)
         except (TypeError, ValueError):
@@ -252,11 +256,18 @@ def _check_modulus(name: str, value: Any) -> None:
 
 def _three(name: str, values: Any) -> tuple[Any, Any, Any]:
     try:
-        a, b, c = (v if isinstance(v, Varying) else float(v) for v in map(wrapped, values))
+        a, b, c = (v if isinstance(v, Varying) else _real(v) for v in map(wrapped, values))
     except (TypeError, ValueError):
         order = "1, 2 and 3" if name == "E" else "12, 13 and 23"
         raise ModelError(f"{name} = {values!r} of an orthotropic material must be three numbers, for {order}") from None
     return a, b, c
+
+
+def _real(value: Any) -> float:
+    """Return a real number as it is; TypeError of anything else, such as text and complex numbers."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        raise TypeError(value)
+    return float(value)
 
 
 def _determinant(nu: Sequence[Any], back: Sequence[Any]) -> Any:

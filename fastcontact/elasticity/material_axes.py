@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import ModelError
+from fastcontact.masks import REFUSAL, is_masked
 from fastcontact.mesh.argument_types import check_type
 
 Array = NDArray[np.float64]
@@ -122,14 +123,17 @@ def frames(axes: Axes, points: Array, kinematics: str) -> Array:
             f"{axes} are not around the axis of symmetry: in axisymmetry their origin is (0, 0, 0) and their direction "
             "(0, 1, 0)"
         )
-    found = np.asarray(axes(points), float)
+    returned = axes(points)
+    if is_masked(returned):
+        raise ModelError(f"the result of the function of a material's axes {REFUSAL}")
+    found = np.asarray(returned, complex if np.iscomplexobj(returned) else float)
     if found.shape != (len(points), 3, 3):
         raise ModelError(
             f"the function of a material's axes returned numbers of shape {found.shape} for {len(points)} points: it must "
             f"return three vectors in rows for each, shape ({len(points)}, 3, 3)"
         )
     off = np.abs(found @ found.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
-    bad = np.flatnonzero(~(off <= 1e-6))
+    bad = np.flatnonzero(~(off <= 1e-6) | np.iscomplexobj(found))
     if len(bad):
         raise ModelError(
             f"the function of a material's axes returned {found[bad[0]].tolist()} at {points[bad[0]]}: these are not unit "
@@ -152,9 +156,9 @@ def rotations(frame: Array) -> Array:
 def _vectors(values: Any, name: str) -> Array:
     """Return finite numbers as an array; ModelError names what they are otherwise."""
     try:
-        found = np.asarray(values, float)
-    except (TypeError, ValueError):
-        found = np.array(np.nan)
-    if not np.isfinite(found).all():
+        found = np.asarray(values)
+    except ValueError:  # rows of several lengths
+        found = np.empty(0, object)
+    if found.dtype.kind not in "iuf" or not np.isfinite(found).all():
         raise ModelError(f"{name} = {values!r} must be finite numbers")
-    return found
+    return found.astype(float)

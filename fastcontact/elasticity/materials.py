@@ -125,6 +125,7 @@ class Material:
             found._check_at(names, *sample)
         return found
 
+    @typed(ModelError)
     def constants_at(self, name: str, rows: NDArray[np.intp], N: Array) -> SimpleNamespace:
         """Return the constants in cells of an element, those that vary as arrays (n_rows * n,) [unit of the constant].
 
@@ -181,6 +182,7 @@ class Material:
             raise ModelError("the axes of the material depend on the position: ask for moduli_at(points, kinematics)")
         return np.asarray(self.moduli_at(np.zeros((1, 3 if kinematics == "3d" else 2)), kinematics)[0])
 
+    @typed(ModelError)
     def moduli_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the moduli (n, 4, 4), in 3D (n, 6, 6) [pressure] at `points` (n, dim) [length]; see `moduli`.
 
@@ -196,6 +198,7 @@ class Material:
         D[inner] = np.linalg.inv(compliance[inner])
         return D
 
+    @typed(ModelError)
     def compliance_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the compliance (n, 4, 4), in 3D (n, 6, 6) [1 / pressure] at `points` (n, dim) [length].
 
@@ -204,6 +207,7 @@ class Material:
         size = 6 if kinematics == "3d" else 4
         return np.asarray(self._compliance6(points, kinematics, constants)[:, :size, :size])
 
+    @typed(ModelError)
     def expansion_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the strains (n, 4), in 3D (n, 6) [1 / temperature] of a degree at `points` (n, dim) [length].
 
@@ -405,6 +409,7 @@ class LinearElastic(Material):
             )
         return np.asarray(isotropic_moduli(np.array([self.E], float), np.array([self.nu], float), kinematics)[0])
 
+    @typed(ModelError)
     def moduli_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the moduli (n, 4, 4), in 3D (n, 6, 6) [pressure] at `points` (n, dim) [length]; see `Material.moduli_at`."""
         given = self if constants is None else constants

@@ -12,7 +12,9 @@ from fastcontact.elasticity import dilatation, element_2d_kernels, element_kerne
 from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.material_sides import MaterialSides
+from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
+from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -23,6 +25,7 @@ BATCH = 16_000_000
 SAMPLED = 16
 
 
+@typed(ModelError)
 def stress_at_points(
     mesh: Mesh,
     kinematics: str,
@@ -60,6 +63,7 @@ def stress_at_points(
     }
 
 
+@typed(ModelError)
 def nodal_stress(
     mesh: Mesh,
     kinematics: str,
@@ -97,6 +101,7 @@ class NodalAverage:
     def __init__(self, count: int, components: int) -> None:
         self._total, self._count = np.zeros((count, components)), np.zeros(count)
 
+    @typed(ModelError)
     def add(self, cells: NDArray[np.int32], extrapolation: Array, values: Array) -> None:
         """Add the stresses of `cells` (n_cells, n_nodes), `values` (n_cells, n_q, n_components) [pressure] at points.
 
@@ -120,6 +125,7 @@ class NodalAverage:
         return self._total
 
 
+@typed(ModelError)
 def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:
     """Return by solid element the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each cell.
 
@@ -130,6 +136,7 @@ def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:
     }
 
 
+@typed(ModelError)
 def nodal_average(mesh: Mesh, at_points: dict[str, Array]) -> Array:
     """Return the stress (n_points, n_components) [pressure] at the nodes: the plain average over the cells at each node.
 
@@ -141,6 +148,7 @@ def nodal_average(mesh: Mesh, at_points: dict[str, Array]) -> Array:
     return average.result()
 
 
+@typed(ModelError)
 def internal_force(mesh: Mesh, kinematics: str, at_points: dict[str, Array]) -> Array:
     """Return the nodal forces (n_points, dim) [force] that balance the stresses at the quadrature points.
 
@@ -154,6 +162,7 @@ def internal_force(mesh: Mesh, kinematics: str, at_points: dict[str, Array]) -> 
     return force
 
 
+@typed(ModelError)
 def von_mises(stress: Array) -> Array:
     """Return the equivalent stress (...) [pressure] of `stress` (..., n_components) [pressure] (von Mises, 1913).
 
@@ -164,6 +173,7 @@ def von_mises(stress: Array) -> Array:
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * shear)
 
 
+@typed(ModelError)
 def equivalent_strain(strain: Array) -> Array:
     """Return the equivalent strain (...) [-] of `strain` (..., n_components) [-], of an isotropic material von Mises / 3 G.
 
@@ -173,6 +183,7 @@ def equivalent_strain(strain: Array) -> Array:
     return np.asarray(2.0 / 3.0 * von_mises(tensor))
 
 
+@typed(ModelError)
 def von_mises_signed(stress: Array, equivalent: Array | None = None) -> Array:
     """Return the von Mises stress (...) [pressure] with the sign of the trace, as VMIS_SG of code_aster.
 

@@ -221,6 +221,8 @@ def wrapped(value: Any, vector: bool = False) -> Any:
             raise ModelError(
                 f"a constant of a material is a number or one for each cell or point, not {value!r}"
             ) from None
+    if isinstance(value, np.ndarray) and value.dtype.kind not in "fiu":
+        raise ModelError(f"a constant of a material is real numbers, not an array of {value.dtype}")
     if isinstance(value, Varying) or not (callable(value) or (isinstance(value, np.ndarray) and value.ndim > 0)):
         return value
     return Varying(value)

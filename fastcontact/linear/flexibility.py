@@ -143,6 +143,18 @@ def solve_multipliers(flexibility: Array, wanted: Array, C: Array | None) -> Arr
     if C is not None:
         flexibility += C
     try:
-        return cho_solve(cho_factor(flexibility), wanted)
-    except LinAlgError:  # rows that repeat each other: of their multipliers the smallest are taken
-        return lstsq(flexibility, wanted)[0]
+        factor = cho_factor(flexibility)
+    except LinAlgError:
+        return _smallest(flexibility, wanted)
+    repeated = factor[0].diagonal() ** 2 <= _round_off(flexibility) * flexibility.diagonal()
+    return _smallest(flexibility, wanted) if repeated.any() else cho_solve(factor, wanted)
+
+
+def _smallest(flexibility: Array, wanted: Array) -> Array:
+    """Return the smallest multipliers (m,) where rows repeat each other and leave them open."""
+    return np.asarray(lstsq(flexibility, wanted, cond=_round_off(flexibility))[0])
+
+
+def _round_off(flexibility: Array) -> float:
+    """Return the rounding error of a factorisation (m, m) over its diagonal."""
+    return 10.0 * len(flexibility) * float(np.finfo(float).eps)

@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing
 
 from fastcontact.errors import FastcontactError
+from fastcontact.masks import REFUSAL, is_masked
 
 F = TypeVar("F", bound=Callable[..., Any])
 _ARRAY_LIKE = {*typing.get_args(np.typing.ArrayLike)}
@@ -101,8 +102,8 @@ def types_of(call: Callable[..., Any]) -> dict[str, Any]:
 
 def check_type(what: str, value: Any, annotation: Any, error: type[FastcontactError]) -> None:
     """Raise `error` if a value is none of the annotated type, or has a mask; the message calls it `what`."""
-    if _is_masked(value):
-        raise error(f"{what} has entries that are masked, and masks are not kept: fill them first, or leave them out")
+    if is_masked(value):
+        raise error(f"{what} {REFUSAL}")
     if fits(value, annotation):
         return
     shown = f"an object of the class {type(value).__name__}"
@@ -118,14 +119,6 @@ def check_type(what: str, value: Any, annotation: Any, error: type[FastcontactEr
     if isinstance(value, str) and _is_number(value) and fits(1, annotation):
         remedy = f": write {value.strip()} without quotation marks"
     raise error(f"{what} must be {words(annotation)}, not {shown}{remedy}")
-
-
-def _is_masked(value: Any) -> bool:
-    """Return whether an array, or one in a series or by name, has masked entries, which NumPy would take for valid ones."""
-    members = (
-        value.values() if isinstance(value, abc.Mapping) else value if isinstance(value, list | tuple) else [value]
-    )
-    return any(isinstance(member, np.ma.MaskedArray) and np.ma.is_masked(member) for member in members)
 
 
 def _is_number(text: str) -> bool:

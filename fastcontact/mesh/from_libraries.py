@@ -12,6 +12,7 @@ from urllib.parse import quote
 import numpy as np
 
 from fastcontact.errors import FastcontactWarning, FileError, MeshError
+from fastcontact.masks import REFUSAL, is_masked
 from fastcontact.mesh import elements, topology
 from fastcontact.mesh.files.blocks import VERTEX
 from fastcontact.mesh.files.mesh_files import read_mesh
@@ -42,6 +43,9 @@ def from_meshio(mesh: Any) -> Mesh:
     """
     if not all(hasattr(mesh, name) for name in ("points", "cells", "cell_data", "cell_sets", "field_data")):
         raise MeshError(f"from_meshio takes a meshio.Mesh, not {type(mesh).__name__}")
+    sets = [mesh.cell_data, mesh.cell_sets, getattr(mesh, "point_data", {}), getattr(mesh, "point_sets", {})]
+    if is_masked([mesh.points, *(block.data for block in mesh.cells), *sets]):
+        raise MeshError(f"meshio's mesh {REFUSAL}")
     # Of Gmsh's tags meshio's readers keep the dimension of each name; their format repeats a cell for each of its groups.
     file_format = "gmsh" if any(key.startswith("gmsh:") for key in mesh.cell_data) else ""
     return _made(plain_parts(mesh), file_format, "meshio's mesh")

@@ -167,6 +167,7 @@ class Mesh:
         """Names of all groups: cell groups, then point groups not already named."""
         return list(self.cell_groups) + [name for name in self.point_groups if name not in self.cell_groups]
 
+    @typed(MeshError)
     def split(self, numbers: NDArray[Any]) -> dict[str, NDArray[np.intp]]:
         """Return by element the rows (m,) of its cells among the cell `numbers` (n,); elements without any are absent."""
         rows = {}

@@ -35,6 +35,7 @@ _MARKUP = {letter: f"\\f{{Symbol}}{symbol}\\f{{}}" for letter, symbol in _GREEK.
 _PLAIN = str.maketrans("\u2212\u2013\u2014\u2018\u2019\u201c\u201d", "---''\"\"")
 
 
+@typed(CaseError)
 @dataclass(frozen=True, eq=False)
 class Curve:
     """One curve of a picture.

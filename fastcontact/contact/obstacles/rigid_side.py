@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from fastcontact.contact.obstacles import Obstacle
 from fastcontact.contact.obstacles.rotation import Rotation
+from fastcontact.errors import ContactError
+from fastcontact.masks import REFUSAL, is_masked
 
 Array = NDArray[np.float64]
 
@@ -50,14 +52,25 @@ class RigidSide:
         """
         local = positions - at.displacement
         if self.rotation is None or at.angle == 0.0:
-            gap, normal = self.obstacle.distance(local)
+            gap, normal = self._distance(local)
         else:
             turned, centre = self.rotation.matrix(at.angle), np.array(self.rotation.centre)
-            gap, normal = self.obstacle.distance((local - centre) @ turned + centre)
+            gap, normal = self._distance((local - centre) @ turned + centre)
             normal = normal @ turned.T
         paired = np.isfinite(gap)
         offset = np.where(paired, gap, 0.0) - np.einsum("nd,nd->n", normal, positions)
         return gap, normal, paired, offset
+
+    def _distance(self, points: Array) -> tuple[Array, Array]:
+        """Return gap (n,) [length] and normals (n, dim) [-] of `points` (n, dim) [length] from the obstacle at rest."""
+        found = self.obstacle.distance(points)
+        if is_masked(found):
+            raise ContactError(
+                f"the distance from a rigid obstacle {REFUSAL}; a gap that is infinite leaves a point out"
+            )
+        if any(np.iscomplexobj(part) for part in found):
+            raise ContactError("the distance from a rigid obstacle must be real numbers, not complex ones")
+        return found
 
     def turning(self, positions: Array, before: Array, now: Stance, then: Stance) -> Array | None:
         """Return how far the rotation alone carries points of the obstacle's surface (n, dim) [length]; None without any.

@@ -69,6 +69,8 @@ class ConstrainedHierarchy:
             self.hierarchy.set_bounds()
             return
         added = None if springs is None else springs.under(elimination.pivots, elimination.weights)
+        if added is not None and not added.rows.nnz:  # they stretch what supports and equations hold
+            added = None
         self._change_levels(elimination, added)
         # Equations raise the spectrum of coarser levels, and that of the finest where they or springs stiffen its nodes, or
         # where it is wide already: on flat and on nearly incompressible cells.

@@ -187,6 +187,7 @@ class ModelContact(ModelConnections):
             check_repeated(self.mesh, pair, other)
         self.contact.append(pair)
 
+    @typed(ModelError)
     def bind(self, pair: ContactPair, supported: NDArray[np.bool_] | None = None) -> Formulation:
         """Return the formulation of a contact pair on this mesh; see `add_contact` for the errors.
 

@@ -196,6 +196,7 @@ class ModelInitialStates(ModelLoads):
             initial_state(kind, names, self._cells_of(names), given, axes, self.kinematics, table)
         )
 
+    @typed(ModelError)
     def temperature_rise(self, factors: Sequence[float]) -> Array | None:
         """Return the rise of the temperature (n_points,) [temperature], None without temperatures.
 
@@ -206,6 +207,7 @@ class ModelInitialStates(ModelLoads):
         rises = [factor * own.rise(self.mesh) for factor, own in zip(factors, self.temperatures, strict=True)]
         return np.asarray(np.sum(rises, axis=0))
 
+    @typed(ModelError)
     def stress_offset(
         self, temperature_factors: Sequence[float] = (), initial_factors: Sequence[float] = (),
         field: MaterialField | None = None,

@@ -75,6 +75,7 @@ class ModelLoads(ModelMaterials):
         axes = axes_of("the body force", {"x": x, "y": y, "z": z}, self.mesh.dim)
         self._add(BodyForce(names, axes, table_of(ramp, "the ramp of the body force")))
 
+    @typed(ModelError)
     def add_gravity(
         self,
         groups: Sequence[str] | str | None = None,
@@ -92,6 +93,7 @@ class ModelLoads(ModelMaterials):
         axes = axes_of("gravity", {"x": x, "y": y, "z": z}, self.mesh.dim)
         self._add(Gravity(names, axes, table_of(ramp, "the ramp of gravity")))
 
+    @typed(ModelError)
     def add_centrifugal(
         self,
         speed: float,

@@ -165,7 +165,13 @@ def test_a_device_that_is_full_is_told_in_one_line(command, option, files, monke
 
 
 @needs_full
-@pytest.mark.parametrize("command", [["info", "old.vtkhdf"], ["profile", "old.vtkhdf"], ["cases"]])
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["info", "old.vtkhdf"], ["profile", "old.vtkhdf"], ["cases"], ["--help"], ["--version"], ["run", "--help"],
+        ["mesh", "half-spheres", "-h"], ["--print-completion", "bash"],
+    ],
+)  # fmt: skip
 @pytest.mark.parametrize("unbuffered", [False, True])
 def test_standard_output_on_a_full_disk_is_told_in_one_line(command, unbuffered, files):
     """At once, or, as output waits for more, when the command ends."""
