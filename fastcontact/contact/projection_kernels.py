@@ -3,9 +3,6 @@
 
 Positions and normals of a facet are polynomials of its reference coordinates, with coefficients (n_facets, m, 3) of the terms
 in `search.facet_tables`; facets with fewer nodes than the widest kind have zeros at the end.
-
-What is called in the loops is put in the place of each call: of a copy compiled by itself, sums and products might be fused in
-another way, and a process that compiles would find other last digits than one that does not.
 """
 
 import numpy as np
