@@ -9,7 +9,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing import connection
@@ -222,9 +222,11 @@ def on_executor(executor: Executor, jobs: Sequence[Job], rest: list[int]) -> Ite
                 futures[executor.submit(run, jobs[index], 1)] = index
         for future in as_completed(futures):
             yield futures[future], future.result()
-    except BaseException:
-        for future in futures:
-            future.cancel()
+    except BaseException as error:
+        # A pool of processes that breaks, or is ended, fails at what was cancelled: it tells those that wait itself.
+        if not isinstance(executor, Workers) and not isinstance(error, BrokenExecutor):
+            for future in futures:
+                future.cancel()
         raise
 
 
