@@ -12,13 +12,18 @@ from numpy.typing import ArrayLike, NDArray
 from fastcontact.errors import ModelError, unknown
 from fastcontact.masks import REFUSAL, is_masked
 
+# Size of any number of a formula: cubes of it are still finite.
+LARGEST = 1e60
 PLANE = ("plane_strain", "plane_stress")
 
 
 def number(name: str, value: object) -> float:
     """Return `value` as a finite float, or raise ModelError."""
-    if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
+    # Compared as it is: whole numbers may be longer than floats can be, and NaN is less than nothing.
+    if isinstance(value, bool) or not isinstance(value, numbers.Real) or not abs(value) < math.inf:
         raise ModelError(f"{name} is {value!r}: it must be a finite number")
+    if abs(value) > LARGEST:
+        raise ModelError(f"{name} is out of range: its size must be at most {LARGEST:g}, in any unit")
     return float(value)
 
 
