@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import numbers
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,12 +20,13 @@ PLANE = ("plane_strain", "plane_stress")
 
 def number(name: str, value: object) -> float:
     """Return `value` as a finite float, or raise ModelError."""
-    # Compared as it is: whole numbers may be longer than floats can be, and NaN is less than nothing.
-    if isinstance(value, bool) or not isinstance(value, numbers.Real) or not abs(value) < math.inf:
+    # Compared as it is: whole numbers may be longer than floats can be; NaN is in no order.
+    size: Any = abs(value) if isinstance(value, numbers.Real) and not isinstance(value, bool) else math.nan
+    if not size < math.inf:
         raise ModelError(f"{name} is {value!r}: it must be a finite number")
-    if abs(value) > LARGEST:
+    if size > LARGEST:
         raise ModelError(f"{name} is out of range: its size must be at most {LARGEST:g}, in any unit")
-    return float(value)
+    return float(value)  # type: ignore[arg-type]
 
 
 def array(name: str, values: ArrayLike) -> NDArray[np.float64]:

@@ -178,7 +178,7 @@ def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) 
             raise CaseError(f"the value of '{where}.{key}' must be a number, not {repr(value)}")
     try:
         return function(**arguments)
-    except (TypeError, ValueError, ArithmeticError) as error:
+    except (TypeError, ValueError) as error:
         given = ", ".join(f"{key} = {repr(value)}" for key, value in arguments.items())
         raise CaseError(f"'{where}': {given} are not of the kinds that it takes ({error})") from error
     except FastcontactError as error:
