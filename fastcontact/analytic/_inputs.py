@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import numbers
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,14 +13,20 @@ from numpy.typing import ArrayLike, NDArray
 from fastcontact.errors import ModelError, unknown
 from fastcontact.masks import REFUSAL, is_masked
 
+# Size of any number of a formula: cubes of it are still finite.
+LARGEST = 1e60
 PLANE = ("plane_strain", "plane_stress")
 
 
 def number(name: str, value: object) -> float:
     """Return `value` as a finite float, or raise ModelError."""
-    if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
+    # Compared as it is: whole numbers may be longer than floats can be; NaN is in no order.
+    size: Any = abs(value) if isinstance(value, numbers.Real) and not isinstance(value, bool) else math.nan
+    if not size < math.inf:
         raise ModelError(f"{name} is {value!r}: it must be a finite number")
-    return float(value)
+    if size > LARGEST:
+        raise ModelError(f"{name} is out of range: its size must be at most {LARGEST:g}, in any unit")
+    return float(value)  # type: ignore[arg-type]
 
 
 def array(name: str, values: ArrayLike) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ import signal
 import sys
 from collections.abc import Sequence
 
-INTERRUPTED = 130  # as shells have it
+INTERRUPTED, TERMINATED = 130, 143  # as shells have them
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -33,6 +33,6 @@ def entry_point() -> None:
 
     code = flushed(code)
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is left to say: a second Ctrl-C ends at once
-    if code == INTERRUPTED:
+    if code in (INTERRUPTED, TERMINATED):
         sys.unraisablehook = lambda found: None  # finalisers of what was left half made
     sys.exit(code)

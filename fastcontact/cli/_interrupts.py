@@ -1,5 +1,6 @@
-"""Ctrl-C, which waits until it can be heard.
+"""Ctrl-C and SIGTERM, which wait until they can be heard.
 
+SIGTERM, by which schedulers end a program, is taken as Ctrl-C is: by default it would leave files that are half written.
 Python raises KeyboardInterrupt wherever it happens to be. In a finaliser, and in a function that a library in C calls back,
 such as LLVM while a kernel is compiled, it prints the exception and forgets it: the command would go on. Modules in C make
 another error of it while they are imported.
@@ -14,50 +15,57 @@ import threading
 import traceback
 from collections.abc import Iterator
 from types import FrameType
+from typing import Any
 
 AGAIN = 0.05  # [s]
+# Exit codes as shells have them.
+CODES: dict[int, int] = {signal.SIGINT: 130, signal.SIGTERM: 143}
+HANDLERS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 IMPORTING = ("importlib._bootstrap", "_frozen_importlib")
 COMMAND_LINE = "fastcontact.cli._main"
 
 
 @contextlib.contextmanager
-def interruptible() -> Iterator[None]:
-    """Let Ctrl-C interrupt the block where the exception is not lost; nothing is done where another handler is set."""
+def interruptible(raised: list[int] | None = None) -> Iterator[None]:
+    """Let Ctrl-C and SIGTERM interrupt the block where the exception is not lost.
+
+    The numbers of the signals that did so come into the list `raised`. Those that have another handler keep it.
+    """
+    raised = [] if raised is None else raised
     ours = threading.current_thread() is threading.main_thread()
-    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        yield
-        return
-    raised = threading.Event()
+    numbers = [number for number, usual in HANDLERS.items() if ours and signal.getsignal(number) == usual]
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         if _is_importing(frame):
             _again(number)
         else:
-            raised.set()
+            raised.append(number)
             raise KeyboardInterrupt
 
     try:
         with _lost_ones_come_again(raised):
-            signal.signal(signal.SIGINT, interrupt)
+            for number in numbers:
+                signal.signal(number, interrupt)
             yield
     except Exception as error:
         # Some functions in C make another error of it; what is raised where it was caught is meant.
-        if raised.is_set() and not isinstance(error.__context__, KeyboardInterrupt):
+        if raised and not isinstance(error.__context__, KeyboardInterrupt):
             raise KeyboardInterrupt from error
         raise
     finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        for number in numbers:
+            signal.signal(number, HANDLERS[number])
 
 
 @contextlib.contextmanager
-def _lost_ones_come_again(raised: threading.Event) -> Iterator[None]:
+def _lost_ones_come_again(raised: list[int]) -> Iterator[None]:
     """Repeat an interruption that Python would print and forget; once one was `raised`, finalisers have nothing to say."""
     before = sys.unraisablehook
 
     def lost(found: sys.UnraisableHookArgs) -> None:
         if issubclass(found.exc_type, KeyboardInterrupt):
-            _again(signal.SIGINT)
-        elif not raised.is_set():
+            _again(raised[-1] if raised else signal.SIGINT)
+        elif not raised:
             before(found)
 
     sys.unraisablehook = lost

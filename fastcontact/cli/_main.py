@@ -1,7 +1,7 @@
 """Dispatch to the sub-commands, and turn errors into exit codes.
 
 0: done; 1: wrong input, one clear line; 2: no convergence, the result file keeps all converged steps; 3: a check of the case
-failed (``run --strict``); 130: interrupted from the keyboard, like 2.
+failed (``run --strict``); 130: interrupted from the keyboard, like 2; 143: the same by SIGTERM.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import logging
 import os
 import pkgutil
 import re
+import signal
 import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -19,7 +20,7 @@ from typing import Any
 from fastcontact._jit import compiling
 from fastcontact._version import __version__
 from fastcontact.cli._completion import SHELLS, PrintCompletion
-from fastcontact.cli._interrupts import forget, interruptible
+from fastcontact.cli._interrupts import CODES, forget, interruptible
 from fastcontact.cli._terminal import add_loudness, encodable, printable, say
 from fastcontact.errors import ConvergenceError, FastcontactError, unknown
 
@@ -96,8 +97,9 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
+    raised: list[int] = []
     try:
-        with interruptible():
+        with interruptible(raised):
             return _run(sys.argv[1:] if argv is None else list(argv))
     except ConvergenceError as error:
         say("\n".join([f"no convergence: {error}", *history_lines(error.history), *_notes(error)]), error=True)
@@ -105,13 +107,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     except FastcontactError as error:
         say(f"error: {error}", error=True)
         forget(error)  # a study that was stopped tells it by such an error
-        return 1
+        return CODES[signal.SIGTERM] if signal.SIGTERM in raised else 1
     except BrokenPipeError:
         return 1
     except KeyboardInterrupt as error:
-        say("\n".join(["interrupted", *_notes(error)]), error=True)
+        number = raised[0] if raised else signal.SIGINT
+        say("\n".join(["interrupted" if number == signal.SIGINT else "terminated", *_notes(error)]), error=True)
         forget(error)
-        return 130  # as shells have it
+        return CODES[number]
 
 
 def _run(given: list[str]) -> int:

@@ -9,11 +9,12 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing import connection
 from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnContext, SpawnProcess
 from pathlib import Path
 from typing import Any
 
@@ -160,18 +161,33 @@ def on_processes(count: int, jobs: Sequence[Job], rest: list[int]) -> Iterator[t
         pool.shutdown(wait=False, cancel_futures=True)
 
 
+class Spawning(SpawnContext):
+    """Starts processes and knows them. Forked children of a process with OpenMP threads die, so they are spawned."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.processes: list[SpawnProcess] = []
+
+    def Process(self, *arguments: Any, **options: Any) -> SpawnProcess:  # type: ignore[override]
+        """Return a new process."""
+        self.processes.append(SpawnProcess(*arguments, **options))
+        return self.processes[-1]
+
+
 class Workers(ProcessPoolExecutor):
     """A pool of processes that can be ended in the middle of their work, and that end with this process."""
 
     def __init__(self, count: int) -> None:
-        # Forked children of a process with OpenMP threads die, so workers are spawned.
-        context = multiprocessing.get_context("spawn")
-        heard, self.line = context.Pipe(duplex=False)
-        super().__init__(count, context, initializer=end_with_parent, initargs=(heard,))
+        self.context = Spawning()
+        heard, self.line = self.context.Pipe(duplex=False)
+        super().__init__(count, self.context, initializer=end_with_parent, initargs=(heard,))
 
     def end(self) -> None:
         """End the processes now; Python would wait for what they are doing before it ends itself."""
         self.line.close()
+        for process in self.context.processes:
+            if process.is_alive():  # also while it imports what it needs to read from the line
+                process.terminate()
 
 
 def started_pool(count: int) -> Workers:
@@ -222,9 +238,11 @@ def on_executor(executor: Executor, jobs: Sequence[Job], rest: list[int]) -> Ite
                 futures[executor.submit(run, jobs[index], 1)] = index
         for future in as_completed(futures):
             yield futures[future], future.result()
-    except BaseException:
-        for future in futures:
-            future.cancel()
+    except BaseException as error:
+        # A pool of processes that breaks, or is ended, fails at what was cancelled: it tells those that wait itself.
+        if not isinstance(executor, Workers) and not isinstance(error, BrokenExecutor):
+            for future in futures:
+                future.cancel()
         raise
 
 

@@ -231,3 +231,24 @@ def test_constants_of_transversely_isotropic_materials(name, value):
     good = {"E_along": 10.0, "E_across": 1.0, "nu_along": 0.3, "nu_across": 0.3, "G_along": 1.0}
     with pytest.raises(fc.ModelError, match=f"{name} of a transversely isotropic material must be a number"):
         fc.Orthotropic.transversely_isotropic(**{**good, name: value})
+
+
+@pytest.mark.parametrize("value", [10**400, 1e300, float("inf"), float("nan"), 1j, True, "1", [1.0]])
+@pytest.mark.parametrize("name", sorted(fc.analytic.THEORIES))
+def test_numbers_of_theories_are_in_range(name, value):
+    """No argument of any theory makes an error of Python's own; infinity is a plane where there is one."""
+    good = {
+        "E": 1.0, "nu": 0.3, "E1": 1.0, "nu1": 0.3, "R1": 1.0, "R": 1.0, "force": 1.0, "friction": 0.1, "approach": 0.01,
+        "tangential_force": 0.01, "radius": 1.0, "slope_angle": 3.0, "half_width": 1.0, "inner_radius": 1.0, "R1x": 1.0,
+        "outer_radius": 2.0, "thickness": 1.0, "clearance": 1e-3, "R1y": 1.0,
+    }  # fmt: skip
+    factory = fc.analytic.THEORIES[name]
+    parameters = inspect.signature(factory).parameters
+    needed = {key: good.get(key, 1.0) for key, p in parameters.items() if p.default is p.empty}
+    refused = 0
+    for key in parameters:
+        try:
+            factory(**{**needed, key: value})
+        except fc.FastcontactError:
+            refused += 1
+    assert refused >= len(needed) - 2  # at least all but radii that may be infinite

@@ -377,10 +377,6 @@ class Building:
     def _ramp(self, conditions: Conditions) -> Ramp:
         """Return the ends of all steps, of the increments of steps with friction, and the corners of all histories."""
         steps = self.content.steps
-        if not steps:
-            raise Place(self.content.title or "the deck", 0, "STEP").refuse(
-                "the deck has no step, so nothing is loaded"
-            )
         instants = {float(number) for number in range(1, len(steps) + 1)}
         if any(pair.options.get("friction") for pair in self.model.contact):
             for number, step in enumerate(steps):

@@ -97,7 +97,8 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
             _add(model, members, shape)
         return
     for place, time in enumerate(times):  # histories that differ from node to node: one field for each corner of them
-        hat = tuple((other, float(other == time)) for other in times[max(place - 1, 0) : place + 2])
+        around = sorted({times[0], *times[max(place - 1, 0) : place + 2], times[-1]})
+        hat = tuple((other, float(other == time)) for other in around)
         values = {point: _at(table, time) for point, table in rises.items()}
         _add(model, [(point, value) for point, value in values.items() if value], hat)
 

@@ -106,6 +106,27 @@ def test_mistakes_name_the_key(write, old, new, message):
         read_case(write(GOOD.replace(old, new, 1)))
 
 
+def test_a_file_of_another_size_than_cases_have_is_not_parsed(tmp_path):
+    path = tmp_path / "huge.toml"
+    with open(path, "wb") as file:
+        file.truncate(1 << 40)  # takes no room
+    with pytest.raises(fc.CaseError, match=r"larger than \d+ MB: put its mesh into a file of its own"):
+        read_case(path)
+
+
+def test_keys_of_another_kind_than_a_generator_takes_are_told(write):
+    text = GOOD.replace("size = 10.0", "size = [10.0]")
+    with pytest.raises(fc.CaseError, match=r"'mesh': .*size of half_spheres must be a number"):
+        read_case(write(text))
+
+
+def test_theories_out_of_the_range_of_numbers_are_told(write):
+    with pytest.raises(
+        fc.CaseError, match=r"'theory.hertz': approach is out of range: its size must be at most 1e\+60"
+    ):
+        read_case(write(GOOD.replace("approach = 4.0", "approach = 1e300")))
+
+
 def test_a_missing_file_is_told(tmp_path):
     with pytest.raises(fc.CaseError, match=r"does not exist"):
         read_case(tmp_path / "none.toml")

@@ -118,6 +118,10 @@ def test_it_says_what_is_compared():
         ({}, r"check\[0\] needs 'quantity'"),
         ({"quantity": "pole.pressure"}, "either 'theory'.* or 'value'"),
         ({"quantity": "pole.pressure", "value": 1.0, "theory": "hertz"}, "either 'theory'.* or 'value'"),
+        (
+            {"quantity": "pole.pressure", "value": 0.0},
+            r"check\[0\]: the value is 0, so no relative deviation can be told",
+        ),
         ({"quantity": "poll.pressure", "value": 1.0}, "'poll': did you mean 'pole'"),
         ({"quantity": "pole.presure", "value": 1.0}, "did you mean 'pressure'"),
         ({"quantity": "hertz.stickradius", "value": 1.0}, "did you mean 'stick_radius'"),

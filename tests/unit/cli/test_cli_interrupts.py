@@ -3,6 +3,7 @@
 import contextlib
 import ctypes
 import importlib
+import json
 import os
 import pathlib
 import signal
@@ -115,6 +116,36 @@ def test_elsewhere_it_comes_at_once():
         signal.raise_signal(signal.SIGINT)
 
 
+def test_sigterm_is_told_in_its_own_words(monkeypatch, capsys):
+    """Exit code 143, also of a study, which says how to go on; afterwards it ends the process as before."""
+    from fastcontact.cli import env
+
+    def terminated(options):
+        signal.raise_signal(signal.SIGTERM)
+
+    def stopped(options):
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except KeyboardInterrupt:
+            raise FastcontactError("stopped; go on so") from None
+
+    for act, said in ((terminated, "terminated\n"), (stopped, "error: stopped; go on so\n")):
+        monkeypatch.setattr(env, "run", act)
+        assert main(["env"]) == 143
+        assert capsys.readouterr().err == said
+        assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+
+
+@pytest.mark.parametrize("where", [in_an_import, in_a_finaliser])
+def test_a_sigterm_that_would_be_lost_comes_later(where, capsys):
+    raised = []
+    with interruptible(raised):
+        where(lambda: signal.raise_signal(signal.SIGTERM))
+        interrupted_within(60)
+    assert signal.SIGTERM in raised
+    assert capsys.readouterr().err == ""
+
+
 def test_the_handler_of_another_program_stays():
     heard = []
     before = signal.signal(signal.SIGINT, lambda *_: heard.append(1))
@@ -219,3 +250,58 @@ def test_no_traceback_is_printed(command, when, tmp_path):
     assert said.startswith(
         ("interrupted\n", "error: stopped; with --store DIR the same command would go on where it stopped")
     )
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_no_half_written_file_stays(number, tmp_path):
+    """The signal comes while a picture is written to a file that is to take the place of another."""
+    (tmp_path / "out.png").write_bytes(b"before")
+    process = subprocess.Popen(
+        [
+            sys.executable, "-m", "fastcontact", "sweep", "forma04a", "--set", "approach=1,2", "--workers", "1", "-q",
+            "--png", "out.png",
+        ],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, cwd=tmp_path,
+    )  # fmt: skip
+    while sorted(os.listdir(tmp_path)) in (["out.png"], []):
+        assert process.poll() is None, process.communicate()[1]
+        time.sleep(0.001)
+    process.send_signal(number)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == {signal.SIGINT: 130, signal.SIGTERM: 143}[number], said
+    assert said == {signal.SIGINT: "interrupted\n", signal.SIGTERM: "terminated\n"}[number]
+    assert os.listdir(tmp_path) == ["out.png"]
+    assert (tmp_path / "out.png").read_bytes() == b"before"
+
+
+def of_session(leader):
+    """Return the processes of a session that run; what has ended may keep its entry."""
+    found = []
+    for entry in pathlib.Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            state, _, _, session = (entry / "stat").read_text(encoding="utf-8").rpartition(")")[2].split()[:4]
+            found += [int(entry.name)] * (int(session) == leader and state != "Z")
+    return found
+
+
+def test_the_end_of_a_study_by_sigterm(tmp_path):
+    """As a scheduler does it: no process stays, nothing but one line is said, what was finished is kept."""
+    process = subprocess.Popen(
+        [
+            sys.executable, "-m", "fastcontact", "sweep", "forma04c", "--set", "approach=1:4:400", "--workers", "2", "-q",
+            "--store", "store",
+        ],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, cwd=tmp_path,
+    )  # fmt: skip
+    while len(list(tmp_path.glob("store/*.json"))) < 3:
+        assert process.poll() is None, process.communicate()[1]
+        time.sleep(0.005)
+    process.terminate()
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 143, said
+    assert said == "error: stopped; the same command goes on where it stopped, with the runs in store\n"
+    deadline = time.monotonic() + 20
+    while left := of_session(process.pid):
+        assert time.monotonic() < deadline, f"{left} still run"
+        time.sleep(0.05)
+    assert all(json.loads(path.read_text(encoding="utf-8"))["result"] for path in tmp_path.glob("store/*"))

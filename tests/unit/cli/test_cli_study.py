@@ -132,7 +132,7 @@ class Sized(float):
 execute.run = endless
 if __name__ == "__main__":
     print("begun", flush=True)
-    for _ in on_processes(2, [Sized(0.0), Sized(600.0), Sized(600.0)], [0, 1, 2]):
+    for _ in on_processes(2, [Sized(0.0), *[Sized(600.0)] * 20], [*range(21)]):
         raise KeyboardInterrupt
 """
 
@@ -142,6 +142,7 @@ def test_a_study_that_is_interrupted_does_not_wait_for_its_runs(tmp_path):
     script.write_text(STOPPED)
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=300, check=False)
     assert done.stdout == "begun\n"
+    assert done.stderr.count("Traceback") == 1, "a thread of the pool failed, too"
     assert done.stderr.rstrip().endswith("KeyboardInterrupt")
     assert done.returncode not in (0, 1)
 

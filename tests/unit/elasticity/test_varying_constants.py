@@ -422,6 +422,22 @@ def test_density_and_expansion_of_any_material_may_vary():
     np.testing.assert_allclose(results[0].displacement, results[1].displacement, atol=1e-14)
 
 
+def test_the_contrast_of_materials_that_vary_is_that_of_their_cells():
+    """Nearly incompressible, or soft in one direction: linear solvers are told, whether the constants vary or not."""
+    found = {}
+    for nu in (0.499, lambda points: np.full(len(points), 0.499)):
+        model = fc.Model(fc.generate.block(), "plane_strain")
+        model.add_material(fc.LinearElastic(1000.0, nu))
+        found[callable(nu)] = model.material_field().contrast
+    assert found[False] == pytest.approx(0.499 / 0.002)
+    assert found[True] == pytest.approx(found[False])
+    soft = {"E": (1e5, 5e4, 2e4), "nu": (0.0, 0.0, 0.0), "G": (1e4, 1e4, 1e4)}
+    for axes in (None, fc.CylindricalAxes((-5.0, 0.5, 0.0), (0.0, 0.0, 1.0))):
+        model = fc.Model(fc.generate.box(divisions=(2, 2, 2)), "3d")
+        model.add_material(fc.Orthotropic(**soft, axes=axes))
+        assert model.material_field().contrast == pytest.approx((5.0 - 1.0) / 3.0, rel=0.01)
+
+
 def test_contact_and_warnings_know_the_range_of_moduli():
     """The softest place scales contact; moduli that differ much are told; without cells nothing is known of them."""
     mesh = fc.generate.block_on_block("quad4", divisions_lower=(4, 2), divisions_upper=(4, 2))

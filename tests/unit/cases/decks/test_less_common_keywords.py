@@ -1,0 +1,319 @@
+"""Keywords of decks that few use: each must do what it says, which forces and displacements tell."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from deck_text import CONTACT, MATERIAL, NODES, STEP, SUPPORTS, WHOLE, deck_of
+from test_refusals import FLAT, SPRING, before, in_parts
+from test_temperatures import TIED, heated
+from test_tightening import BAR, HELD, TIGHT, cooled
+
+import fastcontact as fc
+
+
+def notes_of(deck):
+    return "\n".join(deck.notes)
+
+
+def test_a_node_set_of_an_assembly_names_sets_of_instances(tmp_path):
+    """`i.bottom` is the set of the part, in the instance."""
+    sets = "*Nset, nset=held\ni.bottom\n"
+    text = in_parts(further=sets) + CONTACT.replace("ss, sm", "i.ss, i.sm")
+    text += SUPPORTS.replace("bottom,", "held,").replace("x0,", "i.x0,").replace("y0,", "i.y0,")
+    deck = deck_of(tmp_path, text + STEP.replace("roof", "i.roof"))
+    (step,) = deck.solve()
+    assert step.reaction[deck.points_of("held"), 2].sum() == pytest.approx(100.0)
+
+
+def test_a_keyword_goes_on_over_comments_and_to_the_end_of_the_file(tmp_path):
+    text = WHOLE.replace("*Surface Interaction, name=si\n", "*Surface Interaction,\n** a comment\nname=si\n")
+    assert deck_of(tmp_path, text).solve()[0].contact["ss/sm"].force[2] == pytest.approx(100.0)
+    deck = deck_of(tmp_path, WHOLE.replace("*End Step\n", "*End Step,"))
+    assert deck.ramp.instants == (1.0,)
+
+
+def test_a_deck_that_is_not_there(tmp_path):
+    with pytest.raises(fc.FileError, match=r"none\.inp"):
+        fc.read_deck(tmp_path / "none.inp")
+    with pytest.raises(fc.FileError, match="is a folder: name a file in it"):
+        fc.read_deck(tmp_path)
+
+
+def test_a_file_that_is_lost_while_the_deck_is_read(tmp_path, monkeypatch):
+    def lost(*_, **__):
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(Path, "read_text", lost)
+    (tmp_path / "deck.inp").write_bytes(WHOLE.encode())
+    with pytest.raises(fc.FileError, match=r"cannot read '.*deck\.inp': Input/output error"):
+        fc.read_deck(tmp_path / "deck.inp")
+
+
+CYLINDRICAL = """*Orientation, name=round, system=CYLINDRICAL
+-5., 0.5, 0., -5., 0.5, 1.
+"""
+
+
+def test_materials_with_cylindrical_axes(tmp_path):
+    """Far from the axis, radial is along x: a bar along z has E3."""
+    law = "*Elastic, type=engineering constants\n1.e5, 5.e4, 2.e4, 0., 0., 0., 1.e4, 1.e4,\n1.e4\n"
+    text = before("*Material, name=steel", CYLINDRICAL).replace("*Elastic\n200000., 0.\n", law)
+    deck = deck_of(tmp_path, text.replace(", material=steel\n", ", material=steel, orientation=round\n"))
+    (step,) = deck.solve()
+    assert step.displacement[deck.point(17), 2] == pytest.approx(-100.0 * 2 / 2e4)
+
+
+SKEW = np.array([1.0, 0.0, 1.0]) / np.sqrt(2.0)
+
+
+def test_supports_along_skew_axes(tmp_path):
+    """The foot slides on a plane at 45 degrees: half of the force comes back along x, and it is all found at the supports."""
+    turned = "*Transform, nset=bottom, type=R\n1., 0., 1., 0., 1., 0.\n"
+    text = before("*Boundary\n", turned).replace("bottom, 3\n", "bottom, 1\ntop, 1\n").replace("x0, 1\n", "")
+    text = text.replace(*TIED).replace("*Dsload\nroof, P, 100.\n", "*Cload\ntop, 3, -25.\n")
+    deck = deck_of(tmp_path, text)
+    (step,) = deck.solve()
+    foot = step.reaction[deck.points_of("bottom")]
+    assert foot.sum(axis=0) @ SKEW == pytest.approx(100.0 * np.sqrt(2.0))
+    assert np.abs(step.displacement[deck.points_of("bottom")] @ SKEW).max() < 1e-12
+    total = step.reaction.sum(axis=0)
+    assert total[[0, 2]] == pytest.approx([0.0, 100.0], abs=1e-7)
+    equal = before("*Boundary\n", "*Equation\n2\n15, 3, 1., 16, 3, -1.\n", text)
+    deck = deck_of(tmp_path, equal)
+    (step,) = deck.solve()
+    assert np.ptp(step.displacement[[deck.point(15), deck.point(16)], 2]) < 1e-14
+    assert step.reaction[deck.points_of("bottom")].sum(axis=0) @ SKEW == pytest.approx(100.0 * np.sqrt(2.0))
+    assert (
+        np.abs(step.reaction[[deck.point(15), deck.point(16)], 2]).max() < 1e-7
+    )  # forces of the equation are no reactions
+
+
+def test_supports_on_skew_axes_must_stay(tmp_path):
+    turned = "*Transform, nset=bottom, type=R\n1., 0., 1., 0., 1., 0.\n"
+    text = before("*Boundary\n", turned).replace("bottom, 3\n", "bottom, 1\n")
+    text += "*Step\n*Static\n*Boundary, op=NEW\ntop, 3\nx0, 1\ny0, 2\n*End Step\n"
+    with pytest.raises(fc.CaseError, match=r"leaves out 2 supports .*first: component 1 of node 2"):
+        deck_of(tmp_path, text)
+
+
+RIGID = "*Node, nset=ref\n90, 0.5, 0.5, 2.5\n*Rigid Body, elset=up, ref node=90\n"
+
+
+def test_supports_of_rotations_must_stay(tmp_path):
+    text = NODES + RIGID + MATERIAL + CONTACT + "*Boundary\nbottom, 1, 3\nref, 1, 2\nref, 4, 6\n"
+    steps = STEP.replace("*Dsload\nroof, P, 100.\n", "*Cload\nref, 3, -1.\n")
+    dropped = "*Step\n*Static\n*Boundary, op=NEW\nbottom, 1, 3\nref, 1, 2\nref, 4, 5\n*End Step\n"
+    with pytest.raises(fc.CaseError, match=r"leaves out 1 supports .*first: rotation 3 of a reference node"):
+        deck_of(tmp_path, text + steps + dropped)
+
+
+def test_a_rotation_node_of_a_rigid_body_in_its_own_place(tmp_path):
+    """ROT NODE: its displacement components are rotations."""
+    rigid = RIGID.replace("*Rigid", "*Node, nset=rot\n91, 0.5, 0.5, 2.5\n*Rigid").replace("=90\n", "=90, rot node=91\n")
+    load = "*Boundary\nref, 1, 2\nrot, 1\nrot, 3\n*Cload\nref, 3, -1.\nrot, 2, 0.1\n"
+    text = NODES + rigid + MATERIAL + CONTACT + "*Boundary\nbottom, 1, 3\n" + STEP
+    deck = deck_of(tmp_path, text.replace("*Dsload\nroof, P, 100.\n", load))
+    (step,) = deck.solve()
+    contact = step.contact["ss/sm"]
+    assert contact.force[2] == pytest.approx(1.0)
+    moment = (contact.force_vectors[:, 2] * (contact.coordinates[:, 0] - 0.5)).sum()
+    assert moment == pytest.approx(0.1, rel=1e-3)
+
+
+def test_two_couplings_share_the_rotation_of_a_node(tmp_path):
+    """Both sides of a plane strip follow one node: a moment turns the strip as a whole."""
+    links = (
+        "*Node\n9, 1., 2.\n*Surface, name=left\none, S3\n*Surface, name=right\ntwo, S3\n"
+        "*Coupling, constraint name=a, ref node=9, surface=left\n*Kinematic\n1, 2\n"
+        "*Coupling, constraint name=b, ref node=9, surface=right\n*Kinematic\n1, 2\n"
+    )
+    text = before("*Material", links, FLAT).replace("5, 1, 1.\n", "9, 2, -1.\n")
+    deck = deck_of(tmp_path, text)
+    (step,) = deck.solve()
+    top = [deck.point(n) for n in (3, 4, 6)]
+    moved = step.displacement[top]
+    x = deck.model.mesh.points[top, 0]
+    turn = np.polyfit(x, moved[:, 1], 1)
+    assert np.polyval(turn, x) == pytest.approx(moved[:, 1], abs=1e-12)
+    assert abs(turn[0]) > 1e-6
+    assert step.reaction[:, 1].sum() == pytest.approx(1.0)
+
+
+END = """*Node
+9, 2., 0.5
+*Surface, name=right
+two, S2
+*Coupling, constraint name=a, ref node=9, surface=right
+*Kinematic
+1, 2
+"""
+
+
+def test_a_plane_coupling_whose_rotation_nothing_asks_for_is_determined(tmp_path):
+    deck = deck_of(tmp_path, before("*Material", END, FLAT).replace("5, 1, 1.\n", "9, 1, 1.\n"))
+    (step,) = deck.solve()
+    assert step.reaction[:, 0].sum() == pytest.approx(-1.0)
+    assert np.ptp(step.displacement[[deck.point(5), deck.point(6)], 0]) < 1e-3 * np.abs(step.displacement).max()
+
+
+def test_couplings_in_axisymmetry_are_refused(tmp_path):
+    text = before("*Material", END, FLAT).replace("CPE4", "CAX4")
+    with pytest.raises(fc.CaseError, match=r"is not supported in axisymmetric models: relate the nodes by \*EQUATION"):
+        deck_of(tmp_path, text)
+
+
+def test_body_forces_by_volume_skip_what_is_no_solid(tmp_path):
+    """BX on a set of a solid and a spring."""
+    both = before("*Boundary\n", SPRING + "*Spring, elset=springs\n\n1.\n*Elset, elset=both\n1, 2, 7\n")
+    deck = deck_of(tmp_path, both.replace("*Dsload\nroof, P, 100.\n", "*Dload\nboth, BZ, -3.\n"))
+    (step,) = deck.solve()
+    assert step.reaction[deck.points_of("bottom"), 2].sum() == pytest.approx(6.0, rel=1e-6)
+
+
+GAPS = """*Node
+25, 0., 0., 3.
+26, 1., 0., 3.
+27, 1., 1., 3.
+28, 0., 1., 3.
+*Element, type=GAPUNI, elset=gaps
+31, 15, 25
+32, 16, 26
+33, 17, 27
+34, 18, 28
+*Nset, nset=ceiling, generate
+25, 28
+*Gap, elset=gaps
+0.001, 0., 0., 1.
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("bottom, 3\n", "bottom, 3\n"), "to nodes that are held at rest only"),
+        (("15, 0., 0., 2.\n", "15, 0., 0., 2.1\n"), "their nodes lie in a plane across their direction"),
+    ],
+)
+def test_gap_elements_that_are_no_plane_at_rest(tmp_path, change, said):
+    held = "bottom, 3\n" if "rest" in said else "bottom, 3\nceiling, 1, 3\n"
+    text = before("*Boundary\n", GAPS).replace(*change).replace("bottom, 3\n", held)
+    with pytest.raises(fc.CaseError, match=said):
+        deck_of(tmp_path, text)
+
+
+def test_fixed_supports_keep_where_they_are(tmp_path):
+    """*BOUNDARY, FIXED after a step that moved them; in the first step it holds them at zero."""
+    steps = [
+        "*Boundary\ntop, 3, 3, -0.01\n",
+        "*Boundary, fixed\ntop, 3\n",
+    ]
+    text = WHOLE.replace(STEP, "".join(f"*Step\n*Static\n{lines}*End Step\n" for lines in steps))
+    found = [step.contact["ss/sm"].force[2] for step in deck_of(tmp_path, text).solve()]
+    assert found == pytest.approx([1000.0, 1000.0])
+    text = WHOLE.replace("*Dsload\nroof, P, 100.\n", "*Boundary, fixed\ntop, 3\n*Cload\n5, 3, 100.\n")
+    (step,) = deck_of(tmp_path, text).solve()
+    assert np.abs(step.displacement[deck_of(tmp_path, text).points_of("top"), 2]).max() == 0.0
+
+
+def test_an_amplitude_over_the_total_time_goes_on_in_later_steps(tmp_path):
+    wave = "*Amplitude, name=wave, time=TOTAL TIME\n0., 0., 1., 1., 2., 0.5, 3., 0.\n"
+    steps = "*Step\n*Static\n*Dsload, amplitude=wave\nroof, P, 100.\n*End Step\n" + "*Step\n*Static\n*End Step\n" * 2
+    text = WHOLE.replace(SUPPORTS, wave + SUPPORTS).replace(STEP, steps)
+    found = [step.contact["ss/sm"].force[2] for step in deck_of(tmp_path, text).solve()]
+    assert found == pytest.approx([100.0, 50.0, 0.0], abs=1e-9)
+
+
+def test_steps_one_by_one_are_those_of_solve(tmp_path):
+    deck = deck_of(tmp_path, WHOLE)
+    (one,), (other,) = list(deck.solve_steps()), deck.solve()
+    assert np.array_equal(one.reaction, other.reaction)
+    assert np.array_equal(one.displacement, other.displacement)
+
+
+def test_incompatible_modes_are_left_out_in_axisymmetry_and_said(tmp_path):
+    deck = deck_of(
+        tmp_path,
+        FLAT.replace("CPE4", "CAX4I").replace("1000., 0.3", "1000., 0.").replace("4, 1\n", "4, 1\n2, 2\n5, 2\n"),
+    )
+    assert "CAX4I: without incompatible modes: stiffer where thin parts" in notes_of(deck)
+    assert not deck.model.materials[0][0].incompatible_modes
+
+
+def test_initial_stresses_of_springs_are_refused_and_of_zero_change_nothing(tmp_path):
+    with_spring = before("*Boundary\n", SPRING + "*Spring, elset=springs\n\n1.\n")
+    with pytest.raises(fc.CaseError, match="element 7 is no solid, so it has no initial stress"):
+        deck_of(tmp_path, before("*Step", "*Initial Conditions, type=STRESS\n7, 1., 1., 1., 0., 0., 0.\n", with_spring))
+    deck = deck_of(tmp_path, before("*Step", "*Initial Conditions, type=STRESS\n1, 0., 0., 0., 0., 0., 0.\n"))
+    assert deck.model.initial_states == []
+
+
+def test_elements_inside_out_are_turned_and_said(tmp_path):
+    text = WHOLE.replace("1, 1, 2, 3, 4, 5, 6, 7, 8\n*Element", "1, 4, 3, 2, 1, 8, 7, 6, 5\n*Element")
+    deck = deck_of(tmp_path, text)
+    assert "1 elements were inside out and are turned" in notes_of(deck)
+    assert deck.solve()[0].contact["ss/sm"].force[2] == pytest.approx(100.0)
+
+
+def test_anisotropic_moduli_in_the_order_of_decks(tmp_path):
+    """21 of them, the upper triangle by columns 11, 22, 33, 12, 13, 23: a bar along z has what the whole matrix says."""
+    # Columns of the upper triangle: 11; 12, 22; 13, 23, 33; then shears without coupling.
+    moduli = [3e5, 1e5, 4e5, 1e5, 1e5, 2e5, 0, 0, 0, 7e4, 0, 0, 0, 0, 8e4, 0, 0, 0, 0, 0, 9e4]
+    lines = ",\n".join(", ".join(f"{v:g}" for v in moduli[k : k + 8]) for k in (0, 8, 16)) + "\n"
+    text = WHOLE.replace("*Elastic\n200000., 0.\n", f"*Elastic, type=anisotropic\n{lines}")
+    deck = deck_of(tmp_path, text)
+    D = np.array([[3e5, 1e5, 1e5], [1e5, 4e5, 1e5], [1e5, 1e5, 2e5]])
+    (step,) = deck.solve()
+    strain = np.linalg.solve(D, [0.0, 0.0, -100.0])
+    assert step.displacement[deck.point(17)] == pytest.approx(strain * [1.0, 1.0, 2.0], rel=1e-6)
+    full = deck.model.materials[0][0].moduli("3d")
+    assert np.diag(full)[3:] == pytest.approx([7e4, 9e4, 8e4])  # xy, yz, xz
+
+
+def test_a_locked_section_may_be_named_again_in_a_new_list(tmp_path):
+    """OP=NEW must name it, or it is refused."""
+    again = "*Boundary, op=NEW\nbottom, 1, 3\ntop, 1, 3\n"
+    text = BAR + TIGHT + cooled(HELD) + f"*Step\n*Static\n{again}{HELD}*End Step\n"
+    found = deck_of(tmp_path, text).solve()
+    assert len(found) == 3
+    assert np.allclose(found[2].displacement, found[1].displacement, atol=1e-12)
+    with pytest.raises(fc.CaseError, match="is let go here: once locked it stays so"):
+        deck_of(tmp_path, text.replace(f"{again}{HELD}", again))
+
+
+def test_a_section_has_one_normal(tmp_path):
+    with pytest.raises(fc.CaseError, match="2 data lines where one is needed, the normal"):
+        deck_of(tmp_path, BAR.replace("0., 0., 1.\n*Boundary", "0., 0., 1.\n0., 0., 1.\n*Boundary") + TIGHT)
+
+
+def test_a_distributing_coupling_whose_nodes_leave_a_rotation_free_is_refused_with_its_line(tmp_path):
+    """In space, a surface that is one edge wide would do; one facet without width cannot be made, so nodes on a line are."""
+    thin = NODES.replace("16, 1., 0., 2.", "16, 1e-13, 0., 2.").replace("17, 1., 1., 2.", "17, 1e-13, 1., 2.")
+    coupling = "*Node\n90, 0., 0.5, 3.\n*Coupling, constraint name=c, ref node=90, surface=roof\n*Distributing\n1, 6\n"
+    with pytest.raises(fc.CaseError, match=r"\*COUPLING|\*DISTRIBUTING"):
+        deck_of(tmp_path, thin + coupling + MATERIAL + CONTACT + SUPPORTS + STEP)
+
+
+def test_no_separation_holds_what_was_once_closed(tmp_path):
+    """Pressed, then pulled: the pull goes through the contact."""
+    text = WHOLE.replace("name=si\n", "name=si\n*Surface Behavior, no separation\n")
+    deck = deck_of(tmp_path, text + STEP.replace("100.", "-40."))
+    forces = [step.contact["ss/sm"].force[2] for step in deck.solve()]
+    assert forces == pytest.approx([100.0, -40.0])
+
+
+def test_stabilisation_is_noted(tmp_path):
+    deck = deck_of(tmp_path, WHOLE.replace("*Static\n", "*Static, stabilize=0.0002\n"))
+    assert "STABILIZE has no effect" in notes_of(deck)
+
+
+def test_temperatures_of_nodes_that_each_go_their_own_way(tmp_path):
+    """No two histories have one shape: one field for each corner, and the sums are what the deck says."""
+    nodes = (*range(1, 9), *range(11, 19))
+    given = [{n: 20.0 + 3.0 * n**k - 7.0 * k * n for n in nodes} | {7: 20.0} for k in range(3)]
+    steps = ["*Temperature\n" + "".join(f"{n}, {value}\n" for n, value in values.items()) for values in given]
+    deck = deck_of(tmp_path, heated(steps=steps))
+    assert len(deck.model.temperatures) == 3
+    for step, values in zip(deck.solve(), given, strict=True):
+        rise = deck.model.temperature_rise(step.iterations["temperature_factors"])
+        assert [rise[deck.point(n)] for n in nodes] == pytest.approx([values[n] - 20.0 for n in nodes])
