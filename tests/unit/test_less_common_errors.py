@@ -294,3 +294,106 @@ def test_a_sweep_shows_itself(tmp_path):
     assert repr(study).startswith("Sweep of 'forma04a'\n")
     assert study._repr_html_().count("<tr") == 3
     assert caption in study._repr_html_()
+
+
+def test_a_disk_that_fails_while_hdf5_writes_is_told_once(tmp_path):
+    """The first error is kept, nothing is written after it, and HDF5 sees no exception."""
+    from fastcontact.mesh.files.hdf5_driver import DriverFile
+
+    path = tmp_path / "a.med"
+    path.write_bytes(b"before")
+    file = DriverFile(path)
+    failing = OSError(errno.ENOSPC, "No space left on device")
+
+    def full(*_):
+        raise failing
+
+    before, file._file = (
+        file._file,
+        types.SimpleNamespace(write=full, truncate=full, seek=full, fileno=file._file.fileno),
+    )
+    assert file.truncate(100) == 100
+    assert file.write(b"abc") == 3
+    file._file = before
+    assert file.truncate(0) == 0
+    file.write(b"abc")
+    assert file.failure is failing
+    with pytest.raises(OSError, match="No space left"):
+        file.check()
+    assert path.read_bytes() == b"before"
+
+
+MAIL = "TITRE\n{}\nFINSF\nCOOR_2D\nN1 0. 0.\nN2 1. 0.\nN3 0. 1.\nFINSF\nTRIA3\n{}\nFINSF\nFIN\n"
+
+
+def test_files_of_code_aster_that_are_no_mesh(tmp_path, monkeypatch):
+    path = tmp_path / "a.mail"
+    path.write_text(MAIL.format("a title of TRIA3 words", "M1 N1 N2 N3"))
+    assert fc.read_mesh(path).n_points == 3
+    path.write_text("TITRE\nwithout an end\n")
+    with pytest.raises(fc.FileError, match=r"cut off|FIN"):
+        fc.read_mesh(path)
+    path.write_text("COOR_2D\nN1 0. 0.\nFINSF\nFIN\n")
+    with pytest.raises(fc.MeshError, match=r"'.*a\.mail': "):
+        fc.read_mesh(path)
+
+
+def test_arrays_of_meshio_that_do_not_fit_together():
+    cells = [("triangle", np.array([[0, 1, 2]]))]
+    found = meshio.Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), cells)
+    found.cell_sets = {"A": [np.array([0]), np.array([3])]}
+    found.cell_data = {"gmsh:physical": [np.array([1, 2, 3])]}
+    with pytest.raises(fc.MeshError, match="meshio's mesh"):
+        fc.from_meshio(found)
+
+
+def test_groups_without_points():
+    mesh = SQUARE.with_groups(points={"NONE": []})
+    for act in (
+        lambda m: m.add_periodicity("NONE", "NONE"),
+        lambda m: m.add_spring("LEFT", "NONE", x=1.0),
+    ):
+        with pytest.raises(fc.FastcontactError, match=r"'NONE'.* is empty"):
+            act(model(mesh))
+
+
+def test_the_first_of_several_changes():
+    from fastcontact.analysis.active_set import _first_changed
+
+    active, wanted = np.array([True, False, True, False]), np.array([True, True, False, False])
+    assert _first_changed(active, wanted).tolist() == [True, True, True, False]
+    assert active.tolist() == [True, False, True, False]
+
+
+def test_without_supports_there_is_no_plane_of_symmetry():
+    from fastcontact.contact.contact_middle import symmetry_planes
+
+    assert symmetry_planes(None, SQUARE.points, None) == []
+
+
+def test_loads_on_groups_of_cells_and_facets_act_on_the_cells():
+    facets = SQUARE.cell_groups["TOP"].tolist()
+    solids = [SQUARE.offsets[name] + k for name, block in SQUARE.solids.items() for k in range(len(block))]
+    mesh = SQUARE.with_groups(cells={"BOTH": [*solids, *facets]})
+    found = model(mesh)
+    found.fix("BOTTOM", "xy")
+    found.add_body_force("BOTH", y=-1.0)
+    area = fc.quality(mesh).measure
+    assert fc.solve(found, 1)[0].reaction[:, 1].sum() == pytest.approx(area)
+
+
+def test_stresses_along_the_normal_of_a_contact_in_the_plane():
+    """Without an axis of symmetry the line begins at the largest pressure, along the normal there."""
+    pytest.importorskip("matplotlib")
+    mesh = fc.generate.block(divisions=(6, 6))
+    found = fc.Model(mesh, "plane_strain")
+    found.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    found.fix("BOTTOM", "xy")
+    top = mesh.points[:, 1].max()
+    ball = fc.obstacles.Sphere((0.4, top + 5.0), 5.0)
+    found.add_obstacle("ball", secondary="TOP", obstacle=ball, motion={"y": -0.01})
+    last = fc.solve(found, 1)[-1]
+    ax = fc.plot.axis_stress(mesh, last, "ball")
+    depths = np.concatenate([line.get_xdata() for line in ax.get_lines()])
+    assert depths.max() <= 1.0 + 1e-9
+    assert depths.max() > 0.1
