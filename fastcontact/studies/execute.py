@@ -21,6 +21,7 @@ from typing import Any
 from fastcontact import errors
 from fastcontact.errors import CaseError, FastcontactError, FileError
 from fastcontact.mesh.files.paths import replacing
+from fastcontact.results.committed_file import uninterrupted
 from fastcontact.studies.job import Job, run
 
 Result = dict[str, Any]
@@ -161,16 +162,25 @@ def on_processes(count: int, jobs: Sequence[Job], rest: list[int]) -> Iterator[t
         pool.shutdown(wait=False, cancel_futures=True)
 
 
+class Worker(SpawnProcess):
+    """A process whose start nothing interrupts: one that is half started would print that its input ended."""
+
+    def start(self) -> None:
+        """Start it; signals wait meanwhile."""
+        with uninterrupted():
+            super().start()
+
+
 class Spawning(SpawnContext):
     """Starts processes and knows them. Forked children of a process with OpenMP threads die, so they are spawned."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.processes: list[SpawnProcess] = []
+        self.processes: list[Worker] = []
 
-    def Process(self, *arguments: Any, **options: Any) -> SpawnProcess:  # type: ignore[override]
+    def Process(self, *arguments: Any, **options: Any) -> Worker:  # type: ignore[override]
         """Return a new process."""
-        self.processes.append(SpawnProcess(*arguments, **options))
+        self.processes.append(Worker(*arguments, **options))
         return self.processes[-1]
 
 

@@ -24,10 +24,6 @@ class ModelMaterials(ModelBase):
     def add_material(self, material: Material, groups: Sequence[str] | str | None = None) -> None:
         """Give a material to groups of solid cells, by default to all; groups override what was given to all before."""
         names = self._solid_groups(groups, ", so it cannot have a material")
-        if not isinstance(material, Material):
-            raise ModelError(
-                f"{material!r} is no material: give LinearElastic(E=..., nu=...), Orthotropic(...) or Anisotropic(...)"
-            )
         self.materials.append((material.bound(self._cells_of(names)), names))
 
     def material_numbers(self) -> tuple[Array, dict[str, NDArray[np.int32]]]:

@@ -37,6 +37,9 @@ def test_the_largest_pressure_within_a_thousandth_unattended(root, name, element
 def test_the_force_too(case):
     study = fc.adaptive_study(case, "force", 1e-3)
     assert study.reached
+    ((caption, rows),) = study.tables()
+    assert str(caption) in study._repr_html_()
+    assert len(rows) == 1 + len(study.rounds)
     assert study.rounds[-1].true_error("force") <= 1e-3
 
 

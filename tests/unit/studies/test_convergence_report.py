@@ -18,6 +18,8 @@ def test_a_limit_has_no_more_digits_than_its_error_bar(value, bar, text):
 
 def test_the_report_stands_alone_and_says_everything(root):
     study = convergence_study(root / "data/cases/forma04c.toml", levels=3, workers=1)
+    assert [caption for caption, _ in study.tables()] == [str(series.combination) for series in study.series]
+    assert study._repr_html_().count("<tr") == sum(len(rows) for _, rows in study.tables())
     page = study.html()
     assert not re.search(r"(src|href)=['\"](?!data:)", page)
     assert "http" not in page

@@ -10,6 +10,27 @@ import pytest
 from fastcontact.studies import execute
 
 
+def test_no_worker_is_left_half_started(monkeypatch):
+    """A signal that comes while a process starts is heard when it has."""
+    begun = []
+
+    def start(self):
+        signal.raise_signal(signal.SIGTERM)
+        begun.append(self)
+
+    def heard(number, frame):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(execute.SpawnProcess, "start", start)
+    before = signal.signal(signal.SIGTERM, heard)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            execute.Spawning().Process(target=print).start()
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert len(begun) == 1
+
+
 def deadly(job, threads):
     if job.label == "deadly":
         os.kill(os.getpid(), signal.SIGKILL)
