@@ -66,13 +66,15 @@ class ConstrainedHierarchy:
         self.stiffening = 0.0
         if elimination is not None and not len(elimination.pivots):
             elimination = None
-        if elimination is None and springs is None:
-            self.hierarchy.coarse.set(None)
-            self.hierarchy.set_bounds()
-            return
         added = springs
         if springs is not None and elimination is not None:
             added = springs.under(elimination.pivots, elimination.weights)
+        if added is not None and not added.rows.nnz:  # of slips that supports prevent, or of pivots alone
+            added = None
+        if elimination is None and added is None:
+            self.hierarchy.coarse.set(None)
+            self.hierarchy.set_bounds()
+            return
         self._change_levels(elimination, added)
         # Equations raise the spectrum of coarser levels, and that of the finest where they or springs stiffen its nodes, or
         # where it is wide already: on flat and on nearly incompressible cells.

@@ -17,6 +17,7 @@ from scipy.sparse import csr_array
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.elimination.pivot_order import RepeatedError
+from fastcontact.linear.field_compliance import FieldCompliance, FieldEquations
 from fastcontact.linear.protocol import FrictionTerms, Monitor
 from fastcontact.linear.springs import Springs
 
@@ -33,14 +34,17 @@ class LoadedMultigrid(LoadedIteration):
     """See `LoadedIteration`; its solver is a `Multigrid`."""
 
     def solve(
-        self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
+        self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
         monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `Loaded`: equations with a full compliance, and those that repeat each other, go through columns of K^-1."""
-        parts = None
-        if C is not None and C.ndim == 1 and len(c):
+        parts: _Parts | _FieldParts | None = None
+        if C is not None and len(c) and (isinstance(C, FieldCompliance) or C.ndim == 1):
             try:
-                parts = self._parts(B, c, C, nodes)
+                if isinstance(C, FieldCompliance):
+                    parts = _FieldParts.of(B, c, C, self._solver.K.blocksize[0])
+                else:
+                    parts = self._parts(B, c, C, nodes)
             except RepeatedError as repeated:
                 log.info("%s: their compliance is formed", repeated)
         if parts is None:
@@ -67,7 +71,12 @@ class LoadedMultigrid(LoadedIteration):
         return u, parts.multiplier(u, solver.multiplier(elimination, u, f, springs), c)
 
     def _solved(
-        self, parts: _Parts, c: Array, guess: Array | None, monitor: Monitor | None, tolerance: float | None
+        self,
+        parts: _Parts | _FieldParts,
+        c: Array,
+        guess: Array | None,
+        monitor: Monitor | None,
+        tolerance: float | None,
     ) -> tuple[Array, Array]:
         """Return u and multipliers under equations (m,) whose multipliers act through their own rows."""
         solver, elimination, springs, f = self._solver, parts.elimination, parts.springs, parts.pushed(self._f, c)
@@ -155,3 +164,36 @@ class _Parts:
         found[self.stiff] = of_stiff
         found[~self.stiff] = self.springs.stiffness * (c[~self.stiff] - self.springs.rows @ u)
         return found
+
+
+@dataclass(frozen=True, eq=False)
+class _FieldParts:
+    """Equations of points (m,) as those of a field, and springs; see `field_compliance`."""
+
+    field: FieldEquations
+    elimination: Elimination
+    springs: Springs
+    weights: Array
+
+    @classmethod
+    def of(cls, B: csr_array, c: Array, C: FieldCompliance, size: int) -> _FieldParts:
+        """Return the parts; RepeatedError where equations of the field repeat each other."""
+        field = C.of_field(B, c)
+        elimination = eliminate(field.rows, field.right, None, _nodes(field.rows, size), size)
+        if len(field.compliance.at):
+            elimination = dataclasses.replace(elimination, compliance=field.compliance)
+        return cls(field, elimination, Springs(B, C.rho * C.weights), C.weights)
+
+    def pushed(self, f: Array, c: Array) -> Array:
+        """See `_Parts`."""
+        return f + self.springs.rows.T @ (self.springs.stiffness * c)
+
+    def multiplier(self, u: Array, of_field: Array, c: Array) -> Array:
+        """Return the forces (m,) of the points, given what multiplies the equations of the field."""
+        return self.weights * (self.field.P @ of_field) + self.springs.stiffness * (c - self.springs.rows @ u)
+
+
+def _nodes(rows: csr_array, size: int) -> NDArray[np.intp]:
+    """Return the node (m,) that each row involves most; a node has `size` unknowns."""
+    data = abs(csr_array(rows))
+    return np.asarray(data.argmax(axis=1), np.intp).ravel() // size
