@@ -348,8 +348,15 @@ class _BlockDiagonal:
                 values[np.ix_(mine, mine)] = part.block(rows[mine] - first)
         return values
 
-    def among(self, rows: NDArray[np.intp]) -> Array:
-        return self.block(rows)
+    def among(self, rows: NDArray[np.intp]) -> Array | FieldCompliance:
+        found = []
+        for part, first, end in zip(self._parts, self._start[:-1], self._start[1:], strict=True):
+            mine = rows[(rows >= first) & (rows < end)] - first
+            own = FieldCompliance.none(len(mine)) if part is None or not len(mine) else part.among(mine)
+            if not isinstance(own, FieldCompliance):
+                return self.block(rows)
+            found.append(own)
+        return FieldCompliance.stacked(found, lambda: self.block(rows))
 
     def apply(self, multiplier: Array) -> Array:
         values = np.zeros(len(multiplier))

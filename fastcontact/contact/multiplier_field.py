@@ -60,10 +60,11 @@ class Projection:
         """Return C among `rows`; see `Compliance`."""
         if self.mass is None or not (self.areas[rows] > 0).all():
             return self.block(rows)
-        others = np.where(self.areas > 0, self.areas, 0.0)
+        others = np.where(self.areas > 0, self.areas, 0.0) / self.rho
         others[rows] = 0.0
-        mass = csr_array(self.P.T @ diags_array(others) @ self.P)
-        return FieldCompliance(csr_array(self.P[rows]), self.areas[rows], self.rho, mass, lambda: self.block(rows))
+        mass, areas = csr_array(self.P.T @ diags_array(others) @ self.P), self.areas[rows]
+        mass.eliminate_zeros()
+        return FieldCompliance(csr_array(self.P[rows]), areas, self.rho * areas, mass, lambda: self.block(rows))
 
     def apply(self, multiplier: Array) -> Array:
         """Return ``C multiplier``."""

@@ -1,30 +1,29 @@
 r"""The compliance of forces at points that a field of fewer values cannot represent, and the same equations for that field.
 
-Forces of points with the weights W belong to a field with the values p, ``P p`` at the points. What the field does not represent
-gives way: :math:`C = (W^{-1} - P M^{-1} P^T) / \rho` among the points of some equations, M the mass matrix of the field over
-these and all other points. With forces W (P p - rho (B u - c)) the equations ``B u + C force = c`` are
-:math:`P^T W (B u - c) + E p = 0` for the field, E the mass matrix of the other points over rho: it holds at the edge of the
-contact alone. Springs of the stiffness rho W along the rows B act beside them, which vanish as far as the field represents them.
+Forces of points with the weights W belong to a field with the values p, ``P p`` at the points. What the field does not
+represent gives way: :math:`C = (W^{-1} - P M^{-1} P^T) / \rho` among the points of some equations, M the mass matrix of the
+field over these and all other points. With forces W (P p - rho (B u - c)) the equations ``B u + C force = c`` are
+:math:`P^T W (B u - c) + E p = 0` for the field, E the mass matrix of the other points over rho, which vanishes but at the
+edge of the contact. Springs of the stiffness rho W act along the rows B: on what the field does not represent.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse import block_diag, csc_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 Array = NDArray[np.float64]
-# Smaller eigenvalues of a compliance, relative to its diagonal, are none.
-ROUND_OFF = 1e-12
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class FieldCompliance:
-    """See the module.
+    """See the module; equations that do not give way are fields of one point without springs.
 
     Attributes
     ----------
@@ -32,81 +31,77 @@ class FieldCompliance:
         Field values to the points of the equations [-].
     weights : ndarray (m,)
         W, positive [area].
-    rho : float
-        [pressure / length]
+    stiffness : ndarray (m,)
+        rho W [force / length].
     others : csr_array (k, k)
-        Mass matrix of the points without equations [area].
+        E: the mass matrix of the points without equations over rho.
     dense : callable
         Returns C (m, m) [length / force].
     """
 
     P: csr_array
     weights: Array
-    rho: float
+    stiffness: Array
     others: csr_array
     dense: Callable[[], Array]
 
+    @classmethod
+    def stacked(cls, parts: Sequence[FieldCompliance], dense: Callable[[], Array]) -> FieldCompliance:
+        """Return several, one below the other."""
+        return cls(
+            csr_array(block_diag([part.P for part in parts], format="csr")),
+            np.concatenate([part.weights for part in parts]),
+            np.concatenate([part.stiffness for part in parts]),
+            csr_array(block_diag([part.others for part in parts], format="csr")),
+            dense,
+        )
+
+    @classmethod
+    def none(cls, m: int) -> FieldCompliance:
+        """Return that of m equations that do not give way."""
+        one = csr_array(diags_array(np.ones(m)))
+        return cls(one, np.ones(m), np.zeros(m), csr_array((m, m)), lambda: np.zeros((m, m)))
+
     def of_field(self, B: csr_array, c: Array) -> FieldEquations:
         """Return the same equations for the field, of rows B (m, n) and right-hand sides c (m,) [length]."""
-        W = diags_array(self.weights)
-        shares = csr_array(self.P.T @ W)
+        shares = csr_array(self.P.T @ diags_array(self.weights))
         size = np.asarray(abs(shares).sum(axis=1))
         touched = np.flatnonzero(size > 0.0)
         # Each in units of its own area: equations at the edge of the contact are small ones.
-        shares = csr_array(diags_array(1.0 / size[touched]) @ shares[touched])
-        compliance = EdgeCompliance(self.others, touched, 1.0 / size[touched], self.rho)
-        P = csr_array(self.P[:, touched] @ diags_array(1.0 / size[touched]))
-        return FieldEquations(csr_array(shares @ B), shares @ c, compliance, P)
+        units = 1.0 / size[touched]
+        shares = csr_array(diags_array(units) @ shares[touched])
+        edge = self.others.diagonal()[touched] > 0.0
+        P = csr_array(self.P[:, touched] @ diags_array(units))
+        compliance = self._at_edge(touched[edge], units[edge])
+        return FieldEquations(csr_array(shares @ B), shares @ c, P, edge, compliance)
+
+    def _at_edge(self, given: NDArray[np.intp], units: Array) -> Array:
+        """Return E among values `given` (e,), those without any equation being eliminated."""
+        rest = np.setdiff1d(np.flatnonzero(self.others.diagonal() > 0.0), given)
+        E: Array = self.others[given][:, given].toarray()
+        across = csr_array(self.others[given][:, rest])
+        if across.nnz:
+            E -= across @ splu(csc_array(self.others[rest][:, rest])).solve(across.T.toarray())
+        return E * (units[:, None] * units)
 
 
 @dataclass(frozen=True, eq=False)
 class FieldEquations:
-    """``rows u + compliance p = right``, p what of the field's values is left; ``P p`` are pressures at the points."""
-
-    rows: csr_array
-    right: Array
-    compliance: EdgeCompliance
-    P: csr_array
-
-
-class EdgeCompliance:
-    """The matrix E (l, l) of a field's values that some equation touches, those that none does being eliminated.
-
-    It vanishes but for values at the edge of the contact, and is singular where few points without equations are near.
-
-    Parameters
-    ----------
-    others : csr_array (k, k)
-        Mass matrix of the points without equations.
-    touched : ndarray of int (l,)
-    units : ndarray (l,)
-        What one of each value is.
-    rho : float
+    """``rows u + E p = right``, p the values of the field that some equation touches; ``P p`` are pressures at the points.
 
     Attributes
     ----------
-    at : ndarray of int (e,)
-        Equations that give way.
-    stiffness : float
-        Of one over the mean compliance of these [force / length].
-    factor : ndarray (e, e)
-        A with ``E = A A.T / stiffness`` there; columns without compliance are zero.
+    rows : csr_array (l, n)
+    right : ndarray (l,)
+    P : csr_array (m, l)
+    edge : ndarray of bool (l,)
+        Values at the edge of the contact; the others do not give way.
+    compliance : ndarray (e, e)
+        E among those at the edge.
     """
 
-    def __init__(self, others: csr_array, touched: NDArray[np.intp], units: Array, rho: float) -> None:
-        mass = others.diagonal()
-        self.at = np.flatnonzero(mass[touched] > 0.0)
-        given = touched[self.at]
-        rest = np.setdiff1d(np.flatnonzero(mass > 0.0), given)
-        E = others[given][:, given].toarray()
-        across = csr_array(others[given][:, rest])
-        if across.nnz:
-            E -= across @ splu(csc_array(others[rest][:, rest])).solve(across.T.toarray())
-        E *= units[self.at][:, None] * units[self.at] / rho
-        own = np.diag(E)
-        self.stiffness = 1.0 / float(own.mean()) if len(own) else 0.0
-        # Values of all sizes: what is singular is found relative to what each has of its own.
-        unit = np.sqrt(own)
-        values, vectors = np.linalg.eigh(E / (unit[:, None] * unit))
-        values = np.where(values > ROUND_OFF, values, 0.0)
-        self.factor = np.sqrt(self.stiffness) * unit[:, None] * vectors * np.sqrt(values)
+    rows: csr_array
+    right: Array
+    P: csr_array
+    edge: Mask
+    compliance: Array

@@ -10,7 +10,6 @@ from scipy.sparse import csr_array
 
 from fastcontact.linear.elimination import elimination_kernels, pivot_order
 from fastcontact.linear.elimination.coupled_pivots import CoupledPivots
-from fastcontact.linear.field_compliance import EdgeCompliance
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -36,9 +35,8 @@ class Elimination:
         P, the pivots' columns of the equations, where their inverse is full.
     own_inverse : csr_array (m, m), optional
         P^-1, where it is not.
-    compliance : ndarray (m,) or EdgeCompliance, optional
-        By how much the equations give way by themselves: ``B u + compliance multiplier = c``, a diagonal or a matrix
-        [length / force].
+    compliance : ndarray (m,), optional
+        By how much the equations give way by themselves: ``B u + compliance * multiplier = c`` [length / force].
     """
 
     pivots: Indices
@@ -48,7 +46,7 @@ class Elimination:
     inverse: csr_array | CoupledPivots
     coupled: CoupledPivots | None = None
     own_inverse: csr_array | None = None
-    compliance: Array | EdgeCompliance | None = None
+    compliance: Array | None = None
 
     def shifted(self, c: Array) -> Array:
         """Return how far the pivots (m,) move if the equations' right-hand sides rise by c (m,)."""

@@ -18,7 +18,9 @@ from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.elimination.pivot_order import RepeatedError
 from fastcontact.linear.field_compliance import FieldCompliance, FieldEquations
+from fastcontact.linear.multigrid.border import Border
 from fastcontact.linear.protocol import FrictionTerms, Monitor
+from fastcontact.linear.sparse_rows import scaled
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
@@ -38,13 +40,12 @@ class LoadedMultigrid(LoadedIteration):
         monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `Loaded`: equations with a full compliance, and those that repeat each other, go through columns of K^-1."""
-        parts: _Parts | _FieldParts | None = None
+        parts: _Parts | None = None
         if C is not None and len(c) and (isinstance(C, FieldCompliance) or C.ndim == 1):
             try:
                 if isinstance(C, FieldCompliance):
-                    parts = _FieldParts.of(B, c, C, self._solver.K.blocksize[0])
-                else:
-                    parts = self._parts(B, c, C, nodes)
+                    return self._solved_for_field(B, c, C, guess, monitor, tolerance)
+                parts = self._parts(B, c, C, nodes)
             except RepeatedError as repeated:
                 log.info("%s: their compliance is formed", repeated)
         if parts is None:
@@ -72,7 +73,7 @@ class LoadedMultigrid(LoadedIteration):
 
     def _solved(
         self,
-        parts: _Parts | _FieldParts,
+        parts: _Parts,
         c: Array,
         guess: Array | None,
         monitor: Monitor | None,
@@ -87,6 +88,26 @@ class LoadedMultigrid(LoadedIteration):
 
         u = solver.solution(f, elimination, guess, monitor and watch, tolerance, springs)
         return u, parts.multiplier(u, solver.multiplier(elimination, u, f, springs), c)
+
+    def _solved_for_field(
+        self, B: csr_array, c: Array, C: FieldCompliance, guess: Array | None, monitor: Monitor | None,
+        tolerance: float | None,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """Return u and the forces of points (m,); see `field_compliance`."""
+        solver = self._solver
+        parts = _FieldParts.of(B, c, C, solver.K.blocksize[0])
+        elimination, springs, f, border = parts.elimination, parts.springs, parts.pushed(self._f, c), parts.border()
+
+        def watch(u: Array, inside: Array, error: float) -> bool:
+            assert monitor is not None
+            return monitor(u, parts.multiplier(u, inside, np.empty(0), c), error)
+
+        if border is None:
+            u, at_edge = solver.solution(f, elimination, guess, monitor and watch, tolerance, springs), np.empty(0)
+        else:
+            u, at_edge = solver.bordered_solution(f, elimination, springs, border, guess, tolerance)
+            f = f + border.rows.T @ at_edge
+        return u, parts.multiplier(u, solver.multiplier(elimination, u, f, springs), at_edge, c)
 
     def _parts(
         self, B: csr_array, c: Array, C: Array | None, nodes: NDArray[np.intp] | None, through: csr_array | None = None
@@ -171,29 +192,38 @@ class _FieldParts:
     """Equations of points (m,) as those of a field, and springs; see `field_compliance`."""
 
     field: FieldEquations
-    elimination: Elimination
+    elimination: Elimination | None
     springs: Springs
     weights: Array
 
     @classmethod
     def of(cls, B: csr_array, c: Array, C: FieldCompliance, size: int) -> _FieldParts:
-        """Return the parts; RepeatedError where equations of the field repeat each other."""
-        field = C.of_field(B, c)
-        elimination = eliminate(field.rows, field.right, None, _nodes(field.rows, size), size)
-        if len(field.compliance.at):
-            elimination = dataclasses.replace(elimination, compliance=field.compliance)
-        return cls(field, elimination, Springs(B, C.rho * C.weights), C.weights)
+        """Return the parts; RepeatedError where equations that do not give way repeat each other."""
+        field, elimination = C.of_field(B, c), None
+        if not field.edge.all():
+            rows = csr_array(field.rows[~field.edge])
+            elimination = eliminate(rows, field.right[~field.edge], None, _nodes(rows, size), size)
+        springs = scaled(B, (C.stiffness > 0.0).astype(float))
+        return cls(field, elimination, Springs(springs, C.stiffness), C.weights)
+
+    def border(self) -> Border | None:
+        """Return the equations at the edge of the contact."""
+        field = self.field
+        if not field.edge.any():
+            return None
+        return Border(csr_array(field.rows[field.edge]), field.right[field.edge], field.compliance)
 
     def pushed(self, f: Array, c: Array) -> Array:
         """See `_Parts`."""
         return f + self.springs.rows.T @ (self.springs.stiffness * c)
 
-    def multiplier(self, u: Array, of_field: Array, c: Array) -> Array:
+    def multiplier(self, u: Array, inside: Array, at_edge: Array, c: Array) -> Array:
         """Return the forces (m,) of the points, given what multiplies the equations of the field."""
-        return self.weights * (self.field.P @ of_field) + self.springs.stiffness * (c - self.springs.rows @ u)
+        p = np.empty(len(self.field.right))
+        p[~self.field.edge], p[self.field.edge] = inside, at_edge
+        return self.weights * (self.field.P @ p) + self.springs.stiffness * (c - self.springs.rows @ u)
 
 
 def _nodes(rows: csr_array, size: int) -> NDArray[np.intp]:
     """Return the node (m,) that each row involves most; a node has `size` unknowns."""
-    data = abs(csr_array(rows))
-    return np.asarray(data.argmax(axis=1), np.intp).ravel() // size
+    return np.asarray(abs(rows).argmax(axis=1), np.intp).ravel() // size

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact.linear.elimination.elimination import Elimination
-from fastcontact.linear.field_compliance import EdgeCompliance
 from fastcontact.linear.multigrid.matrix import ScaledMatrix
 from fastcontact.linear.springs import Springs
 
@@ -119,71 +118,41 @@ def multiplier(K: ScaledMatrix, elimination: Elimination | None, springs: Spring
 
 
 class _Excess:
-    """By how much equations that give way are not met, an unknown y in the place of each pivot.
+    """By how much equations that give way are not met: an unknown in each pivot's place. See `Reduced` for parameters."""
 
-    The excess is ``s = y`` with the stiffness ``1 / C``, where the compliance C is diagonal. Where it is a matrix with the factor
-    A, ``C = A A.T / k``, it is ``s = A y`` with the stiffness k.
-
-    Parameters
-    ----------
-    diagonal : ndarray (n,)
-        Of K [force / length].
-    elimination : Elimination
-    compliance : ndarray (m,) or EdgeCompliance
-        Its own.
-    """
-
-    def __init__(self, diagonal: Array, elimination: Elimination, compliance: Array | EdgeCompliance) -> None:
+    def __init__(self, diagonal: Array, elimination: Elimination, compliance: Array) -> None:
         self._elimination, self._pivots = elimination, elimination.pivots
-        self._u = np.empty(len(diagonal))
+        gives, self._compliance = compliance > 0.0, compliance
+        self._stiffness = np.divide(1.0, compliance, out=np.zeros(len(compliance)), where=gives)
+        # Its own stiffness and that of the pivot; an equation that does not give way stays as it is.
         inverse = elimination.own_inverse
         if inverse is None:
             inverse = elimination.with_sparse_weights().inverse
         assert isinstance(inverse, csr_array)
         of_pivots = inverse.power(2).T @ diagonal[self._pivots]
-        if isinstance(compliance, EdgeCompliance):
-            self._at, self._factor, self._stiffness = compliance.at, compliance.factor, compliance.stiffness
-            A = compliance.factor
-            self._inverse = np.linalg.inv(
-                np.diag(np.full(len(A), self._stiffness)) + A.T @ (of_pivots[self._at, None] * A)
-            )
-        else:
-            self._at, self._factor = np.flatnonzero(compliance > 0.0), None
-            self._stiffness = 1.0 / compliance[self._at]
-            self._inverse = 1.0 / (self._stiffness + of_pivots[self._at])
-        self._places = self._pivots[self._at]
+        self._inverse = np.where(gives, 1.0 / (self._stiffness + of_pivots), 0.0)
+        self._gives = gives
+        self._u = np.empty(len(diagonal))
 
     def begin(self, x: Array, multiplier: Array | None) -> None:
         """Put excesses in the pivots' places: those of the forces there, by which what was open before begins with none."""
-        x[self._pivots] = 0.0
-        if multiplier is not None:
-            x[self._places] = -self._acting(multiplier[self._at]) / self._stiffness
+        x[self._pivots] = 0.0 if multiplier is None else -self._compliance * multiplier
 
     def displacement(self, x: Array, offset: Array | None) -> Array:
-        """Return the displacement (n,), work space, of a vector of the iteration; without offset that of a change."""
-        y, excess = x[self._places], np.zeros(len(self._pivots))
-        excess[self._at] = y if self._factor is None else self._factor @ y
-        moved = self._elimination.shifted(excess)
+        moved = self._elimination.shifted(x[self._pivots])
         u = self._u
         u[:] = x
         self._elimination.complete(u, moved if offset is None else moved + offset)
         return u
 
     def reduce(self, x: Array, r: Array, sign: float) -> None:
-        """Move forces r (n,) from the pivots, and leave what acts on the excesses of x: theirs times `sign` beside those."""
-        own = self._elimination.multiplier(r[self._pivots])
+        own = self._elimination.multiplier(r[self._pivots]) + sign * self._stiffness * x[self._pivots]
         self._elimination.move_forces(r)
-        r[self._places] = self._acting(own[self._at]) + sign * self._stiffness * x[self._places]
+        r[self._pivots] = np.where(self._gives, own, 0.0)
 
     def precondition(self, r: Array, norm: float, z: Array, cycle: Callable[[Array, float, Array], None]) -> None:
-        """See `Reduced.precondition`."""
-        own = r[self._places]
-        r[self._places] = 0.0
+        own = r[self._pivots]
+        r[self._pivots] = 0.0
         cycle(r, norm, z)
-        r[self._places] = own
-        z[self._pivots] = 0.0
-        z[self._places] = self._inverse * own if self._factor is None else self._inverse @ own
-
-    def _acting(self, forces: Array) -> Array:
-        """Return what forces (e,) of the equations that give way are on y."""
-        return forces if self._factor is None else np.asarray(self._factor.T @ forces)
+        r[self._pivots] = own
+        z[self._pivots] = self._inverse * own
