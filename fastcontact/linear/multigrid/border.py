@@ -46,7 +46,7 @@ class Border:
         own = np.diag(S)
         S[np.diag_indices(len(S))] += REPEATED * own
         # Residuals of these equations become forces.
-        self.stiffness = 1.0 / float(own.mean())
+        self.stiffness = 1.0 / own
         self._factors = cho_factor(S)
 
     def multiply(self, multiply: Multiply, move_forces: Callable[[Array], None]) -> Multiply:
