@@ -73,7 +73,7 @@ class FieldCompliance:
         edge = self.others.diagonal()[touched] > 0.0
         P = csr_array(self.P[:, touched] @ diags_array(units))
         compliance = self._at_edge(touched[edge], units[edge])
-        return FieldEquations(csr_array(shares @ B), shares @ c, P, edge, compliance)
+        return FieldEquations(csr_array(shares @ B), shares @ c, P, edge, compliance, touched[edge], units[edge])
 
     def _at_edge(self, given: NDArray[np.intp], units: Array) -> Array:
         """Return E among values `given` (e,), those without any equation being eliminated."""
@@ -98,6 +98,8 @@ class FieldEquations:
         Values at the edge of the contact; the others do not give way.
     compliance : ndarray (e, e)
         E among those at the edge.
+    at, units : ndarray (e,)
+        Which values of the field these are, and in which units.
     """
 
     rows: csr_array
@@ -105,3 +107,5 @@ class FieldEquations:
     P: csr_array
     edge: Mask
     compliance: Array
+    at: NDArray[np.intp]
+    units: Array

@@ -35,6 +35,9 @@ STIFF, STIFF_COUPLED = 10.0, 300.0
 class LoadedMultigrid(LoadedIteration):
     """See `LoadedIteration`; its solver is a `Multigrid`."""
 
+    # Values of a pressure field at the edge of the contact, as they were in the last pairing.
+    _at_edge: Array = np.empty(0)
+
     def solve(
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
         monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
@@ -105,7 +108,14 @@ class LoadedMultigrid(LoadedIteration):
         if border is None:
             u, at_edge = solver.solution(f, elimination, guess, monitor and watch, tolerance, springs), np.empty(0)
         else:
-            u, at_edge = solver.bordered_solution(f, elimination, springs, border, guess, tolerance)
+            start, field = np.zeros(C.P.shape[1]), parts.field
+            if guess is not None and len(self._at_edge) == len(start):
+                start = self._at_edge
+            u, at_edge = solver.bordered_solution(
+                f, elimination, springs, border, guess, start[field.at] / field.units, tolerance
+            )
+            self._at_edge = np.zeros(len(start))
+            self._at_edge[field.at] = field.units * at_edge
             f = f + border.rows.T @ at_edge
         return u, parts.multiplier(u, solver.multiplier(elimination, u, f, springs), at_edge, c)
 

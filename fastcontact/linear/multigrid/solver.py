@@ -235,11 +235,12 @@ class Multigrid:
 
     def bordered_solution(
         self, f: Array, elimination: Elimination | None, springs: Springs | None, border: Border,
-        guess: Array | None, tolerance: float | None,
+        guess: Array | None, start: Array, tolerance: float | None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """Solve ``K u + S u = f + G.T multiplier`` and ``G u + C multiplier = d`` under the equations of `elimination`.
 
-        G, C and d are those of the border; returns u (n,) and its multipliers. See `nonsymmetric_solution` for the others.
+        G, C and d are those of the border; returns u (n,) and its multipliers (e,), which begin at `start`. See
+        `nonsymmetric_solution` for the others.
 
         Raises
         ------
@@ -253,9 +254,9 @@ class Multigrid:
         border.prepare(self.diagonal())
         if guess is not None:
             iteration.x[:n] = guess
-        x, r = iteration.x[:n], iteration.r[:n]
-        self._reduced.begin(x, f, r)
-        iteration.r[n:] = border.stiffness * (border.right - border.rows @ x)
+        x, r, iteration.x[n:] = iteration.x[:n], iteration.r[:n], start
+        self._reduced.begin(x, f + border.rows.T @ start, r)
+        iteration.r[n:] = border.stiffness * (border.right - border.rows @ x - border.compliance @ start)
         iteration.start()
 
         def move_forces(forces: Array) -> None:

@@ -130,7 +130,7 @@ def beside_another():
 
 
 CASES = {
-    "all closed": (pressed, 30), "edge": (lambda: pressed(0.02), 150), "few": (lambda: pressed(0.2), 130),
+    "all closed": (pressed, 30), "edge": (lambda: pressed(0.02), 90), "few": (lambda: pressed(0.2), 80),
     "stiff primary": (lambda: pressed(0.02, ratio=100.0), 150), "tet4": (lambda: pressed(0.02, element="tet4"), 200),
     "augmented": (lambda: pressed(0.02, augmentation=10.0), 300), "two pairs": (beside_another, 200),
     "wall": (lambda: on_obstacle(fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))), 30),
