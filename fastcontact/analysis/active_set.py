@@ -58,7 +58,7 @@ def solve(
     while True:
         watch = _Watch(signs, active, changed)
         rows, compliance = np.flatnonzero(active), constraints.normal_compliance
-        C = None if compliance is None else compliance.block(rows)
+        C = None if compliance is None else compliance.among(rows)
         nodes = None if constraints.nodes is None else constraints.nodes[rows]
         u, forces = loaded.solve(
             constraints.B[rows], -constraints.gap0[rows], C, guess, watch, accuracy.residual, nodes

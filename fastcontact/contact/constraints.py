@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, vstack
 
+from fastcontact.linear.field_compliance import FieldCompliance
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -19,6 +21,10 @@ class Compliance(Protocol):
 
     def block(self, rows: NDArray[np.intp]) -> Array:
         """Return the dense rows and columns `rows` of C, or, where C is diagonal, its diagonal there."""
+        ...
+
+    def among(self, rows: NDArray[np.intp]) -> Array | FieldCompliance:
+        """Return the same, or what a linear solver can do without them."""
         ...
 
     def apply(self, multiplier: Array) -> Array:
@@ -319,6 +325,9 @@ class _Softened:
         own = self._softness[rows]
         return own if self._inner is None else np.diag(own) + self._inner.block(rows)
 
+    def among(self, rows: NDArray[np.intp]) -> Array:
+        return self.block(rows)
+
     def apply(self, multiplier: Array) -> Array:
         own = self._softness * multiplier
         return own if self._inner is None else own + self._inner.apply(multiplier)
@@ -338,6 +347,16 @@ class _BlockDiagonal:
             if part is not None and len(mine):
                 values[np.ix_(mine, mine)] = part.block(rows[mine] - first)
         return values
+
+    def among(self, rows: NDArray[np.intp]) -> Array | FieldCompliance:
+        found = []
+        for part, first, end in zip(self._parts, self._start[:-1], self._start[1:], strict=True):
+            mine = rows[(rows >= first) & (rows < end)] - first
+            own = FieldCompliance.none(len(mine)) if part is None or not len(mine) else part.among(mine)
+            if not isinstance(own, FieldCompliance):
+                return self.block(rows)
+            found.append(own)
+        return FieldCompliance.stacked(found, lambda: self.block(rows))
 
     def apply(self, multiplier: Array) -> Array:
         values = np.zeros(len(multiplier))

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import SuperLU
 
 from fastcontact.errors import ContactError
+from fastcontact.linear.field_compliance import FieldCompliance
 
 Array = NDArray[np.float64]
 # Closed integration points up to which the dense equations of the continuous formulation are solved, in about a minute.
@@ -54,6 +55,16 @@ class Projection:
         P = self.P[rows].toarray() * (areas > 0)[:, None]
         own = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)
         return (np.diag(own) - P @ self.mass.solve(np.ascontiguousarray(P.T))) / self.rho
+
+    def among(self, rows: NDArray[np.intp]) -> Array | FieldCompliance:
+        """Return C among `rows`; see `Compliance`."""
+        if self.mass is None or not (self.areas[rows] > 0).all():
+            return self.block(rows)
+        others = np.where(self.areas > 0, self.areas, 0.0) / self.rho
+        others[rows] = 0.0
+        mass, areas = csr_array(self.P.T @ diags_array(others) @ self.P), self.areas[rows]
+        mass.eliminate_zeros()
+        return FieldCompliance(csr_array(self.P[rows]), areas, self.rho * areas, mass, lambda: self.block(rows))
 
     def apply(self, multiplier: Array) -> Array:
         """Return ``C multiplier``."""

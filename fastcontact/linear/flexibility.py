@@ -15,6 +15,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve, lstsq
 from scipy.sparse import csr_array
 
 from fastcontact.errors import ContactError, ConvergenceError
+from fastcontact.linear.field_compliance import FieldCompliance
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -133,7 +134,9 @@ def symmetric(flexibility: Array) -> Array:
     return 0.5 * (flexibility + flexibility.T)
 
 
-def multipliers(columns: FlexibilityColumns, B: csr_array, wanted: Array, C: Array | None) -> Array:
+def multipliers(
+    columns: FlexibilityColumns, B: csr_array, wanted: Array, C: Array | FieldCompliance | None
+) -> Array:  # fmt: skip
     """Return the multipliers (m,) [force] with ``(B K^-1 B.T + C) multiplier = wanted`` (m,) [length].
 
     C is a matrix (m, m), its diagonal (m,) where it has no more, or None.
@@ -141,8 +144,9 @@ def multipliers(columns: FlexibilityColumns, B: csr_array, wanted: Array, C: Arr
     return solve_multipliers(columns.of_rows(B), wanted, C)
 
 
-def solve_multipliers(flexibility: Array, wanted: Array, C: Array | None) -> Array:
+def solve_multipliers(flexibility: Array, wanted: Array, C: Array | FieldCompliance | None) -> Array:
     """Return the multipliers (m,) with ``(flexibility + C) multiplier = wanted``; `flexibility` (m, m) is overwritten."""
+    C = C.dense() if isinstance(C, FieldCompliance) else C
     if C is not None and C.ndim == 1:
         flexibility[np.diag_indices(len(C))] += C
     elif C is not None:

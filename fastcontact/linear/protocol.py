@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
+from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.springs import Springs
 
 Array = NDArray[np.float64]
@@ -47,7 +48,7 @@ class Loaded(Protocol):
     """A prepared matrix with a right-hand side f (n,)."""
 
     def solve(
-        self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
+        self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
         monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """Return (u, multiplier) with ``K u = f + B.T multiplier`` and ``B u + C multiplier = c``.

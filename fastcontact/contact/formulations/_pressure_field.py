@@ -174,8 +174,12 @@ class PressureFieldFormulation(Formulation):
 
     @property
     def eliminable(self) -> bool:
-        """See `Formulation`: the pressure field gives way."""
-        return False
+        """See `Formulation`: what the field does not represent gives way, but its values can be eliminated.
+
+        In space, without friction, which would couple them along all directions, and where corners carry as much as others.
+        """
+        flat = self.points.shape[1] == 3 and self.secondary.order == 1
+        return flat and not self.friction and self.options.penalty is None
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -12,6 +12,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.elimination.pivot_order import RepeatedError
+from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.flexibility import multipliers
 from fastcontact.linear.protocol import Monitor
 
@@ -41,7 +42,7 @@ class LoadedIteration:
         return np.asarray(self._solver.solution(self._f, None, None))
 
     def solve(
-        self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
+        self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
         monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `Loaded`: equations that repeat each other or have a compliance go through columns of K^-1."""

@@ -11,6 +11,7 @@ from scipy.sparse import bsr_array, csc_array, csr_array
 
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
 from fastcontact.linear.factors.known_loads import KnownLoads
+from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.flexibility import FlexibilityColumns, check_rows, multipliers, solve_multipliers, symmetric
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 
@@ -164,7 +165,7 @@ class LoadedFactor:
         self._solver, self._f, self._free = solver, f, free
 
     def solve(
-        self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
+        self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
         monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `Loaded`."""
@@ -223,7 +224,7 @@ class CondensedProblem:
         self._inverse, self._free = inverse, free
 
     def solve(
-        self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
+        self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
         monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `Loaded`."""

@@ -69,7 +69,7 @@ class ConstrainedHierarchy:
         added = springs
         if springs is not None and elimination is not None:
             added = springs.under(elimination.pivots, elimination.weights)
-        if added is not None and not added.rows.nnz:  # they stretch what supports and equations hold
+        if added is not None and not added.rows.nnz:  # of slips that supports prevent, or of pivots alone
             added = None
         if elimination is None and added is None:
             self.hierarchy.coarse.set(None)

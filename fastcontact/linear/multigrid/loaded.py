@@ -17,7 +17,10 @@ from scipy.sparse import csr_array
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.elimination.pivot_order import RepeatedError
+from fastcontact.linear.field_compliance import FieldCompliance, FieldEquations
+from fastcontact.linear.multigrid.border import Border
 from fastcontact.linear.protocol import FrictionTerms, Monitor
+from fastcontact.linear.sparse_rows import scaled
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
@@ -32,14 +35,19 @@ STIFF, STIFF_COUPLED = 10.0, 300.0
 class LoadedMultigrid(LoadedIteration):
     """See `LoadedIteration`; its solver is a `Multigrid`."""
 
+    # Values of a pressure field at the edge of the contact, as they were in the last pairing.
+    _at_edge: Array = np.empty(0)
+
     def solve(
-        self, B: csr_array, c: Array, C: Array | None = None, guess: Array | None = None,
+        self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
         monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `Loaded`: equations with a full compliance, and those that repeat each other, go through columns of K^-1."""
-        parts = None
-        if C is not None and C.ndim == 1 and len(c):
+        parts: _Parts | None = None
+        if C is not None and len(c) and (isinstance(C, FieldCompliance) or C.ndim == 1):
             try:
+                if isinstance(C, FieldCompliance):
+                    return self._solved_for_field(B, c, C, guess, monitor, tolerance)
                 parts = self._parts(B, c, C, nodes)
             except RepeatedError as repeated:
                 log.info("%s: their compliance is formed", repeated)
@@ -67,7 +75,12 @@ class LoadedMultigrid(LoadedIteration):
         return u, parts.multiplier(u, solver.multiplier(elimination, u, f, springs), c)
 
     def _solved(
-        self, parts: _Parts, c: Array, guess: Array | None, monitor: Monitor | None, tolerance: float | None
+        self,
+        parts: _Parts,
+        c: Array,
+        guess: Array | None,
+        monitor: Monitor | None,
+        tolerance: float | None,
     ) -> tuple[Array, Array]:
         """Return u and multipliers under equations (m,) whose multipliers act through their own rows."""
         solver, elimination, springs, f = self._solver, parts.elimination, parts.springs, parts.pushed(self._f, c)
@@ -78,6 +91,33 @@ class LoadedMultigrid(LoadedIteration):
 
         u = solver.solution(f, elimination, guess, monitor and watch, tolerance, springs)
         return u, parts.multiplier(u, solver.multiplier(elimination, u, f, springs), c)
+
+    def _solved_for_field(
+        self, B: csr_array, c: Array, C: FieldCompliance, guess: Array | None, monitor: Monitor | None,
+        tolerance: float | None,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """Return u and the forces of points (m,); see `field_compliance`."""
+        solver = self._solver
+        parts = _FieldParts.of(B, c, C, solver.K.blocksize[0])
+        elimination, springs, f, border = parts.elimination, parts.springs, parts.pushed(self._f, c), parts.border()
+
+        def watch(u: Array, inside: Array, error: float) -> bool:
+            assert monitor is not None
+            return monitor(u, parts.multiplier(u, inside, np.empty(0), c), error)
+
+        if border is None:
+            u, at_edge = solver.solution(f, elimination, guess, monitor and watch, tolerance, springs), np.empty(0)
+        else:
+            start, field = np.zeros(C.P.shape[1]), parts.field
+            if guess is not None and len(self._at_edge) == len(start):
+                start = self._at_edge
+            u, at_edge = solver.bordered_solution(
+                f, elimination, springs, border, guess, start[field.at] / field.units, tolerance
+            )
+            self._at_edge = np.zeros(len(start))
+            self._at_edge[field.at] = field.units * at_edge
+            f = f + border.rows.T @ at_edge
+        return u, parts.multiplier(u, solver.multiplier(elimination, u, f, springs), at_edge, c)
 
     def _parts(
         self, B: csr_array, c: Array, C: Array | None, nodes: NDArray[np.intp] | None, through: csr_array | None = None
@@ -155,3 +195,45 @@ class _Parts:
         found[self.stiff] = of_stiff
         found[~self.stiff] = self.springs.stiffness * (c[~self.stiff] - self.springs.rows @ u)
         return found
+
+
+@dataclass(frozen=True, eq=False)
+class _FieldParts:
+    """Equations of points (m,) as those of a field, and springs; see `field_compliance`."""
+
+    field: FieldEquations
+    elimination: Elimination | None
+    springs: Springs
+    weights: Array
+
+    @classmethod
+    def of(cls, B: csr_array, c: Array, C: FieldCompliance, size: int) -> _FieldParts:
+        """Return the parts; RepeatedError where equations that do not give way repeat each other."""
+        field, elimination = C.of_field(B, c), None
+        if not field.edge.all():
+            rows = csr_array(field.rows[~field.edge])
+            elimination = eliminate(rows, field.right[~field.edge], None, _nodes(rows, size), size)
+        springs = scaled(B, (C.stiffness > 0.0).astype(float))
+        return cls(field, elimination, Springs(springs, C.stiffness), C.weights)
+
+    def border(self) -> Border | None:
+        """Return the equations at the edge of the contact."""
+        field = self.field
+        if not field.edge.any():
+            return None
+        return Border(csr_array(field.rows[field.edge]), field.right[field.edge], field.compliance)
+
+    def pushed(self, f: Array, c: Array) -> Array:
+        """See `_Parts`."""
+        return f + self.springs.rows.T @ (self.springs.stiffness * c)
+
+    def multiplier(self, u: Array, inside: Array, at_edge: Array, c: Array) -> Array:
+        """Return the forces (m,) of the points, given what multiplies the equations of the field."""
+        p = np.empty(len(self.field.right))
+        p[~self.field.edge], p[self.field.edge] = inside, at_edge
+        return self.weights * (self.field.P @ p) + self.springs.stiffness * (c - self.springs.rows @ u)
+
+
+def _nodes(rows: csr_array, size: int) -> NDArray[np.intp]:
+    """Return the node (m,) that each row involves most; a node has `size` unknowns."""
+    return np.asarray(abs(rows).argmax(axis=1), np.intp).ravel() // size

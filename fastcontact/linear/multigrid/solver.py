@@ -18,7 +18,14 @@ from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.flexibility import FlexibilityColumns
 from fastcontact.linear.krylov import krylov_kernels
-from fastcontact.linear.krylov.iterations import ConjugateGradients, ConjugateResiduals, Iteration
+from fastcontact.linear.krylov.iterations import (
+    ConjugateGradients,
+    ConjugateResiduals,
+    Iteration,
+    Multiply,
+    Precondition,
+)
+from fastcontact.linear.multigrid.border import Border
 from fastcontact.linear.multigrid.constrained_hierarchy import ConstrainedHierarchy
 from fastcontact.linear.multigrid.hierarchy import Hierarchy
 from fastcontact.linear.multigrid.matrix import ScaledMatrix
@@ -223,10 +230,48 @@ class Multigrid:
         enough = self._enough(tolerance) * scale
         iteration.x[:] = guess
         self._begin(iteration, f)
-        self._reduce(iteration, enough)
+        self._reduce(iteration, enough, self._reduced.multiply, self.precondition)
         return self._reduced.displacement(iteration.x).copy()
 
-    def _reduce(self, iteration: ConjugateResiduals, enough: float) -> None:
+    def bordered_solution(
+        self, f: Array, elimination: Elimination | None, springs: Springs | None, border: Border,
+        guess: Array | None, start: Array, tolerance: float | None,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """Solve ``K u + S u = f + G.T multiplier`` and ``G u + C multiplier = d`` under the equations of `elimination`.
+
+        G, C and d are those of the border; returns u (n,) and its multipliers (e,), which begin at `start`. See
+        `nonsymmetric_solution` for the others.
+
+        Raises
+        ------
+        StallError
+            If the residual does not fall below the tolerance.
+        """
+        n, self._solved = len(f), None
+        iteration = ConjugateResiduals(n + len(border))
+        scale = self._scale(f, elimination)
+        self.constrain(elimination, springs)
+        border.prepare(self.diagonal())
+        if guess is not None:
+            iteration.x[:n] = guess
+        x, r, iteration.x[n:] = iteration.x[:n], iteration.r[:n], start
+        self._reduced.begin(x, f + border.rows.T @ start, r)
+        iteration.r[n:] = border.stiffness * (border.right - border.rows @ x - border.compliance @ start)
+        iteration.start()
+
+        def move_forces(forces: Array) -> None:
+            if elimination is not None:
+                elimination.move_forces(forces)
+
+        multiply = border.multiply(self._reduced.multiply, move_forces)
+        self._reduce(
+            iteration, self._enough(tolerance or 0.0) * scale, multiply, border.precondition(self.precondition)
+        )
+        return x.copy(), iteration.x[n:].copy()
+
+    def _reduce(
+        self, iteration: ConjugateResiduals, enough: float, multiply: Multiply, precondition: Precondition
+    ) -> None:
         """Iterate until the residual is `enough` [force]; a warm start is improved beyond that.
 
         It may meet the tolerance while the forces of a small contact are not right yet.
@@ -237,8 +282,8 @@ class Multigrid:
             done = iteration.norm <= enough
             if done and made >= MOST_WARM:
                 return
-            stands, multiply = made - fallen >= STANDING, self._reduced.multiply
-            if stands or made >= MAX_NONSYMMETRIC or not iteration.step(multiply, self.precondition):
+            stands = made - fallen >= STANDING
+            if stands or made >= MAX_NONSYMMETRIC or not iteration.step(multiply, precondition):
                 if done:
                     return
                 left = iteration.norm / enough

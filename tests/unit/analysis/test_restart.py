@@ -336,5 +336,6 @@ def test_a_strengthened_multigrid_cycle_is_remembered():
     assert other.solver.precision == "double"
     assert other.solver.hierarchy.bounds == analysis.solver.hierarchy.bounds
     f = np.random.default_rng(0).normal(size=other.solver.hierarchy.n)
-    solutions = [each.solver.solution(f, each.solver._reduced.elimination, None) for each in (analysis, other)]
+    equations = analysis.solver._reduced.elimination
+    solutions = [each.solver.solution(f, equations, None) for each in (analysis, other)]
     np.testing.assert_array_equal(*solutions)

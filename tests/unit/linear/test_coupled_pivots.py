@@ -152,7 +152,7 @@ def test_standard_multipliers_over_a_whole_interface_cost_multigrid_what_dual_on
 @pytest.mark.parametrize(
     ("options", "element"),
     [
-        ({"formulation": "continuous"}, "hex8"), ({"multipliers": "standard"}, "tet10"),
+        ({"formulation": "continuous", "friction": 0.3}, "hex8"), ({"multipliers": "standard"}, "tet10"),
     ],
 )  # fmt: skip
 def test_constraints_that_cannot_be_eliminated_go_to_factors_and_not_through_many_columns(
@@ -174,13 +174,12 @@ def test_constraints_that_cannot_be_eliminated_go_to_factors_and_not_through_man
 def test_auto_knows_which_constraints_multigrid_cannot_eliminate():
     solver = {options: prepare(pressed(20, **dict(options)), fc.linear_ramp(1), fc.Criteria()).solver.name for options in (
         (("multipliers", "standard"),), (("multipliers", "dual"),), (("multipliers", "dual"), ("penalty", 100.0)),
-        (("formulation", "continuous"),),
+        (("formulation", "continuous"),), (("formulation", "continuous"), ("friction", 0.3)),
     )}  # fmt: skip
-    assert list(solver.values()) == ["amg", "amg", "amg", "direct"]
+    assert list(solver.values()) == ["amg", "amg", "amg", "amg", "direct"]
 
 
-@pytest.mark.parametrize("solver", ["direct", "amg"])
-@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize(("solver", "friction"), [("direct", 0.0), ("direct", 0.3), ("amg", 0.3)])
 def test_a_full_compliance_that_would_take_hours_is_refused_with_the_alternative(solver, friction, monkeypatch):
     model = pressed(5, formulation="continuous", friction=friction)
     monkeypatch.setattr("fastcontact.linear.flexibility.MOST_ROWS", 100)

@@ -1,0 +1,111 @@
+r"""The compliance of forces at points that a field of fewer values cannot represent, and the same equations for that field.
+
+Forces of points with the weights W belong to a field with the values p, ``P p`` at the points. What the field does not
+represent gives way: :math:`C = (W^{-1} - P M^{-1} P^T) / \rho` among the points of some equations, M the mass matrix of the
+field over these and all other points. With forces W (P p - rho (B u - c)) the equations ``B u + C force = c`` are
+:math:`P^T W (B u - c) + E p = 0` for the field, E the mass matrix of the other points over rho, which vanishes but at the
+edge of the contact. Springs of the stiffness rho W act along the rows B: on what the field does not represent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import block_diag, csc_array, csr_array, diags_array
+from scipy.sparse.linalg import splu
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class FieldCompliance:
+    """See the module; equations that do not give way are fields of one point without springs.
+
+    Attributes
+    ----------
+    P : csr_array (m, k)
+        Field values to the points of the equations [-].
+    weights : ndarray (m,)
+        W, positive [area].
+    stiffness : ndarray (m,)
+        rho W [force / length].
+    others : csr_array (k, k)
+        E: the mass matrix of the points without equations over rho.
+    dense : callable
+        Returns C (m, m) [length / force].
+    """
+
+    P: csr_array
+    weights: Array
+    stiffness: Array
+    others: csr_array
+    dense: Callable[[], Array]
+
+    @classmethod
+    def stacked(cls, parts: Sequence[FieldCompliance], dense: Callable[[], Array]) -> FieldCompliance:
+        """Return several, one below the other."""
+        return cls(
+            csr_array(block_diag([part.P for part in parts], format="csr")),
+            np.concatenate([part.weights for part in parts]),
+            np.concatenate([part.stiffness for part in parts]),
+            csr_array(block_diag([part.others for part in parts], format="csr")),
+            dense,
+        )
+
+    @classmethod
+    def none(cls, m: int) -> FieldCompliance:
+        """Return that of m equations that do not give way."""
+        one = csr_array(diags_array(np.ones(m)))
+        return cls(one, np.ones(m), np.zeros(m), csr_array((m, m)), lambda: np.zeros((m, m)))
+
+    def of_field(self, B: csr_array, c: Array) -> FieldEquations:
+        """Return the same equations for the field, of rows B (m, n) and right-hand sides c (m,) [length]."""
+        shares = csr_array(self.P.T @ diags_array(self.weights))
+        size = np.asarray(abs(shares).sum(axis=1))
+        touched = np.flatnonzero(size > 0.0)
+        # Each in units of its own area: equations at the edge of the contact are small ones.
+        units = 1.0 / size[touched]
+        shares = csr_array(diags_array(units) @ shares[touched])
+        edge = self.others.diagonal()[touched] > 0.0
+        P = csr_array(self.P[:, touched] @ diags_array(units))
+        compliance = self._at_edge(touched[edge], units[edge])
+        return FieldEquations(csr_array(shares @ B), shares @ c, P, edge, compliance, touched[edge], units[edge])
+
+    def _at_edge(self, given: NDArray[np.intp], units: Array) -> Array:
+        """Return E among values `given` (e,), those without any equation being eliminated."""
+        rest = np.setdiff1d(np.flatnonzero(self.others.diagonal() > 0.0), given)
+        E: Array = self.others[given][:, given].toarray()
+        across = csr_array(self.others[given][:, rest])
+        if across.nnz:
+            E -= across @ splu(csc_array(self.others[rest][:, rest])).solve(across.T.toarray())
+        return E * (units[:, None] * units)
+
+
+@dataclass(frozen=True, eq=False)
+class FieldEquations:
+    """``rows u + E p = right``, p the values of the field that some equation touches; ``P p`` are pressures at the points.
+
+    Attributes
+    ----------
+    rows : csr_array (l, n)
+    right : ndarray (l,)
+    P : csr_array (m, l)
+    edge : ndarray of bool (l,)
+        Values at the edge of the contact; the others do not give way.
+    compliance : ndarray (e, e)
+        E among those at the edge.
+    at, units : ndarray (e,)
+        Which values of the field these are, and in which units.
+    """
+
+    rows: csr_array
+    right: Array
+    P: csr_array
+    edge: Mask
+    compliance: Array
+    at: NDArray[np.intp]
+    units: Array

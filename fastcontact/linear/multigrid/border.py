@@ -1,0 +1,73 @@
+"""A few equations ``B u + C multiplier = c`` with a full compliance C beside those eliminated: unknowns of their own.
+
+The matrix of displacements and multipliers, ``[A, -B.T; B, C]``, is bordered and not positive definite. Conjugate residuals
+solve it, preconditioned by its lower triangle: multigrid for A, and for the multipliers ``C + B D^-1 B.T``, D the diagonal of
+A, softer by as much as neighbours give way, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse import csr_array, diags_array
+
+from fastcontact.linear.krylov.iterations import Multiply, Precondition
+
+Array = NDArray[np.float64]
+# By how much displacements give way more than the diagonal of their matrix says.
+SOFTER = 2.0
+# Part of what they have by themselves that is added to multipliers in the preconditioner: some equations repeat each other.
+REPEATED = 1e-10
+
+
+class Border:
+    """The equations of the module.
+
+    Parameters
+    ----------
+    rows : csr_array (e, n)
+    right : ndarray (e,)
+    compliance : ndarray (e, e)
+    """
+
+    def __init__(self, rows: csr_array, right: Array, compliance: Array) -> None:
+        self.rows, self.right, self.compliance = rows, right, compliance
+
+    def __len__(self) -> int:
+        return len(self.right)
+
+    def prepare(self, diagonal: Array) -> None:
+        """Factorise what preconditions the multipliers, given the diagonal (n,) of A [force / length]."""
+        yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
+        S = self.compliance + SOFTER * (self.rows @ diags_array(yielding) @ self.rows.T).toarray()
+        own = np.diag(S)
+        S[np.diag_indices(len(S))] += REPEATED * own
+        # Residuals of these equations become forces.
+        self.stiffness = 1.0 / own
+        self._factors = cho_factor(S)
+
+    def multiply(self, multiply: Multiply, move_forces: Callable[[Array], None]) -> Multiply:
+        """Return the product with the bordered matrix, from that with A; forces (n,) move from eliminated unknowns."""
+        n = self.rows.shape[1]
+
+        def product(p: Array, q: Array) -> None:
+            multiply(p[:n], q[:n])
+            forces = self.rows.T @ p[n:]
+            move_forces(forces)
+            q[:n] -= forces
+            q[n:] = self.stiffness * (self.rows @ p[:n] + self.compliance @ p[n:])
+
+        return product
+
+    def precondition(self, precondition: Precondition) -> Precondition:
+        """Return the preconditioner, from that of A."""
+        n = self.rows.shape[1]
+
+        def solve(r: Array, norm: float, z: Array) -> None:
+            precondition(r[:n], norm, z[:n])
+            z[n:] = cho_solve(self._factors, r[n:] / self.stiffness - self.rows @ z[:n])
+
+        return solve

@@ -1,0 +1,156 @@
+"""Forces of points that a field represents in part: the equations of the field, and continuous contact by multigrid."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+
+import fastcontact as fc
+from fastcontact.analysis.load_step import load_step
+from fastcontact.analysis.problem import prepare
+from fastcontact.contact.multiplier_field import Projection
+from fastcontact.elasticity.constrained_system import supports_apart
+from fastcontact.elasticity.stiffness import rigid_modes, stiffness
+from fastcontact.linear import choice
+from fastcontact.linear.field_compliance import FieldCompliance
+from fastcontact.linear.solvers.amg import Amg
+
+RHO = 2.0
+
+
+def along_a_line(m=10, per_node=3, seed=0):
+    """Return the projection of points along a line upon a field of m values."""
+    from scipy.sparse.linalg import splu
+
+    rng = np.random.default_rng(seed)
+    at = np.sort(rng.random(per_node * (m - 1))) * (m - 1)
+    left = np.minimum(at.astype(int), m - 2)
+    P = np.zeros((len(at), m))
+    P[np.arange(len(at)), left], P[np.arange(len(at)), left + 1] = 1 - (at - left), at - left
+    areas = 0.1 + 0.1 * rng.random(len(at))
+    mass = splu(csr_array(P.T @ (areas[:, None] * P)).tocsc())
+    return Projection(csr_array(P), areas, RHO, mass)
+
+
+def box():
+    mesh = fc.generate.box((1.0, 1.1, 0.9), (7, 6, 5))
+    moduli = np.asarray([fc.LinearElastic(E=10.0, nu=0.3).moduli("3d")])
+    K = stiffness(mesh, "3d", moduli, {"hex8": np.zeros(len(mesh.cells["hex8"]), np.int64)})
+    fixed = np.repeat(mesh.points[:, 1] == 0, 3)
+    return supports_apart(K, fixed)[0], np.where(fixed[:, None], 0.0, rigid_modes(mesh.points, "3d")), fixed
+
+
+def rows_at_points(projection, fixed, seed=1):
+    """Return rows (m, n): values of a field of displacements, each with an unknown of its own, at the points."""
+    rng, nodes = np.random.default_rng(seed), np.zeros((projection.P.shape[1], len(fixed)))
+    free = rng.permutation(np.flatnonzero(~fixed))
+    for i, row in enumerate(nodes):
+        row[free[i]] = 1.0
+        row[free[len(nodes) + rng.permutation(8)[:3]]] = -rng.random(3)
+    m = projection.P.shape[0]
+    return csr_array(projection.P @ nodes), rng.normal(size=m)
+
+
+@pytest.mark.parametrize("closed", ["all", "some", "few", "one"])
+def test_the_equations_of_the_field_are_those_of_the_points(closed):
+    projection = along_a_line()
+    m = projection.P.shape[0]
+    rows = {"all": np.arange(m), "some": np.arange(5, 20), "few": np.array([3, 12, 13]), "one": np.array([7])}[closed]
+    K, modes, fixed = box()
+    B, c = rows_at_points(projection, fixed)
+    B, c = csr_array(B[rows]), c[rows]
+    f = np.where(fixed, 0.0, np.random.default_rng(5).normal(size=len(fixed)))
+    C = projection.block(rows)
+    whole = np.block([[K.toarray(), -B.toarray().T], [B.toarray(), C]])
+    expected = np.linalg.lstsq(whole, np.concatenate([f, c]), rcond=None)[0]
+    solver = Amg(1e-11)
+    solver.prepare(K, modes)
+    among = projection.among(rows)
+    assert isinstance(among, FieldCompliance)
+    u, forces = solver.load(f).solve(B, c, among)
+    assert not solver.columns.asked
+    assert u == pytest.approx(expected[: len(f)], abs=1e-8 * np.abs(u).max())
+    assert forces == pytest.approx(expected[len(f) :], abs=1e-8 * np.abs(forces).max())
+    # As factors and columns take it.
+    direct = choice.make("direct", dim=3, n_dofs=len(f))
+    direct.prepare(K, modes)
+    assert direct.load(f).solve(B, c, among)[1] == pytest.approx(forces, abs=1e-8 * np.abs(forces).max())
+
+
+def test_points_beside_equations_that_do_not_give_way():
+    projection, m = along_a_line(), 27
+    both = FieldCompliance.stacked([projection.among(np.arange(4, 20)), FieldCompliance.none(2)], lambda: dense)
+    dense = np.zeros((18, 18))
+    dense[:16, :16] = projection.block(np.arange(4, 20))
+    K, modes, fixed = box()
+    assert projection.P.shape[0] == m
+    B, c = rows_at_points(projection, fixed)
+    other = np.zeros((2, len(fixed)))
+    other[[0, 1], np.flatnonzero(~fixed)[[100, 200]]] = 1.0
+    B, c = csr_array(np.vstack([B[4:20].toarray(), other])), np.r_[c[4:20], 0.1, -0.2]
+    f = np.where(fixed, 0.0, 1.0)
+    solver = Amg(1e-11)
+    solver.prepare(K, modes)
+    u, forces = solver.load(f).solve(B, c, both)
+    assert np.abs(B @ u + dense @ forces - c).max() < 1e-8 * np.abs(c).max()
+    assert np.abs(K @ u - f - B.T @ forces).max() < 1e-8 * np.abs(forces).max()
+
+
+def pressed(curvature=0.0, ratio=1.0, element="hex8", n=10, **options):
+    def part(z, k, name):
+        mesh = fc.generate.box((1.0, 1.0, 0.5), (k, k, k // 2), element, (0.0, 0.0, z))
+        return fc.generate.renamed(mesh, {group: name + group for group in mesh.group_names})
+
+    upper = part(0.0, n * 4 // 5, "U_")
+    points = np.array(upper.points)
+    points[:, 2] += curvature * (points[:, 0] ** 2 + points[:, 1] ** 2)
+    model = fc.Model(fc.generate.union(part(-0.5, n, "L_"), upper.replace(points=points)), "3d")
+    model.add_material(fc.LinearElastic(ratio, 0.3), groups=["L_BOX"])
+    model.add_material(fc.LinearElastic(1.0, 0.3), groups=["U_BOX"])
+    model.fix("L_ZMIN", "xyz")
+    model.prescribe("U_ZMAX", x=0.0, y=0.0, z=-0.01)
+    model.add_contact("c", secondary="U_ZMIN", primary="L_ZMAX", formulation="continuous", **options)
+    return model
+
+
+def on_obstacle(obstacle):
+    mesh = fc.generate.box((1.0, 1.0, 0.5), (8, 8, 4), "hex8")
+    model = fc.Model(mesh, "3d")
+    model.add_material(fc.LinearElastic(1.0, 0.3))
+    model.prescribe("ZMAX", x=0.0, y=0.0, z=-0.01)
+    model.add_obstacle("c", secondary="ZMIN", obstacle=obstacle, formulation="continuous")
+    return model
+
+
+def beside_another():
+    """A pair of points beside one of nodes."""
+    model = pressed(0.02)
+    wall = fc.obstacles.HalfSpace((1.001, 0.0, 0.0), (-1.0, 0.0, 0.0))
+    model.add_obstacle("wall", secondary="U_XMAX", obstacle=wall, formulation="node_to_segment")
+    return model
+
+
+CASES = {
+    "all closed": (pressed, 30), "edge": (lambda: pressed(0.02), 90), "few": (lambda: pressed(0.2), 80),
+    "stiff primary": (lambda: pressed(0.02, ratio=100.0), 150), "tet4": (lambda: pressed(0.02, element="tet4"), 200),
+    "augmented": (lambda: pressed(0.02, augmentation=10.0), 300), "two pairs": (beside_another, 200),
+    "wall": (lambda: on_obstacle(fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))), 30),
+    "ball": (lambda: on_obstacle(fc.obstacles.Sphere((0.5, 0.5, -1.0), 1.0)), 100),
+}  # fmt: skip
+
+
+def step_of(model, name):
+    problem = prepare(model, fc.linear_ramp(1), fc.Criteria(), linear_solver=name)
+    return problem.solver, load_step(problem, problem.initial_state(), 1, 1.0)[1].contact["c"]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_continuous_contact_costs_multigrid_no_columns(case):
+    make, most = CASES[case]
+    solver, found = step_of(make(), "amg")
+    assert not solver.gave_up
+    assert not solver.columns.asked
+    assert solver.counters.iterations <= most
+    factors = step_of(make(), "direct")[1]
+    size = np.abs(factors.force_vectors).max()
+    assert found.force_vectors == pytest.approx(factors.force_vectors, abs=1e-7 * size)
+    assert np.array_equal(found.active, factors.active)
