@@ -4,7 +4,8 @@ A sphere on a block, solved by multigrid, mesh left out, assembly included. A ru
 Python's profiler, which tells the wall time of every stage in the main thread. A stage is a function of the package with
 what it calls outside of it. From its wall times on N threads follows its serial part by Amdahl's law, ``t(N) = s + p / N``,
 s and p not negative, in least squares. Where the main thread waits for others, waiting is work of the stage that shares it.
-Memory that gets no faster with more threads counts as serial, too.
+Memory that gets no faster with more threads counts as serial, too: beside it stand the bytes that a product with the finest
+matrix reads in a second, and those that a sum over a long array does.
 """
 
 from __future__ import annotations
@@ -22,6 +23,10 @@ SIZES = (280_000,)
 SMALLEST = 1_500
 STEPS = 20
 BY_UNKNOWNS = True  # --sizes are numbers of unknowns
+# Bytes of the array whose sum tells how fast memory is read: far more than caches hold. A small run takes fewer.
+LONG, SHORT = 480_000_000, 8_000_000
+# Calls of which the fastest counts.
+CALLS = 9
 # Stages that take this part of the run on all threads, or more, are told.
 TOLD = 0.01
 BENCH = Path(__file__).resolve().parents[1]
@@ -70,22 +75,51 @@ def alone(size, steps, profiled):
         profile.runcall(_march, contact, model, steps)
         return {"stages": stages(pstats.Stats(profile).stats)}
     cpu = time.process_time()
-    cold, wall, iterations = _march(contact, model, steps)
-    return {
+    cold, wall, solver = _march(contact, model, steps)
+    found = {
         "n_dofs": model.n_dofs, "wall_s": wall, "cold_wall_s": cold, "cpu_s": time.process_time() - cpu,
-        "iterations": iterations, "peak_bytes": peak_bytes(),
+        "iterations": solver.counters.iterations, "peak_bytes": peak_bytes(),
     }  # fmt: skip
+    return found | bandwidths(solver, SHORT if size <= SMALLEST else LONG)
+
+
+def bandwidths(solver, size):
+    """Return the bytes a second that a sum over `size` bytes reads; bytes and seconds of products with the finest matrix."""
+    import numpy as np
+
+    from fastcontact.linear.krylov import krylov_kernels
+
+    long, sums = np.ones(size // 8), np.empty(-(-(size // 8) // krylov_kernels.CHUNK))
+    found = {"read_rate": size / _fastest(lambda: krylov_kernels.dot(long, long, sums))}
+    A, n = solver.hierarchy.levels[0].A, solver.hierarchy.n
+    where = sum(part.nbytes for part in (A.storage[:3] if A.storage[3] else (A.indptr, A.indices)))
+    for name, matrix, parts in (("single", A, (A.data,)), ("exact", solver.K.scaled, solver.K.scaled.exact)):
+        x, y = np.ones((2, n), A.data.dtype if name == "single" else float)
+        seconds = _fastest(lambda matrix=matrix, x=x, y=y: matrix.multiply(x, y))
+        read = sum(part.nbytes for part in parts) + where + x.nbytes + y.nbytes
+        found |= {f"{name}_bytes": read, f"{name}_s": seconds}
+    return found
+
+
+def _fastest(work):
+    """Return the wall time of the fastest of some calls [s]."""
+    walls = []
+    for _ in range(CALLS):
+        begin = time.perf_counter()
+        work()
+        walls.append(time.perf_counter() - begin)
+    return min(walls)
 
 
 def _march(contact, model, count):
-    """Assemble and make all steps; return the wall time of the first step, assembly included, and of all, and iterations."""
+    """Assemble and make all steps; return the wall time of the first step, assembly included, and of all, and the solver."""
     begin, cold = time.perf_counter(), 0.0
     problem = contact.started(model, "amg", count)
     state = problem.initial_state()
     for index, instant in enumerate(problem.ramp.instants, start=1):
         state, _ = contact.load_step(problem, state, index, instant)
         cold = cold or time.perf_counter() - begin
-    return cold, time.perf_counter() - begin, problem.solver.counters.iterations
+    return cold, time.perf_counter() - begin, problem.solver
 
 
 def stages(stats):
@@ -127,6 +161,8 @@ def entry(steps, runs):
     for run in runs:
         run["speed_up"] = one["wall_s"] / run["wall_s"]
         run["efficiency"] = run["speed_up"] * one["threads"] / run["threads"]
+        for name in ("single", "exact"):
+            run[f"{name}_rate"] = run[f"{name}_bytes"] / run[f"{name}_s"]
     threads = [run["threads"] for run in runs]
     serial, shared = amdahl(threads, [run["wall_s"] for run in runs])
     told = []
@@ -174,12 +210,29 @@ def lines(found):
             f"{run['peak_bytes'] / run['n_dofs']:>21.0f}"
             for run in entry["runs"]
         ]
+        table += _memory(entry["runs"])
         table.append(f"serial part by Amdahl's law: {100 * entry['serial_share']:.1f} % of the run on one thread")
         threads = " ".join(f"{'on ' + str(run['threads']):>8}" for run in entry["runs"])
         table.append(f"{'serial s':>8} {threads}  stage, wall s (profiled)")
         for stage in entry["stages"]:
             walls = " ".join(f"{wall:>8.3f}" for wall in stage["wall_s"])
             table.append(f"{stage['serial_s']:>8.3f} {walls}  {stage['stage']}")
+    return table
+
+
+def _memory(runs):
+    """Return the lines that tell how near products come to the limit of the memory."""
+    table = [
+        f"{'threads':>8} {'sum GB/s':>8} {'product MB':>10} {'ms':>7} {'GB/s':>6} {'of sum':>6} {'exact MB':>8} "
+        f"{'ms':>7} {'GB/s':>6} {'of sum':>6}  memory read by a sum, and by products with the finest matrix"
+    ]
+    for run in runs:
+        row = f"{run['threads']:>8} {run['read_rate'] / 1e9:>8.1f}"
+        for name, width in (("single", 10), ("exact", 8)):
+            rate = run[f"{name}_rate"]
+            row += f" {run[f'{name}_bytes'] / 1e6:>{width}.1f} {1e3 * run[f'{name}_s']:>7.2f} {rate / 1e9:>6.1f}"
+            row += f" {rate / run['read_rate']:>6.2f}"
+        table.append(row)
     return table
 
 

@@ -1,4 +1,4 @@
-"""How kernels are compiled: disk cache, safe subset of fast arithmetic, threads.
+"""How kernels are compiled: disk cache, arithmetic as written, threads.
 
 Kernels compile at their first call, never at import. Where no folder is writable for the cache, they compile
 in every process instead, and one line in the log says so.
@@ -20,8 +20,12 @@ from fastcontact.errors import FastcontactError
 
 log = logging.getLogger("fastcontact")
 
-# Contraction to fused multiply-add only: NaN, infinities and the order of sums stay as written.
-FASTMATH = {"contract"}
+# Arithmetic is done as written, products and sums not fused to one rounding either. A kernel that others call is compiled
+# once by itself and once as a part of each of them, and optimised differently there; which of the copies runs depends on
+# what was compiled or loaded before. Only where each operation has one result do all of them give the same bits.
+AS_WRITTEN: set[str] = set()
+# What vectors may do in a kernel that neither calls another nor is called by one: of that there is one copy.
+ANY_ORDER = {"contract", "reassoc"}
 
 _cache_reported = False
 
@@ -58,9 +62,9 @@ def parallel_kernel(function: Callable[..., Any]) -> Any:
 def summing_kernel(function: Callable[..., Any]) -> Any:
     """Like `kernel`, for long sums of products, which vectors take in an order of their own: the same in every run.
 
-    Only where the last bits may differ between processors, as they do in BLAS.
+    Only where the last bits may differ between processors, as they do in BLAS, and no other kernel calls it, or is called.
     """
-    return _compile(function, parallel=False, fastmath=FASTMATH | {"reassoc"})
+    return _compile(function, parallel=False, fastmath=ANY_ORDER)
 
 
 def inlined_kernel(function: Callable[..., Any]) -> Any:
@@ -76,7 +80,7 @@ def innermost_kernel(function: Callable[..., Any]) -> Any:
     return _compile(function, parallel=False, forceinline=True)
 
 
-def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = FASTMATH, **inlining: Any) -> Any:
+def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = AS_WRITTEN, **inlining: Any) -> Any:
     options: dict[str, Any] = {"fastmath": fastmath, "parallel": parallel, "nogil": True, "error_model": "numpy"}
     options |= inlining
     try:

@@ -56,7 +56,7 @@ def solve(
     one_by_one = False
     iteration = 1
     while True:
-        watch = _Watch(signs, active, changed) if constraints.normal_compliance is None else None
+        watch = _Watch(signs, active, changed)
         rows, compliance = np.flatnonzero(active), constraints.normal_compliance
         C = None if compliance is None else compliance.block(rows)
         nodes = None if constraints.nodes is None else constraints.nodes[rows]
@@ -64,7 +64,7 @@ def solve(
             constraints.B[rows], -constraints.gap0[rows], C, guess, watch, accuracy.residual, nodes
         )
         guess = u
-        if watch is not None and watch.wanted is not None:
+        if watch.wanted is not None:
             changed |= active != watch.wanted
             active = watch.wanted
             continue

@@ -17,6 +17,7 @@ from fastcontact.analysis.inequalities import StepContext, solve_inequalities
 from fastcontact.analysis.iterate import Iterate, initially_active, pair_surfaces
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.scatter import Scatter, Watch
+from fastcontact.analysis.shared_nodes import shared
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.tolerances import PATIENT_UPDATES, Tolerances
 from fastcontact.contact.constraints import StackedConstraints
@@ -114,10 +115,11 @@ def settle_geometry(
     """
     iterate = begun or Iterate.of(step.state)
     try:
-        return _settle(step, iterate, extrapolation, expected)
+        settled = _settle(step, iterate, extrapolation, expected)
     except ConvergenceError as error:
         error.history = error.history or iterate.history
         raise
+    return replace(settled, solution=shared(settled.solution, settled.constraints))
 
 
 def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, expected: float) -> SettledContact:

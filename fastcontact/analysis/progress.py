@@ -55,14 +55,15 @@ class Progress(StatusLine):
         self._total, self._before = total, done
         self._compiled = compiling.count
 
-    def step(self, step: StepResult) -> None:
-        """Redraw after a step."""
-        if not self._show:
+    def step(self, step: StepResult, complete: int | None = None) -> None:
+        """Redraw after a step; `complete` steps are there, all up to this one by default."""
+        index = step.index if complete is None else complete
+        if not self._show or not index:
             return
-        bar = "#" * round(WIDTH * step.index / self._total)
+        bar = "#" * round(WIDTH * index / self._total)
         closed = sum(int(contact.active.sum()) for contact in step.contact.values())
         nodes = "1 node" if closed == 1 else f"{closed} nodes"
-        self.draw(f"[{bar:<{WIDTH}}] step {step.index}/{self._total}, {nodes} in contact{self._left(step.index)}")
+        self.draw(f"[{bar:<{WIDTH}}] step {index}/{self._total}, {nodes} in contact{self._left(index)}")
 
     def _left(self, index: int) -> str:
         """Return the time left after a step; nothing where it was the one for which kernels were compiled."""

@@ -88,10 +88,9 @@ class UnsupportedBodies:
     """
 
     def __init__(self, motions: FreeMotions, system: System, avoid: NDArray[np.intp]) -> None:
-        diagonal = system.matrix.diagonal()
-        weightless = diagonal == 0
-        typical = float(np.median(diagonal[system.free & (diagonal > 0)]))
-        diagonal = np.where(diagonal > 0, diagonal, typical)  # rigid obstacles have no stiffness of their own
+        diagonal, weightless = system.matrix.diagonal(), system.weightless
+        typical = float(np.median(diagonal[system.free & ~weightless]))
+        diagonal = np.where(weightless, typical, diagonal)
         self._dim = system.matrix.blocksize[0]
         self.names = motions.names()
         self.dofs = _spring_dofs(system.unknowns_of(motions.displacement), diagonal, avoid)

@@ -16,16 +16,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
 from fastcontact.cli._terminal import say
-from fastcontact.errors import CaseError, ConvergenceError, FastcontactWarning, ModelError
+from fastcontact.errors import CaseError, ConvergenceError, FastcontactWarning, FileError, ModelError
 
 if TYPE_CHECKING:
     from fastcontact.cases.case import Case
     from fastcontact.results.step import StepResult
+    from fastcontact.results.writer import ResultWriter
 
 HELP = "solve a case file or an input deck (.inp) and write the results of all steps"
 log = logging.getLogger("fastcontact")
 # Cell field of the estimated error.
 ERROR = "error"
+# Steps of meshes of so many points are written while the next one is computed; of others writing takes no time.
+LARGE = 30_000
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -133,8 +136,10 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[_Don
     from fastcontact.cases.summary import of_step
     from fastcontact.results.writer import ResultWriter
 
-    fields = (ERROR,) if options.estimate_error else ()
-    with ResultWriter(output, case.model, case_text=case.text, cell_fields=fields, resume=options.resume) as writer:
+    fields, large = (ERROR,) if options.estimate_error else (), case.model.mesh.n_points >= LARGE
+    with ResultWriter(
+        output, case.model, case_text=case.text, cell_fields=fields, resume=options.resume, background=large
+    ) as writer:
         _check_same(case, writer.done, output)
         last, done = writer.done[-1] if writer.done else None, _done(writer.done)
         steps = list(done.summaries)
@@ -151,17 +156,26 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[_Don
             ):
                 last = case.finished(last)
                 writer.write(_estimated(case.model, last) if fields else last)
-                progress.step(last)
                 steps.append(of_step(last))
+                progress.step(last, writer.n_steps)  # what is still being written does not count
+            writer.wait()
         except (ConvergenceError, KeyboardInterrupt) as error:
-            error.add_note(_kept(output, writer.n_steps))
-            if options.json:  # in place of the summary of an earlier run
-                reason = str(error) or "interrupted from the keyboard"
-                write_json(options.json, {"failed": reason, "complete_steps": writer.n_steps})
+            _stopped(error, writer, output, options.json)
             raise
         finally:
             progress.close()
     return done, last, steps
+
+
+def _stopped(error: BaseException, writer: ResultWriter, output: Path, summary: str | None) -> None:
+    """Say in an error, and in the file of the summary, how many steps are complete."""
+    try:
+        writer.wait()
+    except FileError as failure:
+        error.add_note(str(failure))
+    error.add_note(_kept(output, writer.n_steps))
+    if summary:  # in place of the summary of an earlier run
+        write_json(summary, {"failed": str(error) or "interrupted from the keyboard", "complete_steps": writer.n_steps})
 
 
 def _check_same(case: Any, done: Sequence[Any], output: Path) -> None:

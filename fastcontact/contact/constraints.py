@@ -18,7 +18,7 @@ class Compliance(Protocol):
     """A symmetric positive semidefinite matrix C (m, m) over all constraints."""
 
     def block(self, rows: NDArray[np.intp]) -> Array:
-        """Return the dense rows and columns `rows` of C."""
+        """Return the dense rows and columns `rows` of C, or, where C is diagonal, its diagonal there."""
         ...
 
     def apply(self, multiplier: Array) -> Array:
@@ -316,8 +316,8 @@ class _Softened:
         self._inner, self._softness = inner, softness
 
     def block(self, rows: NDArray[np.intp]) -> Array:
-        own = np.diag(self._softness[rows])
-        return own if self._inner is None else own + self._inner.block(rows)
+        own = self._softness[rows]
+        return own if self._inner is None else np.diag(own) + self._inner.block(rows)
 
     def apply(self, multiplier: Array) -> Array:
         own = self._softness * multiplier

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from fastcontact.contact.pairing import Candidates, Pairing
 from fastcontact.contact.projection import nodal_normals
@@ -33,6 +32,8 @@ def at_nodes(
     normals : str or sequence of float
         See `Formulation`; of the primary side's own, those of nodes are the means of their facets'.
     """
+    from scipy.spatial import cKDTree
+
     nearest = cKDTree(deformed[primary.points]).query(candidates.positions(deformed))[1]
     facet, xi = _on_facets(primary)
     own = normals in ("facet", "averaged")

@@ -132,9 +132,11 @@ def pair(
     at_nodes = at_nodes_of_facets(smooth_normals(primary, coordinates))
     if not isinstance(normals, str):
         at_nodes = np.broadcast_to(np.array(normals), at_nodes.shape).copy()
-    project = along_normals if coordinates.shape[1] == 3 else along_line_normals
-    facet, xi, overhang = project(candidates, primary, coordinates, at_nodes, found)
-    normal = interpolated(at_nodes[facet], places(primary, facet, xi))
+    if coordinates.shape[1] == 3:
+        facet, xi, overhang, normal = along_normals(candidates, primary, coordinates, at_nodes, found)
+    else:
+        facet, xi, overhang = along_line_normals(candidates, primary, coordinates, at_nodes, found)
+        normal = interpolated(at_nodes[facet], places(primary, facet, xi))
     paired = overhang <= projection_tolerance
     return _straight_on(
         Pairing(facet, xi, normal, paired), candidates, primary, coordinates, paired & (overhang > ROUNDING)

@@ -109,6 +109,24 @@ class Surface:
         found.data[:] = 1.0
         return found
 
+    @cached_property
+    def triangular(self) -> NDArray[np.bool_]:
+        """Which facets (n_facets,) are triangles."""
+        return np.concatenate([np.full(len(b.facets), elements.get(b.element).n_corners == 3) for b in self.blocks])
+
+    @cached_property
+    def neighbours(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Where the neighbours of each facet begin (n_facets + 1,), and which they are, ascending: they share a node."""
+        nodes = np.concatenate([block.local.ravel() for block in self.blocks])
+        sizes = np.concatenate([np.full(len(block.local), block.local.shape[1]) for block in self.blocks])
+        start = np.concatenate([[0], np.cumsum(sizes)])
+        incidence = csr_array((np.ones(len(nodes)), nodes, start), shape=(self.n_facets, len(self.points)))
+        found = csr_array(incidence @ incidence.T)
+        found.setdiag(0.0)
+        found.eliminate_zeros()
+        found.sort_indices()
+        return found.indptr.astype(np.intp), found.indices.astype(np.intp)
+
     def corners(self, coordinates: Array) -> list[Array]:
         """Return the nodes (n_facets, n_nodes, dim) of each block at nodal `coordinates` (n_points, dim)."""
         return [coordinates[block.facets] for block in self.blocks]

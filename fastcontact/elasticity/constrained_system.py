@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 # Supports and right-hand sides that miss a condition by less than this fraction meet it.
 CONFLICT = 1e-9
+# A stiffness below this fraction of those that cancel in it is what rounding leaves.
+ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +79,8 @@ class System:
         Supported components, and those of points without stiffness or relation, which stay at zero.
     free : ndarray of bool (n,)
         The unknowns.
+    weightless : ndarray of bool (n,)
+        Unknowns without stiffness of their own: components of rigid obstacles, motions of bodies that relations make rigid.
     T : csr_array (n, n) or None
         See the module; None without relations.
     """
@@ -97,12 +101,16 @@ class System:
         if self.T is None:
             self.K = Stiffness(supports_apart(K, self.fixed))
             self.matrix = self.K.parts[0]
+            self.weightless: Mask = self.free & (diagonal_of(self.matrix) == 0.0)
         else:
             self.K = Stiffness((K,))
             transformed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
             transformed.sort_indices()
+            diagonal = diagonal_of(transformed)
+            cancelling = self.T.multiply(self.T).T @ diagonal_of(K)
             # Not points that relations couple to nothing but each other.
-            self.free &= (transformed.diagonal() > 0) | without_stiffness
+            self.free &= (cancelling > 0.0) | without_stiffness
+            self.weightless = self.free & (diagonal <= ROUND_OFF * cancelling)
             self.matrix = supports_apart(transformed, ~self.free)[0]
         self._no_unknowns = np.flatnonzero(~self.free)
 

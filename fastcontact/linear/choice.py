@@ -42,8 +42,8 @@ def make(
     precision : {"single", "double"}, optional
         Of the multigrid cycle, single by default; direct solvers work in double precision always.
     columns : bool
-        Whether constraints cannot be eliminated, but need columns of ``K^-1``: those with a compliance of their own. For
-        ``"auto"``.
+        Whether constraints cannot be eliminated, but need columns of ``K^-1``: those with a full compliance of their own.
+        For ``"auto"``.
 
     Raises
     ------

@@ -24,7 +24,7 @@ CHUNK = 32
 # Newton's method factorises it several times for each pairing and it is not symmetric, ten seconds each.
 MOST_ROWS, MOST_ROWS_WITH_FRICTION = 20_000, 6_000
 # Formulations whose constraints no solver needs columns of the inverse for.
-CHEAP = 'formulation="mortar" with multipliers="dual", against rigid obstacles formulation="node_to_segment", and no penalty'
+CHEAP = 'formulation="mortar" with multipliers="dual", against rigid obstacles formulation="node_to_segment"'
 
 
 class TooManyColumnsError(ConvergenceError):
@@ -49,8 +49,8 @@ def check_rows(count: int, most: int | None = None) -> None:
     if count > most:
         raise ContactError(
             f"the contact needs the full compliance of {count} constraints, {8e-9 * count**2:.1f} GB that are factorised "
-            f"again and again (at most {most} are), since they give way by themselves or cannot be eliminated: use {CHEAP}, "
-            "or a coarser or smaller secondary side"
+            f"again and again (at most {most} are), by the direct solver, or since they cannot be eliminated: "
+            f'use {CHEAP}, with linear_solver="amg", or a coarser or smaller secondary side'
         )
 
 
@@ -134,15 +134,32 @@ def symmetric(flexibility: Array) -> Array:
 
 
 def multipliers(columns: FlexibilityColumns, B: csr_array, wanted: Array, C: Array | None) -> Array:
-    """Return the multipliers (m,) [force] with ``(B K^-1 B.T + C) multiplier = wanted`` (m,) [length]; C may be None."""
+    """Return the multipliers (m,) [force] with ``(B K^-1 B.T + C) multiplier = wanted`` (m,) [length].
+
+    C is a matrix (m, m), its diagonal (m,) where it has no more, or None.
+    """
     return solve_multipliers(columns.of_rows(B), wanted, C)
 
 
 def solve_multipliers(flexibility: Array, wanted: Array, C: Array | None) -> Array:
     """Return the multipliers (m,) with ``(flexibility + C) multiplier = wanted``; `flexibility` (m, m) is overwritten."""
-    if C is not None:
+    if C is not None and C.ndim == 1:
+        flexibility[np.diag_indices(len(C))] += C
+    elif C is not None:
         flexibility += C
     try:
-        return cho_solve(cho_factor(flexibility), wanted)
-    except LinAlgError:  # rows that repeat each other: of their multipliers the smallest are taken
-        return lstsq(flexibility, wanted)[0]
+        factor = cho_factor(flexibility)
+    except LinAlgError:
+        return _smallest(flexibility, wanted)
+    repeated = factor[0].diagonal() ** 2 <= _round_off(flexibility) * flexibility.diagonal()
+    return _smallest(flexibility, wanted) if repeated.any() else cho_solve(factor, wanted)
+
+
+def _smallest(flexibility: Array, wanted: Array) -> Array:
+    """Return the smallest multipliers (m,) where rows repeat each other and leave them open."""
+    return np.asarray(lstsq(flexibility, wanted, cond=_round_off(flexibility))[0])
+
+
+def _round_off(flexibility: Array) -> float:
+    """Return the rounding error of a factorisation (m, m) over its diagonal."""
+    return 10.0 * len(flexibility) * float(np.finfo(float).eps)

@@ -2,7 +2,8 @@
 
 Shapes: n unknowns, m equations among them. ``K`` is a stiffness [force / length], ``u`` a displacement [length], ``f`` a
 force [force]. Equations ``B u + C multiplier = c`` have rows B (m, n) [-] and right-hand sides c (m,) [length]; their
-multipliers (m,) are forces [force], their compliance C (m, m) is a length per force.
+multipliers (m,) are forces [force], their compliance C is a length per force: a matrix (m, m), or its diagonal (m,) where it
+has no more.
 """
 
 from __future__ import annotations
@@ -111,18 +112,18 @@ class LoadedNonsymmetric(Loaded, Protocol):
 
     def solve_nonsymmetric(
         self, B: csr_array, c: Array, nodes: NDArray[np.intp], guess: Array, tolerance: float,
-        friction: FrictionTerms | None = None,
+        friction: FrictionTerms | None = None, C: Array | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """Return (u, multiplier) with ``B u = c`` and ``K u + S u = f + forces + rows.T multiplier``.
+        """Return (u, multiplier) with ``B u + C multiplier = c`` and ``K u + S u = f + forces + rows.T multiplier``.
 
-        S, forces and rows are those of `friction`; without it they are zero and B. Equations of one of the `nodes` (m,)
-        may share unknowns. The iteration starts from `guess` (n,) and ends at a relative
-        residual of `tolerance`, or of the solver's own where that is larger.
+        C (m,) is a diagonal compliance, None stands for zero. S, forces and rows are those of `friction`; without it they
+        are zero and B. Equations of one of the `nodes` (m,) may share unknowns. The iteration starts from `guess` (n,) and
+        ends at a relative residual of `tolerance`, or of the solver's own where that is larger.
 
         Raises
         ------
         ConvergenceError
-            If equations repeat each other, in B or in rows, or the iteration does not end.
+            If equations that do not give way repeat each other, in B or in rows, or the iteration does not end.
         """
         ...
 

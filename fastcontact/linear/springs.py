@@ -1,4 +1,4 @@
-"""Springs along rows of displacements, such as those across sliding contacts: kept as rows, not as a matrix."""
+"""Springs along rows of displacements, such as penalties and those across sliding contacts: kept as rows, not as a matrix."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, vstack
 
 from fastcontact.linear import springs_kernels
 from fastcontact.linear.sparse_rows import scaled
@@ -20,7 +20,7 @@ ALIKE = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Springs:
-    """Springs with the forces ``-rows.T (stiffness * (rows u))``.
+    """Springs with the forces ``-through.T (stiffness * (rows u))``.
 
     Attributes
     ----------
@@ -28,15 +28,33 @@ class Springs:
         What each spring is stretched by [-].
     stiffness : ndarray (q,)
         Not negative [force / length].
+    through : csr_array (q, n), optional
+        Rows that their forces act along [-]; `rows` by default. What is made of springs for preconditioners has none.
     """
 
     rows: csr_array
     stiffness: NDArray[Any]
+    through: csr_array | None = None
 
     def subtract_forces(self, u: NDArray[Any], r: NDArray[Any], factor: float = 1.0) -> None:
         """Subtract from `r` (n,) `factor` times the product of their matrix with `u` (n,)."""
         R = self.rows
+        if self.through is not None:
+            r -= factor * (self.through.T @ (self.stiffness * (R @ u)))
+            return
         springs_kernels.subtract(R.indptr, R.indices, R.data, self.stiffness, r.dtype.type(factor), u, r)
+
+    def beside(self, others: Springs | None) -> Springs:
+        """Return these springs and others."""
+        if others is None:
+            return self
+        pair = (self, others)
+        rows = csr_array(vstack([one.rows for one in pair], format="csr"))
+        through = None
+        if self.through is not None or others.through is not None:
+            own = [one.rows if one.through is None else one.through for one in pair]
+            through = csr_array(vstack(own, format="csr"))
+        return Springs(rows, np.concatenate([one.stiffness for one in pair]), through)
 
     def under(self, pivots: NDArray[np.intp], weights: csr_array) -> Springs:
         """Return them where ``u[pivots] = weights u``, weights (m, n); rows are then zero at the pivots."""

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
-from scipy.spatial import cKDTree
 
 from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.elasticity.relations import Relation
@@ -116,6 +115,8 @@ def cyclic(
 
 def _turned(mesh: Mesh, first: Nodes, second: Nodes, rotation: Rotation, sign: float) -> tuple[Array, Nodes, Array]:
     """Return how far each node of the first end lies from the nearest one of the second [length], which, and the matrix."""
+    from scipy.spatial import cKDTree
+
     turn, centre = rotation.matrix(sign * rotation.angle), np.array(rotation.centre)
     distance, place = cKDTree(mesh.points[second]).query((mesh.points[first] - centre) @ turn.T + centre)
     return np.asarray(distance), np.asarray(place, np.intp), turn

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
-from scipy.spatial import cKDTree
 
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import FacetBlock, Surface
@@ -71,6 +70,8 @@ def matched(
     ModelError
         If the groups have other numbers of nodes, or do not lie upon each other.
     """
+    from scipy.spatial import cKDTree
+
     (name, nodes), (other, opposite) = first, second
     if len(nodes) != len(opposite):
         raise ModelError(

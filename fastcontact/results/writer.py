@@ -12,6 +12,7 @@ import json
 import os
 import time
 from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -26,6 +27,7 @@ from fastcontact.mesh.files.packing import packed
 from fastcontact.mesh.files.paths import PathLike, checked_target, replacing
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import layout, write_arrays
+from fastcontact.results.background import Background
 from fastcontact.results.committed_file import CommittedFile, uninterrupted
 from fastcontact.results.file_lock import PathLock, left_at, reserve
 from fastcontact.results.reader import Results
@@ -67,6 +69,9 @@ class ResultWriter:
     synchronise : bool, optional
         Whether each step is on the disk when `write` returns, so that it survives a loss of power; by default from ten
         seconds after the file was begun, so that short runs are not slowed. Steps always survive the end of the process.
+    background : bool
+        Whether a step is written while the next one is computed. It is then complete when the next `write`, `wait` or `close`
+        returns, which also raise what went wrong with it; `n_steps` counts those that are. One step more is in memory.
 
     Attributes
     ----------
@@ -104,6 +109,7 @@ class ResultWriter:
         cell_fields: Iterable[str] = (),
         resume: bool = False,
         synchronise: bool | None = None,
+        background: bool = False,
     ) -> None:
         self._material: Any = None
         if not isinstance(mesh, Mesh):
@@ -122,6 +128,7 @@ class ResultWriter:
         self._file: Any = None
         self._committed: Any = None
         self._closed = self._ended = False
+        self._background = Background() if background else None
         self._last: tuple[int, Any] = (0, None)  # index and case of the last step
         self._notes: dict[str, str] = {}  # of the next step: the case file, if another one is resumed
         self._left: tuple[int, ...] | None = None
@@ -155,6 +162,10 @@ class ResultWriter:
         if error is None:
             self.close()
             return
+        try:
+            self.wait()
+        except FileError as failure:
+            error.add_note(str(failure))
         if self._file is None and not isinstance(error, ConvergenceError):
             self._give_up()  # nothing was added: whatever went wrong says nothing about the steps that are there
             return
@@ -165,7 +176,7 @@ class ResultWriter:
             self._finish(run)
 
     def write(self, step: StepResult) -> None:
-        """Append a step; when this returns the step is safe from a crash of the process.
+        """Append a step; when this returns the step is safe from a crash of the process, unless it is in the background.
 
         Raises
         ------
@@ -173,11 +184,29 @@ class ResultWriter:
             If the file is closed, the step does not follow those before it, belongs to another case or does not fit the
             mesh, or the disk takes no more.
         """
+        self.wait()
         if self._closed:
             raise FileError(f"'{self.path}' is closed: write steps before close, or inside the with block")
         layout.check_step(self._mesh, step, self._cell_fields)
         self._check_next(step)
         self._release_done()
+        if self._background is None:
+            self._append(step)
+        else:
+            self._background.start(partial(self._append, step))
+
+    def wait(self) -> None:
+        """Wait until all steps given to `write` are complete.
+
+        Raises
+        ------
+        FileError
+            If the disk took no more.
+        """
+        if self._background is not None:
+            self._background.wait()
+
+    def _append(self, step: StepResult) -> None:
         with self._explained(f"written at step {step.index}"):
             self._open()
             self._check_in_place()
@@ -221,6 +250,11 @@ class ResultWriter:
         FileError
             If the disk takes no more.
         """
+        try:
+            self.wait()
+        except FileError as error:
+            self.__exit__(type(error), error, None)
+            raise
         self._finish({"log": log, "warnings": [str(warning) for warning in warnings]})
 
     def _finish(self, run: dict[str, Any]) -> None:

@@ -101,7 +101,7 @@ def test_the_axis_may_lie_anywhere_in_space():
         (lambda m: m.add_centrifugal(1.0, direction=(0, 0, 1)), "not that of the axisymmetry"),
         (lambda m: m.add_centrifugal(1.0, direction=(0, 0, 0)), "has no length"),
         (lambda m: m.add_centrifugal(1.0, origin=(0,)), "needs three components"),
-        (lambda m: m.add_centrifugal("fast"), "not a finite number"),
+        (lambda m: m.add_centrifugal("fast"), "must be a number, not the string 'fast'"),
     ],
 )
 def test_what_cannot_act_is_refused(add, words):

@@ -2,7 +2,8 @@
 
 A step of Newton's method holds closed gaps and sticking slips as equations. A sliding constraint drags with ``mu n`` along
 its direction d: its multiplier acts through the rows ``B + mu d T``, see `linear.protocol`. In three dimensions t follows
-the slip as that turns, which is a spring across d: ``t = mu n d - stiffness (s - (d s) d)``.
+the slip as that turns, which is a spring across d: ``t = mu n d - stiffness (s - (d s) d)``. Penalties are a diagonal
+compliance of these equations.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ def solve(
     ----------
     loaded : LoadedNonsymmetric
     constraints : Constraints
-        See `friction.solve`; without compliance.
+        See `friction.solve`; without compliance but `softness` and `tangential_softness`.
     closed : ndarray of bool (m,)
         Constraints to start from as closed and sticking.
     accuracy : Accuracy
@@ -107,25 +108,33 @@ class Eliminated:
         self._nodes = np.arange(len(constraints)) if constraints.nodes is None else constraints.nodes
         k, m = len(rows) - 1, len(constraints)
         yielding = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
-        own = compliance_of_rows(rows, yielding)
+        self._gives = _diagonal_compliance(constraints)
+        own = self._own(rows, yielding)
         self._turn = aligning(own) if k == 2 else None
         if self._turn is not None:
             turned = csr_array(self._turn @ vstack(rows, format="csr"))
             rows = tuple(turned[a * m : (a + 1) * m] for a in range(3))
             free = (self._turn @ free.ravel()).reshape(free.shape)
-            own = compliance_of_rows(rows, yielding)
+            own = self._own(rows, yielding)
         still = idle(own)
         slipping = [scaled(T, np.where(off, 0.0, 1.0)) for T, off in zip(rows[1:], still, strict=True)]
         self._rows = (rows[0], *slipping)
         self._free = np.vstack([free[0], np.where(still, 0.0, free[1:])])
         self._slips = ~still
-        self._unit = np.sqrt(SOFTER / np.where(own[0, 0] > 0.0, own[0, 0], 1.0))
+        self._unit = np.sqrt(1.0 / (np.where(own[0, 0] > 0.0, own[0, 0], 1.0) / SOFTER + self._gives[0]))
         equality = constraints.equality
         self.law = Law(np.where(usable, mu, 0.0), None if equality is None else equality & usable)
         self.u = u
         self.round_off = float(
             16 * np.finfo(float).eps * np.abs(self._unit * self._gaps(u))[:, usable].max(initial=0.0)
         )
+
+    def _own(self, rows: tuple[csr_array, ...], yielding: Array) -> Array:
+        """Return `compliance_of_rows`, and what constraints give along their tangents: what gives way is not idle."""
+        own = compliance_of_rows(rows, yielding)
+        slips = np.arange(1, len(rows))
+        own[slips, slips] += self._gives[1:]
+        return own
 
     def start(self, forces: Array | None) -> tuple[Array, Array]:
         """Return forces and gaps of the displacement to start from, scaled."""
@@ -134,17 +143,18 @@ class Eliminated:
             y = (self._turn @ y.ravel()).reshape(y.shape)
         y[1:][~self._slips] = 0.0
         self.reached = y / self._unit
-        return self.reached, self._scaled(self._gaps(self.u))
+        return self.reached, self._scaled(self._gaps(self.u, y))
 
     def unscaled(self, found: Forces) -> Forces:
         """Return forces and gaps along the tangents as they were given."""
-        y, gaps = self.reached * self._unit, self._gaps(self.u)
+        y = self.reached * self._unit
+        gaps = self._gaps(self.u, y)
         if self._turn is not None:
             y, gaps = ((self._turn.T @ part.ravel()).reshape(part.shape) for part in (y, gaps))
         return Forces(y, gaps, found.closed, found.sticking, found.settled, found.residual, 1 + found.iterations)
 
-    def _gaps(self, u: Array) -> Array:
-        return self._free + np.stack([R @ u for R in self._rows])
+    def _gaps(self, u: Array, forces: Array | float = 0.0) -> Array:
+        return self._free + np.stack([R @ u for R in self._rows]) + self._gives * forces
 
     def _scaled(self, gaps: Array) -> Array:
         """Return gaps in units of the constraints; what cannot close is open, by whatever."""
@@ -162,14 +172,15 @@ class Eliminated:
         sliding = self._sliding(y, gaps, np.flatnonzero(closed & ~sticking & (self.law.mu > 0.0)))
         drag = self._drag(B, shut, sliding) if len(sliding.at) else None
         nodes = self._nodes[np.concatenate(equations)]
-        u, multiplier = self._loaded.solve_nonsymmetric(B, c, nodes, self.u, self._tolerance, drag)
+        C = np.concatenate([gives[at] for gives, at in zip(self._gives, equations, strict=True)])
+        u, multiplier = self._loaded.solve_nonsymmetric(B, c, nodes, self.u, self._tolerance, drag, C)
         new, first = np.zeros_like(y), 0
         for own, at in zip(new, equations, strict=True):
             own[at] = multiplier[first : first + len(at)]
             first += len(at)
         new[1:, sliding.at] += sliding.force(new[0, sliding.at], u)
         self.u, self.reached = u, new / self._unit
-        return self.reached, self._scaled(self._gaps(u))
+        return self.reached, self._scaled(self._gaps(u, new))
 
     def _sliding(self, y: Array, gaps: Array, at: NDArray[np.intp]) -> _Sliding:
         """Return what the constraints `at` (q,) do that slide."""
@@ -180,6 +191,7 @@ class Eliminated:
         across = np.stack([-d[1], d[0]])
         rows = sum(scaled(taken(T, at), part) for part, T in zip(across, self._rows[1:], strict=True))
         spring = np.minimum(turning / np.maximum(1.0 - turning, 1e-300), STIFFEST) * self._unit[at] ** 2
+        spring = spring / (1.0 + spring * self._gives[1, at])  # behind that of the constraint itself
         return _Sliding(
             at, pull, _Across(across, Springs(csr_array(rows), spring), (across * self._free[1:, at]).sum(axis=0))
         )
@@ -197,6 +209,16 @@ class Eliminated:
         across = sliding.springs
         pushed = across.springs.rows.T @ (across.springs.stiffness * across.free)
         return FrictionTerms(through, across.springs, -pushed)
+
+
+def _diagonal_compliance(constraints: Constraints) -> Array:
+    """Return what constraints give way by themselves along their normals and tangents (1 + k, m) [length / force]."""
+    found = np.zeros((1 + len(constraints.tangents), len(constraints)))
+    if constraints.softness is not None:
+        found[0] = constraints.softness
+    if constraints.tangential_softness is not None:
+        found[1:] = constraints.tangential_softness
+    return found
 
 
 @dataclass(frozen=True, eq=False)

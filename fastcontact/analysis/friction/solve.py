@@ -54,16 +54,13 @@ def solve(
         A solution with nearly the same forces; one of other constraints is passed over.
     """
     forces = None if guess is None else guess.forces_along(constraints.directions, len(constraints))
-    of_their_own = (
-        constraints.compliance, constraints.softness, constraints.low_rank_compliance, constraints.tangential_softness
-    )  # fmt: skip
-    if isinstance(loaded, LoadedNonsymmetric) and all(part is None for part in of_their_own):
+    together = constraints.compliance is not None or constraints.low_rank_compliance is not None
+    if isinstance(loaded, LoadedNonsymmetric) and not together:
         found = _eliminated(loaded, constraints, closed, accuracy, u, forces)
         if found is not None:
             return found
         log.info("friction: the iteration on eliminated constraints did not settle, their compliance is formed")
     usable = constraints.usable
-    together = constraints.compliance is not None or constraints.low_rank_compliance is not None
     begun = closed if constraints.equality is None else closed | constraints.equality
     chosen = usable if together else usable & begun
     iterations = 0

@@ -103,8 +103,8 @@ class Formulation(ABC):
 
     @property
     def eliminable(self) -> bool:
-        """Whether iterative solvers can eliminate closed constraints: not where they give way by themselves."""
-        return self.options.penalty is None and self.options.tangential_penalty is None
+        """Whether iterative solvers can eliminate closed constraints; penalties, which are springs, do not prevent it."""
+        return True
 
     @classmethod
     def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:

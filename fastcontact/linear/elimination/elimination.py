@@ -33,6 +33,10 @@ class Elimination:
         Inverse of the pivots' columns of the rows that multipliers act through.
     coupled : CoupledPivots, optional
         P, the pivots' columns of the equations, where their inverse is full.
+    own_inverse : csr_array (m, m), optional
+        P^-1, where it is not.
+    compliance : ndarray (m,), optional
+        By how much the equations give way by themselves: ``B u + compliance * multiplier = c`` [length / force].
     """
 
     pivots: Indices
@@ -41,6 +45,15 @@ class Elimination:
     force_weights: csr_array
     inverse: csr_array | CoupledPivots
     coupled: CoupledPivots | None = None
+    own_inverse: csr_array | None = None
+    compliance: Array | None = None
+
+    def shifted(self, c: Array) -> Array:
+        """Return how far the pivots (m,) move if the equations' right-hand sides rise by c (m,)."""
+        if self.coupled is not None:
+            return self.coupled.solve(c)
+        assert self.own_inverse is not None
+        return np.asarray(self.own_inverse @ c, np.float64)
 
     def multiplier(self, forces: Array) -> Array:
         """Return the multiplier (m,) with ``B.T multiplier = forces`` at the pivots; forces = (K u - f)[pivots]."""
@@ -112,13 +125,13 @@ def eliminate(
     pivots, inverse = pivot_order.chosen(B, nodes, size)
     weights, coupled = _weights(B, pivots, inverse), None
     if isinstance(inverse, CoupledPivots):
-        coupled, offset = inverse, inverse.solve(c)
+        own, coupled, offset = None, inverse, inverse.solve(c)
     else:
-        offset = np.asarray(inverse @ c, np.float64)
+        own, offset = inverse, np.asarray(inverse @ c, np.float64)
     if force_rows is None:
-        return Elimination(pivots, weights, offset, weights, inverse, coupled)
+        return Elimination(pivots, weights, offset, weights, inverse, coupled, own)
     inverse = pivot_order.inverse_of(force_rows, pivots, size)
-    return Elimination(pivots, weights, offset, _weights(force_rows, pivots, inverse), inverse, coupled)
+    return Elimination(pivots, weights, offset, _weights(force_rows, pivots, inverse), inverse, coupled, own)
 
 
 def _weights(B: csr_array, pivots: Indices, inverse: csr_array | CoupledPivots) -> csr_array:

@@ -26,13 +26,7 @@ def row_times(_context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end
     from numba.core import types
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        from numba.core import cgutils
-
-        row = _Row(context, builder, signature, args, len(rows), len(cols))
-        step = args[3].type(1)
-        with cgutils.for_range_slice(builder, args[3], args[4], step, args[3].type, inc=True) as (k, _):
-            row.add_block(k)
-        return context.make_tuple(builder, signature.return_type, row.sums())
+        return _all_blocks(_Row(context, builder, signature, args, len(rows), len(cols)), signature, args)
 
     sums = types.UniTuple(x.dtype, len(rows))
     return sums(indices, numbers, x, types.intp, types.intp, rows, cols), code
@@ -45,16 +39,20 @@ def row_times_both_ways(
     from numba.core import types
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        from numba.core import cgutils
-
-        row = _RowBothWays(context, builder, signature, args, len(rows), len(rows))
-        step = args[3].type(1)
-        with cgutils.for_range_slice(builder, args[3], args[4], step, args[3].type, inc=True) as (k, _):
-            row.add_block(k)
-        return context.make_tuple(builder, signature.return_type, row.sums())
+        return _all_blocks(_RowBothWays(context, builder, signature, args, len(rows), len(rows)), signature, args)
 
     sums = types.UniTuple(x.dtype, len(rows))
     return sums(indices, numbers, x, types.intp, types.intp, types.intp, x.dtype, y, rows), code
+
+
+def _all_blocks(row: _Row, signature: Any, args: Any) -> Any:
+    """Write the loop over the blocks of a row, from ``args[3]`` to ``args[4]``, and return its sums."""
+    from numba.core import cgutils
+
+    step = args[3].type(1)
+    with cgutils.for_range_slice(row.builder, args[3], args[4], step, args[3].type, inc=True) as (k, _):
+        row.add_block(k)
+    return row.context.make_tuple(row.builder, signature.return_type, row.sums())
 
 
 def add_row_transposed(
@@ -140,6 +138,8 @@ class _Writer:
 
         self.context, self.builder = context, builder
         self.real, self.lane = context.get_value_type(kind), ir.IntType(32)
+        triple, _, features = context.codegen().magic_tuple()
+        self.fused = "+fma" in features.split(",") or triple.startswith(("aarch64", "arm64"))
 
     def start(self, kind: Any, array: Any) -> Any:
         """Return the address of the first number of an array."""
@@ -171,9 +171,20 @@ class _Writer:
         return parts[0] if len(parts) == 1 else self.builder.fadd(*parts)
 
     def plus(self, total: Any, one: Any, other: Any) -> Any:
-        """Return a total and a product, which may be rounded at once."""
-        product = self.builder.fmul(one, other, flags=("contract",))
-        return self.builder.fadd(total, product, flags=("contract",))
+        """Return a total and a product, rounded at once wherever the processor does that, and nowhere else.
+
+        Left to the compiler, it would depend on the code around it, and copies of a kernel would differ in the last bit.
+        """
+        if not self.fused:
+            return self.builder.fadd(total, self.builder.fmul(one, other))
+        from llvmlite import ir
+
+        kind = total.type
+        letter = "f32" if self.real == ir.FloatType() else "f64"
+        name = f"llvm.fma.{letter}" if kind == self.real else f"llvm.fma.v{kind.count}{letter}"
+        module = self.builder.module
+        known = module.globals.get(name) or ir.Function(module, ir.FunctionType(kind, [kind] * 3), name)
+        return self.builder.call(known, [one, other, total])
 
     def add(self, start: Any, at: Any, column: int, width: int, vector: Any) -> None:
         """Add a vector to numbers in memory."""

@@ -3,8 +3,8 @@
 The prolongators stay those without equations, except for the rows of the eliminated unknowns, the pivots. Only Galerkin
 products near the pivots change. The changes are stored beside the matrices of the levels, which stay as they are. On the
 finest level only diagonal blocks are formed: products with the matrix move displacements and forces at the pivots instead.
-Springs between unknowns, such as those across sliding contacts, are added on all levels: beside smooth displacements, which
-coarser levels correct, they are far stiffer than the bodies.
+Springs between unknowns, such as penalties and those across sliding contacts, are added on all levels: beside smooth
+displacements, which coarser levels correct, they are far stiffer than the bodies.
 """
 
 from __future__ import annotations
@@ -60,15 +60,21 @@ class ConstrainedHierarchy:
     def constrain(self, elimination: Elimination | None, springs: Springs | None = None) -> None:
         """Make the hierarchy that of the matrix under the equations eliminated; None: without equations.
 
-        `springs` are added to the matrix of the hierarchy; only with equations.
+        `springs` are added to the matrix of the hierarchy.
         """
         self._undo()
         self.stiffening = 0.0
-        if elimination is None or not len(elimination.pivots):
+        if elimination is not None and not len(elimination.pivots):
+            elimination = None
+        added = springs
+        if springs is not None and elimination is not None:
+            added = springs.under(elimination.pivots, elimination.weights)
+        if added is not None and not added.rows.nnz:  # they stretch what supports and equations hold
+            added = None
+        if elimination is None and added is None:
             self.hierarchy.coarse.set(None)
             self.hierarchy.set_bounds()
             return
-        added = None if springs is None else springs.under(elimination.pivots, elimination.weights)
         self._change_levels(elimination, added)
         # Equations raise the spectrum of coarser levels, and that of the finest where they or springs stiffen its nodes, or
         # where it is wide already: on flat and on nearly incompressible cells.
@@ -76,12 +82,14 @@ class ConstrainedHierarchy:
         finest = added is not None or self.stiffening > SPECTRUM_CHANGED or self.hierarchy.bounds[0] > WIDE
         self.hierarchy.set_bounds(range(0 if finest else 1, len(self.hierarchy.levels) - 1))
 
-    def _change_levels(self, elimination: Elimination, springs: Springs | None) -> None:
+    def _change_levels(self, elimination: Elimination | None, springs: Springs | None) -> None:
         top = self.hierarchy.levels[0]
         kind = top.b.dtype
-        rounded = elimination.weights.astype(kind)
-        top.eliminated = replace(elimination, weights=rounded, force_weights=rounded)
-        changes = [SymmetricChange.of_equations(self.A, elimination.pivots, elimination.weights)]
+        changes = []
+        if elimination is not None:
+            rounded = elimination.weights.astype(kind)
+            top.eliminated = replace(elimination, weights=rounded, force_weights=rounded)
+            changes.append(SymmetricChange.of_equations(self.A, elimination.pivots, elimination.weights))
         if springs is not None:
             top.springs = springs.scaled(1.0, kind)
             changes.append(SymmetricChange.of_springs(springs, len(self.A.rows)))
@@ -89,9 +97,9 @@ class ConstrainedHierarchy:
             self.hierarchy.coarse.set(csc_array(sum(change.on_finest() for change in changes)))
             return
         diagonals = [change.diagonal() for change in changes]
-        stiffened = self._stiffened(diagonals[0], elimination)
+        stiffened = None if elimination is None else self._stiffened(diagonals[0], elimination)
         self._change_diagonal(top, merged(*diagonals))
-        if len(stiffened):
+        if elimination is not None and stiffened is not None and len(stiffened):
             changes = self._turned_round(elimination, springs, stiffened, diagonals[1:])
         change = merged(*(change.on_coarse(top.P) for change in changes))
         for level in self.hierarchy.levels[1:]:

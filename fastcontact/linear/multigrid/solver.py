@@ -18,10 +18,11 @@ from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.flexibility import FlexibilityColumns
 from fastcontact.linear.krylov import krylov_kernels
-from fastcontact.linear.krylov.iterations import ConjugateGradients, ConjugateResiduals, Multiply
+from fastcontact.linear.krylov.iterations import ConjugateGradients, ConjugateResiduals, Iteration
 from fastcontact.linear.multigrid.constrained_hierarchy import ConstrainedHierarchy
 from fastcontact.linear.multigrid.hierarchy import Hierarchy
 from fastcontact.linear.multigrid.matrix import ScaledMatrix
+from fastcontact.linear.multigrid.reduced import Reduced, multiplier
 from fastcontact.linear.protocol import Counters, Monitor
 from fastcontact.linear.springs import Springs
 
@@ -102,8 +103,8 @@ class Multigrid:
     def _build(self, rigid_modes: Array) -> None:
         self.hierarchy = Hierarchy(self.K.scaled, rigid_modes)
         self._constrained = ConstrainedHierarchy(self.hierarchy, self.K.scaled)
-        # The equations that hold, and those that the hierarchy was changed for.
-        self._equations: Elimination | None = None
+        # The equations and springs that hold, and those that the hierarchy was changed for.
+        self._reduced = Reduced(self.K, None)
         self._hierarchy_equations: Elimination | None = None
         self._hierarchy_springs: Springs | None = None
         self.counters.setups += 1
@@ -125,38 +126,41 @@ class Multigrid:
         well, since only the unknowns beside the pivots count. Pivots that are coupled have sparse weights there.
         """
         check_threads()  # every solution begins here, also that of a child forked after the hierarchy was built
-        if elimination is not self._equations or springs is not self._hierarchy_springs:
+        if elimination is not self._reduced.elimination or springs is not self._reduced.springs:
             sparse = elimination and elimination.with_sparse_weights()
             known = self._hierarchy_springs
             alike = known is None if springs is None else springs.alike(known)
             if not (alike and _alike(sparse, self._hierarchy_equations)):
                 self._constrained.constrain(sparse, None if springs is None else springs.scaled(self.K.unit))
                 self._hierarchy_equations, self._hierarchy_springs = sparse, springs
-            self._equations = elimination
+            gives = elimination is not None and elimination.compliance is not None
+            self._reduced = Reduced(self.K, elimination, springs, self.diagonal() if gives else None)
 
     def solution(
         self, f: Array, elimination: Elimination | None, guess: Array | None, monitor: Monitor | None = None,
-        tolerance: float | None = None,
+        tolerance: float | None = None, springs: Springs | None = None,
     ) -> Array:  # fmt: skip
-        """Solve ``K u = f`` under the equations of `elimination` to the solver's tolerance, or a larger one.
+        """Solve ``K u = f``, `springs` added to K, under the equations of `elimination`.
+
+        To the solver's tolerance, or a larger one.
 
         Raises
         ------
         ConvergenceError
             If the residual does not fall below the tolerance.
         """
-        cg, old = self._cg, self._equations
+        cg, old = self._cg, self._reduced
         scale = self._scale(f, elimination)
         if scale == 0.0:  # nothing moves anything
             self._solved = None
             return np.zeros_like(f)
         goes_on = guess is not None and f is self._solved and np.array_equal(guess, cg.x)
-        self.constrain(elimination)
-        if goes_on:
-            self._go_on(f, old, elimination)
+        self.constrain(elimination, springs)
+        if goes_on and old.bare and self._reduced.bare:
+            self._go_on(f, old.elimination, elimination)
         else:
             cg.x[:] = 0.0 if guess is None else guess
-            self._begin(f, elimination)
+            self._begin(cg, f)
         self._solved = f
         enough = self._enough(tolerance or 0.0) * scale
         made, raised, first = 0, 0, cg.norm
@@ -171,19 +175,21 @@ class Multigrid:
             error = (
                 self._contrast * cg.norm / scale * _amplification(cg.norm / first, made) if watch is not None else 0.0
             )
-            if watch is not None and watch(cg.x, self.multiplier(elimination, cg.x, f), error):
-                break
-            if cg.step(self._multiply, self.precondition):
+            if watch is not None:
+                u = self._reduced.displacement(cg.x)
+                if watch(u, self._reduced.multiplier(u, f), error):
+                    break
+            if cg.step(self._reduced.multiply, self.precondition):
                 made += 1
                 self.counters.iterations += 1
             else:
                 raised += 1
                 self._strengthen(raised)
-                self._begin(f, elimination)
-        return cg.x.copy()
+                self._begin(cg, f)
+        return self._reduced.displacement(cg.x).copy()
 
     def nonsymmetric_solution(
-        self, f: Array, elimination: Elimination, springs: Springs | None, guess: Array, tolerance: float
+        self, f: Array, elimination: Elimination | None, springs: Springs | None, guess: Array, tolerance: float
     ) -> Array:
         """Solve ``K u + S u = f + F.T multiplier`` and ``B u = c``, F the rows that multipliers act through.
 
@@ -195,7 +201,7 @@ class Multigrid:
         ----------
         f : ndarray (n,)
             [force]
-        elimination : Elimination
+        elimination : Elimination or None
         springs : Springs or None
             S is their matrix.
         guess : ndarray (n,)
@@ -215,24 +221,12 @@ class Multigrid:
         scale = self._scale(f, elimination)
         self.constrain(elimination, springs)
         enough = self._enough(tolerance) * scale
-
-        def multiply(p: Array, q: Array) -> None:
-            self.K.combine(1.0, p, 0.0, q, q)
-            if springs is not None:
-                springs.subtract_forces(p, q, -1.0)
-            elimination.move_forces(q)
-
         iteration.x[:] = guess
-        elimination.complete(iteration.x, elimination.offset)
-        self.K.combine(-1.0, iteration.x, 1.0, f, iteration.r)
-        if springs is not None:
-            springs.subtract_forces(iteration.x, iteration.r)
-        elimination.move_forces(iteration.r)
-        iteration.start()
-        self._reduce(iteration, multiply, enough)
-        return iteration.x.copy()
+        self._begin(iteration, f)
+        self._reduce(iteration, enough)
+        return self._reduced.displacement(iteration.x).copy()
 
-    def _reduce(self, iteration: ConjugateResiduals, multiply: Multiply, enough: float) -> None:
+    def _reduce(self, iteration: ConjugateResiduals, enough: float) -> None:
         """Iterate until the residual is `enough` [force]; a warm start is improved beyond that.
 
         It may meet the tolerance while the forces of a small contact are not right yet.
@@ -243,7 +237,7 @@ class Multigrid:
             done = iteration.norm <= enough
             if done and made >= MOST_WARM:
                 return
-            stands = made - fallen >= STANDING
+            stands, multiply = made - fallen >= STANDING, self._reduced.multiply
             if stands or made >= MAX_NONSYMMETRIC or not iteration.step(multiply, self.precondition):
                 if done:
                     return
@@ -266,19 +260,14 @@ class Multigrid:
             self.hierarchy.raise_bounds(RAISE)
             return
         log.info("multigrid: single precision is not enough for this matrix, the cycle goes on in double precision")
-        equations, springs = self._equations, self._hierarchy_springs
+        reduced = self._reduced
         self.build_in("double")
-        self.constrain(equations, springs)
+        self.constrain(reduced.elimination, reduced.springs)
 
-    def _begin(self, f: Array, elimination: Elimination | None) -> None:
+    def _begin(self, iteration: Iteration, f: Array) -> None:
         """Make the iterate obey the equations and compute its residual."""
-        cg = self._cg
-        if elimination is not None:
-            elimination.complete(cg.x, elimination.offset)
-        self.K.combine(-1.0, cg.x, 1.0, f, cg.r)
-        if elimination is not None:
-            elimination.move_forces(cg.r)
-        cg.start()
+        self._reduced.begin(iteration.x, f, iteration.r)
+        iteration.start()
 
     def _go_on(self, f: Array, old: Elimination | None, new: Elimination | None) -> None:
         """Make the iterate obey other equations: its residual changes near the pivots only."""
@@ -311,25 +300,19 @@ class Multigrid:
         """By how much relative residuals flatter a solution: that of the softer body beside stiffer pivots, of shear."""
         return max(1.0, self._constrained.stiffening) * (self.contrast if self.contrast > MILD else 1.0)
 
-    def _multiply(self, p: Array, q: Array) -> None:
-        self.K.combine(1.0, p, 0.0, q, q)
-        if self._equations is not None:
-            self._equations.move_forces(q)
-
     def precondition(self, r: Array, norm: float, z: Array) -> None:
-        """Fill z (n,) with one cycle for r (n,), of 2-norm `norm`; it obeys the equations that hold."""
+        """Fill z (n,) with an approximate solution for r (n,), of 2-norm `norm`; it obeys the equations that hold."""
+        self._reduced.precondition(r, norm, z, self._cycle)
+
+    def _cycle(self, r: Array, norm: float, z: Array) -> None:
         top = self.hierarchy.levels[0]
         krylov_kernels.scaled(1.0 / norm, r, top.b)
         self.hierarchy.cycle()
         krylov_kernels.scaled(norm * self.K.unit, top.x, z)
-        if self._equations is not None:
-            self._equations.complete(z)
 
-    def multiplier(self, elimination: Elimination | None, u: Array, f: Array) -> Array:
-        """Return the multipliers (m,) of the equations at `u`."""
-        if elimination is None:
-            return np.empty(0)
-        return elimination.multiplier(self.K.forces_at(elimination.pivots, u, f))
+    def multiplier(self, elimination: Elimination | None, u: Array, f: Array, springs: Springs | None = None) -> Array:
+        """Return the multipliers (m,) of the equations at the displacement `u`."""
+        return multiplier(self.K, elimination, springs, u, f)
 
 
 def _amplification(left: float, made: int) -> float:

@@ -1,8 +1,9 @@
 """Multigrid as a linear solver, and the factorisation that replaces it where it does not converge.
 
-Equations ``B u = c`` are eliminated, see `multigrid.solver`. Those with a compliance of their own cannot be: they go through
-columns of K^-1, one solution each, kept for the whole analysis. Where those would be many, or the iteration stalls, on thin
-or nearly incompressible parts, a factorisation replaces it for the rest of the analysis, if the matrix is not too large.
+Equations ``B u = c`` are eliminated, see `multigrid.solver`, also those with a diagonal compliance, see `multigrid.loaded`.
+Those with a full one cannot be: they go through columns of K^-1, one solution each, kept for the whole analysis. Where those
+would be many, or the iteration stalls, on thin or nearly incompressible parts, a factorisation replaces it for the rest of
+the analysis, if the matrix is not too large.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.elimination.elimination import Elimination, eliminate
-from fastcontact.linear.elimination.loaded import LoadedIteration
+from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.flexibility import TooManyColumnsError
 from fastcontact.linear.lower_tolerance import tighten
+from fastcontact.linear.multigrid.loaded import LoadedMultigrid
 from fastcontact.linear.multigrid.solver import Multigrid, StallError
 from fastcontact.linear.protocol import FrictionTerms, LinearSolver, Loaded, Product
 from fastcontact.linear.solvers.direct import Direct
@@ -184,44 +185,29 @@ def _or_by_factors(method: Callable[..., Any]) -> Callable[..., Any]:
     return found
 
 
-class _Loaded(LoadedIteration):
+class _Loaded(LoadedMultigrid):
     """See `linear.protocol.LoadedNonsymmetric`."""
 
-    solve = _or_by_factors(LoadedIteration.solve)
-    flexibility = _or_by_factors(LoadedIteration.flexibility)
-    involved_solution = _or_by_factors(LoadedIteration.involved_solution)
-    full_solution = _or_by_factors(LoadedIteration.full_solution)
+    solve = _or_by_factors(LoadedMultigrid.solve)
+    flexibility = _or_by_factors(LoadedMultigrid.flexibility)
+    involved_solution = _or_by_factors(LoadedMultigrid.involved_solution)
+    full_solution = _or_by_factors(LoadedMultigrid.full_solution)
 
     @functools.cached_property
     def _factored(self) -> Loaded:
         return self._solver.instead.load(self._f)
 
-    def diagonal(self) -> Array:
-        return self._solver.diagonal()
-
     def solve_nonsymmetric(
         self, B: csr_array, c: Array, nodes: NDArray[np.intp], guess: Array, tolerance: float,
-        friction: FrictionTerms | None = None,
+        friction: FrictionTerms | None = None, C: Array | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        solver, f = self._solver, self._f
-        if solver.instead is not None:
+        if self._solver.instead is not None:
             raise ConvergenceError("factors give the compliance of friction")
-        size = solver.K.blocksize[0]
         try:
-            if friction is None:
-                elimination = eliminate(B, c, None, nodes, size) if B.shape[0] else None
-                u = solver.solution(f, elimination, guess, tolerance=tolerance)
-                return u, solver.multiplier(elimination, u, f)
-            elimination, springs = eliminate(B, c, friction.rows, nodes, size), friction.springs
-            f = f if friction.forces is None else f + friction.forces
-            u = solver.nonsymmetric_solution(f, elimination, springs, guess, tolerance)
+            return super().solve_nonsymmetric(B, c, nodes, guess, tolerance, friction, C)
         except StallError as stalled:
-            solver.give_up(stalled)
+            self._solver.give_up(stalled)
             raise
-        if springs is not None:
-            f = f.copy()
-            springs.subtract_forces(u, f)
-        return u, solver.multiplier(elimination, u, f)
 
 
 SOLVER = Amg

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from fastcontact.errors import FileError, MeshError, unknown
 from fastcontact.mesh.files import med, meshio_files
@@ -99,6 +98,8 @@ def at_cells(field: CellField, middles: Array, size: float, what: str) -> Array:
     MeshError
         If a cell has no value, or two of different size.
     """
+    from scipy.spatial import cKDTree
+
     theirs, ours = (np.zeros((len(given), 3)) for given in (field.middles, middles))
     theirs[:, : field.middles.shape[1]], ours[:, : middles.shape[1]] = field.middles, middles
     distance, rows = cKDTree(theirs).query(ours)

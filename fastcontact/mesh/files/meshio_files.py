@@ -93,11 +93,8 @@ def _format(path: Path, writing: bool) -> str:
     return "gmsh"
 
 
-def read_point_data(path: Path, field: str) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return the numbers (n_points, ...) [unit of the field] of a field, and its points (n_points, 2 or 3) [length].
-
-    FileError if meshio cannot read the file, or it has no such field.
-    """
+def _read_with_field(path: Path, field: str) -> dict[str, Any]:
+    """Return what `meshio_process.read_in_process` finds of a mesh and a field of it."""
     file_format = _format(path, writing=False)
     _check_before(path, file_format)
     if file_format == "gmsh":
@@ -105,6 +102,15 @@ def read_point_data(path: Path, field: str) -> tuple[NDArray[Any], NDArray[Any]]
     found = read_in_process(path, file_format, field)
     if "error" in found:
         raise _refusal("read", path, found["error"])
+    return found
+
+
+def read_point_data(path: Path, field: str) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the numbers (n_points, ...) [unit of the field] of a field, and its points (n_points, 2 or 3) [length].
+
+    FileError if meshio cannot read the file, or it has no such field.
+    """
+    found = _read_with_field(path, field)
     if field not in found["fields"]:
         raise FileError(f"'{path}': {unknown('field', field, found['fields'])}")
     if found["field"] is None or found["points"] is None or len(found["field"]) != len(found["points"]):
@@ -117,13 +123,7 @@ def read_cell_data(path: Path, field: str) -> tuple[NDArray[Any], NDArray[Any]]:
 
     FileError if meshio cannot read the file, or it has no such field.
     """
-    file_format = _format(path, writing=False)
-    _check_before(path, file_format)
-    if file_format == "gmsh":
-        raise FileError(f"'{path}': fields of Gmsh files are not read: write the field to a .vtu or .med file")
-    found = read_in_process(path, file_format, field)
-    if "error" in found:
-        raise _refusal("read", path, found["error"])
+    found = _read_with_field(path, field)
     if field not in found["cell_fields"]:
         raise FileError(f"'{path}': {unknown('field of cells', field, found['cell_fields'])}")
     values, points, blocks = found["cell_field"], found["points"], found["cells"]

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from fastcontact.errors import FileError, MeshError, unknown
 from fastcontact.mesh.files import med, meshio_files
@@ -120,6 +119,8 @@ def at_points_of(field: PointField, mesh: Mesh, wanted: NDArray[np.intp], what: 
 
 def _rows(field: PointField, mesh: Mesh, wanted: NDArray[np.intp], what: str) -> NDArray[np.intp]:
     """Return the rows (k,) of a field for the wanted points."""
+    from scipy.spatial import cKDTree
+
     n_points = field.values.shape[1]
     size = float(np.ptp(mesh.points, axis=0).max())
     if field.points is None:
@@ -146,6 +147,8 @@ def _rows(field: PointField, mesh: Mesh, wanted: NDArray[np.intp], what: str) ->
 
 def _refuse_two(field: PointField, places: Array, wanted: Array, reach: float, what: str) -> None:
     """Raise MeshError where points of the file at one place have different values."""
+    from scipy.spatial import cKDTree
+
     near = cKDTree(places).query_ball_point(wanted, reach)
     for place, members in zip(wanted, near, strict=True):
         if len(members) > 1 and np.ptp(field.values[:, members], axis=1).max() > 0.0:

@@ -222,3 +222,18 @@ def test_a_matrix_too_large_for_factors_stays_an_error(monkeypatch):
     model = stuck(monkeypatch, limit=10)
     with pytest.raises(ConvergenceError, match="conjugate gradients stand at"):
         fc.solve(model, fc.linear_ramp(1), linear_solver="amg", criteria=fc.Criteria(max_halvings=0))
+
+
+def test_slips_that_supports_and_equations_hold_leave_no_spring():
+    """Nodes in the corner of two planes of symmetry slide along neither."""
+    mesh = fc.generate.sphere_on_block("hex8", R=1.0, size=0.3, contact_size=0.1, contact_radius=0.2)
+    model = fc.Model(mesh, "3d")
+    model.add_material(fc.LinearElastic(E=20000.0, nu=0.3))
+    model.fix("BLOCK_BOTTOM", "xyz")
+    model.fix("SYMMETRY_X", "x")
+    model.fix("SYMMETRY_Z", "z")
+    model.prescribe("SPHERE_TOP", y=-0.01)
+    model.add_contact("pair", secondary="CONT_SPHERE", primary="CONT_BLOCK", friction=0.2)
+    one, other = (fc.solve(model, fc.linear_ramp(2), linear_solver=name)[-1] for name in ("amg", "direct"))
+    assert one.displacement == pytest.approx(other.displacement, abs=1e-7 * np.abs(other.displacement).max())
+    assert one.contact["pair"].force == pytest.approx(other.contact["pair"].force, rel=1e-6)

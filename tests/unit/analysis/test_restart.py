@@ -174,6 +174,15 @@ def test_a_stiff_secondary_side_by_multigrid(friction):
     assert not any("gave up" in text for text in whole[-1].warnings)
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("penalty", [1e3, 1e6])
+def test_a_penalty_by_multigrid(penalty, friction):
+    def make():
+        return boxes("node_to_segment", friction=friction, penalty=penalty)
+
+    check_resumed(make, fc.linear_ramp(3), FRICTION if friction else FRICTIONLESS, linear_solver="amg")
+
+
 @pytest.mark.parametrize("solver", ["direct", "amg"])
 @pytest.mark.parametrize("options", [{}, {"friction": 0.2}], ids=str)
 @pytest.mark.parametrize(("dim", "force"), [(2, True), (2, False), (3, True), (3, False)])
@@ -327,5 +336,5 @@ def test_a_strengthened_multigrid_cycle_is_remembered():
     assert other.solver.precision == "double"
     assert other.solver.hierarchy.bounds == analysis.solver.hierarchy.bounds
     f = np.random.default_rng(0).normal(size=other.solver.hierarchy.n)
-    solutions = [each.solver.solution(f, each.solver._equations, None) for each in (analysis, other)]
+    solutions = [each.solver.solution(f, each.solver._reduced.elimination, None) for each in (analysis, other)]
     np.testing.assert_array_equal(*solutions)

@@ -11,6 +11,7 @@ import pytest
 import fastcontact as fc
 from fastcontact.cli import main
 from fastcontact.cli._main import history_lines
+from fastcontact.results import write_arrays
 
 CASE = """
 title = "small spheres"
@@ -216,8 +217,10 @@ def test_a_run_that_was_killed_is_incomplete(solved, tmp_path, capsys):
     assert "  incomplete: the run was killed, or goes on" in capsys.readouterr().out.splitlines()
 
 
-def test_a_run_interrupted_from_the_keyboard_says_what_it_keeps(solved, tmp_path, capsys, monkeypatch):
+@pytest.mark.parametrize("background", [False, True])
+def test_a_run_interrupted_from_the_keyboard_says_what_it_keeps(solved, tmp_path, capsys, monkeypatch, background):
     path, write = tmp_path / "stopped.vtkhdf", fc.ResultWriter.write
+    monkeypatch.setattr("fastcontact.cli.run.LARGE", 0 if background else np.inf)
 
     def stop(self, step):
         if step.index == 3:
@@ -235,6 +238,51 @@ def test_a_run_interrupted_from_the_keyboard_says_what_it_keeps(solved, tmp_path
     assert main(["run", str(solved / "small.toml"), "-o", str(path), "--resume", "-q"]) == 0
     expected = fc.open_results(solved / "small.vtkhdf")[-1]
     np.testing.assert_array_equal(fc.open_results(path)[-1].displacement, expected.displacement)
+
+
+def test_steps_of_large_meshes_are_written_in_the_background(solved, tmp_path, capsys, monkeypatch):
+    """The results are the same, and what goes wrong with the disk ends the run with one line."""
+    monkeypatch.setattr("fastcontact.cli.run.LARGE", 0)
+    path = tmp_path / "large.vtkhdf"
+    assert main(["run", str(solved / "small.toml"), "-q", "-o", str(path)]) == 0
+    for one, other in zip(fc.open_results(path), fc.open_results(solved / "small.vtkhdf"), strict=True):
+        np.testing.assert_array_equal(one.stress, other.stress)
+    real = write_arrays.append_fields
+
+    def full(file, mesh, number, *given):
+        if number == 1:
+            raise OSError(28, "No space left on device")
+        real(file, mesh, number, *given)
+
+    monkeypatch.setattr(write_arrays, "append_fields", full)
+    assert main(["run", str(solved / "small.toml"), "-q", "-o", str(path)]) == 1
+    told = capsys.readouterr().err.splitlines()[-1]
+    assert "cannot be written at step 2 (No space left on device), 1 steps are complete" in told
+    assert len(fc.open_results(path)) == 1
+
+
+def test_a_disk_that_fails_before_an_interruption_is_told(solved, tmp_path, capsys, monkeypatch):
+    path, write, real = tmp_path / "stopped.vtkhdf", fc.ResultWriter.write, write_arrays.append_fields
+
+    def stop(self, step):
+        if step.index == 3:
+            raise KeyboardInterrupt
+        write(self, step)
+
+    def full(file, mesh, number, *given):
+        if number == 1:
+            raise OSError(28, "No space left on device")
+        real(file, mesh, number, *given)
+
+    monkeypatch.setattr("fastcontact.cli.run.LARGE", 0)
+    monkeypatch.setattr(fc.ResultWriter, "write", stop)
+    monkeypatch.setattr(write_arrays, "append_fields", full)
+    assert main(["run", str(solved / "small.toml"), "-q", "-o", str(path)]) == 130
+    told = capsys.readouterr().err.splitlines()[-3:]
+    assert told[0] == "interrupted"
+    assert "cannot be written at step 2 (No space left on device)" in told[1]
+    assert "keeps one complete step" in told[2]
+    assert len(fc.open_results(path)) == 1
 
 
 def test_a_run_that_fails_at_once_keeps_nothing_and_says_so(solved, tmp_path, capsys):

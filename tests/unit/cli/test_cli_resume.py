@@ -290,6 +290,8 @@ def test_the_progress_of_a_resumed_run_counts_what_it_solves(whole, capsys, monk
     progress.step(whole[1][2])
     assert f"step 3/{STEPS}, " in (told := capsys.readouterr().err)
     assert "nodes in contact, 3 s left" in told
+    progress.step(whole[1][3], complete=0)  # computed, but nothing is written yet
+    assert capsys.readouterr().err == ""
     progress.close()
     assert capsys.readouterr().err.strip() == ""
     quiet = Progress(STEPS, show=False)

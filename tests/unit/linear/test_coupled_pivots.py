@@ -152,8 +152,7 @@ def test_standard_multipliers_over_a_whole_interface_cost_multigrid_what_dual_on
 @pytest.mark.parametrize(
     ("options", "element"),
     [
-        ({"multipliers": "dual", "penalty": 100.0}, "hex8"), ({"formulation": "continuous"}, "hex8"),
-        ({"multipliers": "standard"}, "tet10"),
+        ({"formulation": "continuous"}, "hex8"), ({"multipliers": "standard"}, "tet10"),
     ],
 )  # fmt: skip
 def test_constraints_that_cannot_be_eliminated_go_to_factors_and_not_through_many_columns(
@@ -175,8 +174,9 @@ def test_constraints_that_cannot_be_eliminated_go_to_factors_and_not_through_man
 def test_auto_knows_which_constraints_multigrid_cannot_eliminate():
     solver = {options: prepare(pressed(20, **dict(options)), fc.linear_ramp(1), fc.Criteria()).solver.name for options in (
         (("multipliers", "standard"),), (("multipliers", "dual"),), (("multipliers", "dual"), ("penalty", 100.0)),
+        (("formulation", "continuous"),),
     )}  # fmt: skip
-    assert list(solver.values()) == ["amg", "amg", "direct"]
+    assert list(solver.values()) == ["amg", "amg", "amg", "direct"]
 
 
 @pytest.mark.parametrize("solver", ["direct", "amg"])

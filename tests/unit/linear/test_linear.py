@@ -48,11 +48,15 @@ def test_equations_hold_and_forces_balance(name, problem):
 
 
 @pytest.mark.parametrize("name", linear.SOLVERS)
-def test_soft_equations_hold(name, problem):
+@pytest.mark.parametrize("softness", [1e-12, 1e-9, 1e-6, 1e-3])
+@pytest.mark.parametrize("diagonal", [True, False])
+def test_soft_equations_hold(name, problem, softness, diagonal):
     analysis, f, B, c = problem
-    C = np.diag([1.0, 2.0, 3.0, 4.0]) * 1e-6
-    u, multiplier = prepared(name, analysis).load(f).solve(B, c, C)
-    assert np.abs(B @ u + C @ multiplier - c).max() < 1e-9 * np.abs(u).max()
+    of_each = np.array([1.0, 2.0, 3.0, 4.0]) * softness
+    u, multiplier = prepared(name, analysis).load(f).solve(B, c, of_each if diagonal else np.diag(of_each))
+    assert np.abs(B @ u + of_each * multiplier - c).max() < 1e-9 * np.abs(u).max()
+    out = (analysis.K @ u - f - B.T @ multiplier)[~analysis.system.fixed]
+    assert np.abs(out).max() < 1e-9 * np.abs(f).max()
 
 
 @pytest.mark.parametrize("name", linear.SOLVERS)
@@ -81,7 +85,9 @@ def test_auto_chooses_by_dimension_and_size():
     ("options", "solver"),
     [
         ({"formulation": "node_to_segment"}, "amg"), ({"formulation": "node_to_segment", "friction": 0.3}, "amg"),
-        ({"formulation": "mortar", "multipliers": "dual"}, "amg"), ({"formulation": "mortar", "penalty": 1e6}, "direct"),
+        ({"formulation": "mortar", "multipliers": "dual"}, "amg"),
+        ({"formulation": "mortar", "multipliers": "dual", "penalty": 1e6}, "amg"),
+        ({"formulation": "node_to_segment", "friction": 0.3, "penalty": 1e6, "tangential_penalty": 1e5}, "amg"),
         ({"formulation": "mortar"}, "direct"),  # in the plane a pressure field, which gives way
         ({"formulation": "continuous"}, "direct"),
     ],

@@ -2,11 +2,12 @@
 
 import logging
 import tracemalloc
+from dataclasses import replace
 
 import numba
 import numpy as np
 import pytest
-from scipy.sparse import bsr_array, csr_array, diags_array
+from scipy.sparse import bsr_array, csr_array, diags_array, eye_array
 
 import fastcontact as fc
 from fastcontact.elasticity.constrained_system import supports_apart
@@ -235,8 +236,8 @@ def springs_on(elimination, fixed):
     return Springs(csr_array(R), 100.0 * rng.random(3))
 
 
-@pytest.mark.parametrize("sprung", [False, True])
-def test_equations_and_springs_change_the_levels_to_those_of_the_eliminated_matrix_and_back(sprung):
+@pytest.mark.parametrize(("equations", "sprung"), [(True, False), (True, True), (False, True)])
+def test_equations_and_springs_change_the_levels_to_those_of_the_eliminated_matrix_and_back(equations, sprung):
     K, modes, _, fixed = problem((9, 8, 8))
     hierarchy = Hierarchy(matrix_of(K), modes)
     constrained = ConstrainedHierarchy(hierarchy, matrix_of(K))
@@ -244,7 +245,9 @@ def test_equations_and_springs_change_the_levels_to_those_of_the_eliminated_matr
     before = [level.inverse.copy() for level in hierarchy.levels]
     bounds = [level.bound for level in hierarchy.levels]
     springs = springs_on(elimination, fixed) if sprung else None
-    constrained.constrain(elimination, springs)
+    if not equations:
+        elimination, T = eliminate(csr_array((0, len(fixed))), np.empty(0)), eye_array(len(fixed), format="csr")
+    constrained.constrain(elimination if equations else None, springs)
     A, top = T.T @ K @ T, hierarchy.levels[0]
     if springs is not None:
         A = A + T.T @ springs.rows.T @ diags_array(springs.stiffness) @ springs.rows @ T
@@ -302,6 +305,19 @@ def test_springs_are_kept_and_told_apart():
     assert not springs.alike(Springs(springs.rows[:3], springs.stiffness[:3]))
     assert springs.alike(springs.scaled(1.2))
     assert not springs.alike(springs.scaled(3.0))
+
+
+def test_springs_side_by_side_may_push_along_other_rows():
+    rng = np.random.default_rng(3)
+    R, S, F = (csr_array(rng.normal(size=(k, 9)) * (rng.random((k, 9)) < 0.6)) for k in (4, 3, 4))
+    u, one, other = rng.normal(size=9), 1.0 + rng.random(4), 1.0 + rng.random(3)
+    for through in (None, F):
+        r = np.zeros(9)
+        Springs(R, one, through).beside(Springs(S, other)).subtract_forces(u, r, 0.5)
+        pushed = R if through is None else through
+        expected = pushed.T @ (one * (R @ u)) + S.T @ (other * (S @ u))
+        assert r == pytest.approx(-0.5 * expected)
+    assert Springs(R, one).beside(None).rows is R
 
 
 @pytest.mark.parametrize("rows", [5, 2000])  # one thread, and many
@@ -422,16 +438,18 @@ def test_both_precisions_agree_and_single_takes_half_the_memory():
         Amg(precision="half")
 
 
-def test_the_loop_allocates_nothing_that_grows_with_the_problem():
+@pytest.mark.parametrize("compliance", [None, np.full(6, 1e-3)], ids=["exact", "soft"])
+def test_the_loop_allocates_nothing_that_grows_with_the_problem(compliance):
     solver, f, fixed = prepared()
-    elimination = eliminate(contact_rows(fixed), np.full(6, 1e-3))
+    elimination = replace(eliminate(contact_rows(fixed), np.full(6, 1e-3)), compliance=compliance)
     solver.solution(f, elimination, None)  # compiles
-    solver._begin(f, elimination)
+    solver.constrain(elimination)
+    solver._begin(solver._cg, f)
     tracemalloc.start()
     before = tracemalloc.get_traced_memory()[0]
     tracemalloc.reset_peak()
     for _ in range(5):
-        assert solver._cg.step(solver._multiply, solver.precondition)
+        assert solver._cg.step(solver._reduced.multiply, solver.precondition)
     peak = tracemalloc.get_traced_memory()[1] - before
     tracemalloc.stop()
     assert peak < len(f)  # bytes: less than an eighth of one vector

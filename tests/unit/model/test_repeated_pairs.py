@@ -194,6 +194,33 @@ def test_one_pair_of_both_halves_has_the_pressure_of_the_press(mesh, formulation
         assert contact.pressure == pytest.approx(np.ones(len(contact.points)), rel=1e-6)
 
 
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+@pytest.mark.parametrize("friction", [None, 0.3])
+@pytest.mark.parametrize("swapped", [False, True])
+def test_pairs_share_the_force_of_a_common_node_by_area(solver, friction, swapped):
+    """Their conditions there are the same, and leave the split of the force open; facets grow along the side."""
+    even = block_on_block(divisions_lower=(6, 2), divisions_upper=(6, 2))
+    points = even.points.copy()
+    points[:, 0] = points[:, 0] ** 2 / points[:, 0].max()
+    mesh = parts(parts(fc.Mesh(points, even.cells, even.cell_groups, even.point_groups), "CONT_UPPER"), "CONT_LOWER")
+    model = model_of(mesh)
+    model.fix("LOWER_BOTTOM", "y")
+    model.fix("LOWER_LEFT", "x")
+    model.fix("UPPER_LEFT", "x")
+    model.add_pressure("UPPER_TOP", 1.0)
+    for half in ("RIGHT", "LEFT") if swapped else ("LEFT", "RIGHT"):
+        options = {} if friction is None else {"friction": friction}
+        model.add_contact(
+            half, secondary=f"CONT_UPPER_{half}", primary="CONT_LOWER", formulation="node_to_segment", **options
+        )
+    (step,) = fc.solve(model, fc.linear_ramp(1), linear_solver=solver, linear_tolerance=1e-12)
+    for half, contact in step.contact.items():
+        assert contact.pressure == pytest.approx(np.ones(len(contact.points)), rel=1e-6)
+        width = np.ptp(mesh.points[mesh.points_of(f"CONT_UPPER_{half}"), 0])
+        assert contact.force[1] == pytest.approx(width, rel=1e-6)
+        assert contact.active.all()
+
+
 def test_sides_that_meet_in_a_corner_are_silent():
     """A block in the corner of an angle touches it with two faces that have one node in common on both bodies."""
     points = [[0, 0], [3, 0], [3, 1], [1, 1], [1, 3], [0, 3], [0, 1], [1, 0], [1.5, 1.5], [3, 1.5], [3, 3], [1.5, 3]]

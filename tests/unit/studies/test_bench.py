@@ -39,7 +39,9 @@ def test_the_table_tells_what_failed():
 def test_the_table_of_threads(tmp_path, capsys):
     path = tmp_path / "run.json"
     assert main(["bench", "threads", "--smallest", "--json", str(path)]) == 0
-    assert "serial part by Amdahl's law" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "serial part by Amdahl's law" in told
+    assert "memory read by a sum" in told
     (entry,) = json.loads(path.read_text())["tables"]["threads"]
     one, two = entry["runs"]
     assert (one["threads"], two["threads"]) == (1, 2)
@@ -49,6 +51,12 @@ def test_the_table_of_threads(tmp_path, capsys):
     for run in entry["runs"]:
         assert 0.0 < run["cold_wall_s"] < run["wall_s"]
         assert "linear/multigrid/cycle_kernels.py/multiply" in run["stages"]
+        # Numbers in single precision, and as many again in the low part; places and vectors beside them.
+        assert 1.4 < run["exact_bytes"] / run["single_bytes"] < 2.0
+        assert run["single_bytes"] > 8 * run["n_dofs"] > 0
+        for name in ("single", "exact"):
+            assert run[f"{name}_rate"] == pytest.approx(run[f"{name}_bytes"] / run[f"{name}_s"])
+        assert run["read_rate"] > 0.0
     assert all(len(stage["wall_s"]) == 2 and stage["serial_s"] >= 0.0 for stage in entry["stages"])
 
 

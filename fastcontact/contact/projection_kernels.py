@@ -1,0 +1,202 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Facets in 3D: their normals and angles, and projection along normals interpolated between their nodes.
+
+Positions and normals of a facet are polynomials of its reference coordinates, with coefficients (n_facets, m, 3) of the terms
+in `search.facet_tables`; facets with fewer nodes than the widest kind have zeros at the end.
+"""
+
+import numpy as np
+
+from fastcontact._jit.decorators import innermost_kernel, kernel
+from fastcontact.contact.search.straight_3d_kernels import cross, dot, minus, unit
+
+MAX_ITERATIONS = 15
+# In reference coordinates: a step below which the projection has converged, and what counts as inside a facet.
+STEP = 1e-13
+INSIDE = 1e-10
+# Facets that a projection leaves by amounts that differ by less are left alike: the first one is taken.
+TIE = 1e-12
+# A projection that ends farther beyond its facet than this, in facet lengths, is not trusted.
+BEYOND = 1.0
+# Columns of a Jacobian that span less than this part of the volume of a box are dependent.
+FLAT = 1e-8
+
+
+@kernel
+def normals(nodes, slopes, begin, end, out):
+    """Fill the unit normals (n, m, 3) of facets `begin` to ``end - 1`` with nodes (n, m, 3) at their own nodes.
+
+    `slopes` (m, m, 2) are the derivatives of the shape functions at the nodes.
+    """
+    m = nodes.shape[1]
+    for f in range(begin, end):
+        for a in range(m):
+            ps, qs, rs, pt, qt, rt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            for k in range(m):
+                p, q, r = nodes[f, k, 0], nodes[f, k, 1], nodes[f, k, 2]
+                s, t = slopes[a, k, 0], slopes[a, k, 1]
+                ps, qs, rs = ps + s * p, qs + s * q, rs + s * r
+                pt, qt, rt = pt + t * p, qt + t * q, rt + t * r
+            out[f, a, 0], out[f, a, 1], out[f, a, 2] = unit(cross((ps, qs, rs), (pt, qt, rt)))
+
+
+@kernel
+def angles(nodes, beside, begin, end, out):
+    """Fill the angles (n, m) of facets `begin` to ``end - 1`` with nodes (n, m, 3) at their corners, 1 at other nodes.
+
+    `beside` (n_corners, 2) are the corners next to each corner.
+    """
+    for f in range(begin, end):
+        for a in range(nodes.shape[1]):
+            out[f, a] = 1.0
+        for a in range(beside.shape[0]):
+            own = _row(nodes, f, a)
+            p, q = minus(_row(nodes, f, beside[a, 0]), own), minus(_row(nodes, f, beside[a, 1]), own)
+            sine = cross(p, q)
+            out[f, a] = np.arctan2(np.sqrt(dot(sine, sine)), dot(p, q))
+
+
+@innermost_kernel
+def _row(nodes, f, a):
+    return nodes[f, a, 0], nodes[f, a, 1], nodes[f, a, 2]
+
+
+@kernel
+def coefficients(values, to_terms, first, begin, end, out):
+    """Fill rows `first` + `begin` to ``first + end - 1`` of `out` (n_facets, width, 3): the terms of `values` (n, m, 3).
+
+    `to_terms` (m, m) are those of `facet_tables.Tables`.
+    """
+    m = values.shape[1]
+    for f in range(begin, end):
+        for k in range(out.shape[1]):
+            p, q, r = 0.0, 0.0, 0.0
+            for a in range(m if k < m else 0):
+                share = to_terms[k, a]
+                p, q, r = p + share * values[f, a, 0], q + share * values[f, a, 1], r + share * values[f, a, 2]
+            out[first + f, k, 0], out[first + f, k, 1], out[first + f, k, 2] = p, q, r
+
+
+@innermost_kernel
+def _component(terms, f, d, s, t):
+    """Return one component of the polynomials of facet `f` at (s, t), and its derivatives."""
+    m = terms.shape[1]
+    a, b = terms[f, 1, d], terms[f, 2, d]
+    x, xs, xt = terms[f, 0, d] + a * s + b * t, a, b
+    if m >= 4:
+        a = terms[f, 3, d]
+        x, xs, xt = x + a * s * t, xs + a * t, xt + a * s
+    if m >= 6:
+        a, b = terms[f, 4, d], terms[f, 5, d]
+        x, xs, xt = x + a * s * s + b * t * t, xs + 2.0 * a * s, xt + 2.0 * b * t
+    if m >= 8:
+        a, b = terms[f, 6, d], terms[f, 7, d]
+        x, xs, xt = x + (a * s + b * t) * s * t, xs + (2.0 * a * s + b * t) * t, xt + (a * s + 2.0 * b * t) * s
+    if m >= 9:
+        a = terms[f, 8, d]
+        x, xs, xt = x + a * s * s * t * t, xs + 2.0 * a * s * t * t, xt + 2.0 * a * s * s * t
+    return x, xs, xt
+
+
+@innermost_kernel
+def _place(terms, f, s, t):
+    """Return the value of the polynomials of facet `f` at (s, t), and their derivatives."""
+    x, xs, xt = _component(terms, f, 0, s, t)
+    y, ys, yt = _component(terms, f, 1, s, t)
+    z, zs, zt = _component(terms, f, 2, s, t)
+    return (x, y, z), (xs, ys, zs), (xt, yt, zt)
+
+
+@innermost_kernel
+def _plus(a, factor, b):
+    return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
+
+
+@innermost_kernel
+def _newton(point, terms, directions, f, s, t, height):
+    """Solve ``X(s, t) + height n(s, t) = point`` on the extended facet `f`; return (s, t) and whether it converged."""
+    for _ in range(MAX_ITERATIONS):
+        foot, along_s, along_t = _place(terms, f, s, t)
+        normal, turn_s, turn_t = _place(directions, f, s, t)
+        residual = minus(point, _plus(foot, height, normal))
+        p, q = _plus(along_s, height, turn_s), _plus(along_t, height, turn_t)
+        across = cross(q, normal)
+        volume = dot(p, across)
+        if not abs(volume) > FLAT * np.sqrt(dot(p, p) * dot(q, q) * dot(normal, normal)):
+            return s, t, False
+        ds, dt = dot(residual, across) / volume, dot(residual, cross(normal, p)) / volume
+        dh, size = dot(residual, cross(p, q)) / volume, max(abs(ds), abs(dt))
+        # Far off, a full step may leave the region where the interpolated normals mean anything.
+        share = 1.0 if size <= 1.0 else 1.0 / size
+        s, t, height = s + share * ds, t + share * dt, height + share * dh
+        if share * size <= STEP * (1.0 + max(abs(s), abs(t))):
+            return s, t, True
+    return s, t, False
+
+
+@innermost_kernel
+def beyond(triangle, s, t):
+    """Return how far reference coordinates lie outside a facet, in facet lengths; 0 inside."""
+    outside = max(-s, -t, s + t - 1.0) if triangle else 0.5 * (max(abs(s), abs(t)) - 1.0)
+    return max(outside, 0.0)
+
+
+@innermost_kernel
+def inside(triangle, s, t):
+    """Return reference coordinates moved into a facet."""
+    if triangle:
+        a, b = max(s, 0.0), max(t, 0.0)
+        whole = max(a + b, 1.0)
+        return a / whole, b / whole
+    return min(max(s, -1.0), 1.0), min(max(t, -1.0), 1.0)
+
+
+@innermost_kernel
+def _beside(point, terms, directions, triangular, neighbours, f, height):
+    """Return which facet next to `f` the projection leaves least, where on it, and by how much; infinite if on none."""
+    start, numbers = neighbours
+    best, best_s, best_t, least = f, 0.0, 0.0, np.inf
+    for k in range(start[f], start[f + 1]):
+        g = numbers[k]
+        middle = 1.0 / 3.0 if triangular[g] else 0.0
+        s, t, found = _newton(point, terms, directions, g, middle, middle, height)
+        out = beyond(triangular[g], s, t) if found else np.inf
+        if found and max(out, INSIDE) < max(least, INSIDE) - TIE:
+            best, best_s, best_t, least = g, s, t, out
+    return best, best_s, best_t, least
+
+
+@kernel
+def along_normals(begin, end, points, heights, terms, directions, triangular, neighbours, found):
+    """Project points `begin` to ``end - 1`` along interpolated normals; see `projection.along_normals`.
+
+    Parameters
+    ----------
+    begin, end : int
+    points : ndarray (n, 3)
+        [length].
+    heights : ndarray (n,)
+        Over the closest points [length].
+    terms, directions : ndarray (n_facets, m, 3)
+        Coefficients of positions [length] and of normals [-].
+    triangular : ndarray of bool (n_facets,)
+    neighbours : (ndarray of int (n_facets + 1,), ndarray of int)
+        The facets that share a node with facet f, ascending, are numbers ``start[f]`` to ``start[f + 1] - 1``.
+    found : tuple of ndarray
+        facet (n,), xi (n, 2) [-], overhang (n,) [-]: closest points, changed in place; and unit normals (n, 3), filled.
+    """
+    facet, xi, overhang, normal = found
+    for i in range(begin, end):
+        point, f = (points[i, 0], points[i, 1], points[i, 2]), facet[i]
+        s, t, over = xi[i, 0], xi[i, 1], overhang[i]
+        a, b, good = _newton(point, terms, directions, f, s, t, heights[i])
+        out = beyond(triangular[f], a, b)
+        if good and out <= BEYOND:
+            s, t, over = a, b, out
+            if out > INSIDE:
+                other, a, b, out = _beside(point, terms, directions, triangular, neighbours, f, heights[i])
+                if out < over:
+                    f, s, t, over = other, a, b, out
+        s, t = inside(triangular[f], s, t)
+        facet[i], xi[i, 0], xi[i, 1], overhang[i] = f, s, t, over if over > INSIDE else 0.0
+        normal[i, 0], normal[i, 1], normal[i, 2] = unit(_place(directions, f, s, t)[0])

@@ -1,0 +1,158 @@
+"""The matrix of an iteration: K and springs under eliminated equations, some of which may give way by themselves.
+
+Equations ``B u + C multiplier = c`` with a diagonal compliance C are eliminated like others, but their pivots move by
+``P^-1 s`` more, P the pivots' columns of B. Their excess ``s = B u - c = -C multiplier`` is an unknown of its own, with the
+stiffness ``1 / C``: in the vectors of the iteration it stands in the place of the pivot. However stiff, it costs no digits
+and no iterations, since it is solved for by itself; the stiffer, the less it has to do with the other unknowns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from fastcontact.linear.elimination.elimination import Elimination
+from fastcontact.linear.multigrid.matrix import ScaledMatrix
+from fastcontact.linear.springs import Springs
+
+Array = NDArray[np.float64]
+
+
+class Reduced:
+    """See the module.
+
+    Parameters
+    ----------
+    K : ScaledMatrix
+        Shape (n, n) [force / length].
+    elimination : Elimination, optional
+    springs : Springs, optional
+        Added to K.
+    diagonal : ndarray (n,), optional
+        That of K [force / length], where equations give way.
+
+    Attributes
+    ----------
+    elimination, springs
+    """
+
+    def __init__(
+        self, K: ScaledMatrix, elimination: Elimination | None, springs: Springs | None = None,
+        diagonal: Array | None = None,
+    ) -> None:  # fmt: skip
+        self._K, self.elimination, self.springs = K, elimination, springs
+        self._excess = None
+        if elimination is not None and elimination.compliance is not None:
+            assert diagonal is not None
+            self._excess = _Excess(diagonal, elimination, elimination.compliance)
+
+    @property
+    def bare(self) -> bool:
+        """Whether neither springs nor equations give way."""
+        return self.springs is None and self._excess is None
+
+    def begin(self, x: Array, f: Array, r: Array) -> None:
+        """Turn the displacement x (n,) [length] into a vector of the iteration, and fill r (n,) with its residual."""
+        if self._excess is not None:
+            self._excess.begin(x, self.multiplier(x, f) if x.any() else None)
+        elif self.elimination is not None:
+            self.elimination.complete(x, self.elimination.offset)
+        self._subtract(self.displacement(x), f, x, r)
+
+    def displacement(self, x: Array, moved: bool = True) -> Array:
+        """Return the displacement (n,) of a vector of the iteration, or, where not `moved`, that of a change of it.
+
+        Until the next call: it may be work space, or x itself.
+        """
+        if self._excess is None:
+            return x
+        assert self.elimination is not None
+        return self._excess.displacement(x, self.elimination.offset if moved else None)
+
+    def multiply(self, p: Array, q: Array) -> None:
+        """Fill q (n,) with the product with p (n,)."""
+        u = self.displacement(p, moved=False)
+        self._K.combine(1.0, u, 0.0, q, q)
+        if self.springs is not None:
+            self.springs.subtract_forces(u, q, -1.0)
+        self._reduce(p, q, 1.0)
+
+    def precondition(self, r: Array, norm: float, z: Array, cycle: Callable[[Array, float, Array], None]) -> None:
+        """Fill z (n,) with an approximate solution for r (n,), of 2-norm `norm`; `cycle` is multigrid's, for equations."""
+        if self._excess is None:
+            cycle(r, norm, z)
+            if self.elimination is not None:
+                self.elimination.complete(z)
+        else:
+            self._excess.precondition(r, norm, z, cycle)
+
+    def multiplier(self, u: Array, f: Array) -> Array:
+        """Return the multipliers (m,) [force] of the equations at the displacement u (n,)."""
+        return multiplier(self._K, self.elimination, self.springs, u, f)
+
+    def _subtract(self, u: Array, f: Array, x: Array, r: Array) -> None:
+        self._K.combine(-1.0, u, 1.0, f, r)
+        if self.springs is not None:
+            self.springs.subtract_forces(u, r)
+        self._reduce(x, r, -1.0)
+
+    def _reduce(self, x: Array, r: Array, sign: float) -> None:
+        """Move forces r (n,) from the pivots; add those of the excesses in x times `sign` there."""
+        if self._excess is not None:
+            self._excess.reduce(x, r, sign)
+        elif self.elimination is not None:
+            self.elimination.move_forces(r)
+
+
+def multiplier(K: ScaledMatrix, elimination: Elimination | None, springs: Springs | None, u: Array, f: Array) -> Array:
+    """Return the multipliers (m,) [force] of the equations at the displacement u (n,)."""
+    if elimination is None:
+        return np.empty(0)
+    if springs is not None:
+        f = f.copy()
+        springs.subtract_forces(u, f)
+    return elimination.multiplier(K.forces_at(elimination.pivots, u, f))
+
+
+class _Excess:
+    """By how much equations that give way are not met: an unknown in each pivot's place. See `Reduced` for parameters."""
+
+    def __init__(self, diagonal: Array, elimination: Elimination, compliance: Array) -> None:
+        self._elimination, self._pivots = elimination, elimination.pivots
+        gives, self._compliance = compliance > 0.0, compliance
+        self._stiffness = np.divide(1.0, compliance, out=np.zeros(len(compliance)), where=gives)
+        # Its own stiffness and that of the pivot; an equation that does not give way stays as it is.
+        inverse = elimination.own_inverse
+        if inverse is None:
+            inverse = elimination.with_sparse_weights().inverse
+        assert isinstance(inverse, csr_array)
+        of_pivots = inverse.power(2).T @ diagonal[self._pivots]
+        self._inverse = np.where(gives, 1.0 / (self._stiffness + of_pivots), 0.0)
+        self._gives = gives
+        self._u = np.empty(len(diagonal))
+
+    def begin(self, x: Array, multiplier: Array | None) -> None:
+        """Put excesses in the pivots' places: those of the forces there, by which what was open before begins with none."""
+        x[self._pivots] = 0.0 if multiplier is None else -self._compliance * multiplier
+
+    def displacement(self, x: Array, offset: Array | None) -> Array:
+        moved = self._elimination.shifted(x[self._pivots])
+        u = self._u
+        u[:] = x
+        self._elimination.complete(u, moved if offset is None else moved + offset)
+        return u
+
+    def reduce(self, x: Array, r: Array, sign: float) -> None:
+        own = self._elimination.multiplier(r[self._pivots]) + sign * self._stiffness * x[self._pivots]
+        self._elimination.move_forces(r)
+        r[self._pivots] = np.where(self._gives, own, 0.0)
+
+    def precondition(self, r: Array, norm: float, z: Array, cycle: Callable[[Array, float, Array], None]) -> None:
+        own = r[self._pivots]
+        r[self._pivots] = 0.0
+        cycle(r, norm, z)
+        r[self._pivots] = own
+        z[self._pivots] = self._inverse * own

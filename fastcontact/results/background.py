@@ -1,0 +1,39 @@
+"""Work in a thread of its own: one task at a time, whose error is raised to those who wait for it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from fastcontact.results.committed_file import uninterrupted
+
+
+class Background:
+    """Runs one task while its caller goes on; signals, such as Ctrl-C, wait while a task is waited for."""
+
+    def __init__(self) -> None:
+        self._thread: threading.Thread | None = None
+        self._failure: BaseException | None = None
+
+    def start(self, task: Callable[[], None]) -> None:
+        """Run `task` once the one before it has ended; raise the error of that one instead, if it had any."""
+        self.wait()
+        self._thread = threading.Thread(target=self._run, args=(task,), name="fastcontact-writer")
+        self._thread.start()
+
+    def wait(self) -> None:
+        """Wait until nothing is being done; raise the error of the last task, once."""
+        if self._thread is None:
+            return
+        with uninterrupted():
+            self._thread.join()
+            self._thread = None
+        failure, self._failure = self._failure, None
+        if failure is not None:
+            raise failure
+
+    def _run(self, task: Callable[[], None]) -> None:
+        try:
+            task()
+        except BaseException as error:  # also what no handler of a thread would tell
+            self._failure = error
