@@ -34,12 +34,15 @@ class Projection:
         Augmentation [pressure / length].
     mass : SuperLU, optional
         Factors of ``P.T W P``; None where no point takes part.
+    eliminable : bool
+        Whether linear solvers may take the values of the field in place of the forces.
     """
 
     P: csr_array
     areas: Array
     rho: float
     mass: SuperLU | None
+    eliminable: bool = True
 
     def block(self, rows: NDArray[np.intp]) -> Array:
         """Return rows and columns `rows` of C, a dense matrix; ContactError where it would be too large to be of use."""
@@ -58,7 +61,7 @@ class Projection:
 
     def among(self, rows: NDArray[np.intp]) -> Array | FieldCompliance:
         """Return C among `rows`; see `Compliance`."""
-        if self.mass is None or not (self.areas[rows] > 0).all():
+        if not self.eliminable or self.mass is None or not (self.areas[rows] > 0).all():
             return self.block(rows)
         others = np.where(self.areas > 0, self.areas, 0.0) / self.rho
         others[rows] = 0.0

@@ -190,7 +190,7 @@ class PressureFieldFormulation(Formulation):
         self, candidates: Candidates, pairing: Pairing, field: PressureField, at: Configuration
     ) -> Constraints:
         """Return the constraints of paired integration points whose forces make up a pressure field."""
-        part = self.assembled(candidates, pairing, field.projection, at)
+        part = self.assembled(candidates, pairing, replace(field.projection, eliminable=self.eliminable), at)
         undetermined = self._undetermined(candidates, pairing, field, part.directions) if self.friction else None
         return replace(part, low_rank_compliance=undetermined, areas=field.areas, nodal=field)
 

@@ -23,6 +23,8 @@ class Dense:
     def block(self, rows):
         return self.C[np.ix_(rows, rows)]
 
+    among = block
+
     def apply(self, multiplier):
         return self.C @ multiplier
 
