@@ -37,7 +37,8 @@ class StatusLine:
     def draw(self, text: str) -> None:
         """Replace the line."""
         if self._show:
-            sys.stderr.write(f"\r{text:<{self._width}}")
+            # Back at its beginning, so that a warning does not follow it on the same line.
+            sys.stderr.write(f"\r{text:<{self._width}}\r")
             sys.stderr.flush()
 
     def close(self) -> None:
