@@ -111,3 +111,22 @@ def test_large_numbers_have_no_power_of_ten():
     contact.pressure[:] *= factor
     ax = fc.plot.pressure_profile(contact, units=fc.plot.UNITS)
     assert "= 10542 MPa" in ax.get_legend().get_texts()[0].get_text()
+
+
+@pytest.mark.parametrize("formulation", ["continuous", "node_to_segment"])
+def test_a_profile_says_where_its_edge_is_that_of_nodes(formulation):
+    """The points of continuous contact lie between nodes: results tell a narrower bracket than the picture shows."""
+    mesh = fc.generate.graded_block("quad8", width=20.0, contact_radius=1.2)
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("SYMMETRY_X", "x")
+    model.fix("BOTTOM", "y")
+    ball = fc.obstacles.Sphere(centre=(0.0, 10.0), R=10.0)
+    model.add_obstacle("ball", secondary="CONTACT", obstacle=ball, motion={"y": -0.1}, formulation=formulation)
+    contact = fc.solve(model, 1)[-1].contact["ball"]
+    told = [text.get_text() for text in fc.plot.pressure_profile(contact).get_legend().get_texts()]
+    (edge,) = (text for text in told if text.startswith("edge"))
+    ends = [float(word) for word in edge.split(": ")[1].split(" to ")]
+    alike = np.allclose(ends, contact.radius, rtol=0.01)
+    assert alike == (formulation == "node_to_segment")
+    assert ("between nodes" in edge) is not alike
