@@ -38,6 +38,8 @@ def history(
 ) -> Sequence[Axes]:
     """Plot force and contact radius of a contact pair over the load.
 
+    Where the force cancels all round, as in a press fit, it is the sum of the normal forces.
+
     Parameters
     ----------
     steps, pair
@@ -60,7 +62,9 @@ def history(
     upper, lower = axes
     contacts = contacts_of(steps, pair)
     x = np.array([step.load_factor for step in steps]) * (approach or 1.0)
-    upper.plot(x, [np.linalg.norm(c.force) for c in contacts], "o", ms=4, label="computed")
+    cancels = any(c.active.any() for c in contacts) and all(c.cancels for c in contacts if c.active.any())
+    forces = [c.normal_force if cancels else float(np.linalg.norm(c.force)) for c in contacts]
+    upper.plot(x, forces, "o", ms=4, label="computed")
     _brackets(lower, x, np.array([c.radius for c in contacts]))
     if law is not None and approach is not None:
         name = f"{NAMES.get(type(law), 'theory')}, equal approach"
@@ -68,9 +72,9 @@ def history(
         curves = [law.at_approach(d) for d in fine]
         upper.plot([0.0, *fine], [0.0, *(share * c.force for c in curves)], "k-", lw=1, label=name)
         lower.plot([0.0, *fine], [0.0, *(c.radius for c in curves)], "k-", lw=1, label=name)
-    if contacts[-1].tangent is not None:  # in the plane
+    if any(c.per_thickness for c in contacts):
         units = units_of_results(units, "plane_strain")
-    upper.set(ylabel=labelled("contact force", units, "force"))
+    upper.set(ylabel=labelled("sum of the normal forces" if cancels else "contact force", units, "force"))
     upper.set_title(title or f"Contact '{pair}' over the load", fontsize="medium")
     along = labelled("approach", units, "length") if approach else "load factor"
     round_contact = contacts[-1].measured_from_axis or contacts[-1].coordinates.shape[1] == 3

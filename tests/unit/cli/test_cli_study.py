@@ -147,6 +147,21 @@ def test_a_study_that_is_interrupted_does_not_wait_for_its_runs(tmp_path):
     assert done.returncode not in (0, 1)
 
 
+UNGUARDED = """
+import fastcontact as fc
+fc.convergence_study("forma04a", 2, ["tri3"], ["node_to_segment"], workers=2)
+"""
+
+
+def test_a_script_that_its_workers_would_run_anew_gets_one_error(tmp_path):
+    script = tmp_path / "unguarded.py"
+    script.write_text(UNGUARDED)
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 1
+    assert done.stderr.count("Traceback") == 1, done.stderr
+    assert "put what calls the study under if __name__ == '__main__':" in done.stderr.splitlines()[-1]
+
+
 def is_running(process):
     """Return whether a process is there and no mere entry of one that has ended."""
     try:

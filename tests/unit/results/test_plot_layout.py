@@ -87,6 +87,23 @@ def test_forces_of_plane_models_are_per_thickness_in_a_history(given):
     assert upper.get_ylabel() == "contact force [N/mm]"
 
 
+def test_forces_of_other_models_are_whole_in_a_history():
+    mesh = box((1.0, 1.0, 1.0), (1, 1, 1), "hex8")
+    solid = fc.Model(mesh, "3d")
+    solid.fix("ZMIN", "xyz")
+    disc = fc.Model(block((1.0, 1.0), (2, 2)), "axisymmetric")
+    disc.fix("BOTTOM", "xy")
+    for model, side, way in ((solid, "ZMAX", "z"), (disc, "TOP", "y"), (disc, "RIGHT", "")):
+        model.contact.clear()
+        if not model.materials:
+            model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+        lid = {"point": (0.0,) * (model.mesh.dim - 1) + (1.0,), "normal": (0.0,) * (model.mesh.dim - 1) + (-1.0,)}
+        ring = fc.obstacles.HalfSpace(**lid) if way else fc.obstacles.HalfSpace((0.99, 0.0), (-1.0, 0.0))
+        model.add_obstacle("lid", secondary=side, obstacle=ring, motion={way: -0.01} if way else None)
+        upper, _ = fc.plot.history(fc.solve(model, 1), "lid", units=fc.plot.UNITS)
+        assert upper.get_ylabel().endswith("[N]")
+
+
 def test_large_numbers_have_no_power_of_ten():
     steps = pressed(0.0)
     contact = steps[-1].contact["floor"]
@@ -94,3 +111,22 @@ def test_large_numbers_have_no_power_of_ten():
     contact.pressure[:] *= factor
     ax = fc.plot.pressure_profile(contact, units=fc.plot.UNITS)
     assert "= 10542 MPa" in ax.get_legend().get_texts()[0].get_text()
+
+
+@pytest.mark.parametrize("formulation", ["continuous", "node_to_segment"])
+def test_a_profile_says_where_its_edge_is_that_of_nodes(formulation):
+    """The points of continuous contact lie between nodes: results tell a narrower bracket than the picture shows."""
+    mesh = fc.generate.graded_block("quad8", width=20.0, contact_radius=1.2)
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("SYMMETRY_X", "x")
+    model.fix("BOTTOM", "y")
+    ball = fc.obstacles.Sphere(centre=(0.0, 10.0), R=10.0)
+    model.add_obstacle("ball", secondary="CONTACT", obstacle=ball, motion={"y": -0.1}, formulation=formulation)
+    contact = fc.solve(model, 1)[-1].contact["ball"]
+    told = [text.get_text() for text in fc.plot.pressure_profile(contact).get_legend().get_texts()]
+    (edge,) = (text for text in told if text.startswith("edge"))
+    ends = [float(word) for word in edge.split(": ")[1].split(" to ")]
+    alike = np.allclose(ends, contact.radius, rtol=0.01)
+    assert alike == (formulation == "node_to_segment")
+    assert ("between nodes" in edge) is not alike
