@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array, eye_array, kron
 
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
@@ -225,6 +226,7 @@ def prepare(
         driven.relations(model.relations),
         driven.without_stiffness,
     )
+    solver.corner_functions = _corner_functions(pairs.values(), K.shape[0], mesh.dim)
     contact_dofs = _contact_dofs(mesh, pairs, len(driven))
     involved = system.involved(contact_dofs)
     motions = driven.motions(free_motions(mesh, model.kinematics, supported, model.holding_rows()))
@@ -267,6 +269,17 @@ def _contact_dofs(mesh: Any, pairs: Mapping[str, Formulation], n_driven: int) ->
     points = np.unique(np.concatenate(sides)) if sides else np.empty(0, np.intp)
     moved = mesh.n_points + np.arange(n_driven)
     return (np.concatenate([points, moved])[:, None].astype(np.intp) * mesh.dim + np.arange(mesh.dim)).ravel()
+
+
+def _corner_functions(pairs: Iterable[Formulation], n: int, dim: int) -> csr_array | None:
+    """Return the `Formulation.corner_functions` of all pairs as rows of displacement components (n, n)."""
+    total = None
+    for pair in pairs:
+        if (own := pair.corner_functions) is not None:
+            own = csr_array(kron(own, eye_array(dim), format="csr"))
+            own.resize((n, n))
+            total = own if total is None else csr_array(total.maximum(own))
+    return total
 
 
 def near_nullspace(model: Model) -> Array:

@@ -147,6 +147,9 @@ class LinearSolver(Protocol):
     contrast : float
         By how much some deformations of a cell are stiffer than others: errors of displacements may exceed residuals by so
         much, and iterations that need not end with exact solutions go on by so much further [-].
+    corner_functions : csr_array (n, n), optional
+        Rows of mid nodes of quadratic facets: what they move by where corners do, if gaps are weighted with functions that
+        are linear on facets. A hint which motions to eliminate [-].
     """
 
     tolerance: float
@@ -155,6 +158,7 @@ class LinearSolver(Protocol):
     error: float = 0.0
     gave_up: str = ""
     contrast: float = 1.0
+    corner_functions: csr_array | None = None
 
     @property
     def iterative(self) -> bool:

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints
@@ -105,6 +106,14 @@ class Formulation(ABC):
     def eliminable(self) -> bool:
         """Whether iterative solvers can eliminate closed constraints; penalties, which are springs, do not prevent it."""
         return True
+
+    @property
+    def corner_functions(self) -> csr_array | None:
+        """Values at mid nodes of functions that gaps are weighted with, where these are linear on quadratic facets.
+
+        A matrix (n_points, n_points) with rows of mid nodes and columns of corners [-]; None where there are none.
+        """
+        return None
 
     @classmethod
     def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:

@@ -14,12 +14,13 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from fastcontact.errors import ConvergenceError
+from fastcontact.linear.elimination.condition import condition
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 # Equations whose inverse is larger, in units of their entries, repeat each other but for round-off.
 SINGULAR = 1e12
-# Coupled columns whose inverse is larger than this, in units of their entries, suit no elimination: errors would grow.
+# Coupled columns with a larger condition number suit no elimination: errors would grow.
 ILL_CONDITIONED = 1e6
 # Entries are added up on the blocks of nodes where at least this part of them does not cancel.
 LUMPED = 0.3
@@ -61,11 +62,13 @@ class CoupledPivots:
     ----------
     sparse_inverse : csr_array (m, m)
         Close enough to the inverse for a preconditioner: that of `lumped`.
+    beyond_lumped : csr_array (m, m)
+        The matrix less `lumped`.
 
     Raises
     ------
     CoupledError
-        If it is singular, or there is no such sparse inverse.
+        If it is singular or nearly so, or there is no such sparse inverse.
     """
 
     def __init__(self, P: csr_array, pivots: Indices, size: int) -> None:
@@ -73,13 +76,12 @@ class CoupledPivots:
         kept = np.asarray(abs(L).sum(axis=1)) / np.asarray(abs(P).sum(axis=1))
         if not kept.min() >= LUMPED:
             raise CoupledError()
-        self.sparse_inverse = block_inverse(L)
+        self.sparse_inverse, self.beyond_lumped = block_inverse(L), csr_array(P - L)
         try:
             self._factors = splu(csc_array(P))
         except RuntimeError:  # exactly singular
             raise CoupledError() from None
-        diagonal = np.abs(self._factors.U.diagonal())
-        if not diagonal.max() < ILL_CONDITIONED * diagonal.min():
+        if not condition(P, self.solve, self.solve_transposed) < ILL_CONDITIONED:
             raise CoupledError()
 
     def solve(self, b: Array) -> Array:

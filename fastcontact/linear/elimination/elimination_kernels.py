@@ -1,5 +1,7 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Eliminated unknowns in long vectors. Pivots follow ``x[pivots] = W x``, W in compressed rows that involve no pivots."""
+"""Eliminated unknowns in long vectors. Pivots follow ``x[pivots] = W x``, W in compressed rows that may involve pivots."""
+
+import numpy as np
 
 from fastcontact._jit.decorators import kernel
 
@@ -7,27 +9,39 @@ from fastcontact._jit.decorators import kernel
 @kernel
 def complete(pivots, indptr, indices, weights, x):
     """Set ``x[pivots] = W x``."""
+    sums = np.zeros(pivots.shape[0], x.dtype)
     for p in range(pivots.shape[0]):
         s = x[0] * 0
         for k in range(indptr[p], indptr[p + 1]):
             s += weights[k] * x[indices[k]]
-        x[pivots[p]] = s
+        sums[p] = s
+    for p in range(pivots.shape[0]):
+        x[pivots[p]] = sums[p]
 
 
 @kernel
 def move_forces(pivots, indptr, indices, weights, r):
-    """Move the forces at the pivots to the other unknowns: ``r += W.T r[pivots]``, ``r[pivots] = 0``."""
+    """Move the forces at the pivots to the unknowns that they follow: ``r[pivots] = 0``, then ``r += W.T r[pivots]``."""
+    forces = np.empty(pivots.shape[0], r.dtype)
     for p in range(pivots.shape[0]):
-        force = r[pivots[p]]
+        forces[p] = r[pivots[p]]
         r[pivots[p]] = 0
-        for k in range(indptr[p], indptr[p + 1]):
-            r[indices[k]] += weights[k] * force
+    add_rows(indptr, indices, weights, forces, r)
 
 
 @kernel
 def restore_forces(pivots, indptr, indices, weights, forces, r):
     """Undo `move_forces`, given the `forces` (m,) that were at the pivots."""
     for p in range(pivots.shape[0]):
-        r[pivots[p]] = forces[p]
         for k in range(indptr[p], indptr[p + 1]):
             r[indices[k]] -= weights[k] * forces[p]
+    for p in range(pivots.shape[0]):
+        r[pivots[p]] = forces[p]
+
+
+@kernel
+def add_rows(indptr, indices, weights, factors, r):
+    """Add ``W.T factors`` to r (n,), factors (m,)."""
+    for p in range(factors.shape[0]):
+        for k in range(indptr[p], indptr[p + 1]):
+            r[indices[k]] += weights[k] * factors[p]

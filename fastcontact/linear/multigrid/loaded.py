@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.linear.elimination.corner_functions import eliminated
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.elimination.pivot_order import RepeatedError
@@ -54,6 +55,11 @@ class LoadedMultigrid(LoadedIteration):
         if parts is None:
             return super().solve(B, c, C, guess, monitor, tolerance, nodes)
         return self._solved(parts, c, guess, monitor, tolerance)
+
+    @property
+    def _functions(self) -> csr_array | None:
+        functions: csr_array | None = self._solver.corner_functions
+        return functions
 
     def diagonal(self) -> Array:
         """See `LoadedNonsymmetric`."""
@@ -131,19 +137,20 @@ class LoadedMultigrid(LoadedIteration):
         """
         size = self._solver.K.blocksize[0]
         if C is None or not C.any():
-            return _Parts.of(B, c, None, np.ones(len(c), bool), nodes, size, through)
+            elimination = eliminated(B, c, through, nodes, size, self._functions) if len(c) else None
+            return _Parts(np.ones(len(c), bool), elimination, None)
         diagonal = self._solver.diagonal()
         yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
         own = B.multiply(B) @ yielding
         for least in (STIFF, STIFF_COUPLED):
             stiff = own > least * C
             try:
-                found = _Parts.of(B, c, C, stiff, nodes, size, through)
+                found = _Parts.of(B, c, C, stiff, nodes, size, through, self._functions)
             except RepeatedError:
                 continue
             if not found.coupled or least == STIFF_COUPLED:
                 return found
-        return _Parts.of(B, c, C, C == 0.0, nodes, size, through)
+        return _Parts.of(B, c, C, C == 0.0, nodes, size, through, self._functions)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,19 +163,20 @@ class _Parts:
 
     @classmethod
     def of(
-        cls, B: csr_array, c: Array, C: Array | None, stiff: Mask, nodes: NDArray[np.intp] | None, size: int,
-        through: csr_array | None,
+        cls, B: csr_array, c: Array, C: Array, stiff: Mask, nodes: NDArray[np.intp] | None, size: int,
+        through: csr_array | None, functions: csr_array | None,
     ) -> _Parts:  # fmt: skip
         """Return the parts of ``B u + C multiplier = c``; RepeatedError where those that are stiff repeat each other."""
+        gives = C[stiff].any()
+        if gives:  # excesses take the places of nodal pivots
+            functions = None
         if stiff.all():
-            elimination = eliminate(B, c, through, nodes, size) if len(c) else None
+            elimination = eliminated(B, c, through, nodes, size, functions) if len(c) else None
         else:
             rows, acting = csr_array(B[stiff]), None if through is None else csr_array(through[stiff])
             of_rows = None if nodes is None else nodes[stiff]
-            elimination = eliminate(rows, c[stiff], acting, of_rows, size) if stiff.any() else None
-        if C is None:
-            return cls(stiff, elimination, None)
-        if elimination is not None and C[stiff].any():
+            elimination = eliminated(rows, c[stiff], acting, of_rows, size, functions) if stiff.any() else None
+        if elimination is not None and gives:
             elimination = dataclasses.replace(elimination, compliance=C[stiff])
         if stiff.all():
             return cls(stiff, elimination, None)

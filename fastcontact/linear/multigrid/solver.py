@@ -11,7 +11,7 @@ import logging
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array
+from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._jit.decorators import check_threads
 from fastcontact.errors import ConvergenceError, ModelError
@@ -73,7 +73,7 @@ class Multigrid:
 
     Attributes
     ----------
-    contrast : float
+    contrast, corner_functions
         See `LinearSolver`.
 
     Raises
@@ -88,6 +88,7 @@ class Multigrid:
         self.tolerance, self.precision = tolerance, precision
         self.counters = Counters()
         self.contrast = 1.0
+        self.corner_functions: csr_array | None = None
 
     @property
     def nbytes(self) -> int:

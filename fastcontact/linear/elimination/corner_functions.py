@@ -1,0 +1,153 @@
+"""Equations of the corners of quadratic facets, eliminated along functions that are linear on facets.
+
+Gaps that are weighted with such functions, those of standard mortar multipliers, have next to no entries of their own at
+corners: the integral of a corner's quadratic function is none on triangles, and negative on quadrangles. With nodal pivots
+the matrix to invert is therefore nearly singular, and its inverse full. Where a corner moves and takes the mid nodes of its
+edges along, its linear function D (n,), the entries are those of a mass matrix of linear facets:
+``u + D s`` with ``s = (B D)^-1 (c - B u)``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from fastcontact.linear.elimination import elimination_kernels, pivot_order
+from fastcontact.linear.elimination.coupled_pivots import CoupledPivots
+from fastcontact.linear.elimination.elimination import Elimination, eliminate
+from fastcontact.linear.sparse_rows import scaled
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class CornerElimination(Elimination):
+    """``u[pivots] += moves (B moves)^-1 (c - B u)``.
+
+    Its `pivots` (q,) are all unknowns that move, its `weights` (m, n) are -B, its `force_weights` the rows that multipliers
+    act through, with the sign reversed, too.
+
+    Attributes
+    ----------
+    moves : csr_array (q, m)
+        D: what the pivots move by where the corner of an equation moves by one.
+    corners : ndarray of int (m,)
+        The unknown of each equation's own corner.
+    """
+
+    moves: csr_array = None  # type: ignore[assignment]
+    corners: Indices = None  # type: ignore[assignment]
+
+    def multiplier(self, forces: Array) -> Array:
+        """See `Elimination.multiplier`; forces (q,)."""
+        return super().multiplier(self.moves.T @ forces)
+
+    def complete(self, x: Array, offset: Array | None = None) -> None:
+        """See `Elimination.complete`; offset (q,)."""
+        x[self.pivots] += self.moves @ self.shifted(self.weights @ x)
+        if offset is not None:
+            x[self.pivots] += offset
+
+    def move_forces(self, r: Array) -> None:
+        """See `Elimination.move_forces`: what is left does no work along the corners' functions."""
+        W = self.force_weights
+        elimination_kernels.add_rows(W.indptr, W.indices, W.data, self.multiplier(r[self.pivots]), r)
+
+    def restore_forces(self, r: Array, forces: Array) -> None:
+        """See `Elimination.restore_forces`; forces (q,)."""
+        W = self.force_weights
+        elimination_kernels.add_rows(W.indptr, W.indices, W.data, -self.multiplier(forces), r)
+        r[self.pivots] = forces
+
+    def full_weights(self) -> csr_array:
+        """See `Elimination.full_weights`: what becomes of the pivots (q, n)."""
+        inverse = self.own_inverse if self.coupled is None else csr_array(self.coupled.solve(np.eye(len(self.corners))))
+        assert inverse is not None
+        return self._following(inverse, self.weights)
+
+    def with_sparse_weights(self) -> Elimination:
+        """See `Elimination.with_sparse_weights`."""
+        if self.coupled is None:
+            assert self.own_inverse is not None
+            inverse, rows = self.own_inverse, self.weights
+        else:
+            # The equations with the lumped matrix in place of their own: what they leave of a motion obeys them again.
+            m, n = self.weights.shape
+            E = csr_array((np.ones(m), self.corners, np.arange(m + 1)), shape=(m, n))
+            inverse, rows = self.coupled.sparse_inverse, csr_array(self.weights + self.coupled.beyond_lumped @ E)
+        W = self._following(inverse, rows)
+        return Elimination(self.pivots, W, np.zeros(len(self.pivots)), W, inverse)
+
+    def _following(self, inverse: csr_array, rows: csr_array) -> csr_array:
+        """Return the weights (q, n) that the pivots are of all unknowns."""
+        q = len(self.pivots)
+        own = csr_array((np.ones(q), self.pivots, np.arange(q + 1)), shape=(q, rows.shape[1]))
+        W = csr_array(own + self.moves @ csr_array(inverse @ rows))
+        W.sort_indices()
+        return W
+
+
+def eliminated(
+    B: csr_array, c: Array, force_rows: csr_array | None, nodes: Indices | None, size: int, functions: csr_array | None
+) -> Elimination:
+    """Eliminate equations along the `functions` of corners where they are of that kind, by nodal unknowns elsewhere.
+
+    See `eliminate_corners` and `elimination.eliminate`.
+    """
+    found = None
+    if functions is not None and nodes is not None:
+        found = eliminate_corners(B, c, force_rows, nodes, size, functions)
+    return eliminate(B, c, force_rows, nodes, size) if found is None else found
+
+
+def eliminate_corners(
+    B: csr_array, c: Array, force_rows: csr_array | None, nodes: Indices, size: int, functions: csr_array
+) -> CornerElimination | None:
+    """Return the elimination of equations along the functions of corners, None where they are not of that kind.
+
+    Parameters
+    ----------
+    B : csr_array (m, n)
+        Equations.
+    c : ndarray (m,)
+    force_rows : csr_array (m, n), optional
+        See `elimination.eliminate`, like `nodes` (m,) and `size`.
+    functions : csr_array (n, n)
+        Rows of mid nodes: what they move by where corners do.
+
+    Raises
+    ------
+    RepeatedError
+        If equations repeat each other.
+    """
+    B, n = csr_array(B, copy=True), B.shape[1]
+    B.eliminate_zeros()
+    movable = np.bincount(B.indices, minlength=n) > 0  # supported unknowns have no entries
+    beside = scaled(functions, movable.astype(float))
+    beside.eliminate_zeros()
+    with_mid_nodes = csr_array(B @ beside)
+    if not with_mid_nodes.nnz:
+        return None
+    in_functions = csr_array(B + with_mid_nodes)
+    in_functions.eliminate_zeros()
+    corners = pivot_order.of_nodes(in_functions, nodes, size)
+    if corners is None or np.diff(beside.indptr)[corners].any():
+        return None
+    inverse = pivot_order.inverse_of(in_functions, corners, size)
+    m = len(corners)
+    D = csr_array(beside[:, corners] + csr_array((np.ones(m), (corners, np.arange(m))), shape=(n, m)))
+    pivots = np.flatnonzero(np.diff(D.indptr))
+    moves, weights = csr_array(D[pivots]), csr_array(-B)
+    coupled, own = (inverse, None) if isinstance(inverse, CoupledPivots) else (None, inverse)
+    offset = moves @ (inverse.solve(c) if isinstance(inverse, CoupledPivots) else inverse @ c)
+    force_weights = weights
+    if force_rows is not None:
+        force_weights = csr_array(-force_rows)
+        inverse = pivot_order.inverse_of(csr_array(force_rows + force_rows @ beside), corners, size)
+    return CornerElimination(
+        pivots, weights, offset, force_weights, inverse, coupled, own, moves=moves, corners=corners
+    )
