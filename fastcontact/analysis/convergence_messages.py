@@ -37,7 +37,7 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
         f"{named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. {more} more load steps, a "
         f"finer mesh on the primary side, {_smoother(problem)}a fixed number of updates (Criteria.geometry_updates), or "
         f"accept changes of that size (Criteria.geometry, which is {problem.criteria.geometry:g}, above "
-        f"{max(changes[-CIRCLE:]):.0e})"
+        f"{max(changes[-CIRCLE:]) if circles else changes[-1]:.0e})"
     )
 
 
