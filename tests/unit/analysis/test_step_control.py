@@ -92,13 +92,21 @@ def test_progress_tells_that_a_step_is_cut(capsys):
 
 
 @pytest.mark.parametrize(
-    ("changes", "words"),
+    ("changes", "words", "enough"),
     [
-        ([1e-2 * 0.5**k for k in range(20)], "Allow more (Criteria.max_geometry_updates), use more load steps"),
-        ([0.1, *[1.2e-4, 1.3e-4] * 10], "More of them do not help, it goes round in circles: use more load steps"),
+        (
+            [1e-2 * 0.5**k for k in range(20)],
+            "Allow more (Criteria.max_geometry_updates), use more load steps",
+            "2e-08",
+        ),
+        (
+            [0.1, *[1.2e-4, 0.9e-4] * 10],
+            "More of them do not help, it goes round in circles: use more load steps",
+            "1e-04",
+        ),
     ],
 )
-def test_the_remedy_follows_from_how_the_geometry_moves(changes, words):
+def test_the_remedy_follows_from_how_the_geometry_moves(changes, words, enough):
     mesh = block((1.0, 1.0), (1, 1))
     side = SimpleNamespace(points=np.arange(4))
     pair = SimpleNamespace(secondary=side, primary=side, normals="averaged", multipliers="dual")
@@ -108,7 +116,7 @@ def test_the_remedy_follows_from_how_the_geometry_moves(changes, words):
     told = geometry_moves(problem, history, np.arange(8.0), 60)
     assert words in told
     assert "multipliers=\"standard\" for contact 'joint'" in told
-    assert f"(Criteria.geometry, which is 1e-11, above {max(changes[-8:]):.0e})" in told
+    assert f"(Criteria.geometry, which is 1e-11, above {enough})" in told
 
 
 def driven(**options):
