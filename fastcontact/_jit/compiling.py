@@ -1,14 +1,14 @@
-"""Who is told that kernels are being compiled, which takes some seconds where all were silent."""
+"""Who is told that kernels are being compiled, which takes up to a minute where all were silent."""
 
 from __future__ import annotations
 
 import logging
+import multiprocessing
+import sys
 from collections.abc import Callable
 
-TEXT = "compiling kernels: once, for some seconds; they are kept for later runs"
+TEXT = "compiling kernels: once, for up to a minute; they are kept for later runs"
 log = logging.getLogger("fastcontact")
-# Called as a kernel is compiled; one that is read from the disk cache is not.
-listeners: list[Callable[[], None]] = []
 count = 0  # of kernels that were compiled in this process
 
 
@@ -20,3 +20,20 @@ def notify() -> None:
         log.info(TEXT)
     for listener in tuple(listeners):
         listener()
+
+
+def tell_who_waits() -> None:
+    """Say it once where somebody waits at a terminal or a notebook, and neither the log nor another listener says it."""
+    listeners.remove(tell_who_waits)
+    if not listeners and not log.isEnabledFor(logging.INFO) and _somebody_waits():
+        print(f"fastcontact: {TEXT}", file=sys.stderr, flush=True)
+
+
+def _somebody_waits() -> bool:
+    """Return whether somebody sees the error output, and this is no process that works for another one."""
+    seen = sys.stderr is not None and (sys.stderr.isatty() or "ipykernel" in sys.modules)
+    return seen and multiprocessing.parent_process() is None
+
+
+# Called as a kernel is compiled; one that is read from the disk cache is not.
+listeners: list[Callable[[], None]] = [tell_who_waits]

@@ -55,6 +55,9 @@ class ContactAnswers:
     ----------
     force : ndarray (dim,)
         On the secondary side [force].
+    normal_force : float
+        Sum of the nodal forces along the normals, whatever their directions: times a coefficient of friction what a press
+        fit holds, whose force cancels all round [force].
     moment : ndarray (1,) or (3,)
         Of it about the middle of the contact, see `contact_moment`; zero in axisymmetry [force times length].
     area : float
@@ -72,6 +75,7 @@ class ContactAnswers:
     """
 
     force: Array
+    normal_force: float
     moment: Array
     area: float
     centre: Array
@@ -114,6 +118,7 @@ def _answers(contact: ContactResult, areas: Array, axisymmetric: bool, work: flo
     moment = contact_moment(contact)
     return ContactAnswers(
         force=contact.force,
+        normal_force=contact.normal_force,
         moment=np.zeros_like(moment) if axisymmetric else moment,
         area=area,
         centre=pushed @ contact.coordinates / total if pressed else np.full(contact.coordinates.shape[1], np.nan),
@@ -133,19 +138,20 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
     -------
     structured ndarray (n_steps,)
         ``step``, ``load_factor``; ``force_x`` ...; ``moment_z``, in space ``moment_x`` ...; ``area``; ``centre_x`` ...;
-        ``mean_gap``, ``pressure_mean``, ``pressure_max``, ``dissipation``, ``friction_work``.
+        ``normal_force``, ``mean_gap``, ``pressure_mean``, ``pressure_max``, ``dissipation``, ``friction_work``.
     """
     answers = contact_answers(model, steps, name)
     axes = "xyz"[: model.mesh.dim]
     turns = "z" if model.mesh.dim == 2 else axes
     rows = [
-        (step.index, step.load_factor, *own.force, *own.moment, own.area, *own.centre, own.mean_gap, own.pressure_mean,
-         own.pressure_max, own.dissipation, own.friction_work)
+        (step.index, step.load_factor, *own.force, *own.moment, own.area, *own.centre, own.normal_force, own.mean_gap,
+         own.pressure_mean, own.pressure_max, own.dissipation, own.friction_work)
         for step, own in zip(steps, answers, strict=True)
     ]  # fmt: skip
     names = [
         "load_factor", *(f"force_{axis}" for axis in axes), *(f"moment_{axis}" for axis in turns), "area",
-        *(f"centre_{axis}" for axis in axes), "mean_gap", "pressure_mean", "pressure_max", "dissipation", "friction_work",
+        *(f"centre_{axis}" for axis in axes), "normal_force", "mean_gap", "pressure_mean", "pressure_max",
+        "dissipation", "friction_work",
     ]  # fmt: skip
     return np.array(rows, [("step", int), *((column, float) for column in names)])
 

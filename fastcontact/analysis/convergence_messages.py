@@ -15,6 +15,8 @@ from fastcontact.contact.constraints import StackedConstraints
 
 Array = NDArray[np.float64]
 Nodes = dict[str, list[int]]
+# So many updates whose changes are alike go round in circles.
+CIRCLE = 8
 
 
 def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Array, limit: int) -> str:
@@ -24,12 +26,18 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
     """
     last = history[-1]
     last["nodes"] = _most_moved(problem, change)
+    changes = [entry["displacement_change"] for entry in history]
+    circles = len(changes) > CIRCLE and min(changes[-CIRCLE:]) > 0.5 * max(changes[-CIRCLE:])
+    more = "More of them do not help, it goes round in circles: use" if circles else (
+        "Allow more (Criteria.max_geometry_updates), use"
+    )  # fmt: skip
     return (
         f"the contact geometry did not settle in {limit} updates: the displacement still changes by "
-        f"{last['displacement_change']:.1e} of its largest component, most at "
-        f"{named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. Allow more "
-        f"(max_geometry_updates), use more load steps, a finer mesh on the primary side, {_smoother(problem)}a "
-        f"fixed number of updates, or accept larger changes (Criteria.geometry = {problem.criteria.geometry:g})"
+        f"{changes[-1]:.1e} of its largest component, most at "
+        f"{named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. {more} more load steps, a "
+        f"finer mesh on the primary side, {_smoother(problem)}a fixed number of updates (Criteria.geometry_updates), or "
+        f"accept changes of that size (Criteria.geometry, which is {problem.criteria.geometry:g}, above "
+        f"{max(changes[-CIRCLE:]):.0e})"
     )
 
 
@@ -98,6 +106,8 @@ def named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
 
 
 def _smoother(problem: Problem) -> str:
-    """Return the advice for pairs that may flip between the facets at a node."""
+    """Return the advice for pairs that may flip between the facets at a node, or between what dual functions cover."""
     faceted = [name for name, pair in problem.pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
-    return f'normals="averaged" for contact {faceted[0]!r}, ' if faceted else ""
+    dual = [name for name, pair in problem.pairs.items() if getattr(pair, "multipliers", "") == "dual"]
+    options = {'normals="averaged"': faceted, 'multipliers="standard"': dual}
+    return "".join(f"{option} for contact {names[0]!r}, " for option, names in options.items() if names)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from fastcontact.analysis import active_set
 from fastcontact.analysis.active_dofs import ActiveDofs, constraints_on_unknowns
 from fastcontact.analysis.convergence_messages import no_contact_stops, not_balanced
-from fastcontact.analysis.friction import solve as friction
 from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Accuracy, Solution
@@ -82,6 +81,8 @@ def _solve(
     u = step.dofs.unknowns(iterate.u, lift)
     if not constraints.tangents:
         return active_set.solve(step.loaded, own, active, accuracy, u)
+    from fastcontact.analysis.friction import solve as friction
+
     iterate.frictional = friction.solve(step.loaded, own, active, accuracy, u, iterate.frictional)
     return iterate.frictional
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import sys
 import time
-from typing import TypeVar
+from typing import Self
 
 from fastcontact._jit import compiling
+from fastcontact.analysis import step_halving
 from fastcontact.results.step import StepResult
 
 WIDTH = 30
-Line = TypeVar("Line", bound="StatusLine")
 
 
 class StatusLine:
@@ -21,7 +21,7 @@ class StatusLine:
         self._started = time.perf_counter()
         self._told = False
 
-    def __enter__(self: Line) -> Line:
+    def __enter__(self) -> Self:
         compiling.listeners.append(self._compiling)
         return self
 
@@ -37,7 +37,8 @@ class StatusLine:
     def draw(self, text: str) -> None:
         """Replace the line."""
         if self._show:
-            sys.stderr.write(f"\r{text:<{self._width}}")
+            # Back at its beginning, so that a warning does not follow it on the same line.
+            sys.stderr.write(f"\r{text:<{self._width}}\r")
             sys.stderr.flush()
 
     def close(self) -> None:
@@ -48,12 +49,23 @@ class StatusLine:
 
 
 class Progress(StatusLine):
-    """Load steps of a run: steps done, nodes in contact, time left."""
+    """Load steps of a run: steps done, nodes in contact, time left; where a step is cut in halves."""
 
     def __init__(self, total: int, show: bool, done: int = 0) -> None:
         super().__init__(WIDTH + 54, show)
         self._total, self._before = total, done
         self._compiled = compiling.count
+
+    def __enter__(self) -> Self:
+        step_halving.listeners.append(self._halved)
+        return super().__enter__()
+
+    def __exit__(self, *raised: object) -> None:
+        step_halving.listeners.remove(self._halved)
+        super().__exit__(*raised)
+
+    def _halved(self, index: int, begin: float, end: float) -> None:
+        self.draw(f"step {index}/{self._total} does not converge, cut in halves: {begin:.6g} to {end:.6g}")
 
     def step(self, step: StepResult, complete: int | None = None) -> None:
         """Redraw after a step; `complete` steps are there, all up to this one by default."""

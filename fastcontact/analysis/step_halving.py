@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import replace
 
 from fastcontact.analysis.load_step import load_step
@@ -12,6 +13,8 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.results.step import StepResult
 
 log = logging.getLogger("fastcontact")
+# Called with the number of a step, and the instants between which it does not converge and is cut in halves.
+listeners: list[Callable[[int, float, float], None]] = []
 
 
 def advance(problem: Problem, state: State, index: int, begin: float, end: float) -> tuple[State, StepResult]:
@@ -44,8 +47,12 @@ def _parts(
             part = (
                 f"step {index} was cut in halves {often}, the part {where} fails" if halved else f"step {index} {where}"
             )
-            raise ConvergenceError(f"{error} ({part})", error.history, smaller_steps_help=False) from error
+            told = ConvergenceError(f"{error} ({part})", error.history, smaller_steps_help=False)
+            # As raised where it was found: the same words twice, in two tracebacks, would tell nothing more.
+            raise told.with_traceback(error.__traceback__) from None
         reason = str(error).split(". ")[0]
+        for listener in listeners:
+            listener(index, begin, end)
         log.warning("step %d from %.6g to %.6g does not converge, cut in halves: %s", index, begin, end, reason)
     state, first = _parts(problem, state, index, (begin, middle), halved + 1)
     state, second = _parts(problem, state, index, (middle, end), halved + 1)

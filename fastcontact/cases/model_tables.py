@@ -18,9 +18,10 @@ from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import CONSTANTS, LinearElastic, Material, check_expansion
 from fastcontact.elasticity.varying_constants import Tabulated
 from fastcontact.errors import CaseError, unknown
+from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.files.mesh_fields import read_field
 from fastcontact.mesh.files.mesh_files import read_mesh
-from fastcontact.mesh.generate.cut import OPPOSITE, cut
+from fastcontact.mesh.generate.cut import cut
 from fastcontact.mesh.generate.reference_points import with_reference_points
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model

@@ -15,7 +15,7 @@ from fastcontact.analysis.sensitivities import sensitivities
 from fastcontact.cases.case import Asked, Case
 from fastcontact.cases.checks import at_point, evaluated
 from fastcontact.errors import ModelError
-from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.step import CANCELLED, ContactResult, StepResult
 from fastcontact.results.units import units_of_results, valued, with_unit
 
 # Numbers that a theory must have to be compared as a whole.
@@ -115,6 +115,7 @@ def _answers(case: Case, last: StepResult, name: str, steps: Sequence[Mapping[st
     """Return what `contact_answers` tell of the last step, with the work of friction of all `steps`."""
     (found,) = contact_answers(case.model, [last], name)
     return {
+        "normal_force": found.normal_force,
         "moment": found.moment.tolist(),
         "area": found.area,
         "centre": [_finite(value) for value in found.centre],
@@ -206,9 +207,11 @@ def count(number: int, what: str) -> str:
 
 def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str]) -> list[str]:
     inside, outside = contact["radius"]
+    force = valued(contact["force"], unit, "force", 6)
+    if contact["force"] < CANCELLED * contact["normal_force"]:
+        force += f", normal {valued(contact['normal_force'], unit, 'force', 6)} all round"
     found = [
-        f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force "
-        f"{valued(contact['force'], unit, 'force', 6)}, largest pressure "
+        f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force {force}, largest pressure "
         f"{valued(contact['pressure_max'], unit, 'pressure', 6)}, {_edge(inside, outside, unit)}"
     ]
     if any(contact["obstacle_displacement"] or ()):

@@ -122,8 +122,8 @@ def _run(given: list[str]) -> int:
     handler = _Printable()
     log.handlers[:] = [handler]
     log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
-    if sys.stderr.isatty() and not (arguments.quiet or arguments.verbose):  # the log tells it with -v
-        compiling.listeners[:] = [_say_compiling]
+    told = sys.stderr.isatty() and not (arguments.quiet or arguments.verbose)  # the log tells it with -v
+    compiling.listeners[:] = [_say_compiling] if told else []
     return int(arguments.run(arguments) or 0)
 
 

@@ -8,6 +8,7 @@ import sys
 from functools import partial
 
 from fastcontact.cli import _study
+from fastcontact.cli._warnings import warnings_shown
 from fastcontact.errors import CaseError
 
 HELP = "mesh-convergence study: orders, limits with error bars, model error told from mesh error"
@@ -54,15 +55,16 @@ def _adaptive(options: argparse.Namespace) -> int:
     """Refine until the quantity is accurate, write the files of the options, print the table; 2 if it is not."""
     from fastcontact.studies.adaptive import adaptive_study
 
-    study = adaptive_study(
-        options.case,
-        options.adaptive,
-        options.tolerance,
-        element=_only(options.elements, "element"),
-        formulation=_only(options.formulations, "formulation"),
-        max_dofs=options.max_dofs,
-        progress=sys.stderr.isatty() and not options.quiet,
-    )
+    with warnings_shown():
+        study = adaptive_study(
+            options.case,
+            options.adaptive,
+            options.tolerance,
+            element=_only(options.elements, "element"),
+            formulation=_only(options.formulations, "formulation"),
+            max_dofs=options.max_dofs,
+            progress=sys.stderr.isatty() and not options.quiet,
+        )
     if options.output:
         from fastcontact.results.writer import ResultWriter
 

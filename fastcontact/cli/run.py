@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import dataclasses
-import logging
 import os
 import sys
 import time
-import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
 from fastcontact.cli._terminal import say
-from fastcontact.errors import CaseError, ConvergenceError, FastcontactWarning, FileError, ModelError
+from fastcontact.cli._warnings import warnings_shown
+from fastcontact.errors import CaseError, ConvergenceError, FileError, ModelError
 
 if TYPE_CHECKING:
     from fastcontact.cases.case import Case
@@ -24,7 +22,6 @@ if TYPE_CHECKING:
     from fastcontact.results.writer import ResultWriter
 
 HELP = "solve a case file or an input deck (.inp) and write the results of all steps"
-log = logging.getLogger("fastcontact")
 # Cell field of the estimated error.
 ERROR = "error"
 # Steps of meshes of so many points are written while the next one is computed; of others writing takes no time.
@@ -61,11 +58,11 @@ def run(options: argparse.Namespace) -> int:
         _set_threads(options.threads)
     output = Path(options.output or f"{case_path(options.case).stem}.vtkhdf")
     check_outputs(files_of_case(options.case), [output, options.json], [options.plot])
-    with _warnings_shown() as early:
+    with warnings_shown() as early:
         case = read_case(options.case)
     read = time.perf_counter()
     case.model.check(case.ramp)  # a wrong model must not replace the results of a right one
-    with _warnings_shown() as caught:
+    with warnings_shown() as caught:
         caught += early
         done, last, steps = _solved(options, case, output)
     texts = list(dict.fromkeys([*done.warnings, *caught]))
@@ -89,25 +86,6 @@ def run(options: argparse.Namespace) -> int:
         say(f"{len(failed)} of {len(numbers['checks'])} checks of the case failed: {', '.join(failed)}", error=True)
         return 3
     return 0
-
-
-@contextlib.contextmanager
-def _warnings_shown() -> Iterator[list[str]]:
-    """Show each warning of the library once, in one line, as soon as it is given; collect their texts."""
-    texts: list[str] = []
-    with warnings.catch_warnings():
-        warnings.simplefilter("always", FastcontactWarning)
-        ordinary = warnings.showwarning
-
-        def show(message: Warning | str, category: type[Warning], *rest: object) -> None:
-            if not issubclass(category, FastcontactWarning):
-                ordinary(message, category, *rest)  # type: ignore[arg-type]
-            elif str(message) not in texts:
-                texts.append(str(message))
-                log.warning("warning: %s", message)
-
-        warnings.showwarning = show  # type: ignore[assignment]
-        yield texts
 
 
 class _Done(NamedTuple):

@@ -93,25 +93,26 @@ class System:
         related[R.indices] = True
         if without_stiffness is None:
             without_stiffness = np.zeros(K.shape[0], bool)
-        self.fixed: Mask = supported | ((diagonal_of(K) == 0.0) & ~related & ~without_stiffness)
+        given = diagonal_of(K)
+        self.fixed: Mask = supported | ((given == 0.0) & ~related & ~without_stiffness)
         self._reacting: Mask = self.fixed | related  # supports and relations may exert forces here
         self._constraints = ConstrainedMotion(self.fixed, relations)
         self.T = self._constraints.T if relations else None
         self.free: Mask = self._constraints.free
         if self.T is None:
-            self.K = Stiffness(supports_apart(K, self.fixed))
+            self.K = Stiffness(supports_apart(K, self.fixed, given))
             self.matrix = self.K.parts[0]
-            self.weightless: Mask = self.free & (diagonal_of(self.matrix) == 0.0)
+            self.weightless: Mask = self.free & (given == 0.0)
         else:
             self.K = Stiffness((K,))
             transformed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
             transformed.sort_indices()
             diagonal = diagonal_of(transformed)
-            cancelling = self.T.multiply(self.T).T @ diagonal_of(K)
+            cancelling = self.T.multiply(self.T).T @ given
             # Not points that relations couple to nothing but each other.
             self.free &= (cancelling > 0.0) | without_stiffness
             self.weightless = self.free & (diagonal <= ROUND_OFF * cancelling)
-            self.matrix = supports_apart(transformed, ~self.free)[0]
+            self.matrix = supports_apart(transformed, ~self.free, diagonal)[0]
         self._no_unknowns = np.flatnonzero(~self.free)
 
     def keep(self, matrix: Any) -> None:
@@ -231,8 +232,10 @@ class ConstrainedMotion:
         return self.relations[int(np.searchsorted(ends, row, side="right"))].name
 
 
-def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
+def supports_apart(K: bsr_array, fixed: Mask, diagonal: Array | None = None) -> tuple[bsr_array, csr_array]:
     """Take the rows and columns of supported degrees of freedom out of K (n, n), which is changed in place.
+
+    The `diagonal` (n,) of K may be given where it is known.
 
     Returns
     -------
@@ -242,7 +245,8 @@ def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
         What K was, minus `matrix`: few numbers.
     """
     K = _with_diagonal(K)
-    diagonal = diagonal_of(K)
+    if diagonal is None:
+        diagonal = diagonal_of(K)
     kept = np.where(diagonal > 0, diagonal, diagonal.max(initial=1.0))
     supported = fixed.reshape(-1, K.blocksize[0])
     given = K.indptr, K.indices, K.data, supported, supported.any(axis=1), kept

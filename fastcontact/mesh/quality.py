@@ -107,7 +107,11 @@ def check_cells(mesh: Mesh) -> None:
         measure, flat, inverted = _bad_cells(mesh, name)
         for bad, what, remedy in (
             (flat, "degenerate", "remove it or merge its points differently"),
-            (inverted, "inverted", "turn it with fastcontact.topology.oriented, or refine if it is curved"),
+            (
+                inverted,
+                "inverted",
+                "turn it with mesh, count = fastcontact.topology.oriented(mesh), or refine if it is curved",
+            ),
         ):
             if bad.any():
                 row = int(np.flatnonzero(bad)[0])

@@ -47,7 +47,8 @@ class RigidParts:
 
     def nodes_of(self, number: int) -> Indices:
         """Return the nodes of a part, ascending, with those at hinges."""
-        return np.union1d(np.flatnonzero(self.part == number), self.hinges_of(number))
+        own, hinges = np.flatnonzero(self.part == number), self.hinges_of(number)
+        return np.union1d(own, hinges) if len(hinges) else own
 
 
 @remembered

@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 from fastcontact.elasticity.loads import Load, Table
 from fastcontact.elasticity.relations import Relation
 from fastcontact.errors import MeshError, ModelError, unknown
-from fastcontact.mesh.generate.reference_points import ROTATION
+from fastcontact.mesh.companion_groups import ROTATION
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.spread_forces import Spread, mean_rotation, shares_of, turned
 

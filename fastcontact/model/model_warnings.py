@@ -171,7 +171,8 @@ def _coincident(model: Model) -> str:
     # The grid begins at an odd place, so that round numbers do not lie on its lines.
     grid = np.floor((mesh.points[numbers] - low) / (COINCIDENT * np.ptp(mesh.points, axis=0).max()) + 0.3183)
     # Nodes at one place have the same sum, and others very rarely.
-    if len(np.unique((grid.astype(np.int64) * MIXED[: mesh.dim]).sum(axis=1))) == len(grid):
+    sums = np.sort(grid.astype(np.int64) @ MIXED[: mesh.dim])
+    if not (sums[1:] == sums[:-1]).any():
         return ""
     order = np.lexsort(grid.T)
     same = np.flatnonzero((grid[order[1:]] == grid[order[:-1]]).all(axis=1))
@@ -210,10 +211,19 @@ def _traces(corners: Array, element: Element, xi: Array, weights: Array) -> Arra
     """Return the integral (n_cells,) of the squared gradients of all shape functions of cells (n_cells, n_nodes, dim)."""
     dN = element.gradient(xi)
     J = np.einsum("qnk,cnd->qckd", dN, corners, optimize=True)
-    determinant = np.linalg.det(J)
-    inverse = np.linalg.inv(np.where(determinant[..., None, None] == 0.0, np.nan, J))
-    metric, squares = inverse.transpose(0, 1, 3, 2) @ inverse, np.einsum("qnk,qnl->qkl", dN, dN)
-    return np.asarray((np.einsum("qckl,qkl->qc", metric, squares) * np.abs(determinant)).T @ weights)
+    cofactors = _cofactors(J)  # the inverse, transposed, times the determinant
+    determinant = np.abs((J[..., 0, :] * cofactors[..., 0, :]).sum(axis=-1))
+    metric, squares = cofactors @ np.swapaxes(cofactors, 2, 3), np.einsum("qnk,qnl->qkl", dN, dN)
+    return np.asarray(
+        (np.einsum("qckl,qkl->qc", metric, squares) / np.where(determinant, determinant, np.nan)).T @ weights
+    )
+
+
+def _cofactors(J: Array) -> Array:
+    """Return the cofactors of matrices (..., 2, 2) or (..., 3, 3)."""
+    if J.shape[-1] == 2:
+        return np.asarray(J[..., ::-1, ::-1] * np.array([[1.0, -1.0], [-1.0, 1.0]]))
+    return np.stack([np.cross(J[..., k - 2, :], J[..., k - 1, :]) for k in range(3)], axis=-2)
 
 
 def _some(cells: NDArray[Any]) -> NDArray[Any]:

@@ -12,7 +12,7 @@ from scipy.sparse import csr_array, vstack
 from fastcontact.elasticity.loads import Load, Table, check_number
 from fastcontact.elasticity.relations import Relation
 from fastcontact.errors import ModelError
-from fastcontact.mesh.generate.cut import OPPOSITE
+from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.relation_rows import along, matched, normals_of
 

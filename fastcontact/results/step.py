@@ -13,6 +13,8 @@ from fastcontact.mesh.html_table import html_table
 from fastcontact.results.material_stress import MaterialStress
 
 Array = NDArray[np.float64]
+# Part of the normal forces below which their resultant tells nothing.
+CANCELLED = 1e-3
 
 
 def half_width(place: Array, closed: NDArray[np.bool_], across: Array | None = None) -> tuple[float, float]:
@@ -52,7 +54,8 @@ class ContactResult:
         along the normal through the node with the smallest gap before any load (of equal ones the nearest to the origin)
         [length].
     gap : ndarray (m,)
-        Open positive, closed zero, clearance included; negative by what a penalty lets penetrate [length].
+        Open positive, closed zero, clearance included; negative by what a penalty lets penetrate; infinite at nodes that
+        face nothing themselves, as at the edge of a hole, even where the facets around them press [length].
     pressure : ndarray (m,)
         Contact pressure, >= 0 in compression, per reference area; negative only where tied or bilateral contact pulls. With
         the shape functions of the facets its integral over the whole reference surface is the sum of the normal forces
@@ -146,8 +149,9 @@ class ContactResult:
     def shown(self) -> dict[str, str]:
         """What reprs and tables tell, as texts: force, largest pressure, closed nodes, contact radius."""
         low, high = self.radius
+        force = f"{float(np.linalg.norm(self.force)):.6g}"
         return {
-            "force": f"{float(np.linalg.norm(self.force)):.6g}",
+            "force": f"{force}, normal {self.normal_force:.6g} all round" if self.cancels else force,
             "largest pressure": f"{self.pressure_max:.6g}",
             "closed": f"{int(self.active.sum())} of {len(self.points)} nodes",
             "contact radius": f"{low:.4g} to {high:.4g}" if np.isfinite(low) else "none",
@@ -168,6 +172,14 @@ class ContactResult:
         return flat and bool(self.middle[0] == 0.0) and bool(np.array_equal(self.place, np.abs(self.coordinates[:, 0])))
 
     @property
+    def per_thickness(self) -> bool:
+        """Whether forces are seen to be those of a plane model: not of a solid, nor of a circle, where radial ones cancel."""
+        if self.coordinates.shape[1] == 3 or self.measured_from_axis:
+            return False
+        across, size = float(self.force_vectors[:, 0].sum()), float(np.abs(self.force_vectors).sum())
+        return bool(abs(self.force[0] - across) <= 1e-9 * size and size > 0.0)
+
+    @property
     def stick_radius(self) -> tuple[float, float]:
         """Bracket of the stick zone, as `radius`: the outermost node that sticks, and the next one; NaN if none does."""
         return half_width(self.place, self.active & self.sticking, self.across)
@@ -181,6 +193,17 @@ class ContactResult:
     def pressure_max(self) -> float:
         """Largest nodal pressure [pressure]."""
         return float(self.pressure.max(initial=0.0))
+
+    @property
+    def normal_force(self) -> float:
+        """Sum of the nodal forces along the normals, whatever their directions, positive where they press [force]."""
+        normal = np.where(np.isfinite(self.normal), self.normal, 0.0)
+        return float(np.einsum("nd,nd->", self.force_vectors, normal))
+
+    @property
+    def cancels(self) -> bool:
+        """Whether the resultant is next to nothing beside the normal forces, as all round a press fit."""
+        return bool(np.linalg.norm(self.force) < CANCELLED * self.normal_force)
 
     @property
     def penetration(self) -> float:

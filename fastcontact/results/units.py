@@ -52,8 +52,15 @@ def labelled(text: str, units: Mapping[str, str], quantity: str) -> str:
 
 
 def valued(value: float, units: Mapping[str, str], quantity: str, digits: int = 4) -> str:
-    """Return a value as text with its unit, where that is known."""
-    return with_unit(f"{value:.{digits}g}", units, quantity)
+    """Return a value as text with its unit, where that is known; up to a million as a number without a power of ten.
+
+    Examples
+    --------
+    >>> valued(10541.9, {"pressure": "MPa"}, "pressure"), valued(2.5e-7, {}, "length")
+    ('10542 MPa', '2.5e-07')
+    """
+    whole = 10.0**digits - 0.5 <= abs(value) < 1e6
+    return with_unit(f"{value:.0f}" if whole else f"{value:.{digits}g}", units, quantity)
 
 
 def with_unit(text: str, units: Mapping[str, str], quantity: str) -> str:

@@ -54,7 +54,8 @@ def convergence_study(
         Where to run: by default processes of this machine, or e.g. ``Client.get_executor()`` of Dask or an
         ``MPIPoolExecutor`` of mpi4py. It is not shut down here.
     workers : int, optional
-        Number of these processes, by default one for each processor; 1 runs everything in this one.
+        Number of these processes, by default one for each processor; 1 runs everything in this one. More than one start
+        by importing the script they are called from: there the call belongs under ``if __name__ == "__main__":``.
     store : path-like, optional
         Folder of finished runs: those found there are not run again; new ones are added.
     on_progress : callable, optional

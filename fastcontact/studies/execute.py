@@ -7,6 +7,7 @@ import json
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
@@ -145,6 +146,9 @@ def _run_rest(
 
 def on_processes(count: int, jobs: Sequence[Job], rest: list[int]) -> Iterator[tuple[int, Result]]:
     """Run on `count` processes of this machine; a run that kills its worker is tried once more alone, then reported."""
+    if _imports_its_script():
+        # The script calls the study outside of "if __name__ == '__main__'": the process that waits for this one says so.
+        raise SystemExit(1)
     left = list(rest)
     pool = started_pool(count)
     try:
@@ -206,12 +210,18 @@ def started_pool(count: int) -> Workers:
     try:
         with _worker_settings():
             pool.submit(os.getpid).result()
-    except BrokenProcessPool as error:
+    except BrokenProcessPool:
         raise FastcontactError(
             "no worker process could start: in a script, put what calls the study under if __name__ == '__main__':, "
             "or use workers=1"
-        ) from error
+        ) from None
     return pool
+
+
+def _imports_its_script() -> bool:
+    """Return whether this process is a worker that has only come to import the script of the one that started it."""
+    script = sys.modules.get("__mp_main__")
+    return script not in (None, sys.modules["__main__"])  # which it becomes once it is imported
 
 
 def _alone(job: Job) -> Result:

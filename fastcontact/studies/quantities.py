@@ -29,7 +29,7 @@ EXACT_THEORIES = (PressFit, HertzBox)
 LABELS = {
     "force": ("contact force", "force"),
     "pressure_max": ("largest pressure", "pressure"),
-    "pressure_pole": ("pressure at the axis", "pressure"),
+    "pressure_pole": ("pressure in the middle", "pressure"),
     "contact_radius": ("contact radius", "length"),
     "von_mises_max": ("largest von Mises stress", "pressure"),
     "von_mises_depth": ("depth of the largest von Mises stress", "length"),

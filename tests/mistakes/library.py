@@ -194,7 +194,7 @@ MESH = [
         "an inverted cell",
         lambda: of_square(cells=turned),
         fc.MeshError,
-        r"cell 2 \(quad4 at \(0\.75, 0\.25\), area -0\.25\) is inverted, one of 1 such cells: turn it with fastcontact\.topology\.oriented, or refine if it is curved",
+        r"cell 2 \(quad4 at \(0\.75, 0\.25\), area -0\.25\) is inverted, one of 1 such cells: turn it with mesh, count = fastcontact\.topology\.oriented\(mesh\), or refine if it is curved",
     ),
     Mistake("a folded cell", lambda: of_square(moved(4, (0.9, 0.9))), fc.MeshError, r"cell 3 .* is inverted"),
     Mistake(

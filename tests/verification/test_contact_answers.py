@@ -47,6 +47,38 @@ def test_a_uniform_pressure(element, kinematics):
         assert last.centre == pytest.approx([1.0, 0.0], abs=1e-9)
 
 
+@pytest.mark.parametrize("element", ["quad4", "quad8"])
+def test_what_a_press_fit_holds(element, tmp_path):
+    """The force on the seat of a bush cancels all round; the normal forces are Lame's pressure times the area."""
+    inner, seat, outer, length = 15.0, 40.0, 60.0, 20.0
+    parts = []
+    for name, left, right in (("SHAFT", inner, seat), ("HUB", seat, outer)):
+        part = fc.generate.block((right - left, length), (24, 4), element, origin=(left, 0.0), name=name)
+        parts.append(fc.generate.renamed(part, lambda group, name=name: group if group == name else f"{name} {group}"))
+    model = fc.Model(fc.generate.union(*parts), "axisymmetric")
+    model.add_material(fc.LinearElastic(E=210e3, nu=0.3), "SHAFT")
+    model.add_material(fc.LinearElastic(E=105e3, nu=0.34), "HUB")
+    for name in ("SHAFT", "HUB"):
+        model.fix(f"{name} BOTTOM", "y")
+        model.couple(f"{name} TOP", "y")
+    ramp = [(0.0, 0.0), (1.0, 1.0)]
+    model.add_contact("fit", secondary="HUB LEFT", primary="SHAFT RIGHT", clearance=-0.03, clearance_ramp=ramp)
+    steps = fc.solve(model, 2)
+    moduli = {"E_inner": 210e3, "nu_inner": 0.3, "E_outer": 105e3, "nu_outer": 0.34}
+    radii = {"inner_radius": inner, "interface_radius": seat, "outer_radius": outer}
+    lame = fc.analytic.press_fit_cylinders(**moduli, **radii, interference=0.03, kinematics="plane_stress")
+    exact = lame.pressure * 2.0 * np.pi * seat * length
+    table = fc.contact_history(model, steps, "fit")
+    assert table["normal_force"] == pytest.approx([0.5 * exact, exact], rel=2e-3)
+    contact = steps[-1].contact["fit"]
+    assert contact.normal_force == table["normal_force"][-1]
+    pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+    assert f"normal {contact.normal_force:.6g} all round" in repr(contact)
+    upper, _ = fc.plot.history(steps, "fit", units=fc.plot.UNITS)
+    assert upper.get_ylabel() == "sum of the normal forces [N]"
+    assert list(upper.lines[0].get_ydata()) == list(table["normal_force"])
+
+
 def test_a_punch_off_the_middle_has_a_moment():
     """A rigid plane pressed by a force at a distance of 0.2 from the middle: centre and moment by statics."""
     model = column("quad8", (8, 4))

@@ -227,9 +227,12 @@ def _text(path: Path) -> str:
 
 def _notes(content: Content, thickness: float) -> tuple[str, ...]:
     notes = list(dict.fromkeys(content.notes))
-    if content.outputs:
-        kinds = ", ".join(sorted({f"*{place.keyword}" for place in content.outputs}))
-        notes.append(f"{kinds}: no effect, results hold all output and convergence has criteria of its own")
+    requests = {place.keyword for place in content.outputs}
+    if output := sorted(requests - {"CONTROLS"}):
+        kinds = ", ".join(f"*{keyword}" for keyword in output)
+        notes.append(f"{kinds}: no effect, the result file holds all output of all steps")
+    if "CONTROLS" in requests:
+        notes.append("*CONTROLS: no effect, convergence has criteria of its own")
     if thickness != 1.0:
         notes.append(f"thickness {thickness:g}: the model has a unit of it, results of the deck are those of the whole")
     return tuple(notes)

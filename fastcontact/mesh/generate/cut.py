@@ -12,11 +12,11 @@ from scipy.sparse.csgraph import connected_components
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
-OPPOSITE = " opposite"
 Facet = frozenset[int]
 
 

@@ -9,9 +9,8 @@ from numpy.typing import ArrayLike
 
 from fastcontact.errors import MeshError
 from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.companion_groups import ROTATION
 from fastcontact.mesh.mesh import Mesh
-
-ROTATION = " rotation"
 
 
 @typed(MeshError)

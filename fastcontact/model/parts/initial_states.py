@@ -24,7 +24,6 @@ from fastcontact.mesh.files.paths import PathLike
 from fastcontact.model.parts.base import group_names
 from fastcontact.model.parts.loads import ModelLoads
 from fastcontact.model.ramp import History, Table, table_of
-from fastcontact.model.temperature_files import read_temperatures
 
 Array = NDArray[np.float64]
 
@@ -112,6 +111,8 @@ class ModelInitialStates(ModelLoads):
         FileError, MeshError, ModelError
             If a file cannot be read or lacks the field, a point has no temperature, or instants and times do not fit.
         """
+        from fastcontact.model.temperature_files import read_temperatures
+
         names = self._solid_groups(groups, ": it has no temperature")
         values, own = read_temperatures(self.mesh, file, field, self._points_of_cells(names), instant)
         values = np.where(np.isfinite(values), values, reference)

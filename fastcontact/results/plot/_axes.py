@@ -89,3 +89,27 @@ def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None 
     axes = figure.add_subplot(projection=projection)
     displayed(figure)
     return axes
+
+
+def size_around(place: Array) -> tuple[float, float]:
+    """Return width and height of a picture that the body fills, beside colours, labels and title [inches]."""
+    width, height = np.ptp(place, axis=0) / np.ptp(place, axis=0).max()
+    return max(4.2 * float(width) + 1.9, 5.0), max(4.2 * float(height) + 2.0, 3.2)
+
+
+def legend_below(place: Array) -> float:
+    """Return where the legend begins, in heights of such axes: half an inch leaves room for the label of the axis."""
+    width, height = np.ptp(place, axis=0)
+    return -0.5 / max(4.2 * float(height) / max(float(width), float(height)), 0.2)
+
+
+def bar_beside(place: Array) -> float:
+    """Return the length of the colour bar by that of the room: as high as slender bodies are, but for its label."""
+    width, height = np.ptp(place, axis=0)
+    return float(np.clip(2.0 * height / max(width, 1e-300), 0.45, 0.8))
+
+
+def settled(axes: Any) -> Any:
+    """Return axes in space whose figure has room for their labels, which it knows only once they were drawn."""
+    axes.figure.draw_without_rendering()
+    return axes

@@ -18,9 +18,10 @@ from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.paths import checked_target, replacing
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes
+from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes, settled
 from fastcontact.results.plot.fields import field_of
 from fastcontact.results.plot.shape import deformed_shape, scaled
+from fastcontact.results.plot.solid import show_box
 from fastcontact.results.step import StepResult
 
 Array = NDArray[np.float64]
@@ -108,15 +109,18 @@ def animate(
                 mesh, step, field=field, scale=scale, mirrored=mirrored, limits=colours, title=heading, units=units,
                 view=view, ax=axes,
             )  # fmt: skip
-            _show(axes, box)
+            _show(axes, box, view)
             writer.grab_frame()
     return MovingPicture(target)
 
 
-def _show(axes: Any, box: Any) -> None:
+def _show(axes: Any, box: tuple[Array, Array], view: tuple[float, float]) -> None:
     """Let axes show the part of space that all pictures show."""
-    for axis, low, high in zip("xyz", *box, strict=False):
-        getattr(axes, f"set_{axis}lim")(low, high)
+    if len(box[0]) == 3:
+        show_box(axes, *box, view)
+        settled(axes)
+    else:
+        axes.set(**{f"{axis}lim": ends for axis, *ends in zip("xy", *box, strict=True)})
 
 
 def writer_of(path: Path, pictures_per_second: int) -> Any:

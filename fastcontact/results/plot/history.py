@@ -13,7 +13,7 @@ from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, contacts_of, new_axes
 from fastcontact.results.step import StepResult
-from fastcontact.results.units import labelled
+from fastcontact.results.units import labelled, units_of_results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 # So many numbers of closed nodes stand beside each other above the zones.
 MOST_COUNTS = 20
-STATES = {"open": "0.85", "closed": "C0", "sliding": "C1"}
+STATES = {"open": "0.85", "closed": "C0", "sticking": "C0", "sliding": "C1"}
 
 
 @typed(FastcontactError)
@@ -37,6 +37,8 @@ def history(
     axes: Sequence[Axes] | None = None,
 ) -> Sequence[Axes]:
     """Plot force and contact radius of a contact pair over the load.
+
+    Where the force cancels all round, as in a press fit, it is the sum of the normal forces.
 
     Parameters
     ----------
@@ -60,7 +62,9 @@ def history(
     upper, lower = axes
     contacts = contacts_of(steps, pair)
     x = np.array([step.load_factor for step in steps]) * (approach or 1.0)
-    upper.plot(x, [np.linalg.norm(c.force) for c in contacts], "o", ms=4, label="computed")
+    cancels = any(c.active.any() for c in contacts) and all(c.cancels for c in contacts if c.active.any())
+    forces = [c.normal_force if cancels else float(np.linalg.norm(c.force)) for c in contacts]
+    upper.plot(x, forces, "o", ms=4, label="computed")
     _brackets(lower, x, np.array([c.radius for c in contacts]))
     if law is not None and approach is not None:
         name = f"{NAMES.get(type(law), 'theory')}, equal approach"
@@ -68,7 +72,9 @@ def history(
         curves = [law.at_approach(d) for d in fine]
         upper.plot([0.0, *fine], [0.0, *(share * c.force for c in curves)], "k-", lw=1, label=name)
         lower.plot([0.0, *fine], [0.0, *(c.radius for c in curves)], "k-", lw=1, label=name)
-    upper.set(ylabel=labelled("contact force", units, "force"))
+    if any(c.per_thickness for c in contacts):
+        units = units_of_results(units, "plane_strain")
+    upper.set(ylabel=labelled("sum of the normal forces" if cancels else "contact force", units, "force"))
     upper.set_title(title or f"Contact '{pair}' over the load", fontsize="medium")
     along = labelled("approach", units, "length") if approach else "load factor"
     round_contact = contacts[-1].measured_from_axis or contacts[-1].coordinates.shape[1] == 3
@@ -91,7 +97,7 @@ def _brackets(ax: Any, x: Array, bracket: Array) -> None:
     low, high = bracket.T
     known = np.isfinite(low)
     both = known & np.isfinite(high)
-    name = "computed: outermost closed to first open node"
+    name = "computed: outermost closed place to first open one"
     if both.any():
         ax.vlines(x[both], low[both], high[both], lw=4, alpha=0.5, color="tab:blue", label=name)
         ax.plot([x[both], x[both]], [low[both], high[both]], "_", ms=6, color="tab:blue")
@@ -125,7 +131,8 @@ def contact_zones(
     y = np.concatenate([c.place for c in contacts])
     closed = np.concatenate([c.active for c in contacts])
     sliding = closed & ~np.concatenate([c.sticking for c in contacts])
-    for name, here in (("open", ~closed), ("closed", closed & ~sliding), ("sliding", sliding)):
+    held = "sticking" if sliding.any() or any(c.shear.any() for c in contacts) else "closed"
+    for name, here in (("open", ~closed), (held, closed & ~sliding), ("sliding", sliding)):
         if here.any():
             axes.plot(x[here], y[here], "o" if name != "open" else ".", ms=4, color=STATES[name], label=name)
     every = -(-len(contacts) // MOST_COUNTS)

@@ -13,7 +13,16 @@ from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes, part_shown, placed
+from fastcontact.results.plot._axes import (
+    UNKNOWN,
+    Units,
+    bar_beside,
+    legend_below,
+    new_axes,
+    part_shown,
+    placed,
+    size_around,
+)
 from fastcontact.results.plot.fields import Field, field_of
 from fastcontact.results.plot.hiding import across
 from fastcontact.results.plot.shape import scaled
@@ -75,20 +84,22 @@ def section(
     basis, labels = _plane_axes(direction)
     place = scaled(triangles[..., :3], scale, triangles[..., 3:6])
     flat, values = place @ basis.T - (0.0 if labels else at @ basis.T), triangles[..., 6]
-    axes = new_axes(ax, (6.4, 5.6))
+    best = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
+    part = flat.reshape(-1, 2)
+    part = part if zoom is None else np.array(part_shown(flat[best], zoom, part))
+    axes = new_axes(ax, size_around(part))
     drawn = _fill(axes, flat, values, shown)
     strokes = scaled(lines[..., :3], scale, lines[..., 3:6]) @ basis.T - (0.0 if labels else at @ basis.T)
     if edges if edges is not None else len(strokes) <= 4 * MOST_EDGES:
         _stroke(axes, strokes)
-    best = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
     before = triangles[best][:3] - ((triangles[best][:3] - at) @ direction) * direction
     _mark(axes, flat[best], values[best], before, place.reshape(-1, 3), units, shown)
     if zoom is not None:
-        low, high = part_shown(flat[best], zoom, flat.reshape(-1, 2))
-        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        axes.set(xlim=part[:, 0], ylim=part[:, 1])
     plane = f"section through {placed(at, float(np.ptp(mesh.points, axis=0).max()))}, normal {placed(direction, 1.0)}"
-    axes.set_title(title or f"{plane}, load factor {step.load_factor:g}", fontsize="medium")
-    _frame(axes, drawn, shown, units, labels or ("along the section", "across it"))
+    state = f"load factor {step.load_factor:g}, displacements x {scale:g}"
+    axes.set_title(title or f"{plane}\n{state}", fontsize="medium")
+    _frame(axes, drawn, shown, units, labels or ("along the section", "across it"), part if ax is None else None)
     return axes
 
 
@@ -105,12 +116,15 @@ def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple
     return at, direction / np.linalg.norm(direction)
 
 
-def _frame(axes: Any, drawn: Any, shown: Field, units: Units, labels: tuple[str, str]) -> None:
-    """Give axes their colour bar, labels and legend."""
-    axes.figure.colorbar(drawn, ax=axes, label=labelled(shown.caption, units, shown.quantity), shrink=0.8)
+def _frame(
+    axes: Any, drawn: Any, shown: Field, units: Units, labels: tuple[str, str], part: Array | None
+) -> None:  # fmt: skip
+    """Give axes their colour bar, labels and legend; in a figure of their own, which `part` (n, 2) fills, by its size."""
+    bar, below = (0.8, -0.14) if part is None else (bar_beside(part), legend_below(part))
+    axes.figure.colorbar(drawn, ax=axes, label=labelled(shown.caption, units, shown.quantity), shrink=bar)
     axes.set_aspect("equal")
     axes.set(xlabel=labelled(labels[0], units, "length"), ylabel=labelled(labels[1], units, "length"))
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14))
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, below))
 
 
 def _plane_axes(direction: Array) -> tuple[Array, tuple[str, str] | None]:

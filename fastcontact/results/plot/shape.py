@@ -10,7 +10,17 @@ from numpy.typing import NDArray
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes, part_shown, placed
+from fastcontact.results.plot._axes import (
+    UNKNOWN,
+    Units,
+    bar_beside,
+    legend_below,
+    new_axes,
+    part_shown,
+    placed,
+    settled,
+    size_around,
+)
 from fastcontact.results.plot.fields import Field, field_of
 from fastcontact.results.plot.patches import fill, outlines
 from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen
@@ -21,8 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
-# Size of solids beside their frame, which with its labels takes the rest.
-ROOM = 0.9
 LARGEST = 1e30  # of coordinates that can be drawn: the libraries multiply them
 
 
@@ -87,16 +95,19 @@ def deformed_shape(
         axes = new_axes(ax, (6.4, 6.2), "3d")
         drawn = draw_solid(axes, shown, place, edges, view, limits or shown.range)
         _mark(axes, shown, place, mesh, units, hidden=not is_seen(shown, place, view))
-        return _framed(axes, drawn, shown, heading, units, 0.02)
+        framed = _framed(axes, drawn, shown, heading, units, 0.02)
+        return framed if ax is not None else settled(framed)
     part = np.concatenate([place, place * [-1.0, 1.0]]) if mirrored else place
     part = part if zoom is None else np.array(part_shown(place[shown.extreme], zoom, part))
-    axes = new_axes(ax, _size(part))
+    axes = new_axes(ax, size_around(part))
     for turned in (place, place * [-1.0, 1.0]) if mirrored else (place,):
         drawn = _draw(axes, shown, turned, edges, limits or shown.range, part)
     if zoom is not None:
         axes.set(xlim=part[:, 0], ylim=part[:, 1])
     _mark(axes, shown, place, mesh, units)
-    return _framed(axes, drawn, shown, heading, units, -0.09 if ax is not None else _below(part), _bar(part))
+    return _framed(
+        axes, drawn, shown, heading, units, -0.09 if ax is not None else legend_below(part), bar_beside(part)
+    )
 
 
 def _framed(axes: Any, drawn: Any, shown: Field, heading: str, units: Units, below: float, bar: float = 0.8) -> Any:
@@ -106,9 +117,7 @@ def _framed(axes: Any, drawn: Any, shown: Field, heading: str, units: Units, bel
     """
     caption, dim = labelled(shown.caption, units, shown.quantity), shown.mesh.dim
     axes.figure.colorbar(drawn, ax=axes, label=caption, shrink=0.6 if dim == 3 else bar)
-    if dim == 3:  # smaller, so that the labels of all axes have room
-        axes.set_box_aspect([float(np.diff(getattr(axes, f"get_{axis}lim")())[0]) for axis in "xyz"], zoom=ROOM)
-    else:
+    if dim == 2:
         axes.set_aspect("equal")
     axes.set_title(heading, fontsize="medium", pad=18 if dim == 3 else None)
     axes.set(**{f"{axis}label": labelled(axis, units, "length") for axis in "xyz"[:dim]})
@@ -127,24 +136,6 @@ def _mark(axes: Any, shown: Field, place: Array, mesh: Mesh, units: Units, hidde
     label += f"\nundeformed at {there}" if here != there else ""
     style = {"mfc": "none", "mec": "red", "ms": 9, "mew": 1.5, "zorder": 10}
     axes.plot(*([x] for x in at), "o", label=label, **style)
-
-
-def _size(place: Array) -> tuple[float, float]:
-    """Return width and height of a picture that the body fills, beside colours, labels and title [inches]."""
-    width, height = np.ptp(place, axis=0) / np.ptp(place, axis=0).max()
-    return max(4.2 * float(width) + 1.9, 5.0), max(4.2 * float(height) + 2.0, 3.2)
-
-
-def _below(place: Array) -> float:
-    """Return where the legend begins, in heights of such axes: half an inch leaves room for the label of the axis."""
-    width, height = np.ptp(place, axis=0)
-    return -0.5 / max(4.2 * float(height) / max(float(width), float(height)), 0.2)
-
-
-def _bar(place: Array) -> float:
-    """Return the length of the colour bar by that of the room: as high as slender bodies are, but for its label."""
-    width, height = np.ptp(place, axis=0)
-    return float(np.clip(2.0 * height / max(width, 1e-300), 0.45, 0.8))
 
 
 def _draw(

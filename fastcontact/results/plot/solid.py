@@ -22,6 +22,12 @@ MOST_EDGES = 5000
 CUTS = 2
 # How often a piece that is hidden in part is cut in four.
 FINEST = 4
+# Size of solids beside their frame, which with its labels takes the rest.
+ROOM = 0.9
+# The longer side of what is seen of a box may be this part of its diagonal; slender boxes are drawn smaller.
+WIDEST = 0.8
+# Ticks on an axis that is seen as long as the diagonal of the box.
+TICKS = 14
 
 
 def draw_solid(
@@ -62,9 +68,25 @@ def draw_solid(
     ax.add_collection3d(Poly3DCollection(polygons, facecolors=faces, edgecolors=lines, linewidths=0.3))
     ax.set_proj_type("ortho")
     ax.view_init(elev=view[0], azim=view[1])
-    for setter, low, high in zip((ax.set_xlim, ax.set_ylim, ax.set_zlim), place.min(axis=0), place.max(axis=0)):
-        setter(low, high)
+    show_box(ax, place.min(axis=0), place.max(axis=0), view)
     return ScalarMappable(norm, shown.colours)
+
+
+def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> None:
+    """Let axes in space show the box between two corners (3,) [length] in its own proportions, seen from `view` [degrees].
+
+    Whatever changes the limits must come here: with other proportions strokes would not lie on their faces.
+    """
+    size, eye = np.maximum(high - low, 1e-9 * np.ptp([low, high])), towards(view)
+    diagonal = float(np.linalg.norm(size))
+    level = np.array([-np.sin(np.radians(view[1])), np.cos(np.radians(view[1])), 0.0])
+    widest = float((np.abs([level, np.cross(eye, level)]) @ size).max()) / diagonal
+    part = size * np.sqrt(1.0 - eye**2) / diagonal
+    for name, begin, end, along in zip("xyz", low, high, part):
+        getattr(ax, f"set_{name}lim")(begin, end)
+        locator = getattr(ax, f"{name}axis").get_major_locator()
+        locator.set_params(nbins=int(np.clip(TICKS * along, 1, 9)), prune="lower" if TICKS * along < 1.5 else None)
+    ax.set_box_aspect(size, zoom=ROOM * min(1.0, WIDEST / widest))
 
 
 def is_seen(shown: Field, place: Array, view: tuple[float, float]) -> bool:

@@ -1,13 +1,15 @@
 """Load steps cut in halves: the same end as with those steps asked for, and nothing left of what failed."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from stepping import Stepping
 
 import fastcontact as fc
-from fastcontact.analysis import geometry_loop
+from fastcontact.analysis import geometry_loop, step_halving
+from fastcontact.analysis.convergence_messages import geometry_moves
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.mesh.generate import block
 
@@ -73,8 +75,40 @@ def test_a_step_that_cannot_converge_says_how_often_it_was_cut():
     with pytest.raises(fc.ConvergenceError, match=r"step 1 was cut in halves 2 times, .* 0 to 0\.25 fails") as caught:
         fc.solve(spheres(), fc.linear_ramp(1), linear_solver="direct", criteria=criteria, on_step=handed.append)
     assert not handed
+    assert caught.value.__cause__ is None  # the same words are told once
+    assert caught.value.__suppress_context__
+    assert caught.value.__traceback__ is not None
     assert len(caught.value.history) == 3
     assert all(entry["displacement_change"] > 0 for entry in caught.value.history)
+
+
+def test_progress_tells_that_a_step_is_cut(capsys):
+    limits = {"max_active_set_iterations": 2, "geometry_updates": 0}
+    model = spheres(friction=0.0)
+    fc.solve(model, fc.linear_ramp(1), linear_solver="direct", criteria=Criteria(**limits), progress=True)
+    told = [text.strip() for text in capsys.readouterr().err.split("\r")]
+    assert "step 1/1 does not converge, cut in halves: 0 to 1" in told
+    assert not step_halving.listeners
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ([1e-2 * 0.5**k for k in range(20)], "Allow more (Criteria.max_geometry_updates), use more load steps"),
+        ([0.1, *[1.2e-4, 1.3e-4] * 10], "More of them do not help, it goes round in circles: use more load steps"),
+    ],
+)
+def test_the_remedy_follows_from_how_the_geometry_moves(changes, words):
+    mesh = block((1.0, 1.0), (1, 1))
+    side = SimpleNamespace(points=np.arange(4))
+    pair = SimpleNamespace(secondary=side, primary=side, normals="averaged", multipliers="dual")
+    model, criteria = SimpleNamespace(mesh=mesh), Criteria()
+    problem = SimpleNamespace(model=model, criteria=criteria, shape=(4, 2), pairs={"joint": pair})
+    history = [{"displacement_change": change, "active": 3} for change in changes]
+    told = geometry_moves(problem, history, np.arange(8.0), 60)
+    assert words in told
+    assert "multipliers=\"standard\" for contact 'joint'" in told
+    assert f"(Criteria.geometry, which is 1e-11, above {max(changes[-8:]):.0e})" in told
 
 
 def driven(**options):

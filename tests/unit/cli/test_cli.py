@@ -367,6 +367,23 @@ def test_import_is_light():
     assert done.stdout.strip() == "[]"
 
 
+def test_an_analysis_loads_what_it_needs_only():
+    code = """
+import sys, numpy as np, fastcontact as fc
+cells = {"quad4": [[0, 1, 2, 3]], "line2": [[0, 1]]}
+mesh = fc.Mesh(np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]), cells, {"B": [0], "C": [1]}, {"T": [2, 3]})
+model = fc.Model(mesh, "plane_strain")
+model.add_material(fc.LinearElastic(1.0, 0.3))
+model.prescribe("T", x=0.0, y=-0.01)
+model.add_obstacle("c", secondary="C", obstacle=fc.obstacles.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0)))
+fc.solve(model)
+unused = ("mesh.generate", "mesh.files.meshio_files", "mesh.files.point_fields", "analysis.friction", "cases", "studies")
+print([name for name in unused if f"fastcontact.{name}" in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
 def test_a_failure_without_history_shows_none():
     assert history_lines([]) == []
 

@@ -147,6 +147,41 @@ def test_a_study_that_is_interrupted_does_not_wait_for_its_runs(tmp_path):
     assert done.returncode not in (0, 1)
 
 
+def test_adaptive_meshes_tell_their_warnings_as_a_run_does(tmp_path):
+    (tmp_path / "coarse.toml").write_text("""
+kinematics = "axisymmetric"
+mesh = { generator = "half-spheres", element = "tri3", size = 12.0 }
+material = [{ E = 20000.0, nu = 0.3 }]
+support = [{ group = "A1A2", x = 0.0 }, { group = "A2B2", y = -0.5 }, { group = "A1B1", y = 0.5 }]
+ramp = { steps = 1 }
+[contact.hertz]
+secondary = "CONT1"
+primary = "CONT2"
+""")
+    command = [sys.executable, "-m", "fastcontact", "converge", "coarse.toml", "--adaptive", "--tolerance", "0.009"]
+    command += ["--max-dofs", "400", "-q", "--json", "a.json"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, cwd=tmp_path)
+    told = done.stderr.splitlines()
+    assert told, done.stdout
+    assert all(line.startswith("warning: ") for line in told), done.stderr
+    assert len(set(told)) == len(told)
+
+
+UNGUARDED = """
+import fastcontact as fc
+fc.convergence_study("forma04a", 2, ["tri3"], ["node_to_segment"], workers=2)
+"""
+
+
+def test_a_script_that_its_workers_would_run_anew_gets_one_error(tmp_path):
+    script = tmp_path / "unguarded.py"
+    script.write_text(UNGUARDED)
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 1
+    assert done.stderr.count("Traceback") == 1, done.stderr
+    assert "put what calls the study under if __name__ == '__main__':" in done.stderr.splitlines()[-1]
+
+
 def is_running(process):
     """Return whether a process is there and no mere entry of one that has ended."""
     try:

@@ -12,7 +12,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact._jit import compiling
-from fastcontact.analysis.progress import Progress
+from fastcontact.analysis.progress import Progress, StatusLine
 from fastcontact.mesh.html_table import html_table
 from fastcontact.results.steps import HEAD, SHOWN, Steps
 
@@ -152,6 +152,12 @@ def test_progress_is_written_where_it_is_asked_for(model, capsys):
     assert "step 1/2" in told
     assert "step 2/2" in told
     assert "nodes in contact" in told
+
+
+def test_what_is_written_beside_progress_begins_at_the_left(capsys):
+    """A warning does not follow the bar on its line."""
+    StatusLine(9, show=True).draw("half")
+    assert capsys.readouterr().err == "\rhalf     \r"
 
 
 @pytest.mark.parametrize("listening", [True, False])

@@ -33,6 +33,14 @@ def test_a_keyword_goes_on_over_comments_and_to_the_end_of_the_file(tmp_path):
     assert deck.ramp.instants == (1.0,)
 
 
+@pytest.mark.parametrize("asked", ["*Node Print, nset=x0\nU\n", "*Controls, reset\n", ""])
+def test_notes_tell_of_output_and_of_controls_by_themselves(tmp_path, asked):
+    notes = notes_of(deck_of(tmp_path, WHOLE.replace("*End Step", asked + "*End Step")))
+    assert ("*NODE PRINT: no effect, the result file holds all output" in notes) == asked.startswith("*Node")
+    assert ("*CONTROLS: no effect, convergence has criteria" in notes) == asked.startswith("*Controls")
+    assert ("convergence" in notes) == asked.startswith("*Controls")
+
+
 def test_a_deck_that_is_not_there(tmp_path):
     with pytest.raises(fc.FileError, match=r"none\.inp"):
         fc.read_deck(tmp_path / "none.inp")

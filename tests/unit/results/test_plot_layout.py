@@ -1,0 +1,132 @@
+"""Pictures of bodies of any proportions: nothing is cut off, no text lies on another, edges lie on the faces."""
+
+import numpy as np
+import pytest
+from matplotlib_pictures import frames_of, overlaps, texts
+
+import fastcontact as fc
+from fastcontact.mesh.generate import block, box
+from fastcontact.results.step import StepResult
+
+pytest.importorskip("matplotlib", reason="pictures need matplotlib")
+# Of boxes: a cube, a beam along each axis, a plate, a tile.
+SIZES = [(1, 1, 1), (60, 15, 20), (5, 60, 8), (4, 6, 70), (50, 40, 3), (0.03, 0.02, 0.001)]
+VIEWS = [(25.0, -60.0), (25.0, -120.0), (20.0, 120.0), (60.0, 10.0)]
+
+
+def step_of(mesh, displacement=None, load_factor=1.0):
+    n, dim = mesh.points.shape
+    u = np.zeros((n, dim)) if displacement is None else displacement
+    values = 1000.0 + mesh.points[:, 0]
+    return StepResult(1, load_factor, u, np.zeros((n, 4 if dim == 2 else 6)), values, values, np.zeros((n, dim)))
+
+
+@pytest.mark.parametrize("view", VIEWS, ids=str)
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_texts_of_a_solid_are_whole_and_apart(size, view):
+    mesh = box(size, (2, 2, 2), "hex8")
+    ax = fc.plot.deformed_shape(mesh, step_of(mesh, 0.01 * mesh.points), view=view, units=fc.plot.UNITS)
+    ax.figure.canvas.draw()
+    assert overlaps(texts(ax), solid=True) == []
+
+
+@pytest.mark.parametrize("zoom", [None, 0.3])
+@pytest.mark.parametrize("size", [(1.0, 1.0), (60.0, 15.0), (15.0, 60.0), (40.0, 2.0)], ids=str)
+def test_texts_of_sections_and_plane_bodies_are_whole_and_apart(size, zoom):
+    plane, solid = block(size, (4, 4)), box((size[0], 2.0, size[1]), (4, 2, 4), "hex8")
+    zoom = zoom and zoom * min(size)
+    for ax in (
+        fc.plot.deformed_shape(plane, step_of(plane), zoom=zoom, units=fc.plot.UNITS),
+        fc.plot.section(solid, step_of(solid), (0.0, 1.0, 0.0), (0.0, 1.0, 0.0), zoom=zoom, units=fc.plot.UNITS),
+    ):
+        ax.figure.canvas.draw()
+        assert overlaps(texts(ax)) == []
+
+
+def test_a_section_says_how_displacements_are_scaled():
+    mesh = box((1.0, 1.0, 1.0), (2, 2, 2), "hex8")
+    ax = fc.plot.section(mesh, step_of(mesh), (0.5, 0.5, 0.5), (0.0, 1.0, 0.0), scale=20.0)
+    assert ax.get_title().endswith("load factor 1, displacements x 20")
+
+
+@pytest.mark.parametrize("size", SIZES[:3], ids=str)
+def test_pictures_of_an_animation_are_whole_and_in_proportion(size, tmp_path, monkeypatch):
+    mesh = box(size, (2, 2, 2), "hex8")
+    steps = [step_of(mesh, 0.3 * k * mesh.points * [1.0, 0.2, 0.0], float(k)) for k in (1, 2)]
+    seen = frames_of(monkeypatch, lambda: fc.plot.animate(mesh, steps, tmp_path / "a.gif", units=fc.plot.UNITS))
+    assert len(seen) == 2
+    for found in seen:
+        assert found["overlaps"] == []
+        # As long along all axes: only then edges, which are moved towards the eye, lie on the faces that they belong to.
+        assert np.ptp(found["scales"]) < 1e-9 * max(found["scales"])
+    assert seen[0]["limits"] == seen[1]["limits"]
+
+
+def pressed(friction):
+    mesh = block((4.0, 1.0), (8, 2))
+    model = fc.Model(mesh, kinematics="plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.prescribe("TOP", y=-0.01)
+    model.prescribe("TOP", x=0.001)
+    floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, friction=friction)
+    return fc.solve(model, 2)
+
+
+@pytest.mark.parametrize(("friction", "word"), [(0.0, "closed"), (0.5, "sticking")])
+def test_zones_say_what_closed_nodes_do(friction, word):
+    ax = fc.plot.contact_zones(pressed(friction), "floor")
+    named = {text.get_text() for text in ax.get_legend().get_texts()}
+    assert word in named
+    assert not {"closed", "sticking"} - {word} & named
+
+
+@pytest.mark.parametrize("given", ["N", "N/mm"])
+def test_forces_of_plane_models_are_per_thickness_in_a_history(given):
+    upper, _ = fc.plot.history(pressed(0.0), "floor", units={**fc.plot.UNITS, "force": given})
+    assert upper.get_ylabel() == "contact force [N/mm]"
+
+
+def test_forces_of_other_models_are_whole_in_a_history():
+    mesh = box((1.0, 1.0, 1.0), (1, 1, 1), "hex8")
+    solid = fc.Model(mesh, "3d")
+    solid.fix("ZMIN", "xyz")
+    disc = fc.Model(block((1.0, 1.0), (2, 2)), "axisymmetric")
+    disc.fix("BOTTOM", "xy")
+    for model, side, way in ((solid, "ZMAX", "z"), (disc, "TOP", "y"), (disc, "RIGHT", "")):
+        model.contact.clear()
+        if not model.materials:
+            model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+        lid = {"point": (0.0,) * (model.mesh.dim - 1) + (1.0,), "normal": (0.0,) * (model.mesh.dim - 1) + (-1.0,)}
+        ring = fc.obstacles.HalfSpace(**lid) if way else fc.obstacles.HalfSpace((0.99, 0.0), (-1.0, 0.0))
+        model.add_obstacle("lid", secondary=side, obstacle=ring, motion={way: -0.01} if way else None)
+        upper, _ = fc.plot.history(fc.solve(model, 1), "lid", units=fc.plot.UNITS)
+        assert upper.get_ylabel().endswith("[N]")
+
+
+def test_large_numbers_have_no_power_of_ten():
+    steps = pressed(0.0)
+    contact = steps[-1].contact["floor"]
+    factor = 10541.9 / contact.pressure_max
+    contact.pressure[:] *= factor
+    ax = fc.plot.pressure_profile(contact, units=fc.plot.UNITS)
+    assert "= 10542 MPa" in ax.get_legend().get_texts()[0].get_text()
+
+
+@pytest.mark.parametrize("formulation", ["continuous", "node_to_segment"])
+def test_a_profile_says_where_its_edge_is_that_of_nodes(formulation):
+    """The points of continuous contact lie between nodes: results tell a narrower bracket than the picture shows."""
+    mesh = fc.generate.graded_block("quad8", width=20.0, contact_radius=1.2)
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("SYMMETRY_X", "x")
+    model.fix("BOTTOM", "y")
+    ball = fc.obstacles.Sphere(centre=(0.0, 10.0), R=10.0)
+    model.add_obstacle("ball", secondary="CONTACT", obstacle=ball, motion={"y": -0.1}, formulation=formulation)
+    contact = fc.solve(model, 1)[-1].contact["ball"]
+    told = [text.get_text() for text in fc.plot.pressure_profile(contact).get_legend().get_texts()]
+    (edge,) = (text for text in told if text.startswith("edge"))
+    ends = [float(word) for word in edge.split(": ")[1].split(" to ")]
+    alike = np.allclose(ends, contact.radius, rtol=0.01)
+    assert alike == (formulation == "node_to_segment")
+    assert ("between nodes" in edge) is not alike
