@@ -165,6 +165,17 @@ def test_iterations_beside_a_stiff_secondary_side_that_touches_in_part_or_is_nea
     assert found["residual"] < 1e-6
 
 
+@pytest.mark.filterwarnings("ignore:Young's moduli")
+@pytest.mark.parametrize(("element", "most"), [("tet10", 7.0), ("hex20", 7.5)])
+def test_friction_beside_a_much_stiffer_secondary_side_is_not_solved_pairing_by_pairing(element, most):
+    robustness = suite("subjects").load("robustness")
+    found = robustness.figures(robustness.blocks(6, 0.3, ratio=1e-3, element=element))
+    assert not found["gave_up"]
+    assert found["pairings"] <= 18
+    assert found["step"]["iterations"] <= most * found["linear"]["iterations"]
+    assert found["residual"] < 1e-6
+
+
 @pytest.mark.parametrize("ball", [False, True])
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_iterations_on_rigid_obstacles_are_a_few_times_those_without_contact(ball, friction):

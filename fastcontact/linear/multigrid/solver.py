@@ -231,7 +231,9 @@ class Multigrid:
         enough = self._enough(tolerance) * scale
         iteration.x[:] = guess
         self._begin(iteration, f)
-        self._reduce(iteration, enough, self._reduced.multiply, self.precondition)
+        # Beside what is much stiffer the solver's own tolerance leaves errors that pairings would reduce one by one.
+        aim = tolerance / self._contrast * scale
+        self._reduce(iteration, enough, self._reduced.multiply, self.precondition, aim)
         return self._reduced.displacement(iteration.x).copy()
 
     def bordered_solution(
@@ -271,13 +273,14 @@ class Multigrid:
         return x.copy(), iteration.x[n:].copy()
 
     def _reduce(
-        self, iteration: ConjugateResiduals, enough: float, multiply: Multiply, precondition: Precondition
-    ) -> None:
-        """Iterate until the residual is `enough` [force]; a warm start is improved beyond that.
+        self, iteration: ConjugateResiduals, enough: float, multiply: Multiply, precondition: Precondition,
+        aim: float = np.inf,
+    ) -> None:  # fmt: skip
+        """Iterate until the residual is `enough` [force]; a warm start is improved beyond that, to `aim` where that is less.
 
         It may meet the tolerance while the forces of a small contact are not right yet.
         """
-        made, wanted = 0, max(min(enough, WARM * iteration.norm), WARM_LEAST * enough)
+        made, wanted = 0, max(min(enough, WARM * iteration.norm, aim), WARM_LEAST * enough)
         least, fallen = iteration.norm, 0  # the residual when it last fell, and the iterations until then
         while iteration.norm > wanted:
             done = iteration.norm <= enough

@@ -53,6 +53,7 @@ class FreeMotions:
         W = csr_array(weights[:, self._at])
         W = W[np.diff(W.indptr) > 0]
         self._moves = csr_array(self._yielding @ W.T)
+        self._pulls = csr_array(self._moves.T)  # in rows: products are many
         compliance = csr_array(W @ self._moves)
         shifted = compliance + diags_array(REPEATED * compliance.diagonal(), format="csr")
         self._factors = splu(csc_array(shifted), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
@@ -60,7 +61,7 @@ class FreeMotions:
     def correct(self, r: NDArray[Any], factor: float, step: NDArray[Any], x: NDArray[Any]) -> None:
         """Add `factor` times the correction for the residual r (n,) to the last `step` (n,) and to x (n,)."""
         own = r[self._at].astype(float)
-        found = self._yielding @ own - self._moves @ self._factors.solve(self._moves.T @ own)
+        found = self._yielding @ own - self._moves @ self._factors.solve(self._pulls @ own)
         found = (factor * found).astype(x.dtype)
         step[self._at] += found
         x[self._at] += found

@@ -123,6 +123,18 @@ def test_equations_without_mid_nodes_are_eliminated_by_nodal_unknowns():
     assert isinstance(eliminated(B, c, None, nodes, SIZE, functions), CornerElimination)
 
 
+def test_corners_with_next_to_no_entries_are_left_to_other_ways():
+    B, nodes, functions = quadratic_line(8, 1)
+    weak = B.toarray()
+    weak[3, SIZE * 3 : SIZE * 4] *= 1e-3
+    weak[3, SIZE * (9 + 2) : SIZE * (9 + 4)] *= 1e-3  # and the mid nodes beside
+    found = eliminated(csr_array(weak), np.zeros(len(weak)), None, nodes, SIZE, functions)
+    assert not isinstance(found, CornerElimination)
+    u = np.random.default_rng(8).normal(size=B.shape[1])
+    found.complete(u)
+    assert np.abs(weak @ u).max() < 1e-10 * np.abs(u).max()
+
+
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
 def test_kernels_take_weights_of_pivots_themselves(kind):
     rng = np.random.default_rng(7)
