@@ -41,6 +41,8 @@ class Balance:
         What is allowed of it [force].
     relative : float
         The residual over the largest force of this step, zero where that is round-off.
+    noise : float
+        Forces up to this are round-off [force].
     """
 
     reaction: Array
@@ -48,11 +50,21 @@ class Balance:
     residual: float
     bound: float
     relative: float
+    noise: float = 0.0
 
     @property
     def excess(self) -> float:
         """The residual in units of what is allowed."""
         return self.residual / self.bound if self.bound else float(np.inf if self.residual else 0.0)
+
+    @property
+    def wanting(self) -> float:
+        """How many times more accurate solutions should be.
+
+        Solutions that are off by more than round-off leave it open whether there are any forces, as where bodies have come
+        apart: then that first, which takes much less than a balance of forces that may not exist.
+        """
+        return self.residual / self.noise if self.residual > self.noise > self.bound else self.excess
 
     def check(self, index: int, problem: Problem, history: Sequence[dict[str, Any]]) -> None:
         """Raise ConvergenceError for step `index` if the residual is beyond its bound."""
@@ -97,10 +109,10 @@ def balance(problem: Problem, u: Array, contact_force: Array, external: Array, l
     force = max(largest(part) for part in forces)
     largest_so_far = max(largest_so_far, force)
     bound = max(criteria.relative * force, criteria.absolute or 0.0)
-    round_off = 0.0
+    round_off = noise = 0.0
     if not 0.0 < residual <= bound:
         # Without forces the criterion is 0/0: round-off of the internal forces decides, which costs a product with K.
-        round_off = _round_off(problem, u, forces, largest_so_far)
+        round_off, noise = _round_off(problem, u, forces, largest_so_far)
     n_dofs = problem.model.n_dofs
     return Balance(
         reaction[:n_dofs] + ground_force(problem.model.springs, u[:n_dofs]),
@@ -108,11 +120,14 @@ def balance(problem: Problem, u: Array, contact_force: Array, external: Array, l
         residual,
         max(bound, round_off),
         float(residual / force) if force > round_off else 0.0,
+        noise,
     )
 
 
-def _round_off(problem: Problem, u: Array, forces: tuple[Array, ...], largest_force: float) -> float:
+def _round_off(problem: Problem, u: Array, forces: tuple[Array, ...], largest_force: float) -> tuple[float, float]:
     """Return how far internal forces may be off where there are no other `forces` (n_dofs,) than their round-off [force].
+
+    And up to which size forces are round-off [force].
 
     That is so where no degree of freedom knows its force to the criterion, or the force itself may be round-off from
     elsewhere. Where forces are there, they are what counts: stiff parts that move far may not hide what is missing from
@@ -122,5 +137,5 @@ def _round_off(problem: Problem, u: Array, forces: tuple[Array, ...], largest_fo
     noise = max(slack, THERE * ROUND_OFF * largest(row_sums))
     for part in map(np.abs, forces):
         if ((part > noise) & (part * problem.criteria.relative > ROUND_OFF * row_sums)).any():
-            return slack
-    return max(max(ALLOWED, 10 * problem.solver.tolerance) * largest(row_sums), slack)
+            return slack, noise
+    return max(max(ALLOWED, 10 * problem.solver.tolerance) * largest(row_sums), slack), noise

@@ -17,7 +17,7 @@ from fastcontact.analysis.inequalities import StepContext, solve_inequalities
 from fastcontact.analysis.iterate import Iterate, initially_active, pair_surfaces
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.scatter import Scatter, Watch
-from fastcontact.analysis.shared_nodes import shared
+from fastcontact.analysis.shared_nodes import once, shared
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.tolerances import PATIENT_UPDATES, Tolerances
 from fastcontact.contact.constraints import StackedConstraints
@@ -119,7 +119,7 @@ def settle_geometry(
     except ConvergenceError as error:
         error.history = error.history or iterate.history
         raise
-    return replace(settled, solution=shared(settled.solution, settled.constraints))
+    return replace(settled, solution=shared(settled.solution, settled.constraints, settled.iterate.u))
 
 
 def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, expected: float) -> SettledContact:
@@ -135,7 +135,8 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
         constraints = pair_surfaces(problem, step.state, step.load, iterate)
         active = initially_active(constraints, iterate, extrapolation if plan.extrapolate and update == 0 else None)
         accuracy = tolerances.accuracy(step.dofs.scale(iterate.u, step.load.lift), single)
-        solution, part = solve_inequalities(step, constraints, iterate, active, accuracy)
+        apart = once(constraints)
+        solution, part = solve_inequalities(step, apart, iterate, active & apart.usable, accuracy)
         moved = _move(step, iterate, constraints, solution, part)
         if not (solution.settled or single or tolerances.inexact):
             _raise_cycling(problem, constraints, solution, iterate)

@@ -56,7 +56,7 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     start, expected = prepare_start(problem, state, load, loaded)
     settled, u, balanced = equilibrium(problem, start, load, loaded, expected)
     # An iterative solver was too inaccurate: it is asked for more, and goes on from the same contact.
-    while balanced.excess > 1.0 and problem.solver.improve(balanced.excess):
+    while balanced.excess > 1.0 and problem.solver.improve(balanced.wanting):
         settled, u, balanced = equilibrium(problem, start, load, with_loads(problem, load), expected, settled)
     balanced.check(index, problem, settled.iterate.history if settled is not None else ())
     iterations = counted(settled, problem.solver.counters.iterations - solved_before)

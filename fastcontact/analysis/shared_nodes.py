@@ -1,7 +1,9 @@
 """Nodes in several contact pairs that face the same place.
 
-Their conditions are one and the same, which fixes the sum of their forces alone: solvers leave it to any one of the pairs, or
-split it as they please. Each pair carries the part that its area is of all their areas, so that the pressure is the same.
+Their conditions are one and the same, which fixes the sum of their forces alone. One of them is solved for, since equations
+that repeat each other cannot be eliminated. Each pair then carries the part that its area is of all their areas, so that the
+pressure is the same. Of several clearances at one place the smallest alone can close. What gives way by a penalty repeats
+nothing: its force follows from its own penetration.
 """
 
 from __future__ import annotations
@@ -13,14 +15,26 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
-from fastcontact.contact.constraints import StackedConstraints
+from fastcontact.contact.constraints import Constraints, StackedConstraints
 
 Indices = NDArray[np.intp]
 # Entries of rows [-], and coefficients of friction, that differ by less are the same.
 SAME = 1e-9
+# Gaps that differ by less than this part of the coordinates are the same.
+SAME_GAP = 64 * float(np.finfo(float).eps)
 
 
-def shared(solution: Solution, constraints: StackedConstraints) -> Solution:
+def once(constraints: StackedConstraints) -> Constraints:
+    """Return constraints of which those cannot close that repeat others, or that lie behind them."""
+    _, second, behind = _alike(constraints)
+    if constraints.tangential_softness is not None:  # these add up
+        second = second[constraints.tangential_softness[second] == 0.0]
+    idle = np.zeros(len(constraints), bool)
+    idle[second] = idle[behind] = True
+    return constraints.without(idle)
+
+
+def shared(solution: Solution, constraints: StackedConstraints, u: NDArray[np.float64]) -> Solution:
     """Return a solution whose forces at nodes of several pairs are shared by area.
 
     Parameters
@@ -28,23 +42,28 @@ def shared(solution: Solution, constraints: StackedConstraints) -> Solution:
     solution : Solution
     constraints : StackedConstraints
         Those of all pairs.
+    u : ndarray (n_dofs,)
+        Displacements of the bodies [length].
     """
-    first, second = _repeated(constraints)
-    if not len(first):
+    first, second, behind = _alike(constraints)
+    if not len(second) + len(behind):
         return solution
     m, area = len(constraints), _areas(constraints)
     place = np.arange(m)  # of each constraint, the first one that it repeats
     place[second] = first
     together = csr_array((np.ones(m), (place, np.arange(m))), shape=(m, m))
     part = (area / (together @ area)[place])[:, None]
-    normal = (part * (together @ solution.multiplier[:, None])[place])[:, 0]
+    normal, gap = (part * (together @ solution.multiplier[:, None])[place])[:, 0], solution.gap[place]
+    gap[behind] = constraints.gaps(u)[behind]
     active = (together @ solution.active)[place] > 0
     if not isinstance(solution, FrictionalEquilibrium):
-        return replace(solution, multiplier=normal, active=active, wanted=active)
+        return replace(solution, multiplier=normal, gap=gap, active=active, wanted=active)
     sticking = np.where(active, (together @ (solution.active & ~solution.sticking))[place] == 0, solution.sticking)
     return replace(
         solution,
         multiplier=normal,
+        gap=gap,
+        slip=solution.slip[place],
         active=active,
         sticking=sticking,
         tangential=part * (together @ solution.tangential)[place],
@@ -58,18 +77,46 @@ def _areas(constraints: StackedConstraints) -> NDArray[np.float64]:
     )
 
 
-def _repeated(constraints: StackedConstraints) -> tuple[Indices, Indices]:
-    """Return constraints (k,) of a pair, and those of later pairs (k,) that repeat them."""
+def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
+    """Return constraints (k,) of a pair, those of other pairs (k,) that repeat them, and others that lie behind some.
+
+    The latter face the same place along the same normal, with a larger clearance: what is in front of them holds their node.
+    """
     none = np.empty(0, np.intp)
     if len(constraints.parts) < 2 or constraints.nodes is None:
-        return none, none
-    usable = np.flatnonzero(np.isfinite(_areas(constraints)) & constraints.usable)
-    _, begin, at = np.unique(constraints.nodes[usable], return_index=True, return_inverse=True)
-    first, second = usable[begin[at]], usable
-    first, second = first[first != second], second[first != second]
+        return none, none, none
+    first, second = _of_one_node(constraints)
     if not len(first):
-        return none, none
-    apart = abs(constraints.friction[first] - constraints.friction[second]) if constraints.friction is not None else 0.0
-    for rows in (constraints.B, *constraints.tangents):
-        apart = np.maximum(apart, abs(rows[first] - rows[second]).max(axis=1).toarray().ravel())
-    return first[apart <= SAME], second[apart <= SAME]
+        return none, none, none
+    alike = _apart(constraints.B, first, second) <= SAME
+    if constraints.equality is not None:
+        alike &= ~(constraints.equality[first] | constraints.equality[second])
+    first, second = first[alike], second[alike]
+    between = constraints.gap0[second] - constraints.gap0[first]
+    level = between <= SAME_GAP * np.abs(constraints.positions).max()
+    same = level.copy()
+    if constraints.friction is not None:
+        same &= abs(constraints.friction[first] - constraints.friction[second]) <= SAME
+    for rows in constraints.tangents:
+        same &= _apart(rows, first, second) <= SAME
+    return first[same], second[same], second[~level]
+
+
+def _of_one_node(constraints: StackedConstraints) -> tuple[Indices, Indices]:
+    """Return the constraint with the smallest gap at nodes of several, and each of the others; without penalty."""
+    assert constraints.nodes is not None
+    usable = np.isfinite(_areas(constraints)) & constraints.usable
+    if constraints.softness is not None:
+        usable &= constraints.softness == 0.0
+    order = np.flatnonzero(usable)
+    order = order[np.argsort(constraints.gap0[order], kind="stable")]
+    _, begin, at = np.unique(constraints.nodes[order], return_index=True, return_inverse=True)
+    first, second = order[begin[at]], order
+    return first[first != second], second[first != second]
+
+
+def _apart(rows: csr_array, first: Indices, second: Indices) -> NDArray[np.float64]:
+    """Return the largest difference (k,) between entries of rows."""
+    if not len(first):
+        return np.empty(0)
+    return np.asarray(abs(rows[first] - rows[second]).max(axis=1).toarray().ravel())

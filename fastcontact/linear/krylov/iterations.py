@@ -20,6 +20,8 @@ Multiply = Callable[[Array, Array], None]
 Precondition = Callable[[Array, float, Array], None]
 # Search directions of conjugate residuals that a new one is made orthogonal to; older ones are forgotten.
 KEPT = 20
+# A step of conjugate residuals that leaves more of the residual than this is lost.
+LOST = 0.98
 
 
 class Iteration:
@@ -110,6 +112,7 @@ class ConjugateResiduals(Iteration):
         # Directions of unit image, and their images with the sign reversed: `advance` then serves to orthogonalise.
         self._kept: list[tuple[Array, Array]] = []
         self._made = 0
+        self._lost = False  # the last step
 
     @property
     def nbytes(self) -> int:
@@ -119,12 +122,16 @@ class ConjugateResiduals(Iteration):
     def start(self) -> None:
         """See `Iteration.start`."""
         super().start()
-        self._made = 0
+        self._made, self._lost = 0, False
 
     def step(self, multiply: Multiply, precondition: Precondition) -> bool:
         """Make one iteration; return False where no direction is left that reduces the residual."""
-        z, q = self.z, self.q
-        precondition(self.r, self.norm, z)
+        z, q, norm = self.z, self.q, self.norm
+        if self._lost:
+            _, image = self._kept[(self._made - 1) % KEPT]
+            precondition(image, 1.0, z)
+        else:
+            precondition(self.r, norm, z)
         multiply(z, q)
         square = before = self.dot(q, q)
         for direction, image in self._kept[: min(self._made, KEPT)]:
@@ -133,6 +140,7 @@ class ConjugateResiduals(Iteration):
             return False
         self._advance(self.dot(self.r, q) / square, z, q)
         self._keep(z, q, float(np.sqrt(square)))
+        self._lost = self.norm > LOST * norm
         return True
 
     def _keep(self, z: Array, q: Array, size: float) -> None:

@@ -183,3 +183,23 @@ def test_what_loose_criteria_leave_is_told_with_its_number(criteria):
     text = "still changed by" if "geometry" in criteria else "forces are out of balance by"
     with pytest.warns(fc.FastcontactWarning, match=text + r" \d\.\de-0[34]"):
         solved(model, solver, linear_tolerance=1e-3, criteria=fc.Criteria(**criteria))
+
+
+@pytest.mark.filterwarnings("ignore:.*across its radius")
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize(
+    "options",
+    [{"elements": 8}, {"elements": 8, "formulation": "mortar"}, {"elements": 20, "dim": 2}],
+    ids=["node", "mortar", "2D"],
+)
+def test_bodies_that_come_apart_have_no_forces_that_multigrid_balances_in_vain(options, friction, caplog):
+    model = stacked(friction=friction, **options)
+    with caplog.at_level(logging.WARNING, "fastcontact"):
+        steps = fc.solve(model, [(0.0, 0.0), (1.0, 1.0), (2.0, -0.5), (3.0, 1.0)], linear_solver="amg")
+    assert not caplog.records  # as that factors took over
+    axis = model.mesh.dim - 1
+    moved = steps[1].displacement[model.mesh.points_of("U_BLOCK")]
+    rigid = -0.5 * np.where(np.arange(axis + 1) == axis, -DEPTH, np.where(np.arange(axis + 1) == 0, 0.2 * DEPTH, 0.0))
+    assert np.abs(moved - rigid).max() < 1e-11 * DEPTH
+    assert not steps[1].contact["c"].active.any()
+    assert all(out_of_balance(model, steps[k]) < 1e-6 for k in (0, 2))

@@ -13,6 +13,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.contact.configuration import Configuration
 from fastcontact.errors import ModelError
 from fastcontact.linear import choice as linear
+from fastcontact.linear.krylov.iterations import KEPT, ConjugateResiduals
 
 
 @pytest.fixture(scope="module")
@@ -160,3 +161,31 @@ def test_whole_solutions_know_how_exact_they_are(spring, low, high):
     assert low <= solver.error < high
     solver.prepare(bsr_array(K.tobsr((1, 1))), np.ones((n, 1)), np.arange(3))
     assert solver.error == 0.0  # the inverse of the last unknowns is the same for every pairing
+
+
+def circulating(n, turned):
+    """A matrix (n, n) that passes every unknown on to the next one; in part, so that the residual may turn slowly, too."""
+    return np.roll(np.eye(n), 1, axis=0) + turned * np.eye(n)
+
+
+@pytest.mark.parametrize("n", [2, 7, KEPT - 2])
+@pytest.mark.parametrize("turned", [0.0, 1e-9, 1e-3])
+def test_conjugate_residuals_get_on_where_the_image_of_the_residual_lies_across_it(n, turned):
+    A, f = circulating(n, turned), np.eye(n)[0]
+    iteration = ConjugateResiduals(n)
+    iteration.r[:] = f
+    iteration.start()
+    norms = [iteration.norm]
+
+    def multiply(p, q):
+        q[:] = A @ p
+
+    def precondition(r, norm, z):
+        z[:] = r
+
+    while iteration.norm > 1e-10 and len(norms) <= 2 * n:
+        assert iteration.step(multiply, precondition)
+        norms.append(iteration.norm)
+    assert iteration.norm <= 1e-10
+    assert np.abs(f - A @ iteration.x).max() < 1e-9
+    assert (np.diff(norms) <= 1e-12).all()  # it never grows

@@ -1,0 +1,86 @@
+"""Nodes that two node-to-segment pairs share: one condition, whose force both carry by their areas."""
+
+import logging
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+
+pytestmark = pytest.mark.filterwarnings("ignore:.*across its radius", "ignore:.*raise its penalty")
+CLEARANCE = 0.003
+
+
+def pressed(pairs, element="hex8", **options):
+    """A block on a larger one, whose lower side belongs to `pairs` = 1 or 2 contacts that meet along a line of nodes."""
+    lower = fc.generate.box((1.4, 1.2, 0.5), (4, 3, 2), element, (-0.2, -0.1, -0.5), name="LOWER")
+    upper = fc.generate.box((1.0, 1.0, 0.5), (4, 4, 2), element, (0.0, 0.0, 0.0), name="UPPER")
+    lower, upper = (
+        fc.generate.renamed(mesh, {name: letter + name for name in mesh.group_names if len(name) == 4})
+        for letter, mesh in (("L", lower), ("U", upper))
+    )
+    mesh = fc.generate.union(lower, upper)
+    mesh = mesh.with_facet_group("LEFT", lambda x: (abs(x[:, 2]) < 1e-9) & (x[:, 0] < 0.5))
+    bottom = mesh.cell_groups["UZMIN"]
+    left = np.intersect1d(bottom, mesh.cell_groups["LEFT"])
+    groups = {**mesh.cell_groups, "LEFT": left, "RIGHT": np.setdiff1d(bottom, left)}
+    model = fc.Model(mesh.replace(cell_groups=groups), "3d")
+    model.add_material(fc.LinearElastic(1000.0, 0.3))
+    model.fix("LZMIN", "xyz")
+    model.prescribe("UZMAX", x=0.004, y=0.0, z=-0.01)
+    clearances = options.pop("clearances", (0.0, 0.0))
+    for name, clearance in zip(["LEFT", "RIGHT"] if pairs == 2 else ["UZMIN"], clearances, strict=False):
+        own = {"clearance": clearance} if clearance else {}
+        model.add_contact(
+            name, secondary=name, primary="LZMAX", formulation="node_to_segment", normals="facet", **options, **own
+        )
+    return model
+
+
+def solved(model, solver):
+    return fc.solve(model, fc.linear_ramp(2), linear_solver=solver)[-1]
+
+
+def together(step):
+    """Return the contact forces (n_points, 3) of all pairs on the secondary side."""
+    total = np.zeros_like(step.displacement)
+    for contact in step.contact.values():
+        np.add.at(total, contact.points, contact.force_vectors)
+    return total
+
+
+@pytest.mark.parametrize("element", ["hex8", "tet4"])
+@pytest.mark.parametrize("penalty", [None, 1e5])
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+def test_two_pairs_are_what_one_of_both_is(solver, penalty, element, caplog):
+    options = {"element": element} | ({} if penalty is None else {"penalty": penalty})
+    one = solved(pressed(1, **options), solver)
+    with caplog.at_level(logging.INFO, "fastcontact"):
+        two = solved(pressed(2, **options), solver)
+    assert not any("repeat each other" in record.message for record in caplog.records)  # columns of the inverse
+    size = np.abs(together(one)).max()
+    assert together(two) == pytest.approx(together(one), abs=1e-7 * size)
+    left, right = two.contact["LEFT"], two.contact["RIGHT"]
+    common, mine, theirs = np.intersect1d(left.points, right.points, return_indices=True)
+    assert len(common) == 5
+    for name in ("pressure", "gap"):
+        values = getattr(left, name)
+        assert getattr(right, name)[theirs] == pytest.approx(values[mine], abs=1e-7 * max(np.abs(values).max(), 1e-3))
+    assert (left.active[mine] == right.active[theirs]).all()
+    assert left.active[mine].any()
+
+
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+@pytest.mark.parametrize("open_side", ["LEFT", "RIGHT"])
+def test_a_node_of_two_pairs_of_different_clearance_is_held_by_the_tighter_one(open_side, solver):
+    clearances = (CLEARANCE, 0.0) if open_side == "LEFT" else (0.0, CLEARANCE)
+    step = solved(pressed(2, clearances=clearances), solver)
+    left, right = step.contact["LEFT"], step.contact["RIGHT"]
+    _, mine, theirs = np.intersect1d(left.points, right.points, return_indices=True)
+    loose, rows = (left, mine) if open_side == "LEFT" else (right, theirs)
+    tight, held = (right, theirs) if open_side == "LEFT" else (left, mine)
+    assert tight.active[held].any()
+    shut = tight.active[held]
+    assert loose.gap[rows[shut]] == pytest.approx(CLEARANCE, rel=1e-6)
+    assert not loose.active[rows[shut]].any()
+    assert not loose.force_vectors[rows[shut]].any()
