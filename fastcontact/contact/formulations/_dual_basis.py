@@ -31,6 +31,8 @@ Mask = NDArray[np.bool_]
 SHARE, SHARE_WITHOUT_CENTRE = 0.25, 0.375
 # A function of which less than this fraction of its weight faces the other side takes no part of its own.
 COVERED = 0.02
+# Parts above this fraction of the largest one count as equal to it: those of curved facets differ by some hundredths.
+EQUAL = 0.9
 # Dual functions of whole facets have root mean squares up to 2.4 (nine nodes); beyond this multiple of one, and where
 # their integral falls below this fraction of their weight, they extrapolate more than they test.
 MOST, LEAST = 20.0, 0.2
@@ -88,7 +90,9 @@ def dual_functions(mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Arr
     """
     part = kept & (fraction > 0.0)
     dual, D = biorthogonal(mass, part)
-    largest = np.argmax(np.where(part, fraction, -1.0), axis=1)[:, None] == np.arange(part.shape[1])
+    share = np.where(part, fraction, -1.0)
+    # The first of those that are nearly equal: which it is must not change as facets deform.
+    largest = np.argmax(share >= EQUAL * share.max(axis=1, keepdims=True), axis=1)[:, None] == np.arange(part.shape[1])
     for fewer in (part & (fraction > COVERED), part & largest):
         wild = np.flatnonzero(~_tame(dual, mass, part))
         if not len(wild):

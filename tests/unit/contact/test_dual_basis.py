@@ -139,6 +139,19 @@ def test_on_any_part_of_a_facet_the_functions_sum_to_one_and_stay_moderate(name,
     assert (dual[0] @ weight[0])[taking_part].min() > 0.0
 
 
+@pytest.mark.parametrize("name", FACETS)
+def test_the_functions_that_a_whole_facet_keeps_stay_the_same_as_it_deforms(name):
+    """Beside a plane of symmetry nodes are left out, and of the others no functions may suit: one of them is chosen."""
+    mass, element, random = mass_over(name, corners(name))[None], elements.get(name), np.random.default_rng(3)
+    held = (0,) if element.dim == 1 else (0, 1, *((element.n_corners,) if element.order == 2 else ()))
+    kept = ~np.isin(np.arange(element.n_nodes), held)[None]
+    chosen = set()
+    for _ in range(50):
+        _, D = dual_functions(mass, kept, 1.0 + 0.03 * random.uniform(-1.0, 1.0, kept.shape))
+        chosen.add(tuple((np.diag(D[0]) > 0).tolist()))
+    assert len(chosen) == 1
+
+
 def test_a_facet_that_faces_nothing_has_no_functions():
     dual, D = dual_functions(np.zeros((1, 4, 4)), np.ones((1, 4), bool), np.zeros((1, 4)))
     assert not dual.any()
