@@ -52,6 +52,9 @@ def shared(solution: Solution, constraints: StackedConstraints, u: NDArray[np.fl
     place = np.arange(m)  # of each constraint, the first one that it repeats
     place[second] = first
     together = csr_array((np.ones(m), (place, np.arange(m))), shape=(m, m))
+    # Constraints that are no others' keep their forces: they need not stand for an area.
+    of_several = np.bincount(place, minlength=m)[place] > 1
+    area = np.where(of_several, area, 1.0)
     part = (area / (together @ area)[place])[:, None]
     normal, gap = (part * (together @ solution.multiplier[:, None])[place])[:, 0], solution.gap[place]
     gap[behind] = constraints.gaps(u)[behind]
@@ -91,7 +94,8 @@ def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
     alike = _apart(constraints.B, first, second) <= SAME
     if constraints.equality is not None:
         alike &= ~(constraints.equality[first] | constraints.equality[second])
-    first, second = first[alike], second[alike]
+    second, at = np.unique(second[alike], return_index=True)  # the first of these has the smallest gap
+    first = first[alike][at]
     between = constraints.gap0[second] - constraints.gap0[first]
     level = between <= SAME_GAP * np.abs(constraints.positions).max()
     same = level.copy()
@@ -103,16 +107,23 @@ def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
 
 
 def _of_one_node(constraints: StackedConstraints) -> tuple[Indices, Indices]:
-    """Return the constraint with the smallest gap at nodes of several, and each of the others; without penalty."""
+    """Return constraints (k,) at nodes of several, and for each another one there with a gap as large or larger.
+
+    Without penalty. Those that another one is paired with are in order of their gaps.
+    """
     assert constraints.nodes is not None
     usable = np.isfinite(_areas(constraints)) & constraints.usable
     if constraints.softness is not None:
         usable &= constraints.softness == 0.0
     order = np.flatnonzero(usable)
-    order = order[np.argsort(constraints.gap0[order], kind="stable")]
-    _, begin, at = np.unique(constraints.nodes[order], return_index=True, return_inverse=True)
-    first, second = order[begin[at]], order
-    return first[first != second], second[first != second]
+    order = order[np.lexsort((constraints.gap0[order], constraints.nodes[order]))]
+    node, found = constraints.nodes[order], [np.empty((2, 0), np.intp)]
+    apart = 1
+    while len(same := np.flatnonzero(node[apart:] == node[:-apart])):
+        found.append(np.stack([order[same], order[same + apart]]))
+        apart += 1
+    first, second = np.concatenate(found[::-1], axis=1)
+    return first, second
 
 
 def _apart(rows: csr_array, first: Indices, second: Indices) -> NDArray[np.float64]:

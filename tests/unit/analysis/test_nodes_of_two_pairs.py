@@ -84,3 +84,47 @@ def test_a_node_of_two_pairs_of_different_clearance_is_held_by_the_tighter_one(o
     assert loose.gap[rows[shut]] == pytest.approx(CLEARANCE, rel=1e-6)
     assert not loose.active[rows[shut]].any()
     assert not loose.force_vectors[rows[shut]].any()
+
+
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+@pytest.mark.parametrize("overlap", [-0.001, 0.001])
+def test_a_wall_at_the_same_nodes_is_no_third_of_them(overlap, solver, caplog):
+    """Beside two pairs along one normal a node may have a third one along another, before or behind them."""
+    steps = []
+    for pairs in (1, 2):
+        model = pressed(pairs)
+        wall = fc.obstacles.HalfSpace(point=(0.0, overlap, 0.0), normal=(0.0, 1.0, 0.0))
+        model.add_obstacle("wall", secondary="UYMIN", obstacle=wall, formulation="node_to_segment")
+        with caplog.at_level(logging.INFO, "fastcontact"):
+            steps.append(solved(model, solver))
+    one, two = steps
+    assert not any("repeat each other" in record.message for record in caplog.records)
+    assert together(two) == pytest.approx(together(one), abs=1e-7 * np.abs(together(one)).max())
+    left, right = two.contact["LEFT"], two.contact["RIGHT"]
+    _, mine, theirs = np.intersect1d(left.points, right.points, return_indices=True)
+    assert right.pressure[theirs] == pytest.approx(left.pressure[mine], abs=1e-7 * left.pressure.max())
+
+
+def beside_a_third_body(formulation):
+    """The two blocks, and a third one that the upper block touches with part of a side."""
+    third = fc.generate.box((0.4, 0.4, 0.3), (2, 2, 2), "hex8", (0.3, 1.0, 0.1), name="THIRD")
+    third = fc.generate.renamed(third, {name: f"T{name}" for name in third.group_names if len(name) == 4})
+    model = fc.Model(fc.generate.union(pressed(2).mesh, third), "3d")
+    model.add_material(fc.LinearElastic(1000.0, 0.3))
+    model.fix("LZMIN", "xyz")
+    model.fix("TYMAX", "xyz")
+    model.prescribe("UZMAX", x=0.004, y=0.0, z=-0.01)
+    for name in ("LEFT", "RIGHT"):
+        model.add_contact(name, secondary=name, primary="LZMAX", formulation="node_to_segment", normals="facet")
+    model.add_contact("side", secondary="UYMAX", primary="TYMIN", formulation=formulation)
+    return model
+
+
+@pytest.mark.parametrize("formulation", ["mortar", "continuous", "node_to_segment"])
+def test_a_pair_that_shares_no_nodes_keeps_its_pressures(formulation):
+    """Nodes of a mortar that face nothing stand for no area, by which nothing may be divided."""
+    side = solved(beside_a_third_body(formulation), "direct").contact["side"]
+    assert np.isfinite(side.pressure).all()
+    assert 0.2 < side.pressure_max < 20.0
+    assert side.force_vectors.sum(axis=0) == pytest.approx(side.force, rel=1e-12)
+    assert -side.force[1] == pytest.approx(0.26, rel=0.2)
