@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from pressed_blocks import pressed
 from scipy.sparse import csr_array
 
 import fastcontact as fc
@@ -95,21 +96,8 @@ def test_points_beside_equations_that_do_not_give_way():
     assert np.abs(K @ u - f - B.T @ forces).max() < 1e-8 * np.abs(forces).max()
 
 
-def pressed(curvature=0.0, ratio=1.0, element="hex8", n=10, **options):
-    def part(z, k, name):
-        mesh = fc.generate.box((1.0, 1.0, 0.5), (k, k, k // 2), element, (0.0, 0.0, z))
-        return fc.generate.renamed(mesh, {group: name + group for group in mesh.group_names})
-
-    upper = part(0.0, n * 4 // 5, "U_")
-    points = np.array(upper.points)
-    points[:, 2] += curvature * (points[:, 0] ** 2 + points[:, 1] ** 2)
-    model = fc.Model(fc.generate.union(part(-0.5, n, "L_"), upper.replace(points=points)), "3d")
-    model.add_material(fc.LinearElastic(ratio, 0.3), groups=["L_BOX"])
-    model.add_material(fc.LinearElastic(1.0, 0.3), groups=["U_BOX"])
-    model.fix("L_ZMIN", "xyz")
-    model.prescribe("U_ZMAX", x=0.0, y=0.0, z=-0.01)
-    model.add_contact("c", secondary="U_ZMIN", primary="L_ZMAX", formulation="continuous", **options)
-    return model
+def continuous(curvature=0.0, **options):
+    return pressed(curvature=curvature, formulation="continuous", **options)
 
 
 def on_obstacle(obstacle):
@@ -123,16 +111,16 @@ def on_obstacle(obstacle):
 
 def beside_another():
     """A pair of points beside one of nodes."""
-    model = pressed(0.02)
+    model = continuous(0.02)
     wall = fc.obstacles.HalfSpace((1.001, 0.0, 0.0), (-1.0, 0.0, 0.0))
     model.add_obstacle("wall", secondary="U_XMAX", obstacle=wall, formulation="node_to_segment")
     return model
 
 
 CASES = {
-    "all closed": (pressed, 30), "edge": (lambda: pressed(0.02), 90), "few": (lambda: pressed(0.2), 80),
-    "stiff primary": (lambda: pressed(0.02, ratio=100.0), 150), "tet4": (lambda: pressed(0.02, element="tet4"), 200),
-    "augmented": (lambda: pressed(0.02, augmentation=10.0), 300), "two pairs": (beside_another, 200),
+    "all closed": (continuous, 30), "edge": (lambda: continuous(0.02), 90), "few": (lambda: continuous(0.2), 80),
+    "stiff primary": (lambda: continuous(0.02, ratio=100.0), 150), "tet4": (lambda: continuous(0.02, element="tet4"), 200),
+    "augmented": (lambda: continuous(0.02, augmentation=10.0), 300), "two pairs": (beside_another, 200),
     "wall": (lambda: on_obstacle(fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))), 30),
     "ball": (lambda: on_obstacle(fc.obstacles.Sphere((0.5, 0.5, -1.0), 1.0)), 100),
 }  # fmt: skip

@@ -1,0 +1,24 @@
+"""Two blocks of cells that do not match, for tests of linear solvers under contact."""
+
+import numpy as np
+
+import fastcontact as fc
+
+
+def pressed(element="hex8", friction=0.0, ratio=1.0, curvature=0.0, n=10, **options):
+    """Two blocks that do not match, pressed together, and with friction pushed along each other."""
+
+    def part(z, k, name):
+        mesh = fc.generate.box((1.0, 1.0, 0.5), (k, k, k // 2), element, (0.0, 0.0, z))
+        return fc.generate.renamed(mesh, {group: name + group for group in mesh.group_names})
+
+    upper = part(0.0, n * 4 // 5, "U_")
+    points = np.array(upper.points)
+    points[:, 2] += curvature * (points[:, 0] ** 2 + points[:, 1] ** 2)
+    model = fc.Model(fc.generate.union(part(-0.5, n, "L_"), upper.replace(points=points)), "3d")
+    model.add_material(fc.LinearElastic(ratio, 0.3), groups=["L_BOX"])
+    model.add_material(fc.LinearElastic(1.0, 0.3), groups=["U_BOX"])
+    model.fix("L_ZMIN", "xyz")
+    model.prescribe("U_ZMAX", x=0.01 if friction else 0.0, y=0.0, z=-0.01)
+    model.add_contact("c", secondary="U_ZMIN", primary="L_ZMAX", friction=friction, **options)
+    return model
