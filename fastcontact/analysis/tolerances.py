@@ -79,7 +79,7 @@ class Tolerances:
 
     def enough(self, update: int, size: float) -> float:
         """Return the change of the displacement, whose size is given, below which the geometry has settled [length]."""
-        # Iterative solvers leave a noise of their tolerance, times the contrast of the cells; asking for less would never end.
+        # Iterative solvers leave a noise of their tolerance, times the contrast of cells; asking for less would never end.
         noise = self._solver.tolerance * (self._solver.contrast if self._solver.iterative else 1.0)
         accuracy = max(self._criteria.geometry, noise)
         if update >= PATIENT_UPDATES:

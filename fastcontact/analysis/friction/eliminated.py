@@ -30,9 +30,9 @@ Mask = NDArray[np.bool_]
 # any. The solution does not depend on it, for there nothing slips across.
 STIFFEST = 100.0
 # Constraints are taken for so much softer than the unknowns that they act on are by themselves, for neighbours give way, too.
-# Nearly incompressible cells resist a single node far more than a surface, see `LinearSolver.contrast`: beyond MILD constraints
-# are softer still, with its root, or Newton's method turns a few slips to and fro (nu = 0.4999, 161 442 unknowns: 614
-# iterations, none that settled before; nu = 0.499 did not care).
+# Nearly incompressible cells resist a single node far more than a surface (`LinearSolver.contrast`): beyond MILD, constraints
+# are softer still, with its root, or Newton's method turns a few slips to and fro (nu = 0.4999, 161 442 unknowns: 588
+# iterations, where it did not settle; nu = 0.499 did not care).
 SOFTER, MILD = 0.2, 10.0
 # The residual of the friction law that is small enough, in units of that of the linear solutions; and that which will do
 # after PATIENCE steps: contact forces that are a small part of all forces are no more accurate.
