@@ -44,6 +44,8 @@ WATCH_EVERY = 2
 WATCH_CONTRAST_FROM = 6
 # Equations with the same pivots whose weights differ by less than this share a hierarchy.
 ALIKE = 0.02
+# What a change of the hierarchy costs, the elimination of its equations included, in iterations.
+CHANGE = 15
 # Residuals that fall by less are taken to fall by this.
 SLOWEST = 0.999
 # A warm start of a nonsymmetric solution is improved by this factor, but not to less than this part of its tolerance, and by
@@ -61,6 +63,10 @@ class StallError(ConvergenceError):
     """The iteration does not reach its tolerance."""
 
 
+class TooManyIterationsError(StallError):
+    """The work done so far costs more than another way of solving."""
+
+
 class Multigrid:
     """Smoothed-aggregation multigrid as preconditioner of conjugate gradients.
 
@@ -75,6 +81,10 @@ class Multigrid:
     ----------
     contrast, corner_functions
         See `LinearSolver`.
+    work : int
+        Iterations so far, and changes of the hierarchy in units of them.
+    allowed : int, optional
+        Up to which work; None for any.
 
     Raises
     ------
@@ -89,6 +99,8 @@ class Multigrid:
         self.counters = Counters()
         self.contrast = 1.0
         self.corner_functions: csr_array | None = None
+        self.work = 0
+        self.allowed: int | None = None
 
     @property
     def nbytes(self) -> int:
@@ -141,6 +153,7 @@ class Multigrid:
             if not (alike and _alike(sparse, self._hierarchy_equations)):
                 self._constrained.constrain(sparse, None if springs is None else springs.scaled(self.K.unit))
                 self._hierarchy_equations, self._hierarchy_springs = sparse, springs
+                self._worked(CHANGE)
             gives = elimination is not None and elimination.compliance is not None
             self._reduced = Reduced(self.K, elimination, springs, self.diagonal() if gives else None)
 
@@ -189,7 +202,7 @@ class Multigrid:
                     break
             if cg.step(self._reduced.multiply, self.precondition):
                 made += 1
-                self.counters.iterations += 1
+                self._count()
             else:
                 raised += 1
                 self._strengthen(raised)
@@ -293,9 +306,18 @@ class Multigrid:
                 left = iteration.norm / enough
                 raise StallError(f"conjugate residuals stand at {left:.1e} times the tolerance after {made} iterations")
             made += 1
-            self.counters.iterations += 1
+            self._count()
             if iteration.norm < FALLS * least:
                 least, fallen = iteration.norm, made
+
+    def _count(self) -> None:
+        self.counters.iterations += 1
+        self._worked(1)
+
+    def _worked(self, iterations: int) -> None:
+        self.work += iterations
+        if self.allowed is not None and self.work > self.allowed:
+            raise TooManyIterationsError("the work allowed is done")
 
     def diagonal(self) -> Array:
         """Return the diagonal (n,) of K."""
