@@ -49,8 +49,10 @@ CHANGE = 15
 # Residuals that fall by less are taken to fall by this.
 SLOWEST = 0.999
 # A warm start of a nonsymmetric solution is improved by this factor, but not to less than this part of its tolerance, and by
-# so many iterations at most where that is met.
+# so many iterations at most where that is met. Each time that the next start is not better by STOOD these were too few, and
+# become twice as many, up to LONGEST_WARM.
 WARM, WARM_LEAST, MOST_WARM = 0.05, 1e-3, 10
+STOOD, LONGEST_WARM = 0.2, 40
 # A nonsymmetric iteration whose residual does not fall to this part in so many iterations stands still for good.
 FALLS, STANDING = 0.99, 40
 # Smaller contrasts of materials are taken for none.
@@ -101,6 +103,11 @@ class Multigrid:
         self.corner_functions: csr_array | None = None
         self.work = 0
         self.allowed: int | None = None
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget how warm the starts of the last load step were."""
+        self._most_warm, self._cut_short = MOST_WARM, np.inf
 
     @property
     def nbytes(self) -> int:
@@ -294,10 +301,15 @@ class Multigrid:
         It may meet the tolerance while the forces of a small contact are not right yet.
         """
         made, wanted = 0, max(min(enough, WARM * iteration.norm, aim), WARM_LEAST * enough)
+        begun = iteration.norm
+        if begun > STOOD * self._cut_short:
+            self._most_warm = min(2 * self._most_warm, LONGEST_WARM)
+        self._cut_short = np.inf
         least, fallen = iteration.norm, 0  # the residual when it last fell, and the iterations until then
         while iteration.norm > wanted:
             done = iteration.norm <= enough
-            if done and made >= MOST_WARM:
+            if done and made >= self._most_warm:
+                self._cut_short = begun
                 return
             stands = made - fallen >= STANDING
             if stands or made >= MAX_NONSYMMETRIC or not iteration.step(multiply, precondition):

@@ -82,6 +82,7 @@ class Amg(Multigrid, LinearSolver):
 
     def load(self, f: Array) -> Loaded:
         """Return the prepared matrix with right-hand side `f` (n,); work is allowed anew, see `affordable`."""
+        self.begin()
         self.allowed = self.work + self.affordable if self._may_factorise else None
         return _Loaded(self, f)
 
