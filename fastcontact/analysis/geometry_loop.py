@@ -147,7 +147,7 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
             watch.forget()
         elif moved.change <= tolerances.enough(update, moved.size):
             return settled
-        elif scatter := watch.seen(part, settled.force, moved.change, moved.size):
+        elif scatter := watch.seen(part, settled.force, moved.change, moved.size, tolerances.noise(moved.size)):
             _log_scatter(scatter, problem.criteria.geometry)
             return replace(settled, scatter=scatter)
         mixed = mixing.next(moved.before, part, solution, tolerances.inexact)

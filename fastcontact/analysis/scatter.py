@@ -3,7 +3,7 @@
 How much round-off there is depends on the condition of the stiffness and of the constraints, which nothing tells beforehand;
 the last displacements show it. An iteration that still converges, however slowly, goes on in one direction: over a window
 its displacements lie as far apart as all changes together. Round-off goes to and fro: they lie hardly farther apart than one
-change.
+change. So does what iterative linear solutions leave, of which is known how large it may be.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from fastcontact._jit.norms_kernels import largest, largest_difference
 Array = NDArray[np.float64]
 # Updates to look at, and how far apart their displacements may lie in units of the typical change: WINDOW in one direction.
 WINDOW, APART = 8, 4.0
+# Where changes may be what linear solutions leave, fewer will do, closer together: 3 in one direction.
+SHORT_WINDOW, CLOSE = 4, 2.0
 # What may scatter at most: displacements relative to the largest one, nodal contact forces relative to the largest one.
 DISPLACEMENT, FORCE = 1e-6, 1e-5
 # Changes that become smaller than this part of those at the beginning of the window still converge.
@@ -48,7 +50,7 @@ class Watch:
         self._forces: list[Array] = []
         self._changes: list[float] = []
 
-    def seen(self, part: Array, force: Array, change: float, size: float) -> Scatter | None:
+    def seen(self, part: Array, force: Array, change: float, size: float, noise: float = 0.0) -> Scatter | None:
         """Take the displacements `part` (k,) [length] and contact forces (n,) [force] of an update; return their scatter.
 
         Parameters
@@ -58,6 +60,8 @@ class Watch:
             By how much the displacements differ from those before [length].
         size : float
             Of the displacements [length].
+        noise : float
+            Changes up to this may be what an iterative linear solver leaves [length].
 
         Returns
         -------
@@ -71,12 +75,14 @@ class Watch:
         self._forces.append(force.copy())
         self._changes.append(change)
         del self._parts[:-WINDOW], self._forces[:-WINDOW], self._changes[:-WINDOW]
-        if len(self._changes) < WINDOW:
+        last = self._changes[-SHORT_WINDOW:]
+        window, apart = (SHORT_WINDOW, CLOSE) if max(last) <= noise else (WINDOW, APART)
+        if len(self._changes) < window:
             return None
-        found = Scatter(_apart(self._parts) / size, _apart(self._forces) / (largest(force) or 1.0))
-        typical, half = float(np.median(self._changes)), WINDOW // 2
-        declining = np.median(self._changes[half:]) < DECLINE * np.median(self._changes[:half])
-        if declining or found.displacement * size > APART * typical:
+        changes, half = self._changes[-window:], window // 2
+        found = Scatter(_apart(self._parts[-window:]) / size, _apart(self._forces[-window:]) / (largest(force) or 1.0))
+        declining = np.median(changes[half:]) < DECLINE * np.median(changes[:half])
+        if declining or found.displacement * size > apart * float(np.median(changes)):
             return None
         return found if found.displacement <= DISPLACEMENT and found.force <= FORCE else None
 

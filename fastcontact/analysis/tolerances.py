@@ -18,6 +18,11 @@ INEXACT_NEWTON_STEPS = 3
 PATIENT_UPDATES = 25
 
 
+# Changes of the displacement, in units of an iterative solver's tolerance, that its solutions alone may make beside what is
+# much stiffer.
+LEFT = 1e3
+
+
 class Tolerances:
     """The tolerances of a load step.
 
@@ -76,6 +81,10 @@ class Tolerances:
             max_iterations=limit,
             max_newton_steps=1 if limit == 1 else INEXACT_NEWTON_STEPS if self.inexact else None,
         )
+
+    def noise(self, size: float) -> float:
+        """Return which changes of the displacement, whose size is given, linear solutions alone may make [length]."""
+        return LEFT * self._solver.tolerance * size if self._solver.iterative else 0.0
 
     def enough(self, update: int, size: float) -> float:
         """Return the change of the displacement, whose size is given, below which the geometry has settled [length]."""

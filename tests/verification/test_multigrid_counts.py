@@ -186,6 +186,19 @@ def test_friction_of_nearly_incompressible_bodies_is_paired_as_often_as_that_of_
     assert found["residual"] < 1e-6
 
 
+@pytest.mark.filterwarnings("ignore:Young's moduli")
+@pytest.mark.parametrize(
+    ("given", "most", "pairings"), [({"element": "tet10", "ratio": 1e-4}, 22.0, 20), ({"nu": 0.499}, 3.0, 11)]
+)
+def test_warm_starts_go_on_to_what_is_right_for_what_is_soft(given, most, pairings):
+    robustness = suite("subjects").load("robustness")
+    found = robustness.figures(robustness.blocks(6 if "element" in given else 12, 0.3, **given))
+    assert not found["gave_up"]
+    assert found["pairings"] <= pairings
+    assert found["step"]["iterations"] <= most * found["linear"]["iterations"]
+    assert found["residual"] < 1e-6
+
+
 @pytest.mark.parametrize("ball", [False, True])
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_iterations_on_rigid_obstacles_are_a_few_times_those_without_contact(ball, friction):

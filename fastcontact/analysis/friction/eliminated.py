@@ -37,6 +37,10 @@ SOFTER, MILD = 0.2, 10.0
 # The residual of the friction law that is small enough, in units of that of the linear solutions; and that which will do
 # after PATIENCE steps: contact forces that are a small part of all forces are no more accurate.
 ENOUGH, ACCEPTABLE, PATIENCE = 10.0, 300.0, 12
+# Where Newton's method goes on to the end, its steps are no more accurate than so much of the residual of the friction law,
+# but LOOSEST at least: slips that hardly move get other directions from looser ones. Where that is less than LOOSER times the
+# accuracy of the last step, there is nothing to gain. The last step is exact.
+FORCING, LOOSEST, LOOSER = 0.03, 1e-3, 1e3
 
 
 def solve(
@@ -64,7 +68,7 @@ def solve(
         Forces to start from [force].
     """
     tolerance, steps = accuracy.residual or 0.0, accuracy.max_newton_steps
-    problem = Eliminated(loaded, constraints, u, tolerance)
+    problem = Eliminated(loaded, constraints, u, tolerance, inexact=steps is None)
     y, gaps = problem.start(forces)
     try:
         if forces is None or not forces.any():
@@ -79,6 +83,9 @@ def solve(
             y, gaps = problem.step(y, gaps, gaps[0] < 0.0, gaps[0] < 0.0)
         exact = max(EXACT, ENOUGH * tolerance)
         found = newton(problem, y, gaps, exact, PATIENCE if steps is None else steps - 1)
+        if problem.finish():
+            y, gaps = problem.step(found.y, found.gaps, found.closed, found.sticking)
+            found = newton(problem, y, gaps, exact, PATIENCE)
         if steps is None and not found.settled:
             if found.residual > ACCEPTABLE * tolerance:
                 found = newton(problem, found.y, found.gaps, exact)
@@ -103,10 +110,13 @@ class Eliminated:
         Forces that it led to, scaled.
     """
 
-    def __init__(self, loaded: LoadedNonsymmetric, constraints: Constraints, u: Array, tolerance: float) -> None:
+    def __init__(
+        self, loaded: LoadedNonsymmetric, constraints: Constraints, u: Array, tolerance: float, inexact: bool
+    ) -> None:
         usable, mu = constraints.usable, constraints.coefficients
         rows, free = (constraints.B, *constraints.tangents), constraints.gaps_at_rest()
         self._loaded, self._usable, self._tolerance = loaded, usable, tolerance
+        self._inexact, self._last = inexact, tolerance
         self._nodes = np.arange(len(constraints)) if constraints.nodes is None else constraints.nodes
         k, m = len(rows) - 1, len(constraints)
         yielding = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
@@ -176,7 +186,8 @@ class Eliminated:
         drag = self._drag(B, shut, sliding) if len(sliding.at) else None
         nodes = self._nodes[np.concatenate(equations)]
         C = np.concatenate([gives[at] for gives, at in zip(self._gives, equations, strict=True)])
-        u, multiplier = self._loaded.solve_nonsymmetric(B, c, nodes, self.u, self._tolerance, drag, C)
+        self._last = self._accuracy(y, gaps)
+        u, multiplier = self._loaded.solve_nonsymmetric(B, c, nodes, self.u, self._last, drag, C)
         new, first = np.zeros_like(y), 0
         for own, at in zip(new, equations, strict=True):
             own[at] = multiplier[first : first + len(at)]
@@ -184,6 +195,20 @@ class Eliminated:
         new[1:, sliding.at] += sliding.force(new[0, sliding.at], u)
         self.u, self.reached = u, new / self._unit
         return self.reached, self._scaled(self._gaps(u, new))
+
+    def _accuracy(self, y: Array, gaps: Array) -> float:
+        """Return the relative residual of the linear solution of a step from forces `y` and `gaps`, see FORCING."""
+        if not self._inexact:
+            return self._tolerance
+        size = float(np.abs(y).max(initial=0.0))
+        off = float(np.abs(self.law.residual(y, gaps)).max(initial=0.0))
+        worth = min(FORCING * off / size, LOOSEST) if size else LOOSEST
+        return worth if worth > LOOSER * self._tolerance else self._tolerance
+
+    def finish(self) -> bool:
+        """Let further steps be exact; return whether the last one was not."""
+        self._inexact = False
+        return self._last > self._tolerance
 
     def _sliding(self, y: Array, gaps: Array, at: NDArray[np.intp]) -> _Sliding:
         """Return what the constraints `at` (q,) do that slide."""

@@ -65,6 +65,8 @@ def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[I
         return pivots, inverse_of(B, pivots, size)
     if nodes is not None and (pivots := of_nodes(B, nodes, size)) is not None:
         return pivots, inverse_of(B, pivots, size)
+    if nodes is not None and (pivots := of_most_groups(B, nodes)) is not None:
+        return pivots, inverse_of(B, pivots, size)
     pivots = assigned(B)
     return pivots, inverse_of(B, pivots, size)
 
@@ -81,20 +83,22 @@ def inverse_of(B: csr_array, pivots: Indices, size: int) -> csr_array | CoupledP
     label = connected_components(P, directed=False)[1]
     largest = np.bincount(label).max(initial=0)
     if largest > LARGEST_BLOCK:
-        if (found := _triangular_inverse(P)) is not None:
+        if (found := _triangular_inverse(P, LARGEST_BLOCK, MOST_LAYERS)) is not None:
             return found
         try:
             return CoupledPivots(P, pivots, size)
         except CoupledError:
+            if (found := _triangular_inverse(P, FULL_UP_TO, 2 * MOST_LAYERS)) is not None:
+                return found
             if largest > FULL_UP_TO:
                 raise
     return block_inverse(P)
 
 
-def _triangular_inverse(P: csr_array) -> csr_array | None:
-    """Return the inverse of a matrix of small blocks on its diagonal, coupled in few layers; None where it is not so."""
+def _triangular_inverse(P: csr_array, largest: int, layers: int) -> csr_array | None:
+    """Return the inverse of a matrix of blocks on its diagonal, at most so large, in so many layers; None for others."""
     label = connected_components(P, connection="strong")[1]
-    if np.bincount(label).max() > LARGEST_BLOCK:
+    if np.bincount(label).max() > largest:
         return None
     inside = np.repeat(label, np.diff(P.indptr)) == label[P.indices]
     diagonal, beyond = (
@@ -103,7 +107,7 @@ def _triangular_inverse(P: csr_array) -> csr_array | None:
     )
     diagonal.eliminate_zeros()
     beyond.eliminate_zeros()
-    return _layered_inverse(block_inverse(diagonal), beyond)
+    return _layered_inverse(block_inverse(diagonal), beyond, layers)
 
 
 def of_groups(B: csr_array, groups: Indices, layers: int = MOST_LAYERS) -> Indices | None:
@@ -111,6 +115,32 @@ def of_groups(B: csr_array, groups: Indices, layers: int = MOST_LAYERS) -> Indic
 
     In so many layers at most: unknowns of a group alone are those that no other group of its own and later layers has.
     """
+    pivots = _in_layers(B, groups, layers)
+    return pivots if (pivots >= 0).all() else None
+
+
+def of_most_groups(B: csr_array, groups: Indices) -> Indices | None:
+    """Return the unknown (m,) of each row: as `of_groups` where there are enough, assigned to the other rows by themselves.
+
+    Such are slips where a support holds the node, but not what it sticks to: they have no unknowns of their own. None where
+    all rows are of that kind, or too many.
+    """
+    pivots = _in_layers(B, groups, MOST_LAYERS)
+    left = np.flatnonzero(pivots < 0)
+    if len(left) == len(pivots):
+        return None
+    # Unknowns of earlier layers are none of theirs. Rows of a group that has too few may still have one of their own.
+    pivots[left] = _in_layers(csr_array(B[left]), np.arange(len(left)), layers=1)
+    left = left[pivots[left] < 0]
+    if len(left) > DENSE_UP_TO:
+        return None
+    if len(left):
+        pivots[left] = assigned(csr_array(B[left]))
+    return pivots
+
+
+def _in_layers(B: csr_array, groups: Indices, layers: int) -> Indices:
+    """Return the unknown (m,) of each row in so many layers, see `of_groups`; -1 where there is none."""
     m, n = B.shape
     group, row = np.unique(groups, return_inverse=True)[1], np.repeat(np.arange(m), np.diff(B.indptr))
     pivots = np.full(m, -1, np.intp)
@@ -120,12 +150,10 @@ def of_groups(B: csr_array, groups: Indices, layers: int = MOST_LAYERS) -> Indic
         np.minimum.at(lowest, B.indices[among], group[row[among]])
         np.maximum.at(highest, B.indices[among], group[row[among]])
         found = _pivots_in_groups(B, group, among & (lowest[B.indices] == highest[B.indices]))
-        if not (found >= 0).any():
-            return None
         pivots = np.where(pivots < 0, found, pivots)
-        if (pivots >= 0).all():
-            return pivots
-    return None
+        if (pivots >= 0).all() or not (found >= 0).any():
+            break
+    return pivots
 
 
 def of_nodes(B: csr_array, nodes: Indices, size: int) -> Indices | None:
@@ -209,18 +237,18 @@ def layered(B: csr_array, smallest: float = SMALLEST, layers: int = MOST_LAYERS)
             P = csr_array(B[:, pivots])
             beyond = csr_array(P - diags_array(P.diagonal(), format="csr"))
             beyond.eliminate_zeros()
-            inverse = _layered_inverse(csr_array(diags_array(1.0 / P.diagonal(), format="csr")), beyond)
+            inverse = _layered_inverse(csr_array(diags_array(1.0 / P.diagonal(), format="csr")), beyond, layers)
             return None if inverse is None else (pivots, inverse)
     return None
 
 
-def _layered_inverse(inner: csr_array, beyond: csr_array) -> csr_array | None:
+def _layered_inverse(inner: csr_array, beyond: csr_array, layers: int) -> csr_array | None:
     """Return the inverse of a matrix that couples every row to deeper layers only: a finite Neumann series.
 
-    `inner` is the inverse of what couples no layers, `beyond` what does. None where there are more than MOST_LAYERS.
+    `inner` is the inverse of what couples no layers, `beyond` what does. None where there are more than so many `layers`.
     """
     total = term = inner
-    for _ in range(MOST_LAYERS):
+    for _ in range(layers):
         term = csr_array(-(inner @ beyond @ term))
         if not term.nnz:
             return total

@@ -44,11 +44,15 @@ WATCH_EVERY = 2
 WATCH_CONTRAST_FROM = 6
 # Equations with the same pivots whose weights differ by less than this share a hierarchy.
 ALIKE = 0.02
+# What a change of the hierarchy costs, the elimination of its equations included, in iterations.
+CHANGE = 15
 # Residuals that fall by less are taken to fall by this.
 SLOWEST = 0.999
 # A warm start of a nonsymmetric solution is improved by this factor, but not to less than this part of its tolerance, and by
-# so many iterations at most where that is met.
+# so many iterations at most where that is met. Each time that the next start is not better by STOOD these were too few, and
+# become twice as many, up to LONGEST_WARM.
 WARM, WARM_LEAST, MOST_WARM = 0.05, 1e-3, 10
+STOOD, LONGEST_WARM = 0.2, 40
 # A nonsymmetric iteration whose residual does not fall to this part in so many iterations stands still for good.
 FALLS, STANDING = 0.99, 40
 # Smaller contrasts of materials are taken for none.
@@ -59,6 +63,10 @@ RAISE, RAISES = 1.3, 4
 
 class StallError(ConvergenceError):
     """The iteration does not reach its tolerance."""
+
+
+class TooManyIterationsError(StallError):
+    """The work done so far costs more than another way of solving."""
 
 
 class Multigrid:
@@ -75,6 +83,10 @@ class Multigrid:
     ----------
     contrast, corner_functions
         See `LinearSolver`.
+    work : int
+        Iterations so far, and changes of the hierarchy in units of them.
+    allowed : int, optional
+        Up to which work; None for any.
 
     Raises
     ------
@@ -89,6 +101,13 @@ class Multigrid:
         self.counters = Counters()
         self.contrast = 1.0
         self.corner_functions: csr_array | None = None
+        self.work = 0
+        self.allowed: int | None = None
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget how warm the starts of the last load step were."""
+        self._most_warm, self._cut_short = MOST_WARM, np.inf
 
     @property
     def nbytes(self) -> int:
@@ -141,6 +160,7 @@ class Multigrid:
             if not (alike and _alike(sparse, self._hierarchy_equations)):
                 self._constrained.constrain(sparse, None if springs is None else springs.scaled(self.K.unit))
                 self._hierarchy_equations, self._hierarchy_springs = sparse, springs
+                self._worked(CHANGE)
             gives = elimination is not None and elimination.compliance is not None
             self._reduced = Reduced(self.K, elimination, springs, self.diagonal() if gives else None)
 
@@ -189,7 +209,7 @@ class Multigrid:
                     break
             if cg.step(self._reduced.multiply, self.precondition):
                 made += 1
-                self.counters.iterations += 1
+                self._count()
             else:
                 raised += 1
                 self._strengthen(raised)
@@ -281,10 +301,15 @@ class Multigrid:
         It may meet the tolerance while the forces of a small contact are not right yet.
         """
         made, wanted = 0, max(min(enough, WARM * iteration.norm, aim), WARM_LEAST * enough)
+        begun = iteration.norm
+        if begun > STOOD * self._cut_short:
+            self._most_warm = min(2 * self._most_warm, LONGEST_WARM)
+        self._cut_short = np.inf
         least, fallen = iteration.norm, 0  # the residual when it last fell, and the iterations until then
         while iteration.norm > wanted:
             done = iteration.norm <= enough
-            if done and made >= MOST_WARM:
+            if done and made >= self._most_warm:
+                self._cut_short = begun
                 return
             stands = made - fallen >= STANDING
             if stands or made >= MAX_NONSYMMETRIC or not iteration.step(multiply, precondition):
@@ -293,9 +318,18 @@ class Multigrid:
                 left = iteration.norm / enough
                 raise StallError(f"conjugate residuals stand at {left:.1e} times the tolerance after {made} iterations")
             made += 1
-            self.counters.iterations += 1
+            self._count()
             if iteration.norm < FALLS * least:
                 least, fallen = iteration.norm, made
+
+    def _count(self) -> None:
+        self.counters.iterations += 1
+        self._worked(1)
+
+    def _worked(self, iterations: int) -> None:
+        self.work += iterations
+        if self.allowed is not None and self.work > self.allowed:
+            raise TooManyIterationsError("the work allowed is done")
 
     def diagonal(self) -> Array:
         """Return the diagonal (n,) of K."""

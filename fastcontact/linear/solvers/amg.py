@@ -2,8 +2,8 @@
 
 Equations ``B u = c`` are eliminated, see `multigrid.solver`, also those with a diagonal compliance, see `multigrid.loaded`.
 Those with a full one cannot be: they go through columns of K^-1, one solution each, kept for the whole analysis. Where those
-would be many, or the iteration stalls, on thin or nearly incompressible parts, a factorisation replaces it for the rest of
-the analysis, if the matrix is not too large.
+would be many, or the iteration stalls, on thin or nearly incompressible parts, or a load step has taken more work than
+a factorisation, a factorisation replaces it for the rest of the analysis, if the matrix is not too large.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.flexibility import TooManyColumnsError
 from fastcontact.linear.lower_tolerance import tighten
 from fastcontact.linear.multigrid.loaded import LoadedMultigrid
-from fastcontact.linear.multigrid.solver import Multigrid, StallError
+from fastcontact.linear.multigrid.solver import Multigrid, StallError, TooManyIterationsError
 from fastcontact.linear.protocol import FrictionTerms, LinearSolver, Loaded, Product
 from fastcontact.linear.solvers.direct import Direct
 from fastcontact.linear.springs import Springs
@@ -34,6 +34,10 @@ FACTORS_UP_TO = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
 # Equations that stiffen a node by more than this leave the softer body too little of multigrid's tolerance; coupled ones,
 # whose weights are nearly right only, take hundreds of iterations from the second on.
 STIFFENED, STIFFENED_COUPLED = 3e4, 6.0
+# Work in one load step, in iterations, from which on factors are cheaper for certain: so much, and so much for each unknown,
+# by the number of components of a displacement. In 3D a factorisation and a step by it cost 300 and 0.04 where two bodies
+# touch, three times as much in stacks with friction (measured, see bench/README.md).
+COST, COST_OF_UNKNOWN = 1000, {1: 0.0, 2: 0.0, 3: 0.08}
 # Where forces stay out of balance, the tolerance is lowered down to this; round-off leaves little below it.
 TIGHT = 1e-12
 
@@ -77,8 +81,16 @@ class Amg(Multigrid, LinearSolver):
         return self.K if release else K
 
     def load(self, f: Array) -> Loaded:
-        """Return the prepared matrix with right-hand side `f` (n,)."""
+        """Return the prepared matrix with right-hand side `f` (n,); work is allowed anew, see `affordable`."""
+        self.begin()
+        self.allowed = self.work + self.affordable if self._may_factorise else None
         return _Loaded(self, f)
+
+    @property
+    def affordable(self) -> int:
+        """How many iterations cost more than a factorisation and a load step by it."""
+        n, size = self.K.shape[0], self.K.blocksize[0]
+        return COST + int(COST_OF_UNKNOWN[size] * n)
 
     def improve(self, excess: float) -> bool:
         """See `LinearSolver.improve`: lower the tolerance, or let factors take over where round-off is near."""
@@ -111,10 +123,10 @@ class Amg(Multigrid, LinearSolver):
 
     def remember(self, memory: dict[str, Any]) -> None:
         """See `LinearSolver.remember`."""
-        self.tolerance = memory.get("tolerance", self.tolerance)
         if memory.get("instead"):
             self._factorise(memory["instead"]["why"]).remember(memory["instead"])
             return
+        self.tolerance = memory.get("tolerance", self.tolerance)
         if memory["precision"] != self.precision:
             self.build_in(memory["precision"])
         self.columns.ask_again(memory["asked"])
@@ -149,7 +161,14 @@ class Amg(Multigrid, LinearSolver):
         """
         if not self._may_factorise:
             raise stalled
-        self._factorise(f"multigrid gave up and factors took over, which cost more time and memory: {stalled}")
+        if isinstance(stalled, TooManyIterationsError):
+            why = (
+                f"multigrid gave up and factors took over, which cost more memory: the work of {self.affordable} iterations "
+                f"in one load step takes longer than a factorisation of {self.K.shape[0]} unknowns"
+            )
+        else:
+            why = f"multigrid gave up and factors took over, which cost more time and memory: {stalled}"
+        self._factorise(why)
 
     @property
     def _may_factorise(self) -> bool:
@@ -160,6 +179,9 @@ class Amg(Multigrid, LinearSolver):
         self.gave_up, self.instead = why, Direct()
         self.instead.counters = self.counters
         self.instead.prepare(self.K.restored(), self._modes.astype(float), self._involved)
+        # What is asked of later solutions is what factors give.
+        self.asked = self.tolerance if self.asked is None else self.asked
+        self.tolerance, self.error = self.instead.tolerance, self.instead.error
         return self.instead
 
 

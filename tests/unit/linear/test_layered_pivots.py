@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from fastcontact.linear.elimination.pivot_order import chosen, inverse_of, layered, of_groups
+from fastcontact.linear.elimination.coupled_pivots import CoupledPivots
+from fastcontact.linear.elimination.pivot_order import chosen, inverse_of, layered, of_groups, of_most_groups
 
 
 def in_layers(seed, sizes=(5, 4, 3), n_others=6):
@@ -86,3 +87,28 @@ def test_a_chain_of_more_layers_is_no_sum_of_few_products():
     inverse = inverse_of(B, np.arange(m), 1)
     assert not isinstance(inverse, csr_array)
     assert inverse.solve(B @ np.ones(m)) == pytest.approx(np.ones(m))
+
+
+def held_along_a_line(n):
+    """Equations of n nodes in a row, two each: gaps with an own unknown, and slips that only move three nodes opposite."""
+    B = np.zeros((2 * n, n + 2 * (n + 2)))
+    for i in range(n):
+        B[2 * i, i] = 1.0
+        B[2 * i, n + i : n + i + 3] = -0.2, -0.6, -0.2
+        B[2 * i + 1, 2 * n + 2 + i : 2 * n + 5 + i] = -0.25, -0.5, -0.25
+    return csr_array(B), np.repeat(np.arange(n), 2)
+
+
+@pytest.mark.parametrize("n", [20, 300])
+def test_equations_without_unknowns_of_their_own_leave_those_of_the_others_alone(n):
+    """Slips of nodes that a support holds, but not what they stick to."""
+    B, nodes = held_along_a_line(n)
+    assert of_groups(B, nodes) is None
+    gaps, slips = np.arange(0, 2 * n, 2), np.arange(1, 2 * n, 2)
+    pivots = of_most_groups(B, nodes)
+    assert (pivots[gaps] < 2 * n + 2).all()
+    assert (pivots[slips] >= 2 * n + 2).all()
+    pivots, inverse = chosen(B, nodes, 1)
+    P = B[:, pivots].toarray()
+    inverted = inverse.solve(P) if isinstance(inverse, CoupledPivots) else inverse.toarray() @ P
+    assert inverted == pytest.approx(np.eye(2 * n), abs=1e-8)

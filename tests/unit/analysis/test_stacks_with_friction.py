@@ -1,0 +1,60 @@
+"""Stacks of blocks with friction by multigrid: bodies in the middle are held by contact alone."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.analysis.load_step import load_step
+from fastcontact.analysis.problem import prepare
+
+
+def stack(element, divisions, friction=0.3):
+    """Blocks that do not match, those in the middle a little smaller and held along x and y by one side each."""
+    parts = []
+    for level, n in enumerate(divisions):
+        width = 1.0 if level % 2 == 0 else 0.9
+        mesh = fc.generate.box((width, width, 0.5), (n, n, n // 2), element, (0.0, 0.03 * level, 0.5 * level))
+        parts.append(fc.generate.renamed(mesh, {group: f"B{level}_{group}" for group in mesh.group_names}))
+    model = fc.Model(fc.generate.union(*parts), "3d")
+    model.add_material(fc.LinearElastic(1.0, 0.3))
+    model.fix("B0_ZMIN", "xyz")
+    top = len(divisions) - 1
+    model.prescribe(f"B{top}_ZMAX", x=0.01, y=0.0, z=-0.01)
+    for level in range(1, top):
+        model.fix(f"B{level}_YMIN", "y")
+        model.fix(f"B{level}_XMIN", "x")
+    for level in range(top):
+        secondary, primary = f"B{level + 1}_ZMIN", f"B{level}_ZMAX"
+        options = {"formulation": "mortar", "multipliers": "dual", "friction": friction}
+        model.add_contact(f"c{level}", secondary=secondary, primary=primary, **options)
+    return model
+
+
+def solved(model, name):
+    problem = prepare(model, fc.linear_ramp(1), fc.Criteria(), linear_solver=name)
+    return problem.solver, load_step(problem, problem.initial_state(), 1, 1.0)[1]
+
+
+# Exact solutions in each step of Newton's method took 418, 851 and 1017 iterations.
+@pytest.mark.parametrize(("element", "divisions", "most"), [("hex8", (4, 5, 4), 300), ("hex20", (3, 4, 3), 620)])
+def test_newtons_method_solves_no_more_exactly_than_the_friction_law_holds(element, divisions, most):
+    model = stack(element, divisions)
+    solver, found = solved(model, "amg")
+    assert not solver.gave_up
+    assert solver.counters.iterations <= most
+    exact = solved(model, "direct")[1]
+    size = np.abs(exact.displacement).max()
+    assert found.displacement == pytest.approx(exact.displacement, abs=1e-8 * size)
+    for name, contact in exact.contact.items():
+        force = found.contact[name].force_vectors
+        assert force == pytest.approx(contact.force_vectors, abs=1e-7 * np.abs(contact.force_vectors).max())
+
+
+@pytest.mark.slow
+def test_slips_of_nodes_that_a_support_holds_alone_are_eliminated_on_quadratic_facets(monkeypatch):
+    """They have no unknowns of their own, and left no order for all others: 2 372 columns of the inverse, by factors."""
+    monkeypatch.setattr("fastcontact.linear.solvers.amg.COST", 100_000)
+    solver, _ = solved(stack("tet10", (6, 8, 6)), "amg")
+    assert not solver.gave_up
+    assert not solver.columns.asked
+    assert solver.counters.iterations <= 800
