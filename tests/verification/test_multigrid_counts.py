@@ -182,7 +182,7 @@ def test_friction_of_nearly_incompressible_bodies_is_paired_as_often_as_that_of_
     found = robustness.figures(robustness.blocks(12, 0.3, nu=nu))
     assert not found["gave_up"]
     assert found["pairings"] <= most
-    assert found["step"]["iterations"] <= 2.2 * found["linear"]["iterations"]
+    assert found["step"]["iterations"] <= 2.5 * found["linear"]["iterations"]
     assert found["residual"] < 1e-6
 
 

@@ -6,6 +6,7 @@ problem a little and go on.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 
 import numpy as np
@@ -18,8 +19,10 @@ Array = NDArray[np.float64]
 # given the 2-norm of r.
 Multiply = Callable[[Array, Array], None]
 Precondition = Callable[[Array, float, Array], None]
-# Search directions of conjugate residuals that a new one is made orthogonal to; older ones are forgotten.
-KEPT = 20
+# Search directions of conjugate residuals that a new one is made orthogonal to; older ones are forgotten. Where so many
+# iterations leave more of the residual than SLOWLY, as many more are kept, up to MOST_KEPT: friction of nearly incompressible
+# bodies stands still without them; elsewhere they cost more than they save.
+KEPT, SLOWLY, MOST_KEPT = 20, 0.1, 100
 # A step of conjugate residuals that leaves more of the residual than this is lost.
 LOST = 0.98
 
@@ -104,37 +107,40 @@ class ConjugateResiduals(Iteration):
     """Preconditioned generalised conjugate residuals, truncated (Eisenstat, Elman and Schultz, 1983); see `Iteration`.
 
     For matrices that are not symmetric. Every iteration makes the residual as small as the directions kept allow, so it
-    never grows; the preconditioner may vary. Room for directions is made as they are needed.
+    never grows; the preconditioner may vary. Directions are few at first, and more wherever the residual falls slowly.
     """
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
         # Directions of unit image, and their images with the sign reversed: `advance` then serves to orthogonalise.
-        self._kept: list[tuple[Array, Array]] = []
-        self._made = 0
+        self._kept: deque[tuple[Array, Array]] = deque()
+        self._spare: list[tuple[Array, Array]] = []
+        self._room, self._made, self._before = KEPT, 0, 0.0
         self._lost = False  # the last step
 
     @property
     def nbytes(self) -> int:
         """Memory [bytes]."""
-        return (4 + 2 * len(self._kept)) * self.x.nbytes + self._sums.nbytes
+        return (4 + 2 * (len(self._kept) + len(self._spare))) * self.x.nbytes + self._sums.nbytes
 
     def start(self) -> None:
         """See `Iteration.start`."""
         super().start()
-        self._made, self._lost = 0, False
+        self._spare = [*self._spare, *self._kept][:KEPT]
+        self._kept.clear()
+        self._room, self._made, self._before = KEPT, 0, self.norm
+        self._lost = False
 
     def step(self, multiply: Multiply, precondition: Precondition) -> bool:
         """Make one iteration; return False where no direction is left that reduces the residual."""
         z, q, norm = self.z, self.q, self.norm
         if self._lost:
-            _, image = self._kept[(self._made - 1) % KEPT]
-            precondition(image, 1.0, z)
+            precondition(self._kept[-1][1], 1.0, z)
         else:
             precondition(self.r, norm, z)
         multiply(z, q)
         square = before = self.dot(q, q)
-        for direction, image in self._kept[: min(self._made, KEPT)]:
+        for direction, image in self._kept:
             square = krylov_kernels.advance(self.dot(q, image), direction, image, z, q, self._sums)
         if not square > np.finfo(float).eps ** 2 * before:
             return False
@@ -144,10 +150,16 @@ class ConjugateResiduals(Iteration):
         return True
 
     def _keep(self, z: Array, q: Array, size: float) -> None:
-        at = self._made % KEPT
-        if at == len(self._kept):
-            self._kept.append((np.empty_like(z), np.empty_like(q)))
-        direction, image = self._kept[at]
-        krylov_kernels.scaled(1.0 / size, z, direction)
-        krylov_kernels.scaled(-1.0 / size, q, image)
+        """Keep a direction and its image, of the norm `size`, in the place of the oldest one where there is no room."""
+        if len(self._kept) >= self._room:
+            pair = self._kept.popleft()
+        else:
+            pair = self._spare.pop() if self._spare else (np.empty_like(z), np.empty_like(q))
+        krylov_kernels.scaled(1.0 / size, z, pair[0])
+        krylov_kernels.scaled(-1.0 / size, q, pair[1])
+        self._kept.append(pair)
         self._made += 1
+        if self._made % KEPT == 0:
+            if self.norm > SLOWLY * self._before:
+                self._room = min(self._room + KEPT, MOST_KEPT)
+            self._before = self.norm

@@ -83,6 +83,8 @@ class Multigrid:
     ----------
     contrast, corner_functions
         See `LinearSolver`.
+    patience : int
+        Nonsymmetric iterations of one solution at most.
     work : int
         Iterations so far, and changes of the hierarchy in units of them.
     allowed : int, optional
@@ -101,7 +103,7 @@ class Multigrid:
         self.counters = Counters()
         self.contrast = 1.0
         self.corner_functions: csr_array | None = None
-        self.work = 0
+        self.patience, self.work = MAX_NONSYMMETRIC, 0
         self.allowed: int | None = None
         self.begin()
 
@@ -312,7 +314,7 @@ class Multigrid:
                 self._cut_short = begun
                 return
             stands = made - fallen >= STANDING
-            if stands or made >= MAX_NONSYMMETRIC or not iteration.step(multiply, precondition):
+            if stands or made >= self.patience or not iteration.step(multiply, precondition):
                 if done:
                     return
                 left = iteration.norm / enough

@@ -22,7 +22,13 @@ from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.flexibility import TooManyColumnsError
 from fastcontact.linear.lower_tolerance import tighten
 from fastcontact.linear.multigrid.loaded import LoadedMultigrid
-from fastcontact.linear.multigrid.solver import Multigrid, StallError, TooManyIterationsError
+from fastcontact.linear.multigrid.solver import (
+    MAX_ITERATIONS,
+    MAX_NONSYMMETRIC,
+    Multigrid,
+    StallError,
+    TooManyIterationsError,
+)
 from fastcontact.linear.protocol import FrictionTerms, LinearSolver, Loaded, Product
 from fastcontact.linear.solvers.direct import Direct
 from fastcontact.linear.springs import Springs
@@ -78,6 +84,7 @@ class Amg(Multigrid, LinearSolver):
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
         self.build(K, rigid_modes, release)
         self._involved, self.instead, self.gave_up = involved, None, ""
+        self.patience = MAX_NONSYMMETRIC if self._may_factorise else MAX_ITERATIONS
         return self.K if release else K
 
     def load(self, f: Array) -> Loaded:
@@ -145,10 +152,11 @@ class Amg(Multigrid, LinearSolver):
         """
         super().constrain(elimination, springs)
         coupled = elimination is not None and elimination.coupled is not None
-        if self._constrained.stiffening > (STIFFENED_COUPLED if coupled else STIFFENED) and self._may_factorise:
+        stiffening = self._constrained.stiffening
+        if stiffening > (STIFFENED_COUPLED if coupled else STIFFENED) and self._may_factorise:
             raise StallError(
-                f"contact makes nodes {self._constrained.stiffening:.1e} times as stiff as they are, where the secondary "
-                "side is much stiffer than the primary one: let the softer body be the secondary side"
+                f"contact makes nodes {stiffening:.1e} times as stiff as they are, where the secondary side is much stiffer "
+                "than the primary one: let the softer body be the secondary side"
             )
 
     def give_up(self, stalled: StallError | TooManyColumnsError) -> None:
