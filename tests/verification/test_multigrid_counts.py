@@ -177,15 +177,12 @@ def test_friction_beside_a_much_stiffer_secondary_side_is_not_solved_pairing_by_
 
 
 @pytest.mark.filterwarnings("ignore:Young's moduli")
-@pytest.mark.parametrize(
-    ("given", "most", "pairings"), [({"element": "tet10", "ratio": 1e-4}, 22.0, 20), ({"nu": 0.499}, 3.0, 11)]
-)
-def test_warm_starts_go_on_to_what_is_right_for_what_is_soft(given, most, pairings):
+def test_warm_starts_go_on_to_what_is_right_for_what_is_soft():
     robustness = suite("subjects").load("robustness")
-    found = robustness.figures(robustness.blocks(6 if "element" in given else 12, 0.3, **given))
+    found = robustness.figures(robustness.blocks(6, 0.3, element="tet10", ratio=1e-4))
     assert not found["gave_up"]
-    assert found["pairings"] <= pairings
-    assert found["step"]["iterations"] <= most * found["linear"]["iterations"]
+    assert found["pairings"] <= 20
+    assert found["step"]["iterations"] <= 22 * found["linear"]["iterations"]
     assert found["residual"] < 1e-6
 
 
