@@ -176,26 +176,23 @@ def test_friction_beside_a_much_stiffer_secondary_side_is_not_solved_pairing_by_
     assert found["residual"] < 1e-6
 
 
+@pytest.mark.filterwarnings("ignore:Young's moduli")
+def test_warm_starts_go_on_to_what_is_right_for_what_is_soft():
+    robustness = suite("subjects").load("robustness")
+    found = robustness.figures(robustness.blocks(6, 0.3, element="tet10", ratio=1e-4))
+    assert not found["gave_up"]
+    assert found["pairings"] <= 20
+    assert found["step"]["iterations"] <= 22 * found["linear"]["iterations"]
+    assert found["residual"] < 1e-6
+
+
 @pytest.mark.parametrize(("nu", "most"), [(0.49, 8), (0.499, 8), (0.4999, 9)])
 def test_friction_of_nearly_incompressible_bodies_is_paired_as_often_as_that_of_others(nu, most):
     robustness = suite("subjects").load("robustness")
     found = robustness.figures(robustness.blocks(12, 0.3, nu=nu))
     assert not found["gave_up"]
     assert found["pairings"] <= most
-    assert found["step"]["iterations"] <= 2.5 * found["linear"]["iterations"]
-    assert found["residual"] < 1e-6
-
-
-@pytest.mark.filterwarnings("ignore:Young's moduli")
-@pytest.mark.parametrize(
-    ("given", "most", "pairings"), [({"element": "tet10", "ratio": 1e-4}, 22.0, 20), ({"nu": 0.499}, 3.0, 11)]
-)
-def test_warm_starts_go_on_to_what_is_right_for_what_is_soft(given, most, pairings):
-    robustness = suite("subjects").load("robustness")
-    found = robustness.figures(robustness.blocks(6 if "element" in given else 12, 0.3, **given))
-    assert not found["gave_up"]
-    assert found["pairings"] <= pairings
-    assert found["step"]["iterations"] <= most * found["linear"]["iterations"]
+    assert found["step"]["iterations"] <= 2.2 * found["linear"]["iterations"]
     assert found["residual"] < 1e-6
 
 

@@ -49,8 +49,8 @@ CHANGE = 15
 # Residuals that fall by less are taken to fall by this.
 SLOWEST = 0.999
 # A warm start of a nonsymmetric solution is improved by this factor, but not to less than this part of its tolerance, and by
-# so many iterations at most where that is met. Each time that the next start is not better by STOOD these were too few, and
-# become twice as many, up to LONGEST_WARM.
+# so many iterations at most where that is met. Beside much stiffer pivots, each time that the next start is not better by
+# STOOD these were too few, and become twice as many, up to LONGEST_WARM.
 WARM, WARM_LEAST, MOST_WARM = 0.05, 1e-3, 10
 STOOD, LONGEST_WARM = 0.2, 40
 # A nonsymmetric iteration whose residual does not fall to this part in so many iterations stands still for good.
@@ -304,7 +304,7 @@ class Multigrid:
         """
         made, wanted = 0, max(min(enough, WARM * iteration.norm, aim), WARM_LEAST * enough)
         begun = iteration.norm
-        if begun > STOOD * self._cut_short:
+        if begun > STOOD * self._cut_short and self._constrained.stiffening > MILD:
             self._most_warm = min(2 * self._most_warm, LONGEST_WARM)
         self._cut_short = np.inf
         least, fallen = iteration.norm, 0  # the residual when it last fell, and the iterations until then
