@@ -17,8 +17,8 @@ from fastcontact.analysis.inequalities import StepContext, solve_inequalities
 from fastcontact.analysis.iterate import Iterate, initially_active, pair_surfaces
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.scatter import Scatter, Watch
-from fastcontact.analysis.shared_nodes import once, shared
-from fastcontact.analysis.solution import Solution
+from fastcontact.analysis.shared_nodes import SharedNodes
+from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.tolerances import PATIENT_UPDATES, Tolerances
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.errors import ConvergenceError
@@ -119,7 +119,10 @@ def settle_geometry(
     except ConvergenceError as error:
         error.history = error.history or iterate.history
         raise
-    return replace(settled, solution=shared(settled.solution, settled.constraints, settled.iterate.u))
+    nodes = SharedNodes.of(settled.constraints)
+    if nodes is None:
+        return settled
+    return replace(settled, solution=nodes.shared(settled.solution, settled.constraints, settled.iterate.u))
 
 
 def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, expected: float) -> SettledContact:
@@ -135,8 +138,7 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
         constraints = pair_surfaces(problem, step.state, step.load, iterate)
         active = initially_active(constraints, iterate, extrapolation if plan.extrapolate and update == 0 else None)
         accuracy = tolerances.accuracy(step.dofs.scale(iterate.u, step.load.lift), single)
-        apart = once(constraints)
-        solution, part = solve_inequalities(step, apart, iterate, active & apart.usable, accuracy)
+        solution, part = _solve_once(step, constraints, iterate, active, accuracy)
         moved = _move(step, iterate, constraints, solution, part)
         if not (solution.settled or single or tolerances.inexact):
             _raise_cycling(problem, constraints, solution, iterate)
@@ -163,6 +165,17 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
         raise ConvergenceError(geometry_moves(problem, iterate.history, changed, plan.limit), iterate.history)
     fixed = plan.limit and not problem.criteria.keep_pairing
     return SettledContact(constraints, solution, iterate, (plan.limit, moved.relative) if fixed else None)
+
+
+def _solve_once(
+    step: StepContext, constraints: StackedConstraints, iterate: Iterate, active: Mask, accuracy: Accuracy
+) -> tuple[Solution, Array]:
+    """Solve the inequalities of a pairing, those of nodes in several pairs once."""
+    nodes = SharedNodes.of(constraints)
+    if nodes is None:
+        return solve_inequalities(step, constraints, iterate, active & constraints.usable, accuracy)
+    once = nodes.once(constraints)
+    return solve_inequalities(step, once, iterate, nodes.closed(active) & once.usable, accuracy)
 
 
 @dataclass(frozen=True, eq=False)

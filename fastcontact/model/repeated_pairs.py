@@ -77,13 +77,14 @@ def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> lis
     """Return a warning for each two pairs whose sides go on in each other at common nodes, on both bodies.
 
     Each pair has a pressure of its own at such a node, and only the sum of both follows from the gap: it is spread over
-    the neighbours in a way that means nothing. Node-to-segment shares the force of a node by areas, which is right.
+    the neighbours in a way that means nothing. Node-to-segment shares the force of a node by areas, which is right where
+    both pairs have the same primary side; where that is cut, too, each pair faces a part of it alone.
     """
     texts = []
     for (one, ours), (other, theirs) in combinations(pairs, 2):
-        if {one.formulation, other.formulation} == {"node_to_segment"}:
-            continue
         if not isinstance(ours.primary, Surface) or not isinstance(theirs.primary, Surface):
+            continue
+        if {one.formulation, other.formulation} == {"node_to_segment"} and one.primary == other.primary:
             continue
         roles = ((theirs.secondary, theirs.primary), (theirs.primary, theirs.secondary))
         for secondary, primary in roles:

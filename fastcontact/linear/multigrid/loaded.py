@@ -100,7 +100,12 @@ class LoadedMultigrid(LoadedIteration):
             assert monitor is not None
             return monitor(u, parts.multiplier(u, multiplier, c), error)
 
-        u = solver.solution(f, elimination, guess, monitor and watch, tolerance, springs)
+        if parts.giving and self._functions is not None:
+            # Excesses at mid nodes are not eliminated here: conjugate gradients broke down, conjugate residuals go on.
+            start = np.zeros(len(f)) if guess is None else guess
+            u = solver.nonsymmetric_solution(f, elimination, springs, start, tolerance or solver.tolerance)
+        else:
+            u = solver.solution(f, elimination, guess, monitor and watch, tolerance, springs)
         return u, parts.multiplier(u, solver.multiplier(elimination, u, f, springs), c)
 
     def _solved_for_field(
@@ -192,6 +197,11 @@ class _Parts:
     def coupled(self) -> bool:
         """Whether equations eliminated have pivots in common."""
         return self.elimination is not None and self.elimination.coupled is not None
+
+    @property
+    def giving(self) -> bool:
+        """Whether equations eliminated give way."""
+        return self.elimination is not None and self.elimination.compliance is not None
 
     def pushed(self, f: Array, c: Array) -> Array:
         """Return forces f (n,) and those of the springs at u = 0."""

@@ -165,6 +165,8 @@ def test_splitting_does_no_harm_where_nodes_carry_forces(mesh):
     sides = ("CONT_UPPER_LEFT", "CONT_LOWER"), ("CONT_UPPER_RIGHT", "CONT_LOWER")
     assert not split(mesh, "node_to_segment", *sides)
     assert split(mesh, "mortar", *sides)
+    both = ("CONT_UPPER_LEFT", "CONT_LOWER_LEFT"), ("CONT_UPPER_RIGHT", "CONT_LOWER_RIGHT")
+    assert split(mesh, "node_to_segment", *both)
 
 
 @pytest.mark.parametrize("formulation", ["node_to_segment", "mortar"])
