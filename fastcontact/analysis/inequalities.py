@@ -69,16 +69,19 @@ def solve_inequalities(
     """
     if step.problem.unsupported_bodies is not None:
         return _with_unsupported_bodies(step, step.problem.unsupported_bodies, constraints, iterate, active, accuracy)
-    solution = _solve(step, constraints, iterate, active, accuracy, step.load.lift)
+    solution = _solve(step, constraints, iterate, active, accuracy, step.load.lift, iterate.u)
     return solution, step.dofs.displacement(solution.u, step.load.lift)
 
 
 def _solve(
-    step: StepContext, constraints: Constraints, iterate: Iterate, active: Mask, accuracy: Accuracy, lift: Array
-) -> Solution:
-    """Solve in the unknowns that supports and relations leave; `lift` (n_dofs,) is what they prescribe [length]."""
+    step: StepContext, constraints: Constraints, iterate: Iterate, active: Mask, accuracy: Accuracy, lift: Array, guess: Array
+) -> Solution:  # fmt: skip
+    """Solve in the unknowns that supports and relations leave.
+
+    `lift` (n_dofs,) is what they prescribe, `guess` (n_dofs,) are displacements to start from [length].
+    """
     own = constraints_on_unknowns(step.dofs, constraints, lift, step.state.u)
-    u = step.dofs.unknowns(iterate.u, lift)
+    u = step.dofs.unknowns(guess, lift)
     if not constraints.tangents:
         return active_set.solve(step.loaded, own, active, accuracy, u)
     from fastcontact.analysis.friction import solve as friction
@@ -97,12 +100,13 @@ def _with_unsupported_bodies(
 ) -> tuple[Solution, Array]:
     """Solve for bodies held by contact alone; return the solution and all displacements (n_dofs,)."""
     problem, state, lift = step.problem, step.state, step.load.lift
-    known = active
+    known, near = active, iterate.u
 
     def solve_at(position: Array) -> Solution:
-        nonlocal known
-        solution = _solve(step, constraints, iterate, known, accuracy, lift + bodies.rigid(position))
-        known = solution.wanted
+        nonlocal known, near
+        at = lift + bodies.rigid(position)
+        solution = _solve(step, constraints, iterate, known, accuracy, at, near)
+        known, near = solution.wanted, problem.system.displacement(solution.u, at)
         return solution
 
     start = iterate.u[bodies.dofs]
@@ -110,7 +114,10 @@ def _with_unsupported_bodies(
         moved = _approach(step, bodies, constraints, iterate.u)
         start = start if active.any() else start + moved
     noise = 10 * problem.solver.tolerance
-    found = bodies.settle(solve_at, start, state.largest_rigid_force, noise, state.gap_round_off)
+    found = bodies.settle(
+        solve_at, start, state.largest_rigid_force, noise, state.gap_round_off,
+        None if iterate.rigid is None else iterate.rigid.derivative,
+    )  # fmt: skip
     if found.state.settled and not found.slack:
         raise ConvergenceError(not_balanced(bodies, found, state.largest_rigid_force), iterate.history)
     iterate.rigid = found

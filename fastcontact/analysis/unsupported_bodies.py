@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 SLACK = 1e-12
 # What is left when nothing improves any more counts as slack below this fraction.
 STAGNANT = 1e-8
+# Where displacements are no more accurate, a step by a known derivative is still worth its one solution above this fraction.
+WORTH_A_STEP = 1e-10
 MAX_POSITIONS = 100
 # Lengths tried along one step.
 TRIALS = 20
@@ -56,6 +58,8 @@ class RigidPosition:
         Positions tried.
     slack : bool
         Whether the springs are slack.
+    derivative : ndarray (k, k), optional
+        Of the elongations by the position, there or nearby, if any was needed [-].
     """
 
     state: Solution
@@ -63,6 +67,7 @@ class RigidPosition:
     spring_force: Array
     positions: int
     slack: bool
+    derivative: Array | None = None
 
 
 class UnsupportedBodies:
@@ -145,9 +150,13 @@ class UnsupportedBodies:
         return [name for name, w in zip(self.names, work, strict=True) if w > 0.1 * work.max()]
 
     def settle(
-        self, solve_at: Callable[[Array], Solution], start: Array, load: float, noise: float, round_off: float
-    ) -> RigidPosition:
+        self, solve_at: Callable[[Array], Solution], start: Array, load: float, noise: float, round_off: float,
+        derivative: Array | None = None,
+    ) -> RigidPosition:  # fmt: skip
         """Find the position at which the springs are slack.
+
+        A derivative by differences costs a contact problem for each free motion. It is therefore kept as long as its steps
+        halve the elongations, and corrected by each of them (Broyden, 1965).
 
         Parameters
         ----------
@@ -160,6 +169,8 @@ class UnsupportedBodies:
             Accuracy of displacements, as a fraction of the largest one.
         round_off : float
             Accuracy of gaps [length].
+        derivative : ndarray (k, k), optional
+            Of the elongations by the position, at a similar one [-].
 
         Returns
         -------
@@ -169,25 +180,29 @@ class UnsupportedBodies:
         search = _Search(solve_at, self.dofs, start)
         noise *= float(np.abs(search.state.u).max())
 
-        def elongation(part: float) -> float:
-            return max(part * max(load, search.contact_force) / self.stiffness, noise)
+        def elongation(part: float, least: float = noise) -> float:
+            return max(part * max(load, search.contact_force) / self.stiffness, least)
 
         def tolerable() -> float:
             return max(elongation(STAGNANT), round_off)
 
-        derivative: Array | None = None
+        if derivative is not None and search.settled and elongation(WORTH_A_STEP, 0.0) < search.left <= noise:
+            search.move(_step(derivative, search.elongation), farther=False)
         while search.settled and search.left > elongation(SLACK) and search.positions < MAX_POSITIONS:
-            before = search.left
+            before, fresh = search.left, derivative is None
             if derivative is None:
                 derivative = search.differences(max(0.1 * search.left, 1e3 * noise, 1e3 * round_off))
-            search.move(_step(derivative, search.elongation), farther=search.left > tolerable())
-            if search.left > 0.1 * before:
-                derivative = None
-                if search.left >= 0.5 * before and search.left <= tolerable():
+            start, there = search.position, search.elongation
+            search.move(_step(derivative, there), farther=search.left > tolerable())
+            derivative = _corrected(derivative, search.position - start, search.elongation - there)
+            if search.left >= 0.5 * before:
+                if fresh and search.left <= tolerable():
                     break
+                derivative = None
         slack = search.settled and search.left <= tolerable()
         state = dataclasses.replace(search.unsettled or search.state, iterations=search.iterations)
-        return RigidPosition(state, search.position, self.stiffness * search.elongation, search.positions, slack)
+        force = self.stiffness * search.elongation
+        return RigidPosition(state, search.position, force, search.positions, slack, derivative)
 
 
 class _Search:
@@ -262,6 +277,12 @@ def _step(derivative: Array, elongation: Array) -> Array:
     step = -right[resisted].T @ ((left[:, resisted].T @ elongation) / values[resisted])
     free = right[~resisted]
     return np.asarray(step + free.T @ (free @ elongation))
+
+
+def _corrected(derivative: Array, moved: Array, change: Array) -> Array:
+    """Return the derivative (k, k) nearest to `derivative` that explains the `change` (k,) by a move (k,) (Broyden, 1965)."""
+    square = float(moved @ moved)
+    return derivative + np.outer(change - derivative @ moved, moved) / square if square else derivative
 
 
 def _spring_dofs(motions: Array, diagonal: Array, avoid: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -80,6 +80,93 @@ def test_what_nothing_resists_goes_as_far_as_something_does():
     assert search.position[0] == pytest.approx(1.0, abs=1e-5)
 
 
+def three_springs():
+    """Return bodies with three springs, and a smooth problem of theirs: elongations (3,) by the position, and its calls."""
+    bodies = UnsupportedBodies.__new__(UnsupportedBodies)
+    bodies.dofs, bodies.stiffness = np.arange(3), 1.0
+    matrix = np.array([[2.0, 0.5, 0.0], [0.5, 1.0, 0.2], [0.0, 0.2, 0.7]])
+    calls = []
+
+    def solve_at(position):
+        calls.append(position)
+        w = np.array([1.0, -0.5, 0.3]) - matrix @ position - 0.05 * position**3
+        return dataclasses.replace(solution(0.0), u=w)
+
+    return bodies, solve_at, calls
+
+
+def test_a_derivative_is_kept_and_corrected():
+    """One by differences, of three problems, is enough; with that of the last pairing none is needed."""
+    bodies, solve_at, calls = three_springs()
+    found = bodies.settle(solve_at, np.zeros(3), load=1.0, noise=0.0, round_off=0.0)
+    assert found.slack
+    assert len(calls) <= 1 + 3 + 8
+    calls.clear()
+    again = bodies.settle(solve_at, found.position + 1e-4, 1.0, 0.0, 0.0, found.derivative)
+    assert again.slack
+    np.testing.assert_allclose(again.position, found.position, rtol=0.0, atol=1e-11)
+    assert len(calls) <= 6
+    assert np.all(calls[1] != calls[0])  # a step: differences move one spring at a time
+
+
+def test_a_wrong_derivative_is_replaced():
+    bodies, solve_at, _ = three_springs()
+    exact = bodies.settle(solve_at, np.zeros(3), 1.0, 0.0, 0.0)
+    for wrong in (-1e3 * np.eye(3), np.eye(3), np.zeros((3, 3))):
+        found = bodies.settle(solve_at, np.zeros(3), 1.0, 0.0, 0.0, wrong)
+        assert found.slack
+        np.testing.assert_allclose(found.position, exact.position, rtol=0.0, atol=1e-11)
+
+
+def test_what_noise_hides_is_still_brought_down_by_a_known_derivative():
+    """A load of 1 and a spring that carries 1e-6 of it, below the noise of its elongation: one solution more."""
+    bodies, solve_at, _ = three_springs()
+    found = bodies.settle(solve_at, np.zeros(3), 1.0, 0.0, 0.0)
+
+    def beside_a_large_displacement(position):
+        return dataclasses.replace(solve_at(position), u=np.append(solve_at(position).u, 1.0))
+
+    nearby = found.position + 1e-6
+    before = bodies.settle(beside_a_large_displacement, nearby, 1.0, 1e-5, 0.0)
+    assert before.positions == 1
+    after = bodies.settle(beside_a_large_displacement, nearby, 1.0, 1e-5, 0.0, found.derivative)
+    assert after.positions == 2
+    assert np.abs(after.spring_force).max() < 0.1 * np.abs(before.spring_force).max()
+
+
+@pytest.mark.parametrize(
+    ("friction", "linear_solver", "most"),
+    [(0.0, "direct", 25), (0.0, "amg", 25), (0.3, "direct", 180), (0.3, "amg", 100)],
+)
+def test_plates_that_lie_loose_on_each_other_cost_few_solutions(friction, linear_solver, most):
+    """Three plates that do not match, pressed and sheared: differences once a step, and starts from the last position."""
+    sizes, divisions = ((8.0, 2.0), (6.0, 2.0), (7.0, 2.0)), ((6, 2), (5, 2), (7, 2))
+    plates, z = [], 0.0
+    for i, ((width, height), (n, k)) in enumerate(zip(sizes, divisions, strict=True)):
+        plate = fc.generate.box((width, width, height), (n, n, k), origin=(-width / 2, -width / 2, z))
+        plates.append(fc.generate.renamed(plate, {name: f"{name}{i}" for name in plate.group_names}))
+        z += height
+    model = fc.Model(fc.generate.union(*plates), "3d")
+    for i, E in enumerate((2e5, 1e4, 7e4)):
+        model.add_material(fc.LinearElastic(E, 0.3), groups=[f"BOX{i}"])
+    model.fix("ZMIN0", "xyz")
+    model.add_pressure("ZMAX2", 10.0)
+    for i in (1, 2):
+        model.add_contact(f"c{i}", secondary=f"ZMIN{i}", primary=f"ZMAX{i - 1}", friction=friction)
+        if not friction:
+            model.fix(f"XMIN{i}", "x")
+            model.fix(f"YMIN{i}", "y")
+    if friction:
+        model.add_traction("ZMAX2", x=1.0)
+    (step,) = fc.solve(model, 1, linear_solver=linear_solver)
+    for name in ("c1", "c2"):
+        force = step.contact[name].force
+        assert abs(force[2]) == pytest.approx(490.0, rel=1e-7)
+        if friction:
+            np.testing.assert_allclose(np.abs(force[:2]), [49.0, 0.0], rtol=1e-6, atol=1e-5)
+    assert step.iterations["active_set_iterations"] <= most
+
+
 @pytest.mark.parametrize("force", [0.0, 1e5])
 def test_slack_is_in_units_of_the_contact_forces(force):
     """Where motions drive the bodies there is no load: what round-off leaves is compared with what presses on them."""
