@@ -179,7 +179,7 @@ class PressureFieldFormulation(Formulation):
         In space, without friction, which would couple them along all directions, and where corners carry as much as others.
         """
         flat = self.points.shape[1] == 3 and self.secondary.order == 1
-        return flat and not self.friction and self.options.penalty is None
+        return flat and not self.friction
 
     def __post_init__(self) -> None:
         super().__post_init__()
