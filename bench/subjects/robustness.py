@@ -78,9 +78,8 @@ def made(given):
 
 def variations(divisions):
     """Return what is varied, as text and arguments of `blocks`."""
-    rows = [(f"mesh {n}", {"divisions": n}) for n in (*MESHES, divisions) if n in MESHES]
-    rows = [(text, given) for text, given in rows if text != f"mesh {divisions}"]
-    rows = [(f"mesh {divisions}", {}), *rows]
+    others = [n for n in MESHES if n != divisions] if divisions == SIZES[0] else []
+    rows = [(f"mesh {divisions}", {}), *((f"mesh {n}", {"divisions": n}) for n in others)]
     rows += [(f"surface curved by {value:g}", {"curvature": value}) for value in (0.002, 0.02, 0.2, 2.0)]
     rows += [(f"modulus ratio {value:g}", {"ratio": value}) for value in (1e2, 1e4, 1e8, 1e-2, 1e-4)]
     rows += [(f"nu {value:g}", {"nu": value}) for value in (0.45, 0.49, 0.499, 0.4999)]
@@ -100,21 +99,24 @@ def variations(divisions):
     return rows
 
 
-def entries(smallest, tell):
-    """Return the figures of all rows; the `smallest` run takes the first two on a coarse mesh. `tell` hears of each row."""
-    divisions = 6 if smallest else SIZES[0]
+def entries(smallest, tell, sizes=None):
+    """Return the figures of all rows; the `smallest` run takes the first two on a coarse mesh. `tell` hears of each row.
+
+    `sizes` are numbers of unknowns, each with a whole table; the other meshes are part of that of SIZES only.
+    """
     figures(blocks(6, FRICTION))  # compiles
     found = []
-    for text, given in variations(divisions)[: 2 if smallest else None]:
-        tell(text)
-        found.append(
-            {
-                "varied": text,
-                "friction": given["friction"],
-                **figures(made(given), repeats=1 if smallest else REPEATS),
-            }
-        )
+    for divisions in [6] if smallest else [divisions_of(size) for size in sizes] if sizes else SIZES:
+        for text, given in variations(divisions)[: 2 if smallest else None]:
+            tell(f"{text}, {divisions} divisions")
+            measured = figures(made(given), repeats=1 if smallest else REPEATS)
+            found.append({"varied": text, "friction": given["friction"], **measured})
     return found
+
+
+def divisions_of(unknowns):
+    """Return the divisions, an even number, with about so many unknowns of hexahedra in both blocks."""
+    return max(6, 2 * round(((unknowns / 2.3) ** (1 / 3) - 1) / 2))
 
 
 def figures(model, solver="amg", repeats=1):

@@ -22,7 +22,6 @@ from pathlib import Path
 SIZES = (280_000,)
 SMALLEST = 1_500
 STEPS = 20
-BY_UNKNOWNS = True  # --sizes are numbers of unknowns
 # Bytes of the array whose sum tells how fast memory is read: far more than caches hold. A small run takes fewer.
 LONG, SHORT = 480_000_000, 8_000_000
 # Calls of which the fastest counts.

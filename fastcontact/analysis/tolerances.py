@@ -79,8 +79,9 @@ class Tolerances:
 
     def enough(self, update: int, size: float) -> float:
         """Return the change of the displacement, whose size is given, below which the geometry has settled [length]."""
-        # Iterative solvers leave a noise of their tolerance; asking for less would never end.
-        accuracy = max(self._criteria.geometry, self._solver.tolerance)
+        # Iterative solvers leave a noise of their tolerance, times the contrast of cells; asking for less would never end.
+        noise = self._solver.tolerance * (self._solver.contrast if self._solver.iterative else 1.0)
+        accuracy = max(self._criteria.geometry, noise)
         if update >= PATIENT_UPDATES:
             accuracy = max(accuracy, self._solver.error)
         return max(accuracy * size, self._round_off)

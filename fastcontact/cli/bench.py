@@ -81,12 +81,7 @@ def _table(subject: Any, name: str, options: argparse.Namespace, show: bool) -> 
         if show:
             say(f"{name} {text} ...", error=True)
 
-    sizes: tuple[Any, ...] = ()
-    if options.sizes:
-        if not getattr(subject, "BY_UNKNOWNS", False):
-            raise FastcontactError(f"the table of '{name}' has sizes of its own: leave --sizes out")
-        sizes = (options.sizes,)
-    found: list[dict[str, Any]] = subject.entries(options.smallest, tell, *sizes)
+    found: list[dict[str, Any]] = subject.entries(options.smallest, tell, options.sizes)
     if not options.quiet:
         say("\n".join(subject.lines(found)))
     return found

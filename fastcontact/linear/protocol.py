@@ -107,6 +107,11 @@ class FrictionTerms:
 class LoadedNonsymmetric(Loaded, Protocol):
     """Also solves where multipliers act through other rows than those of the equations: sliding friction."""
 
+    @property
+    def contrast(self) -> float:
+        """See `LinearSolver`."""
+        ...
+
     def diagonal(self) -> Array:
         """Return the diagonal (n,) of K [force / length]."""
         ...

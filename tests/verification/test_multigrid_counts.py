@@ -176,6 +176,16 @@ def test_friction_beside_a_much_stiffer_secondary_side_is_not_solved_pairing_by_
     assert found["residual"] < 1e-6
 
 
+@pytest.mark.parametrize(("nu", "most"), [(0.49, 8), (0.499, 8), (0.4999, 9)])
+def test_friction_of_nearly_incompressible_bodies_is_paired_as_often_as_that_of_others(nu, most):
+    robustness = suite("subjects").load("robustness")
+    found = robustness.figures(robustness.blocks(12, 0.3, nu=nu))
+    assert not found["gave_up"]
+    assert found["pairings"] <= most
+    assert found["step"]["iterations"] <= 2.2 * found["linear"]["iterations"]
+    assert found["residual"] < 1e-6
+
+
 @pytest.mark.parametrize("ball", [False, True])
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_iterations_on_rigid_obstacles_are_a_few_times_those_without_contact(ball, friction):

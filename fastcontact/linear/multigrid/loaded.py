@@ -61,6 +61,11 @@ class LoadedMultigrid(LoadedIteration):
         functions: csr_array | None = self._solver.corner_functions
         return functions
 
+    @property
+    def contrast(self) -> float:
+        """See `LinearSolver`."""
+        return float(self._solver.contrast)
+
     def diagonal(self) -> Array:
         """See `LoadedNonsymmetric`."""
         return np.asarray(self._solver.diagonal())

@@ -31,6 +31,15 @@ def test_the_table_of_robustness(tmp_path, capsys):
         assert row["step"]["iterations"] < 3 * row["linear"]["iterations"]
 
 
+def test_the_table_of_robustness_by_numbers_of_unknowns():
+    robustness = suite("subjects").load("robustness")
+    for divisions in (12, 20, 40):
+        model = robustness.blocks(divisions)
+        assert robustness.divisions_of(model.n_dofs) == divisions
+    meshes = [text for text, _ in robustness.variations(40) if text.startswith("mesh")]
+    assert meshes == ["mesh 40", "mesh 40"]
+
+
 def test_the_table_tells_what_failed():
     failed = {"varied": "nu 0.5", "friction": 0.0, "n_dofs": 12, "failed": "no way"}
     assert suite("subjects").load("robustness").lines([failed])[1].endswith("failed: no way")
@@ -133,7 +142,6 @@ def test_scaling_pictures(tmp_path):
         (["serach"], "search"),
         (["search", "--dofs", "5"], "go together"),
         (["search", "--sizes", "0"], "positive"),
-        (["robustness", "--sizes", "500"], "leave --sizes out"),
         (["contact", "--problem", "sphere", "--dofs", "500"], "sphere-on-block"),
         (["search", "--compare", "absent.json"], "no stored run"),
     ],
