@@ -40,6 +40,8 @@ class FieldCompliance:
         E: the mass matrix of the points without equations over rho, and what softer points add.
     dense : callable
         Returns C (m, m) [length / force].
+    bordered : bool
+        Whether values that do not give way stay unknowns, too: on quadratic facets, whose equations resemble each other.
     """
 
     P: csr_array
@@ -47,6 +49,7 @@ class FieldCompliance:
     stiffness: Array
     others: csr_array
     dense: Callable[[], Array]
+    bordered: bool = False
 
     @classmethod
     def stacked(cls, parts: Sequence[FieldCompliance], dense: Callable[[], Array]) -> FieldCompliance:
@@ -57,6 +60,7 @@ class FieldCompliance:
             np.concatenate([part.stiffness for part in parts]),
             csr_array(block_diag([part.others for part in parts], format="csr")),
             dense,
+            any(part.bordered for part in parts),
         )
 
     @classmethod
@@ -72,7 +76,7 @@ class FieldCompliance:
         added = self.P.T @ diags_array(self.weights * weights * softness) @ self.P
         others = csr_array(self.others + added)
         others.eliminate_zeros()
-        return FieldCompliance(self.P, weights, self.stiffness * share, others, dense)
+        return FieldCompliance(self.P, weights, self.stiffness * share, others, dense, self.bordered)
 
     def of_field(self, B: csr_array, c: Array) -> FieldEquations:
         """Return the same equations for the field, of rows B (m, n) and right-hand sides c (m,) [length]."""
@@ -82,7 +86,7 @@ class FieldCompliance:
         # Each in units of its own area: equations at the edge of the contact are small ones.
         units = 1.0 / size[touched]
         shares = csr_array(diags_array(units) @ shares[touched])
-        edge = self.others.diagonal()[touched] > 0.0
+        edge = (self.others.diagonal()[touched] > 0.0) | self.bordered
         P = csr_array(self.P[:, touched] @ diags_array(units))
         compliance = self._at_edge(touched[edge], units[edge])
         return FieldEquations(csr_array(shares @ B), shares @ c, P, edge, compliance, touched[edge], units[edge])
@@ -112,9 +116,9 @@ class FieldEquations:
     right : ndarray (l,)
     P : csr_array (m, l)
     edge : ndarray of bool (l,)
-        Values that give way: those at the edge of the contact, with a penalty all.
+        Values that stay unknowns: those at the edge of the contact, which give way; with a penalty all, see `bordered`.
     compliance : csr_array (e, e)
-        E among those at the edge.
+        E among those that stay unknowns.
     at, units : ndarray (e,)
         Which values of the field these are, and in which units.
     """

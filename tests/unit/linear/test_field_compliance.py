@@ -119,8 +119,9 @@ def continuous(curvature=0.0, **options):
     return pressed(curvature=curvature, formulation="continuous", **options)
 
 
-def on_obstacle(obstacle):
-    mesh = fc.generate.box((1.0, 1.0, 0.5), (8, 8, 4), "hex8")
+def on_obstacle(obstacle, element="hex8"):
+    divisions = (8, 8, 4) if element == "hex8" else (4, 4, 2)
+    mesh = fc.generate.box((1.0, 1.0, 0.5), divisions, element)
     model = fc.Model(mesh, "3d")
     model.add_material(fc.LinearElastic(1.0, 0.3))
     model.prescribe("ZMAX", x=0.0, y=0.0, z=-0.01)
@@ -136,13 +137,24 @@ def beside_another(**options):
     return model
 
 
+def quadratic(element, curvature=0.0, **options):
+    return pressed(element, curvature=curvature, n=5, formulation="continuous", **options)
+
+
+WALL = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 CASES = {
     "all closed": (continuous, 30), "edge": (lambda: continuous(0.02), 90), "few": (lambda: continuous(0.2), 80),
     "stiff primary": (lambda: continuous(0.02, ratio=100.0), 150), "tet4": (lambda: continuous(0.02, element="tet4"), 200),
     "augmented": (lambda: continuous(0.02, augmentation=10.0), 300), "two pairs": (beside_another, 200),
     "penalty": (lambda: continuous(penalty=1.0), 40), "stiff penalty": (lambda: continuous(0.02, penalty=1000.0), 90),
     "soft penalty": (lambda: continuous(0.02, penalty=0.1), 40), "penalty beside": (lambda: beside_another(penalty=2.0), 200),
-    "wall": (lambda: on_obstacle(fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))), 30),
+    "wall": (lambda: on_obstacle(WALL), 30),
+    "hex27": (lambda: quadratic("hex27"), 60), "tet10": (lambda: quadratic("tet10"), 60),
+    "hex20": (lambda: quadratic("hex20"), 110), "hex20, curved": (lambda: quadratic("hex20", 0.02), 110),
+    "hex20, penalty": (lambda: quadratic("hex20", 0.02, penalty=100.0), 100),
+    "tet10, curved": (lambda: quadratic("tet10", 0.02), 80),
+    "hex20 on a wall": (lambda: on_obstacle(WALL, "hex20"), 110),
+    "tet10 on a wall": (lambda: on_obstacle(WALL, "tet10"), 80),
     "ball": (lambda: on_obstacle(fc.obstacles.Sphere((0.5, 0.5, -1.0), 1.0)), 100),
 }  # fmt: skip
 
