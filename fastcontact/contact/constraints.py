@@ -325,7 +325,10 @@ class _Softened:
         own = self._softness[rows]
         return own if self._inner is None else np.diag(own) + self._inner.block(rows)
 
-    def among(self, rows: NDArray[np.intp]) -> Array:
+    def among(self, rows: NDArray[np.intp]) -> Array | FieldCompliance:
+        inner = None if self._inner is None else self._inner.among(rows)
+        if isinstance(inner, FieldCompliance):
+            return inner.softened(self._softness[rows], lambda: self.block(rows))
         return self.block(rows)
 
     def apply(self, multiplier: Array) -> Array:

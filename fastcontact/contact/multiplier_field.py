@@ -36,6 +36,8 @@ class Projection:
         Factors of ``P.T W P``; None where no point takes part.
     eliminable : bool
         Whether linear solvers may take the values of the field in place of the forces.
+    quadratic : bool
+        Whether facets are.
     """
 
     P: csr_array
@@ -43,6 +45,7 @@ class Projection:
     rho: float
     mass: SuperLU | None
     eliminable: bool = True
+    quadratic: bool = False
 
     def block(self, rows: NDArray[np.intp]) -> Array:
         """Return rows and columns `rows` of C, a dense matrix; ContactError where it would be too large to be of use."""
@@ -67,7 +70,8 @@ class Projection:
         others[rows] = 0.0
         mass, areas = csr_array(self.P.T @ diags_array(others) @ self.P), self.areas[rows]
         mass.eliminate_zeros()
-        return FieldCompliance(csr_array(self.P[rows]), areas, self.rho * areas, mass, lambda: self.block(rows))
+        P, stiffness = csr_array(self.P[rows]), self.rho * areas
+        return FieldCompliance(P, areas, stiffness, mass, lambda: self.block(rows), self.quadratic)
 
     def apply(self, multiplier: Array) -> Array:
         """Return ``C multiplier``."""

@@ -5,6 +5,9 @@ represent gives way: :math:`C = (W^{-1} - P M^{-1} P^T) / \rho` among the points
 field over these and all other points. With forces W (P p - rho (B u - c)) the equations ``B u + C force = c`` are
 :math:`P^T W (B u - c) + E p = 0` for the field, E the mass matrix of the other points over rho, which vanishes but at the
 edge of the contact. Springs of the stiffness rho W act along the rows B: on what the field does not represent.
+
+Points that are softer by S, as with a penalty, have the compliance :math:`C + S`. With :math:`W' = W / (1 + \rho W S)` in
+place of W, which is in the equations of the field as in the springs, E becomes :math:`E + P^T W W' S P`: all values give way.
 """
 
 from __future__ import annotations
@@ -34,9 +37,11 @@ class FieldCompliance:
     stiffness : ndarray (m,)
         rho W [force / length].
     others : csr_array (k, k)
-        E: the mass matrix of the points without equations over rho.
+        E: the mass matrix of the points without equations over rho, and what softer points add.
     dense : callable
         Returns C (m, m) [length / force].
+    bordered : bool
+        Whether values that do not give way stay unknowns, too: on quadratic facets, whose equations resemble each other.
     """
 
     P: csr_array
@@ -44,6 +49,7 @@ class FieldCompliance:
     stiffness: Array
     others: csr_array
     dense: Callable[[], Array]
+    bordered: bool = False
 
     @classmethod
     def stacked(cls, parts: Sequence[FieldCompliance], dense: Callable[[], Array]) -> FieldCompliance:
@@ -54,6 +60,7 @@ class FieldCompliance:
             np.concatenate([part.stiffness for part in parts]),
             csr_array(block_diag([part.others for part in parts], format="csr")),
             dense,
+            any(part.bordered for part in parts),
         )
 
     @classmethod
@@ -61,6 +68,15 @@ class FieldCompliance:
         """Return that of m equations that do not give way."""
         one = csr_array(diags_array(np.ones(m)))
         return cls(one, np.ones(m), np.zeros(m), csr_array((m, m)), lambda: np.zeros((m, m)))
+
+    def softened(self, softness: Array, dense: Callable[[], Array]) -> FieldCompliance:
+        """Return that of points softer by `softness` (m,) [length / force]."""
+        share = 1.0 / (1.0 + self.stiffness * softness)
+        weights = self.weights * share
+        added = self.P.T @ diags_array(self.weights * weights * softness) @ self.P
+        others = csr_array(self.others + added)
+        others.eliminate_zeros()
+        return FieldCompliance(self.P, weights, self.stiffness * share, others, dense, self.bordered)
 
     def of_field(self, B: csr_array, c: Array) -> FieldEquations:
         """Return the same equations for the field, of rows B (m, n) and right-hand sides c (m,) [length]."""
@@ -70,19 +86,24 @@ class FieldCompliance:
         # Each in units of its own area: equations at the edge of the contact are small ones.
         units = 1.0 / size[touched]
         shares = csr_array(diags_array(units) @ shares[touched])
-        edge = self.others.diagonal()[touched] > 0.0
+        edge = (self.others.diagonal()[touched] > 0.0) | self.bordered
         P = csr_array(self.P[:, touched] @ diags_array(units))
         compliance = self._at_edge(touched[edge], units[edge])
         return FieldEquations(csr_array(shares @ B), shares @ c, P, edge, compliance, touched[edge], units[edge])
 
-    def _at_edge(self, given: NDArray[np.intp], units: Array) -> Array:
-        """Return E among values `given` (e,), those without any equation being eliminated."""
+    def _at_edge(self, given: NDArray[np.intp], units: Array) -> csr_array:
+        """Return E (e, e) among values `given` (e,), those without any equation being eliminated."""
         rest = np.setdiff1d(np.flatnonzero(self.others.diagonal() > 0.0), given)
-        E: Array = self.others[given][:, given].toarray()
+        E = csr_array(self.others[given][:, given])
         across = csr_array(self.others[given][:, rest])
         if across.nnz:
-            E -= across @ splu(csc_array(self.others[rest][:, rest])).solve(across.T.toarray())
-        return E * (units[:, None] * units)
+            beside = np.flatnonzero(np.diff(across.indptr))
+            of_beside = csr_array(across[beside])
+            gives = of_beside @ splu(csc_array(self.others[rest][:, rest])).solve(of_beside.T.toarray())
+            place = csr_array((np.ones(len(beside)), (beside, np.arange(len(beside)))), (len(given), len(beside)))
+            E = csr_array(E - place @ csr_array(gives) @ place.T)
+        in_units = diags_array(units)
+        return csr_array(in_units @ E @ in_units)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,9 +116,9 @@ class FieldEquations:
     right : ndarray (l,)
     P : csr_array (m, l)
     edge : ndarray of bool (l,)
-        Values at the edge of the contact; the others do not give way.
-    compliance : ndarray (e, e)
-        E among those at the edge.
+        Values that stay unknowns: those at the edge of the contact, which give way; with a penalty all, see `bordered`.
+    compliance : csr_array (e, e)
+        E among those that stay unknowns.
     at, units : ndarray (e,)
         Which values of the field these are, and in which units.
     """
@@ -106,6 +127,6 @@ class FieldEquations:
     right: Array
     P: csr_array
     edge: Mask
-    compliance: Array
+    compliance: csr_array
     at: NDArray[np.intp]
     units: Array

@@ -176,10 +176,9 @@ class PressureFieldFormulation(Formulation):
     def eliminable(self) -> bool:
         """See `Formulation`: what the field does not represent gives way, but its values can be eliminated.
 
-        In space, without friction, which would couple them along all directions, and where corners carry as much as others.
+        In space, without friction, which would couple them along all directions.
         """
-        flat = self.points.shape[1] == 3 and self.secondary.order == 1
-        return flat and not self.friction and self.options.penalty is None
+        return self.points.shape[1] == 3 and not self.friction
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -190,7 +189,8 @@ class PressureFieldFormulation(Formulation):
         self, candidates: Candidates, pairing: Pairing, field: PressureField, at: Configuration
     ) -> Constraints:
         """Return the constraints of paired integration points whose forces make up a pressure field."""
-        part = self.assembled(candidates, pairing, replace(field.projection, eliminable=self.eliminable), at)
+        projection = replace(field.projection, eliminable=self.eliminable, quadratic=self.secondary.order > 1)
+        part = self.assembled(candidates, pairing, projection, at)
         undetermined = self._undetermined(candidates, pairing, field, part.directions) if self.friction else None
         return replace(part, low_rank_compliance=undetermined, areas=field.areas, nodal=field)
 

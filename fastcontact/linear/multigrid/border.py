@@ -1,4 +1,4 @@
-"""A few equations ``B u + C multiplier = c`` with a full compliance C beside those eliminated: unknowns of their own.
+"""Equations ``B u + C multiplier = c`` that give way together, beside those eliminated: unknowns of their own.
 
 The matrix of displacements and multipliers, ``[A, -B.T; B, C]``, is bordered and not positive definite. Conjugate residuals
 solve it, preconditioned by its lower triangle: multigrid for A, and for the multipliers ``C + B D^-1 B.T``, D the diagonal of
@@ -11,8 +11,8 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse.linalg import splu
 
 from fastcontact.linear.krylov.iterations import Multiply, Precondition
 
@@ -30,10 +30,10 @@ class Border:
     ----------
     rows : csr_array (e, n)
     right : ndarray (e,)
-    compliance : ndarray (e, e)
+    compliance : csr_array (e, e)
     """
 
-    def __init__(self, rows: csr_array, right: Array, compliance: Array) -> None:
+    def __init__(self, rows: csr_array, right: Array, compliance: csr_array) -> None:
         self.rows, self.right, self.compliance = rows, right, compliance
 
     def __len__(self) -> int:
@@ -42,12 +42,11 @@ class Border:
     def prepare(self, diagonal: Array) -> None:
         """Factorise what preconditions the multipliers, given the diagonal (n,) of A [force / length]."""
         yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
-        S = self.compliance + SOFTER * (self.rows @ diags_array(yielding) @ self.rows.T).toarray()
-        own = np.diag(S)
-        S[np.diag_indices(len(S))] += REPEATED * own
+        S = self.compliance + SOFTER * (self.rows @ diags_array(yielding) @ self.rows.T)
+        own = S.diagonal()
         # Residuals of these equations become forces.
         self.stiffness = 1.0 / own
-        self._factors = cho_factor(S)
+        self._factors = splu(csc_array(S + diags_array(REPEATED * own)))
 
     def multiply(self, multiply: Multiply, move_forces: Callable[[Array], None]) -> Multiply:
         """Return the product with the bordered matrix, from that with A; forces (n,) move from eliminated unknowns."""
@@ -68,6 +67,6 @@ class Border:
 
         def solve(r: Array, norm: float, z: Array) -> None:
             precondition(r[:n], norm, z[:n])
-            z[n:] = cho_solve(self._factors, r[n:] / self.stiffness - self.rows @ z[:n])
+            z[n:] = self._factors.solve(r[n:] / self.stiffness - self.rows @ z[:n])
 
         return solve

@@ -175,9 +175,10 @@ def test_constraints_that_cannot_be_eliminated_go_to_factors_and_not_through_man
 def test_auto_knows_which_constraints_multigrid_cannot_eliminate():
     solver = {options: prepare(pressed(20, **dict(options)), fc.linear_ramp(1), fc.Criteria()).solver.name for options in (
         (("multipliers", "standard"),), (("multipliers", "dual"),), (("multipliers", "dual"), ("penalty", 100.0)),
-        (("formulation", "continuous"),), (("formulation", "continuous"), ("friction", 0.3)),
+        (("formulation", "continuous"),), (("formulation", "continuous"), ("penalty", 100.0)),
+        (("formulation", "continuous"), ("friction", 0.3)),
     )}  # fmt: skip
-    assert list(solver.values()) == ["amg", "amg", "amg", "amg", "direct"]
+    assert list(solver.values()) == ["amg", "amg", "amg", "amg", "amg", "direct"]
 
 
 @pytest.mark.parametrize(("solver", "friction"), [("direct", 0.0), ("direct", 0.3), ("amg", 0.3)])

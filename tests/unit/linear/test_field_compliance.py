@@ -77,6 +77,25 @@ def test_the_equations_of_the_field_are_those_of_the_points(closed):
     assert direct.load(f).solve(B, c, among)[1] == pytest.approx(forces, abs=1e-8 * np.abs(forces).max())
 
 
+def test_softer_points_have_the_compliance_of_both():
+    projection = along_a_line()
+    rows = np.arange(5, 20)
+    K, modes, fixed = box()
+    B, c = rows_at_points(projection, fixed)
+    B, c = csr_array(B[rows]), c[rows]
+    f = np.where(fixed, 0.0, np.random.default_rng(5).normal(size=len(fixed)))
+    softness = np.random.default_rng(6).random(len(rows)) * np.logspace(-4, 2, len(rows))
+    dense = np.diag(softness) + projection.block(rows)
+    whole = np.block([[K.toarray(), -B.toarray().T], [B.toarray(), dense]])
+    expected = np.linalg.solve(whole, np.concatenate([f, c]))
+    solver = Amg(1e-11)
+    solver.prepare(K, modes)
+    u, forces = solver.load(f).solve(B, c, projection.among(rows).softened(softness, lambda: dense))
+    assert not solver.columns.asked
+    assert u == pytest.approx(expected[: len(f)], abs=1e-8 * np.abs(u).max())
+    assert forces == pytest.approx(expected[len(f) :], abs=1e-8 * np.abs(forces).max())
+
+
 def test_points_beside_equations_that_do_not_give_way():
     projection, m = along_a_line(), 27
     both = FieldCompliance.stacked([projection.among(np.arange(4, 20)), FieldCompliance.none(2)], lambda: dense)
@@ -100,8 +119,9 @@ def continuous(curvature=0.0, **options):
     return pressed(curvature=curvature, formulation="continuous", **options)
 
 
-def on_obstacle(obstacle):
-    mesh = fc.generate.box((1.0, 1.0, 0.5), (8, 8, 4), "hex8")
+def on_obstacle(obstacle, element="hex8"):
+    divisions = (8, 8, 4) if element == "hex8" else (4, 4, 2)
+    mesh = fc.generate.box((1.0, 1.0, 0.5), divisions, element)
     model = fc.Model(mesh, "3d")
     model.add_material(fc.LinearElastic(1.0, 0.3))
     model.prescribe("ZMAX", x=0.0, y=0.0, z=-0.01)
@@ -109,19 +129,32 @@ def on_obstacle(obstacle):
     return model
 
 
-def beside_another():
-    """A pair of points beside one of nodes."""
+def beside_another(**options):
+    """A pair of points beside one of nodes with `options`."""
     model = continuous(0.02)
     wall = fc.obstacles.HalfSpace((1.001, 0.0, 0.0), (-1.0, 0.0, 0.0))
-    model.add_obstacle("wall", secondary="U_XMAX", obstacle=wall, formulation="node_to_segment")
+    model.add_obstacle("wall", secondary="U_XMAX", obstacle=wall, formulation="node_to_segment", **options)
     return model
 
 
+def quadratic(element, curvature=0.0, **options):
+    return pressed(element, curvature=curvature, n=5, formulation="continuous", **options)
+
+
+WALL = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 CASES = {
     "all closed": (continuous, 30), "edge": (lambda: continuous(0.02), 90), "few": (lambda: continuous(0.2), 80),
     "stiff primary": (lambda: continuous(0.02, ratio=100.0), 150), "tet4": (lambda: continuous(0.02, element="tet4"), 200),
     "augmented": (lambda: continuous(0.02, augmentation=10.0), 300), "two pairs": (beside_another, 200),
-    "wall": (lambda: on_obstacle(fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))), 30),
+    "penalty": (lambda: continuous(penalty=1.0), 40), "stiff penalty": (lambda: continuous(0.02, penalty=1000.0), 90),
+    "soft penalty": (lambda: continuous(0.02, penalty=0.1), 40), "penalty beside": (lambda: beside_another(penalty=2.0), 200),
+    "wall": (lambda: on_obstacle(WALL), 30),
+    "hex27": (lambda: quadratic("hex27"), 60), "tet10": (lambda: quadratic("tet10"), 60),
+    "hex20": (lambda: quadratic("hex20"), 110), "hex20, curved": (lambda: quadratic("hex20", 0.02), 110),
+    "hex20, penalty": (lambda: quadratic("hex20", 0.02, penalty=100.0), 100),
+    "tet10, curved": (lambda: quadratic("tet10", 0.02), 80),
+    "hex20 on a wall": (lambda: on_obstacle(WALL, "hex20"), 110),
+    "tet10 on a wall": (lambda: on_obstacle(WALL, "tet10"), 80),
     "ball": (lambda: on_obstacle(fc.obstacles.Sphere((0.5, 0.5, -1.0), 1.0)), 100),
 }  # fmt: skip
 
