@@ -12,6 +12,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.cases.checks import CHECK, Check, read_check
 from fastcontact.cases.decks.blocks import files_of_deck
 from fastcontact.cases.decks.deck import Deck, read_deck
+from fastcontact.cases.input_files import files_named
 from fastcontact.cases.keys import NUMBER, RAMP, SENSITIVITY, SOLVE, STUDY, TOP, UNITS, at, called, check_keys, tables
 from fastcontact.cases.model_tables import build_model, points
 from fastcontact.cases.shipped import case_path, shipped_cases
@@ -133,21 +134,14 @@ def _case_of_deck(path: Path) -> Case:
 
 
 def files_of_case(path: str | Path) -> list[Path]:
-    """Return a case file and the files of meshes and fields that it names, or a deck and what it includes.
+    """Return a case file and all files that it names, or a deck and what it includes.
 
     Raises CaseError or FileError if one cannot be read.
     """
     path = case_path(path)
     if path.suffix.lower() == DECK:
         return files_of_deck(existing_file(path))
-    found, waiting = [path], [_parsed(path)[1]]
-    while waiting:
-        for key, value in waiting.pop().items():
-            several = value if isinstance(value, list) else [value]
-            if key == "file":
-                found += [path.parent / name for name in several if isinstance(name, str)]
-            waiting += [table for table in several if isinstance(table, dict)]
-    return found
+    return [path, *files_named(_parsed(path)[1], path.parent)]
 
 
 def _parsed(path: Path) -> tuple[str, dict[str, Any]]:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -29,13 +28,13 @@ def check_outputs(
     Raises FileError if a folder is missing or write-protected, a path is a folder, the file to read or that of another
     output, or a picture of no known format; FastcontactError if there is no matplotlib.
     """
-    from fastcontact.mesh.files.paths import checked_target
+    from fastcontact.mesh.files.paths import checked_target, is_stream
 
     drawn = [str(path) for path in pictures if path]
     sources = {_identity(Path(os.path.realpath(path))) for path in read if path}
     seen: set[object] = set()
     for path in [*(str(path) for path in files if path), *drawn]:
-        if Path(path).is_char_device() or Path(path).is_fifo():  # such as /dev/stdout
+        if is_stream(path):
             continue
         identity = _identity(checked_target(path))
         if identity in sources:
@@ -48,12 +47,12 @@ def check_outputs(
 
 
 def _identity(path: Path) -> object:
-    """Return device and number of a file, the same for all its names; of a file to come its path."""
+    """Return device and number of a file, the same for all its names; of a file to come its folder's, and its name."""
     try:
-        found = path.stat()
+        status = path.stat()
     except OSError:
-        return path
-    return found.st_dev, found.st_ino
+        return path if path.parent == path else (_identity(path.parent), path.name)
+    return status.st_dev, status.st_ino
 
 
 def _check_formats(paths: list[str]) -> None:
@@ -68,8 +67,10 @@ def _check_formats(paths: list[str]) -> None:
 
 
 def write_text(path: str, content: str) -> None:
-    """Write a text file, whole or not at all; raises FileError if it cannot be written."""
-    with _target(path) as target:
+    """Write a text file, whole or not at all, or to a stream; raises FileError if it cannot be written."""
+    from fastcontact.mesh.files.paths import replacing
+
+    with replacing(path) as target:
         target.write_text(content, encoding="utf-8")
 
 
@@ -83,31 +84,16 @@ def save(axes: Any, path: str) -> None:
 
     What Matplotlib warns of, such as characters that its font lacks, is told in one line each.
     """
+    from fastcontact.mesh.files.paths import replacing
+
     try:
-        with warnings.catch_warnings(record=True) as caught, _target(path) as target:
+        with warnings.catch_warnings(record=True) as caught, replacing(path) as target:
             warnings.simplefilter("always", UserWarning)
             axes.figure.savefig(target)
         for text in dict.fromkeys(str(warning.message) for warning in caught):
             say(f"warning: {path}: {' '.join(text.split())}", error=True)
     except ValueError as error:
         raise FileError(f"cannot write the picture '{path}': {error}") from error
-
-
-@contextlib.contextmanager
-def _target(path: str) -> Iterator[Path]:
-    """Give the path to write to: beside a file, whose place it takes when all is written, or a device such as /dev/stdout."""
-    from fastcontact.mesh.files.paths import replacing
-
-    if Path(path).is_char_device() or Path(path).is_fifo():
-        try:
-            yield Path(path)
-        except BrokenPipeError:
-            raise
-        except OSError as error:
-            raise FileError(f"'{path}' cannot be written ({error.strerror or error}): name another file") from error
-        return
-    with replacing(path) as temporary:
-        yield temporary
 
 
 def profile_picture(case: Any, step: StepResult, path: str) -> None:

@@ -11,6 +11,7 @@ import traceback
 import warnings
 from collections import deque
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from fastcontact._jit import decorators as _jit
 from fastcontact._version import __version__
 from fastcontact.analysis.run import solve_steps
 from fastcontact.cases.case import Case, build_case
+from fastcontact.cases.input_files import digest, files_named
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import FastcontactError, FastcontactWarning
 from fastcontact.mesh.mesh import Mesh
@@ -36,7 +38,7 @@ KEYS = {
     *("file", "group", "flip", "crease"),
 }
 # Raised when the measured numbers or their form in a store change.
-SCHEMA = 2
+SCHEMA = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +55,12 @@ class Job:
     size: float = 0.0  # amount of work, in any unit that the runs of a study share
     folder: Path = Path()  # in which files lie that the case names
 
-    @property
+    @cached_property  # of the files as they are when a study begins
     def key(self) -> str:
-        """Hash of all that the numbers depend on: the case, its mesh, the version."""
+        """Hash of all that the numbers depend on: the case, its mesh, the contents of all files it names, the version."""
         data = {key: value for key, value in self.data.items() if key not in ("title", "units", "check")}
         whole = {"version": __version__, "schema": SCHEMA, "data": data, "pair": self.pair, "recipe": self.recipe}
-        whole["folder"] = str(self.folder) if _names_files(self.data) else ""
+        whole["files"] = digest(files_named({key: data[key] for key in data if key != "mesh"}, self.folder))
         found = hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode())
         if self.base is not None:
             found.update(_fingerprint(self.base))
@@ -72,11 +74,6 @@ def job_of(
     data, mesh = case_data(chosen, member), recipe(chosen, member.element, level)
     base = case.mesh if chosen.generator is None else None
     return Job(label, case.name, data, chosen.pair, mesh, base, marks, size, case.folder)
-
-
-def _names_files(data: dict[str, Any]) -> bool:
-    """Return whether a case has rigid obstacles from mesh files, which are read where it runs."""
-    return any("file" in entry or "file" in (entry.get("shape") or ()) for entry in data.get("obstacle", {}).values())
 
 
 def _fingerprint(mesh: Mesh) -> bytes:

@@ -170,20 +170,35 @@ def _check_before(path: Path, file_format: str) -> None:
         _check_references(path)
 
 
-def _check_references(path: Path) -> None:
-    """Refuse an XDMF file that refers to files in other folders, or to HDF5 files that do."""
+def files_of(path: Path) -> list[Path]:
+    """Return a mesh file and all files that are read with it; FileError if one of XDMF cannot be read."""
+    if path.suffix.lower() in (".xdmf", ".xmf"):
+        return [path, *(beside for beside, _ in _references(path))]
+    other = {".node": ".ele", ".ele": ".node"}.get(path.suffix)  # the two files of TetGen
+    return [path, path.with_suffix(other)] if other else [path]
+
+
+def _references(path: Path) -> Iterator[tuple[Path, str]]:
+    """Yield the files that an XDMF file names, and their formats."""
     try:
         items = [item for item in ElementTree.parse(path).iter() if item.get("Format") in ("HDF", "Binary")]
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise _refusal("read", path, f"it is no XML: {error}") from error
-    folder = path.resolve().parent
+    except OSError as error:
+        raise FileError(f"cannot read '{path}': {error.strerror or error}") from error
     for item in items:
-        name = (item.text or "").strip()
-        beside = folder / (name.partition(":")[0] if item.get("Format") == "HDF" else name)
+        name, kind = (item.text or "").strip(), item.get("Format", "")
+        yield path.resolve().parent / (name.partition(":")[0] if kind == "HDF" else name), kind
+
+
+def _check_references(path: Path) -> None:
+    """Refuse an XDMF file that refers to files in other folders, or to HDF5 files that do."""
+    folder = path.resolve().parent
+    for beside, kind in _references(path):
         if folder not in (beside.resolve().parent, beside.resolve()):
             raise _refusal("read", path, f"it refers to the file '{beside.resolve()}', which is not beside it")
         existing_file(beside)
-        if item.get("Format") == "HDF":
+        if kind == "HDF":
             with hdf5.opened(beside):
                 pass
 

@@ -5,13 +5,19 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import secrets
+import shutil
+import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from fastcontact.errors import FileError
 
 PathLike = str | os.PathLike[str]
+# Names of the open files of this process.
+_DESCRIPTOR = re.compile(r"/(?:dev|proc/(?:self|thread-self|\d+))/fd/(\d+)")
 
 
 def existing_file(path: PathLike) -> Path:
@@ -38,6 +44,8 @@ def existing_file(path: PathLike) -> Path:
 def checked_target(path: PathLike) -> Path:
     """Return the real path to write to, that of the file which a link names, or raise FileError if it cannot be written."""
     target = Path(os.path.realpath(os.fspath(path)))
+    if descriptor(path) is not None:
+        raise FileError(f"'{path}' is a stream: name a plain file")
     try:
         if target.is_dir():
             raise FileError(f"'{target}' is a folder: name a file in it")
@@ -54,6 +62,27 @@ def checked_target(path: PathLike) -> Path:
     return target
 
 
+def descriptor(path: PathLike) -> int | None:
+    """Return the number of the open file of this process that a path such as ``/dev/stdout`` names, None of other paths.
+
+    The path of the file behind it says too little: a shell may have opened that file to append to it.
+    """
+    name = os.path.abspath(os.fspath(path))
+    for _ in range(40):  # links, as many as the system follows
+        match = _DESCRIPTOR.fullmatch(name)
+        if match:
+            return int(match[1])
+        if not os.path.islink(name):
+            break
+        name = os.path.normpath(os.path.join(os.path.dirname(name), os.readlink(name)))
+    return None
+
+
+def is_stream(path: PathLike) -> bool:
+    """Return whether a path names what is written to from beginning to end: an open file, a device, a pipe."""
+    return descriptor(path) is not None or Path(path).is_char_device() or Path(path).is_fifo()
+
+
 def _may_write(path: Path) -> bool:
     return os.access(path, os.W_OK, effective_ids=os.access in os.supports_effective_ids)
 
@@ -63,8 +92,15 @@ def replacing(path: PathLike) -> Iterator[Path]:
     """Give an empty file beside `path` to write to, which takes its place on success and is removed after a failure.
 
     Its name cannot be guessed and it is a new file, so that no link put there beforehand is followed. When it takes its
-    place it is on the disk. What the operating system refuses becomes a FileError.
+    place it is on the disk. A stream such as ``/dev/stdout`` gets what was written behind all that it holds. What the
+    operating system refuses becomes a FileError.
     """
+    if is_stream(path):
+        with tempfile.TemporaryDirectory() as folder:
+            temporary = Path(folder, Path(path).name)
+            yield temporary
+            _send(temporary, path)
+        return
     target = checked_target(path)
     # The suffix stays last, because writers choose the format by it.
     temporary = target.with_name(f".{target.stem[:100]}.{secrets.token_hex(12)}{target.suffix}")
@@ -81,6 +117,20 @@ def replacing(path: PathLike) -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def _send(file: Path, stream: PathLike) -> None:
+    """Write a file to a stream; through the open file that it names, if it does: it knows where its end is."""
+    number = descriptor(stream)
+    try:
+        if number in (1, 2):
+            (sys.stdout if number == 1 else sys.stderr).flush()
+        with open(file, "rb") as source, open(stream if number is None else os.dup(number), "wb") as target:
+            shutil.copyfileobj(source, target)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise FileError(f"'{stream}' cannot be written ({error.strerror or error}): name another file") from error
 
 
 def _synchronise(path: Path) -> None:

@@ -147,6 +147,31 @@ def test_files_of_fields_are_what_a_command_reads(text, option, files, monkeypat
     assert Path("heat.vtu").read_text() == "<VTKFile>"
 
 
+@pytest.mark.parametrize("option", ["--json", "-o"])
+def test_the_data_file_of_an_xdmf_mesh_is_read_too(option, files, monkeypatch, capsys):
+    monkeypatch.chdir(files)
+    Path("mesh.xdmf").write_text('<Xdmf><DataItem Format="HDF">points.h5:/p</DataItem></Xdmf>')
+    Path("points.h5").write_bytes(b"points")
+    Path("case.toml").write_text(Path("case.toml").read_text().replace("coarse.med", "mesh.xdmf"))
+    assert main(["run", "case.toml", option, "points.h5"]) == 1
+    assert "'points.h5' is what this command reads" in capsys.readouterr().err
+    assert Path("points.h5").read_bytes() == b"points"
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/stdout"), reason="needs names of open files")
+@pytest.mark.parametrize("name", ["/dev/stdout", "/dev/fd/1", "link"])
+def test_what_a_shell_opened_to_append_to_is_appended_to(name, files):
+    os.symlink("/dev/stdout", files / "link")
+    (files / "log").write_text("kept\n")
+    command = [sys.executable, "-m", "fastcontact", "profile", "old.vtkhdf", "--csv", name]
+    with open(files / "log", "a") as log:
+        subprocess.run(command, stdout=log, check=True, cwd=files)
+    log = (files / "log").read_text()
+    assert log.startswith("kept\n")
+    assert "pressure" in log
+    assert main(["run", str(files / "case.toml"), "-o", "/dev/stdout"]) == 1
+
+
 needs_full = pytest.mark.skipif(not Path("/dev/full").is_char_device(), reason="needs a device that is always full")
 
 

@@ -31,6 +31,27 @@ def test_the_key_tells_what_the_numbers_depend_on():
     assert of(mesh, material=1, title="another").key == keys[2]
 
 
+def test_the_key_tells_the_contents_of_every_file_that_a_run_reads(tmp_path):
+    """Fields, temperatures, obstacles, and the data file of an XDMF mesh."""
+    names = ("field.vtu", "warm.vtu", "warmer.vtu", "wall.xdmf", "wall.h5")
+    for name in names:
+        (tmp_path / name).write_text("one", encoding="utf-8")
+    item = '<Xdmf><DataItem Format="HDF">wall.h5:/points</DataItem></Xdmf>'
+    (tmp_path / "wall.xdmf").write_text(item, encoding="utf-8")
+    data = {
+        "material": [{"E": {"file": "field.vtu", "field": "E"}}],
+        "temperature": [{"file": ["warm.vtu", "warmer.vtu"]}],
+        "obstacle": {"wall": {"shape": {"file": "wall.xdmf"}}},
+    }
+    keys = [replace(of(**data), folder=tmp_path).key]
+    for name in names:
+        (tmp_path / name).write_text((tmp_path / name).read_text(encoding="utf-8") + " ", encoding="utf-8")
+        keys.append(replace(of(**data), folder=tmp_path).key)
+    (tmp_path / "wall.h5").unlink()
+    keys.append(replace(of(**data), folder=tmp_path).key)
+    assert len(set(keys)) == len(keys)
+
+
 def test_options_that_another_formulation_does_not_have_are_dropped(chosen):
     own = {**chosen.data["contact"]["hertz"], "integration": "simpson"}
     chosen = replace(chosen, data={**chosen.data, "contact": {"hertz": own}})

@@ -1,0 +1,34 @@
+"""Files that a case reads: itself, meshes, fields, surfaces of obstacles, and what these name in turn."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from fastcontact.mesh.files.meshio_files import files_of
+
+
+def files_named(data: dict[str, Any], folder: Path) -> Iterator[Path]:
+    """Yield all files that the parsed data of a case file name, relative to `folder`, and those that are read with them."""
+    for key, value in data.items():
+        entries = value if isinstance(value, list) else [value]
+        for entry in entries:
+            if isinstance(entry, dict):
+                yield from files_named(entry, folder)
+            elif key == "file" and isinstance(entry, str):
+                path = folder / entry
+                yield from files_of(path) if path.is_file() else [path]
+
+
+def digest(paths: Iterator[Path]) -> str:
+    """Return a hash of the contents of files, the same wherever they lie; a file that cannot be read counts as missing."""
+    whole = hashlib.sha256()
+    for path in paths:
+        try:
+            with open(path, "rb") as file:
+                whole.update(hashlib.file_digest(file, "sha256").digest())
+        except OSError:
+            whole.update(b"missing")
+    return whole.hexdigest()
