@@ -10,12 +10,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 
+def printable(text: str) -> str:
+    """Return a text with all characters that control or format replaced by their escapes, but for the ends of lines."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in text)
+
+
 class FastcontactError(Exception):
     """Base class of every error that fastcontact raises on purpose; its message is one line."""
 
     def __str__(self) -> str:
-        # Names from files may hold anything, line ends too.
-        return " ".join(super().__str__().splitlines())
+        # Names from files may hold anything: line ends, and what steers a terminal.
+        return printable(" ".join(super().__str__().splitlines()))
 
 
 class MeshError(FastcontactError):
@@ -59,6 +66,9 @@ class ConvergenceError(FastcontactError):
 
 class FastcontactWarning(UserWarning):
     """Something doubtful about a model or its result, with its number."""
+
+    def __str__(self) -> str:
+        return printable(super().__str__())
 
 
 def warn(text: str) -> None:

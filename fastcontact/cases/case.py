@@ -152,7 +152,7 @@ def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
                 f"the case file '{path}' is larger than {toml_text.LARGEST >> 20} MB: put its mesh into a file of its own"
             )
         text = path.read_text(encoding="utf-8-sig")  # editors of Windows begin texts with a byte order mark
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:  # also a name with a zero in it, and no UTF-8
         raise CaseError(f"cannot read the case file '{path}': {_unreadable(path, error)}") from error
     try:
         return text, toml_text.parsed(text)

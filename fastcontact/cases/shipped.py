@@ -31,10 +31,9 @@ def case_path(given: str | Path) -> Path:
     try:
         if path.exists() or path.suffix or path.name != str(given):
             return path
-    except OSError as error:
-        raise CaseError(
-            f"cannot look for the case file '{str(given)[:200]}' ({error.strerror}): check its name"
-        ) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise CaseError(f"cannot look for the case file '{str(given)[:200]}' ({reason}): check its name") from None
     try:
         return shipped_case(path.name)
     except CaseError as error:

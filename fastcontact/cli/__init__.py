@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import sys
 from collections.abc import Sequence
 
-INTERRUPTED, TERMINATED = 130, 143  # as shells have them
+INTERRUPTED = 130  # as shells have it
+STOPPED = (129, 130, 143)  # by a signal
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -23,6 +25,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def entry_point() -> None:
     """Run the command line and exit with its code."""
+    _open_standard_files()
     # Threads of BLAS spin between the small products here; loops of our own have those of Numba.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
@@ -32,7 +35,20 @@ def entry_point() -> None:
     from fastcontact.cli._terminal import flushed
 
     code = flushed(code)
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is left to say: a second Ctrl-C ends at once
-    if code in (INTERRUPTED, TERMINATED):
+    if code in STOPPED:
+        for stopped in STOPPED:  # nothing that comes now changes the exit code
+            with contextlib.suppress(ValueError):  # a system without this signal
+                signal.signal(stopped - 128, signal.SIG_IGN)
         sys.unraisablehook = lambda found: None  # finalisers of what was left half made
+    else:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is left to say: Ctrl-C ends at once
     sys.exit(code)
+
+
+def _open_standard_files() -> None:
+    """Open files 0 to 2 on nothing where a process is started without them: the next file opened would take their place."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)

@@ -1,6 +1,7 @@
-"""Ctrl-C and SIGTERM, which wait until they can be heard.
+"""Ctrl-C, SIGTERM and SIGHUP, which wait until they can be heard.
 
-SIGTERM, by which schedulers end a program, is taken as Ctrl-C is: by default it would leave files that are half written.
+SIGTERM, by which schedulers end a program, and SIGHUP, which a terminal sends as it closes, are taken as Ctrl-C is: by
+default they would leave files that are half written.
 Python raises KeyboardInterrupt wherever it happens to be. In a finaliser, and in a function that a library in C calls back,
 such as LLVM while a kernel is compiled, it prints the exception and forgets it: the command would go on. Modules in C make
 another error of it while they are imported.
@@ -12,58 +13,76 @@ import contextlib
 import signal
 import sys
 import threading
+import time
 import traceback
 from collections.abc import Iterator
 from types import FrameType
 from typing import Any
 
 AGAIN = 0.05  # [s]
-# Exit codes as shells have them.
-CODES: dict[int, int] = {signal.SIGINT: 130, signal.SIGTERM: 143}
+# A signal that follows another one so soon means the same [s].
+REPEATED = 0.5
 HANDLERS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+if hasattr(signal, "SIGHUP"):
+    HANDLERS[signal.SIGHUP] = signal.SIG_DFL
+# Exit codes as shells have them.
+CODES: dict[int, int] = {number: 128 + number for number in HANDLERS}
 IMPORTING = ("importlib._bootstrap", "_frozen_importlib")
 COMMAND_LINE = "fastcontact.cli._main"
 
 
 @contextlib.contextmanager
 def interruptible(raised: list[int] | None = None) -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM interrupt the block where the exception is not lost.
+    """Let Ctrl-C, SIGTERM and SIGHUP interrupt the block where the exception is not lost.
 
     The numbers of the signals that did so come into the list `raised`. Those that have another handler keep it.
     """
+    heard: list[float] = []  # when the last one interrupted the block, unless that was lost
     raised = [] if raised is None else raised
     ours = threading.current_thread() is threading.main_thread()
     numbers = [number for number, usual in HANDLERS.items() if ours and signal.getsignal(number) == usual]
 
     def interrupt(number: int, frame: FrameType | None) -> None:
+        if heard and time.monotonic() - heard[-1] < REPEATED:
+            return
         if _is_importing(frame):
             _again(number)
         else:
             raised.append(number)
+            heard.append(time.monotonic())
             raise KeyboardInterrupt
 
     try:
-        with _lost_ones_come_again(raised):
+        with _lost_ones_come_again(raised, heard), meant(raised):
             for number in numbers:
                 signal.signal(number, interrupt)
             yield
-    except Exception as error:
-        # Some functions in C make another error of it; what is raised where it was caught is meant.
-        if raised and not isinstance(error.__context__, KeyboardInterrupt):
-            raise KeyboardInterrupt from error
-        raise
     finally:
         for number in numbers:
             signal.signal(number, HANDLERS[number])
 
 
 @contextlib.contextmanager
-def _lost_ones_come_again(raised: list[int]) -> Iterator[None]:
+def meant(raised: list[int]) -> Iterator[None]:
+    """Raise KeyboardInterrupt where a signal was `raised` and functions in C made another error of it."""
+    try:
+        yield
+    except Exception as error:
+        if raised and not isinstance(
+            error.__context__, KeyboardInterrupt
+        ):  # else it was caught, and the error is meant
+            raise KeyboardInterrupt from error
+        raise
+
+
+@contextlib.contextmanager
+def _lost_ones_come_again(raised: list[int], heard: list[float]) -> Iterator[None]:
     """Repeat an interruption that Python would print and forget; once one was `raised`, finalisers have nothing to say."""
     before = sys.unraisablehook
 
     def lost(found: sys.UnraisableHookArgs) -> None:
         if issubclass(found.exc_type, KeyboardInterrupt):
+            heard.clear()
             _again(raised[-1] if raised else signal.SIGINT)
         elif not raised:
             before(found)

@@ -1,7 +1,7 @@
 """Dispatch to the sub-commands, and turn errors into exit codes.
 
 0: done; 1: wrong input, one clear line; 2: no convergence, the result file keeps all converged steps; 3: a check of the case
-failed (``run --strict``); 130: interrupted from the keyboard, like 2; 143: the same by SIGTERM.
+failed (``run --strict``); 130: interrupted from the keyboard, like 2; 143, 129: the same by SIGTERM, SIGHUP.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from typing import Any
 from fastcontact._jit import compiling
 from fastcontact._version import __version__
 from fastcontact.cli._completion import SHELLS, PrintCompletion
-from fastcontact.cli._interrupts import CODES, forget, interruptible
-from fastcontact.cli._terminal import add_loudness, encodable, printable, say
-from fastcontact.errors import ConvergenceError, FastcontactError, unknown
+from fastcontact.cli._interrupts import CODES, forget, interruptible, meant
+from fastcontact.cli._terminal import add_loudness, encodable, say, somebody_watches
+from fastcontact.errors import ConvergenceError, FastcontactError, printable, unknown
 
 log = logging.getLogger("fastcontact")
 _FLAG = re.compile(r"(?<![\w-])--?[A-Za-z][\w-]*")
@@ -37,7 +37,7 @@ class _Printable(logging.StreamHandler[Any]):
     def format(self, record: logging.LogRecord) -> str:
         """Return the line to write; on a terminal it takes the place of the progress bar."""
         line = encodable(printable(super().format(record)), self.stream)
-        return f"\r\x1b[K{line}" if sys.stderr.isatty() else line
+        return f"\r\x1b[K{line}" if somebody_watches() else line
 
 
 class Parser(argparse.ArgumentParser):
@@ -98,16 +98,22 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     raised: list[int] = []
+    with interruptible(raised):  # also while it is told why the command ends
+        return _told(sys.argv[1:] if argv is None else list(argv), raised)
+
+
+def _told(given: list[str], raised: list[int]) -> int:
+    """Run a command; an error is told, and becomes an exit code. `raised` are the signals that came."""
     try:
-        with interruptible(raised):
-            return _run(sys.argv[1:] if argv is None else list(argv))
+        with meant(raised):
+            return _run(given)
     except ConvergenceError as error:
         say("\n".join([f"no convergence: {error}", *history_lines(error.history), *_notes(error)]), error=True)
         return 2
     except FastcontactError as error:
         say(f"error: {error}", error=True)
         forget(error)  # a study that was stopped tells it by such an error
-        return CODES[signal.SIGTERM] if signal.SIGTERM in raised else 1
+        return CODES[raised[0]] if raised and raised[0] != signal.SIGINT else 1
     except BrokenPipeError:
         return 1
     except KeyboardInterrupt as error:
@@ -122,7 +128,7 @@ def _run(given: list[str]) -> int:
     handler = _Printable()
     log.handlers[:] = [handler]
     log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
-    told = sys.stderr.isatty() and not (arguments.quiet or arguments.verbose)  # the log tells it with -v
+    told = somebody_watches() and not (arguments.quiet or arguments.verbose)  # the log tells it with -v
     compiling.listeners[:] = [_say_compiling] if told else []
     return int(arguments.run(arguments) or 0)
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from fastcontact.cli._executor import executor
 from fastcontact.cli._outputs import check_outputs, save, write_json, write_text
-from fastcontact.cli._terminal import say
+from fastcontact.cli._terminal import say, somebody_watches
 from fastcontact.errors import FastcontactError
 from fastcontact.studies.progress import Runs
 
@@ -45,7 +44,7 @@ def names(text: str | None) -> list[str] | None:
 
 def finished(options: argparse.Namespace, study: Callable[..., Any]) -> Any:
     """Return the result of a study, run on the executor of the options; the error of an interruption says how to go on."""
-    progress = Runs(show=sys.stderr.isatty() and not options.quiet)
+    progress = Runs(show=somebody_watches() and not options.quiet)
     try:
         with executor(options.executor) as where:
             return study(executor=where, workers=options.workers, store=options.store, on_progress=progress)

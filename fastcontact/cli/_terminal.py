@@ -11,7 +11,7 @@ import os
 import sys
 from typing import Any, TextIO
 
-from fastcontact.errors import FileError
+from fastcontact.errors import FileError, printable
 
 
 def add_loudness(parser: argparse.ArgumentParser, default: Any) -> None:
@@ -24,9 +24,16 @@ def add_loudness(parser: argparse.ArgumentParser, default: Any) -> None:
         loudness.add_argument(*flags, action="store_true", default=default, help=text)
 
 
+def somebody_watches() -> bool:
+    """Return whether standard error is a terminal; a process may be started without any."""
+    return sys.stderr is not None and sys.stderr.isatty()
+
+
 def say(text: object, *, error: bool = False) -> None:
     """Print a text on standard output, or on standard error, of which nobody could be told that it cannot be written."""
-    stream: TextIO = sys.stderr if error else sys.stdout
+    stream: TextIO | None = sys.stderr if error else sys.stdout
+    if stream is None:  # closed before the process was started
+        return
     try:
         print(encodable(printable(str(text)), stream), file=stream)
     except BrokenPipeError:
@@ -53,13 +60,6 @@ def flushed(code: int) -> int:
 def _unwritten(error: OSError) -> str:
     """Return what is said where standard output leads to a full disk."""
     return f"cannot write to standard output ({error.strerror}): send it elsewhere"
-
-
-def printable(text: str) -> str:
-    """Return a text with all characters that control or format replaced by their escapes, but for the ends of lines."""
-    if text.isprintable():
-        return text
-    return "".join(c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in text)
 
 
 def encodable(text: str, stream: TextIO) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fastcontact.cli._outputs import check_outputs, write_json
-from fastcontact.cli._terminal import say
+from fastcontact.cli._terminal import say, somebody_watches
 from fastcontact.errors import FastcontactError, FileError
 
 HELP = "run the benchmarks of the checkout"
@@ -53,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
     before = _stored(options.compare) if options.compare else None
     results: dict[str, Any] = {}
     tables: dict[str, Any] = {}
-    show = sys.stderr.isatty() and not options.quiet
+    show = somebody_watches() and not options.quiet
     for name in options.names or subjects.names():
         subject = subjects.load(name)
         if hasattr(subject, "entries"):  # a table of its own

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import sys
 from functools import partial
 
 from fastcontact.cli import _study
@@ -63,7 +62,7 @@ def _adaptive(options: argparse.Namespace) -> int:
             element=_only(options.elements, "element"),
             formulation=_only(options.formulations, "formulation"),
             max_dofs=options.max_dofs,
-            progress=sys.stderr.isatty() and not options.quiet,
+            progress=somebody_watches() and not options.quiet,
         )
     if options.output:
         from fastcontact.results.writer import ResultWriter

@@ -5,14 +5,13 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import os
-import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
-from fastcontact.cli._terminal import say
+from fastcontact.cli._terminal import say, somebody_watches
 from fastcontact.cli._warnings import warnings_shown
 from fastcontact.errors import CaseError, ConvergenceError, FileError, ModelError
 
@@ -122,7 +121,7 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[_Don
         last, done = writer.done[-1] if writer.done else None, _done(writer.done)
         steps = list(done.summaries)
         total = len(steps) + len(remaining(case.ramp, last))
-        progress = Progress(total, show=sys.stderr.isatty() and not options.quiet, done=len(steps))
+        progress = Progress(total, show=somebody_watches() and not options.quiet, done=len(steps))
         try:
             for last in solve_steps(
                 case.model,

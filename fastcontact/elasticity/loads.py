@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from fastcontact.elasticity.symmetry_axis import axis_nodes
 from fastcontact.errors import ModelError, unknown
-from fastcontact.masks import REFUSAL, is_masked
 from fastcontact.mesh import elements, quadrature
+from fastcontact.mesh.argument_types import values_at
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
 
@@ -291,10 +291,7 @@ def evaluated(value: Value, points: Array, name: str) -> Array:
     if not callable(value):
         return np.full(points.shape[:-1], float(value))
     flat = np.ascontiguousarray(points.reshape(-1, points.shape[-1]))
-    returned = value(flat)
-    if is_masked(returned):
-        raise ModelError(f"{name} is a function whose result {REFUSAL}")
-    found = np.asarray(returned)
+    found = np.asarray(values_at(value, flat, name, ModelError))
     if found.shape != (len(flat),) or found.dtype.kind not in "fiu":
         raise ModelError(
             f"{name} is a function that returned {found.dtype} numbers of shape {found.shape} for {len(flat)} points: "

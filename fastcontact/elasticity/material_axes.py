@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.errors import ModelError
-from fastcontact.masks import REFUSAL, is_masked
-from fastcontact.mesh.argument_types import check_type
+from fastcontact.mesh.argument_types import check_type, values_at
 
 Array = NDArray[np.float64]
 Axes = Sequence[Sequence[float]] | Callable[[Array], Array] | None
@@ -123,9 +122,7 @@ def frames(axes: Axes, points: Array, kinematics: str) -> Array:
             f"{axes} are not around the axis of symmetry: in axisymmetry their origin is (0, 0, 0) and their direction "
             "(0, 1, 0)"
         )
-    returned = axes(points)
-    if is_masked(returned):
-        raise ModelError(f"the result of the function of a material's axes {REFUSAL}")
+    returned = values_at(axes, points, "the axes of a material", ModelError)
     found = np.asarray(returned, complex if np.iscomplexobj(returned) else float)
     if found.shape != (len(points), 3, 3):
         raise ModelError(

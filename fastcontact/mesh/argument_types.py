@@ -129,6 +129,21 @@ def _is_number(text: str) -> bool:
     return True
 
 
+def values_at(function: Callable[..., Any], points: Any, name: str, error: type[FastcontactError]) -> Any:
+    """Return what a function of the caller, called `name` in messages, returns for `points`; `error` if it fails."""
+    try:
+        returned = function(points)
+    except Exception as failure:
+        reason = f"{type(failure).__name__}: {failure}"
+        raise error(
+            f"{name} is a function that failed for {len(points)} points of shape {np.shape(points)} ({reason}): call it with "
+            "such an array to see where"
+        ) from failure
+    if is_masked(returned):
+        raise error(f"{name} is a function whose result {REFUSAL}")
+    return returned
+
+
 def fits(value: Any, annotation: Any) -> bool:
     """Return whether a value is of the annotated type, as far as that can be seen without using it up."""
     origin, members = typing.get_origin(annotation), typing.get_args(annotation)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import operator
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -163,8 +164,10 @@ class Results(Sequence[StepResult]):
         """Return a step by its position, from 0, or from the end if negative; a slice gives a list of steps."""
         if isinstance(number, slice):
             return [self._read_step(position) for position in range(*number.indices(self._n_steps))]
-        if not hasattr(number, "__index__"):
-            raise FileError(f"a step of '{self.path}' is a whole number, from 0, or a slice, not {number!r}")
+        try:
+            number = operator.index(number)
+        except TypeError:
+            raise FileError(f"a step of '{self.path}' is a whole number, from 0, or a slice, not {number!r}") from None
         if not -self._n_steps <= number < self._n_steps:
             raise IndexError(f"'{self.path}' has {self._n_steps} steps, so there is no step at position {number}")
         return self._read_step(range(self._n_steps)[number])

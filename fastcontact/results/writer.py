@@ -8,8 +8,10 @@ Room on the disk is reserved before, because HDF5 loses the whole file when one 
 from __future__ import annotations
 
 import contextlib
+import copy
 import json
 import os
+import threading
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
@@ -47,7 +49,8 @@ class ResultWriter:
     """A result file to which one step after the other is written.
 
     The file is begun at once: errors show before any step is computed. From then on it can be opened at any time, by viewers
-    too, and shows all steps so far, even after an exception or a crash.
+    too, and shows all steps so far, even after an exception or a crash. Several threads may share a writer: its methods
+    wait for each other.
 
     Parameters
     ----------
@@ -71,7 +74,8 @@ class ResultWriter:
         seconds after the file was begun, so that short runs are not slowed. Steps always survive the end of the process.
     background : bool
         Whether a step is written while the next one is computed. It is then complete when the next `write`, `wait` or `close`
-        returns, which also raise what went wrong with it; `n_steps` counts those that are. One step more is in memory.
+        returns, which also raise what went wrong with it; `n_steps` counts those that are. A copy of the step is in memory
+        until then, so that the arrays of the caller may change.
 
     Attributes
     ----------
@@ -129,6 +133,7 @@ class ResultWriter:
         self._committed: Any = None
         self._closed = self._ended = False
         self._background = Background() if background else None
+        self._turn = threading.RLock()
         self._last: tuple[int, Any] = (0, None)  # index and case of the last step
         self._notes: dict[str, str] = {}  # of the next step: the case file, if another one is resumed
         self._left: tuple[int, ...] | None = None
@@ -175,6 +180,7 @@ class ResultWriter:
                 run["log"] = {"failed_step": error.history}
             self._finish(run)
 
+    @typed(FileError)
     def write(self, step: StepResult) -> None:
         """Append a step; when this returns the step is safe from a crash of the process, unless it is in the background.
 
@@ -184,16 +190,17 @@ class ResultWriter:
             If the file is closed, the step does not follow those before it, belongs to another case or does not fit the
             mesh, or the disk takes no more.
         """
-        self.wait()
-        if self._closed:
-            raise FileError(f"'{self.path}' is closed: write steps before close, or inside the with block")
-        layout.check_step(self._mesh, step, self._cell_fields)
-        self._check_next(step)
-        self._release_done()
-        if self._background is None:
-            self._append(step)
-        else:
-            self._background.start(partial(self._append, step))
+        with self._turn:
+            self.wait()
+            if self._closed:
+                raise FileError(f"'{self.path}' is closed: write steps before close, or inside the with block")
+            layout.check_step(self._mesh, step, self._cell_fields)
+            self._check_next(step)
+            self._release_done()
+            if self._background is None:
+                self._append(step)
+            else:
+                self._background.start(partial(self._append, copy.deepcopy(step)))
 
     def wait(self) -> None:
         """Wait until all steps given to `write` are complete.
@@ -204,7 +211,8 @@ class ResultWriter:
             If the disk took no more.
         """
         if self._background is not None:
-            self._background.wait()
+            with self._turn:
+                self._background.wait()
 
     def _append(self, step: StepResult) -> None:
         with self._explained(f"written at step {step.index}"):
@@ -235,6 +243,7 @@ class ResultWriter:
                 f"step {step.index} belongs to another case than step {index}: write it to a file of its own"
             )
 
+    @typed(FileError)
     def close(self, log: Any = None, warnings: Iterable[str] = ()) -> None:
         """Finish the file; a second call does nothing.
 
@@ -258,8 +267,11 @@ class ResultWriter:
         self._finish({"log": log, "warnings": [str(warning) for warning in warnings]})
 
     def _finish(self, run: dict[str, Any]) -> None:
-        if self._closed:
-            return
+        with self._turn:
+            if not self._closed:
+                self._finish_once(run)
+
+    def _finish_once(self, run: dict[str, Any]) -> None:
         if self._file is None and self._ended and "error" not in run:
             self._give_up()  # a complete file stays as it is
             return

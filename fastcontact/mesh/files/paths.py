@@ -43,7 +43,10 @@ def existing_file(path: PathLike) -> Path:
 
 def checked_target(path: PathLike) -> Path:
     """Return the real path to write to, that of the file which a link names, or raise FileError if it cannot be written."""
-    target = Path(os.path.realpath(os.fspath(path)))
+    try:
+        target = Path(os.path.realpath(os.fspath(path)))
+    except ValueError as error:  # a zero in it
+        raise FileError(f"{os.fspath(path)!r} cannot be the name of a file ({error}): name another one") from error
     if descriptor(path) is not None:
         raise FileError(f"'{path}' is a stream: name a plain file")
     try:

@@ -51,7 +51,10 @@ def group_names(groups: Sequence[str] | str | None) -> tuple[str, ...] | None:
     """Return the names of groups as users give them, one or several; None for all."""
     if groups is None:
         return None
-    return (groups,) if isinstance(groups, str) else tuple(groups)
+    names = (groups,) if isinstance(groups, str) else tuple(groups)
+    if not names:
+        raise ModelError("the list of groups is empty: name a group, or leave the argument out for all cells")
+    return names
 
 
 class ModelBase:

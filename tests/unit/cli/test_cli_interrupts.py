@@ -116,24 +116,48 @@ def test_elsewhere_it_comes_at_once():
         signal.raise_signal(signal.SIGINT)
 
 
-def test_sigterm_is_told_in_its_own_words(monkeypatch, capsys):
-    """Exit code 143, also of a study, which says how to go on; afterwards it ends the process as before."""
+@pytest.mark.parametrize("number", [signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)])
+def test_sigterm_is_told_in_its_own_words(number, monkeypatch, capsys):
+    """Exit code 143 or 129, also of a study, which says how to go on; afterwards it ends the process as before."""
     from fastcontact.cli import env
 
     def terminated(options):
-        signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(number)
 
     def stopped(options):
         try:
-            signal.raise_signal(signal.SIGTERM)
+            signal.raise_signal(number)
         except KeyboardInterrupt:
             raise FastcontactError("stopped; go on so") from None
 
     for act, said in ((terminated, "terminated\n"), (stopped, "error: stopped; go on so\n")):
         monkeypatch.setattr(env, "run", act)
-        assert main(["env"]) == 143
+        assert main(["env"]) == 128 + number
         assert capsys.readouterr().err == said
-        assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+        assert signal.getsignal(number) == signal.SIG_DFL
+
+
+@pytest.mark.parametrize("second", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_that_follows_at_once_changes_nothing(second, monkeypatch, capsys):
+    """While files are closed, and while it is told why the command ends."""
+    from fastcontact.cli import _main, env
+
+    def terminated(options):
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        finally:
+            signal.raise_signal(second)
+            closed.append(True)
+
+    def say(text, error=False):
+        signal.raise_signal(second)
+        said.append(text)
+
+    closed, said = [], []
+    monkeypatch.setattr(env, "run", terminated)
+    monkeypatch.setattr(_main, "say", say)
+    assert main(["env"]) == 143
+    assert (closed, said) == ([True], ["terminated"])
 
 
 @pytest.mark.parametrize("where", [in_an_import, in_a_finaliser])
@@ -254,7 +278,7 @@ def test_no_traceback_is_printed(command, when, tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_no_half_written_file_stays(number, tmp_path):
-    """The signal comes while a picture is written to a file that is to take the place of another."""
+    """Two signals come while a picture is written to a file that is to take the place of another."""
     (tmp_path / "out.png").write_bytes(b"before")
     process = subprocess.Popen(
         [
@@ -267,6 +291,8 @@ def test_no_half_written_file_stays(number, tmp_path):
         assert process.poll() is None, process.communicate()[1]
         time.sleep(0.001)
     process.send_signal(number)
+    time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)
     assert process.returncode == {signal.SIGINT: 130, signal.SIGTERM: 143}[number], said
     assert said == {signal.SIGINT: "interrupted\n", signal.SIGTERM: "terminated\n"}[number]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import io
+import json
 import os
 import shutil
 import subprocess
@@ -13,9 +14,10 @@ from pathlib import Path
 import matplotlib as mpl
 import pytest
 
+import fastcontact as fc
 from fastcontact.cli import main
 from fastcontact.cli._main import parser
-from fastcontact.cli._terminal import printable
+from fastcontact.errors import printable
 
 mpl.use("Agg")
 
@@ -170,6 +172,16 @@ def test_what_a_shell_opened_to_append_to_is_appended_to(name, files):
     assert log.startswith("kept\n")
     assert "pressure" in log
     assert main(["run", str(files / "case.toml"), "-o", "/dev/stdout"]) == 1
+
+
+@pytest.mark.skipif(os.name == "nt", reason="files as POSIX numbers them")
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+def test_a_process_without_standard_files(closed, files):
+    """As daemons are started: no file that is opened takes the place of what is printed."""
+    command = f"'{sys.executable}' -m fastcontact run case.toml -o out.vtkhdf --json out.json {closed}"
+    assert subprocess.run(command, shell=True, cwd=files, check=False).returncode == 0
+    assert len(fc.open_results(files / "out.vtkhdf")) == len(fc.open_results(files / "old.vtkhdf"))
+    assert json.loads((files / "out.json").read_text())["case"]
 
 
 needs_full = pytest.mark.skipif(not Path("/dev/full").is_char_device(), reason="needs a device that is always full")

@@ -1,5 +1,6 @@
 """Steps that are written while the next one is computed: the same file, no step lost, and errors that are told."""
 
+import contextlib
 import threading
 import time
 
@@ -132,3 +133,37 @@ def test_an_error_is_raised_once_and_the_next_task_runs():
     work.start(lambda: done.append(1))
     work.wait()
     assert done == [1]
+
+
+def test_arrays_of_the_caller_may_change(tmp_path, slow):
+    with ResultWriter(tmp_path / "run.vtkhdf", MESH, background=True) as out:
+        step = nth_step(1)
+        out.write(step)
+        for field in (step.displacement, step.stress, *(contact.pressure for contact in step.contact.values())):
+            field[:] = -1.0
+        slow.set()
+    with open_results(tmp_path / "run.vtkhdf") as found:
+        assert_same(found[0], nth_step(1))
+
+
+@pytest.mark.parametrize("background", [False, True])
+def test_threads_that_share_a_writer_lose_nothing(tmp_path, background):
+    """Each step is written whole or refused, because a later one came first; what was written is there."""
+    written, path = [], tmp_path / "run.vtkhdf"
+
+    def write(numbers):
+        for number in numbers:
+            with contextlib.suppress(FileError):
+                out.write(nth_step(number))
+                written.append(number)
+
+    with ResultWriter(path, MESH, background=background) as out:
+        threads = [threading.Thread(target=write, args=(range(k, 40, 4),)) for k in range(1, 5)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    with open_results(path) as found:
+        assert [step.index for step in found] == [nth_step(number).index for number in sorted(written)]
+        for step, number in zip(found, sorted(written), strict=True):
+            assert_same(step, nth_step(number))
