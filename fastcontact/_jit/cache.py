@@ -1,55 +1,189 @@
-"""Kernels on disk are compiled anew when a file they depend on has changed; Numba looks at a kernel's own file alone."""
+"""Compiled kernels on disk: each in a file, used only if it is whole, nobody else's, and of the sources as they are.
+
+Numba knows a kernel by the time and size of its own source file, reads whatever lies in its cache, and stops where that is
+damaged. Here the name of a file tells the contents of all sources that the kernel depends on, so that kernels outlive another
+installation of the same version, and its first bytes tell what follows, so that damage costs a compilation.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
+import logging
 import os
+import pickle
+import secrets
 import stat
-from collections.abc import Callable
-from functools import cache
+import sys
+from collections.abc import Callable, Iterator
+from functools import cache, cached_property
+from pathlib import Path
 from typing import Any
 
+import llvmlite
+import numba
+import numpy as np
 
-def is_trusted(kernel: Any) -> bool:
-    """Return whether nobody but the owner of this process and root can write to the folder of a kernel's cache.
+from fastcontact._version import __version__
 
-    What lies there is run. Groups of their own, which many systems give to each user, are no others.
+log = logging.getLogger("fastcontact")
+# What Numba compiles by, and does not tell apart in its cache.
+OPTIONS = ("OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "CPU_NAME", "CPU_FEATURES", "THREADING_LAYER")
+CONSTANTS = (bool, int, float, complex, str, tuple, np.ndarray, np.generic, type(None))
+
+
+class KernelFiles:
+    """Files of the compiled versions of a kernel, with the methods that Numba's dispatcher calls.
+
+    What goes wrong with a file is told once, in one line; the kernel is then compiled.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        Where the files lie.
+    name : str
+        Beginning of their names.
+    function : callable
+        The kernel in Python.
+    options : str
+        By which it is compiled.
+    dumps : callable
+        Returns an object of Numba as bytes, which `pickle` reads.
     """
-    folder = getattr(getattr(kernel, "_cache", None), "cache_path", None)
-    return folder is None or not hasattr(os, "getuid") or (_is_own(folder) and _keeps_names(os.path.dirname(folder)))
+
+    def __init__(
+        self, folder: Path, name: str, function: Callable[..., Any], options: str, dumps: Callable[[Any], bytes]
+    ) -> None:
+        self.folder, self._name, self._function, self._options, self._dumps = folder, name, function, options, dumps
+
+    def load(self, key: Any) -> Any:
+        """Return what was kept for a signature; None if there is nothing that may be used."""
+        path = self._path(key)
+        try:
+            with open(path, "rb") as file:
+                if not _is_own(os.fstat(file.fileno())):
+                    _tell(f"others may write to the compiled kernel '{path}'")
+                    return None
+                digest, data = file.read(hashlib.sha256().digest_size), file.read()
+            if hashlib.sha256(data).digest() == digest:
+                return pickle.loads(data)
+            _tell(f"the compiled kernel '{path}' is damaged")
+        except FileNotFoundError:
+            pass
+        except Exception as error:  # of an object that another release of a library has written
+            _tell(f"the compiled kernel '{path}' cannot be read ({error})")
+        return None
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep what was compiled for a signature; the file appears whole or not at all."""
+        path, content = self._path(key), self._dumps(data)
+        temporary = path.with_name(f"{path.name}.{secrets.token_hex(8)}")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            temporary.write_bytes(hashlib.sha256(content).digest() + content)
+            os.replace(temporary, path)
+        except OSError as error:
+            _tell(f"compiled kernels cannot be kept in '{path.parent}' ({error.strerror or error})")
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+    def flush(self) -> None:
+        """Do nothing: what is out of date has another name."""
+
+    def _path(self, key: Any) -> Path:
+        return self.folder / f"{self._name}.{_digest(self._stamp + repr(key).encode())[:24]}.nbc"
+
+    @cached_property
+    def _stamp(self) -> bytes:
+        """What the machine code depends on, apart from the signature and the processor."""
+        environment = {name: getattr(numba.config, name, None) for name in OPTIONS}
+        parts = [__version__, numba.__version__, llvmlite.__version__, sys.version, self._options, repr(environment)]
+        return "\n".join([*parts, *sorted(set(_sources(self._function, set())))]).encode()
+
+
+def keep(kernel: Any, function: Callable[..., Any], options: str) -> str:
+    """Keep a kernel, made from a function with `options`, in `KernelFiles`; return why it cannot be kept, empty if it can."""
+    numbas: Any = getattr(kernel, "_cache", None)
+    if numbas is None:
+        return ""  # kernels are not compiled
+    folder = folder_of(numbas.cache_path)
+    if not is_trusted(folder):
+        return f"others may write to the folder of compiled kernels, {folder}"
+    name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
+    numbas._cache_file = KernelFiles(folder, name, function, options, numbas._cache_file._dump)
+    return ""
 
 
 @cache
-def _is_own(folder: str) -> bool:
-    found = os.stat(folder)
-    shared = found.st_mode & stat.S_IWOTH or (found.st_mode & stat.S_IWGRP and found.st_gid not in (0, os.getgid()))
-    return found.st_uid in (0, os.getuid()) and not shared
+def folder_of(fallback: str) -> Path:
+    """Return the folder of compiled kernels: in NUMBA_CACHE_DIR, else in the user's cache, else `fallback`."""
+    chosen = str(getattr(numba.config, "CACHE_DIR", ""))
+    if chosen:
+        base = chosen
+    elif sys.platform == "win32":
+        base = os.environ.get("LOCALAPPDATA", "")
+    elif sys.platform == "darwin":
+        base = os.path.expanduser("~/Library/Caches")
+    else:
+        base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    folder = Path(base, "fastcontact")
+    try:
+        if folder.is_absolute() or chosen:
+            folder.mkdir(parents=True, exist_ok=True)
+            if os.access(folder, os.W_OK):
+                return folder
+    except OSError:
+        log.debug("no compiled kernels in '%s'", folder)
+    return Path(fallback)
 
 
 @cache
-def _keeps_names(folder: str) -> bool:
-    """Return whether others cannot put a folder of theirs in the place of one inside `folder`."""
-    return bool(os.stat(folder).st_mode & stat.S_ISVTX) or _is_own(folder)
+def is_trusted(folder: Path) -> bool:
+    """Return whether nobody but the owner of this process and root can write to a folder: what lies there is run.
 
-
-def watch_files(kernel: Any, function: Callable[..., Any], decorators: str) -> Any:
-    """Return a kernel, made from a function, with all files that its machine code depends on in the stamp of its cache.
-
-    They are those of the kernels that it may call, and the file of `decorators`, which say how it is compiled.
+    Groups of their own, which many systems give to each user, are no others.
     """
-    files = {decorators}
-    _gather(function, files)
-    cache_file = getattr(getattr(kernel, "_cache", None), "_cache_file", None)  # none where kernels are not compiled
-    if cache_file is not None:
-        cache_file._source_stamp = [(stat.st_mtime, stat.st_size) for stat in map(os.stat, sorted(files))]
-    return kernel
+    folder.mkdir(parents=True, exist_ok=True)
+    above = os.stat(folder.parent)  # others who may rename the folder could put one of theirs in its place
+    return _is_own(os.stat(folder)) and (bool(above.st_mode & stat.S_ISVTX) or _is_own(above))
 
 
-def _gather(function: Callable[..., Any], files: set[str]) -> None:
-    """Add the file of a function and those of the kernels, and of the code written by hand, that it and they may call."""
-    file = function.__code__.co_filename
-    if file not in files:
-        files.add(file)
-        for other in list(function.__globals__.values()):
-            part = getattr(other, "py_func", None) or getattr(other, "_defn", None)  # of a kernel, of an intrinsic
-            if part is not None:
-                _gather(part, files)
+def _is_own(status: os.stat_result) -> bool:
+    if not hasattr(os, "getuid"):
+        return True
+    shared = status.st_mode & stat.S_IWOTH or (status.st_mode & stat.S_IWGRP and status.st_gid not in (0, os.getgid()))
+    return status.st_uid in (0, os.getuid()) and not shared
+
+
+@cache
+def _tell(text: str) -> None:
+    """Log a line, once in a process."""
+    log.info("%s: compiling instead", text)
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+@cache
+def _digest_of_file(path: str) -> str:
+    return _digest(Path(path).read_bytes())
+
+
+def _sources(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
+    """Yield what the code of a function, and of the kernels and intrinsics that it may call, depends on.
+
+    These are their files, and the constants of other files that are compiled into them.
+    """
+    code = function.__code__
+    if code in seen:
+        return
+    seen.add(code)
+    yield _digest_of_file(code.co_filename)
+    for name in code.co_names:
+        value = function.__globals__.get(name)
+        called = getattr(value, "py_func", None) or getattr(value, "_defn", None)  # of a kernel, of an intrinsic
+        if called is not None:
+            yield from _sources(called, seen)
+        elif isinstance(value, CONSTANTS):
+            yield f"{name} = {value.tobytes() if isinstance(value, np.ndarray) else value!r}"

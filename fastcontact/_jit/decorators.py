@@ -85,9 +85,9 @@ def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = 
     options |= inlining
     try:
         cached = numba.njit(cache=True, **options)(function)
-        if cache.is_trusted(cached):
-            return cache.watch_files(cached, function, __file__)
-        reason = f"others may write to the folder of compiled kernels, {cached.stats.cache_path}"
+        reason = cache.keep(cached, function, repr(options))
+        if not reason:
+            return cached
     except RuntimeError as error:  # numba: "cannot cache function ...: no locator available for file ..."
         if "cannot cache" not in str(error):
             raise

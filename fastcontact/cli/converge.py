@@ -7,6 +7,7 @@ import dataclasses
 from functools import partial
 
 from fastcontact.cli import _study
+from fastcontact.cli._terminal import somebody_watches
 from fastcontact.cli._warnings import warnings_shown
 from fastcontact.errors import CaseError
 

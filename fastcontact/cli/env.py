@@ -27,8 +27,8 @@ def run(options: argparse.Namespace) -> int:
     for name, version in summary.versions().items():
         say(f"{name:<12} {version}")
     say(f"{'threads':<12} {_jit.threads()} of {os.cpu_count()}")
-    cache = getattr(element_2d_kernels.add_stiffness, "_cache", None)
-    say(f"{'cache':<12} {getattr(cache, 'cache_path', 'none: kernels compile in every process')}")
+    files = getattr(getattr(element_2d_kernels.add_stiffness, "_cache", None), "_cache_file", None)
+    say(f"{'cache':<12} {getattr(files, 'folder', 'none: kernels compile in every process')}")
     if options.warmup:
         started = time.perf_counter()
         with warnings.catch_warnings():

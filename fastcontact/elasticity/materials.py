@@ -328,7 +328,7 @@ class LinearElastic(Material):
             object.__setattr__(self, name, wrapped(getattr(self, name)))
         if not isinstance(self.E, Varying):
             check_positive("Young's modulus E", self.E)
-        if not isinstance(self.nu, Varying) and not (isinstance(self.nu, Real) and -1.0 < self.nu < 0.5):
+        if not isinstance(self.nu, Varying) and not (isinstance(self.nu, Real) and -1.0 < float(self.nu) < 0.5):
             raise ModelError(
                 f"Poisson's ratio nu = {self.nu} must lie between -1 and 0.5, both excluded "
                 "(for an incompressible material take nu = 0.4999, in quadrangles or hexahedra: they have a mean dilatation "

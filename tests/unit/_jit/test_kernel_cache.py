@@ -76,10 +76,62 @@ def test_a_cache_that_others_may_write_to_is_not_used(written, inside, mode, use
     assert ("others may write to the folder of compiled kernels" in done.stderr) != used
 
 
-def test_the_cache_notices_changes_of_how_kernels_are_compiled(written):
-    """What a kernel is compiled with stands in the file of the decorators."""
+@pytest.mark.parametrize("option", ["NUMBA_OPT", "NUMBA_BOUNDSCHECK"])
+def test_the_cache_notices_how_kernels_are_compiled(written, option, monkeypatch):
+    monkeypatch.setenv(option, "1")
+    ask = ASK.replace("caller", "callee").replace("whole", "part")
+    assert answers(written, ask) == ["2.0", "0"]
+    assert answers(written, ask) == ["2.0", "1"]
+
+
+def test_the_cache_notices_a_constant_of_another_file(tmp_path):
+    (tmp_path / "caller.py").write_text("from constants import NUMBER\n" + CALLER.replace("10.0 *", "NUMBER *"))
+    (tmp_path / "callee.py").write_text(CALLEE.format(decorator="kernel", number=1))
+    for number in (3.0, 5.0):
+        (tmp_path / "constants.py").write_text(f"NUMBER = {number}\n")
+        assert answers(tmp_path, ASK) == [str(2 * number), "0"]
+
+
+def test_kernels_outlive_an_installation(written):
+    """Of the same sources in another folder, written at another time."""
+    again = written / "again"
+    again.mkdir()
+    for name in ("caller.py", "callee.py"):
+        (again / name).write_text((written / name).read_text())
+    os.replace(written / "cache", again / "cache")
+    assert answers(again, "import callee; print(callee.part(1.0), sum(callee.part.stats.cache_hits.values()))") == [
+        "2.0",
+        "1",
+    ]
+
+
+HARM = {
+    "empty": lambda path: path.write_bytes(b""),
+    "cut": lambda path: path.write_bytes(path.read_bytes()[:-7]),
+    "zeroed": lambda path: path.write_bytes(bytes(path.stat().st_size)),
+    "flipped": lambda path: path.write_bytes(path.read_bytes()[:-900] + b"\xff" + path.read_bytes()[-899:]),
+    "writable": lambda path: path.chmod(0o666),
+    "a folder": lambda path: (path.unlink(), path.mkdir()),
+}
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs owners and modes of files")
+@pytest.mark.parametrize("harm", HARM)
+def test_a_file_that_is_damaged_or_of_others_costs_a_compilation_and_a_line(written, harm):
+    (path,) = (written / "cache").rglob("*.nbc")
+    HARM[harm](path)
     question = (
-        "import os, callee; from fastcontact._jit import decorators; callee.part(1.0); found = os.stat(decorators.__file__); "
-        "print((found.st_mtime, found.st_size) in callee.part._cache._cache_file._source_stamp)"
+        "import logging, sys; logging.basicConfig(level=20, stream=sys.stderr); import callee; print(callee.part(1.0))"
     )
-    assert answers(written, question) == ["True"]
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(written / "cache"), "NUMBA_DISABLE_JIT": "0"}
+    done = subprocess.run(
+        [sys.executable, "-c", question], capture_output=True, text=True, check=True, env=environment, cwd=written
+    )
+    assert done.stdout == "2.0\n"
+    assert sum("compiling instead" in line for line in done.stderr.splitlines()) == 1 + (harm == "a folder"), (
+        done.stderr
+    )
+    assert str(path.parent) in done.stderr
+    if harm != "a folder":
+        ask = ASK.replace("caller", "callee").replace("whole", "part")
+        assert answers(written, ask) == ["2.0", "1"]

@@ -240,7 +240,7 @@ def loaded(library):
 
 def compiled(count):
     """Tell whether so many kernels have been compiled."""
-    return lambda process, kernels: sum(1 for _ in kernels.rglob("*.nbi")) >= count
+    return lambda process, kernels: sum(1 for _ in kernels.rglob("*.nbc")) >= count
 
 
 WHEN = {
