@@ -47,6 +47,23 @@ def test_excluded_nodes_carry_nothing(formulation, space):
         assert not contact.force_vectors[out].any()
 
 
+@pytest.mark.parametrize("space", ["plane", "space"])
+def test_an_excluded_node_is_the_same_to_dual_multipliers(space):
+    """Where nodes lie opposite nodes, dual multipliers are the forces of node-to-segment; neighbours take nothing over."""
+    mesh = boxes(lower=(6, 2, 2), upper=(6, 2, 2)) if space == "space" else blocks(lower=(6, 3), upper=(6, 3))
+    mesh = with_group(mesh, SIDES[space][0], lambda x: np.abs(x[:, 0] - 5.0) > 4.9)
+    kinematics, found = "3d" if space == "space" else "plane_strain", {}
+    for formulation, options in (("node_to_segment", {}), ("mortar", {"multipliers": "dual"})):
+        for excluded in ([], ["OUT"]):
+            model = touching(held(mesh, kinematics), formulation, excluded=excluded, normals="averaged", **options)
+            found[formulation, len(excluded)] = fc.solve(model, 1)[-1].contact["pair"]
+    out = np.isin(found["mortar", 1].points, mesh.points_of("OUT"))
+    assert not found["mortar", 1].force_vectors[out].any()
+    lost = [found[name, 1].force[-1] / found[name, 0].force[-1] for name in ("node_to_segment", "mortar")]
+    assert lost[1] == pytest.approx(lost[0], rel=1e-3)
+    assert lost[0] < 0.97
+
+
 @pytest.mark.parametrize("element", ["quad4", "quad8", "tri6"])
 @pytest.mark.parametrize("formulation", ["continuous", "mortar"])
 @pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric"])
