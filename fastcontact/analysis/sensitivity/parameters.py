@@ -215,8 +215,8 @@ def _material(model: Model, asked: Asked) -> tuple[int, LinearElastic]:
 
 
 def _with_model(problem: Problem, model: Model) -> Problem:
-    supported = model.prescribed_by_ramp()[0]
-    return replace(problem, model=model, pairs={pair.name: model.bind(pair, supported) for pair in model.contact})
+    pairs = {pair.name: model.bind(pair, problem.pairs[pair.name].held) for pair in model.contact}
+    return replace(problem, model=model, pairs=pairs)
 
 
 def forces_of(contact: MovingContact) -> Array:
