@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.model.model import Model
-from fastcontact.model.pretension import with_locks
+from fastcontact.model.pretension import locked_lengths
 from fastcontact.results.step import StepResult
-
-Array = NDArray[np.float64]
 
 
 def locked_before(model: Model, last: StepResult | None) -> Model:
     """Return the model with the sections that were locked when the `last` step began."""
     if last is None:
         return model
-    return _locked(model, float(np.nextafter(last.load_factor, -np.inf)), last.displacement)
+    before, kept = float(np.nextafter(last.load_factor, -np.inf)), (last.restart or {}).get("locked", {})
+    return _with_locks(model, locked_lengths(model.pretensions, before, last.displacement, kept))
 
 
 def go_on(
@@ -43,17 +41,23 @@ def go_on(
         At the beginning of the step.
     begin : float
     """
-    locked = _locked(model, begin, problem.displacement(state.u))
+    lengths = locked_lengths(model.pretensions, begin, problem.displacement(state.u), state.locked)
+    locked = _with_locks(model, lengths)
     if len(locked.relations) == len(problem.model.relations):
         return problem, state
     problem = prepared(locked)
-    return problem, replace(state, solver=problem.solver.snapshot(), extrapolation=Extrapolation(), rigid=None)
+    return problem, replace(
+        state, solver=problem.solver.snapshot(), extrapolation=Extrapolation(), rigid=None, locked=lengths
+    )
 
 
-def _locked(model: Model, begin: float, displacement: Array) -> Model:
-    locks = with_locks(model.pretensions, begin, displacement)
-    if not locks:
+def _with_locks(model: Model, lengths: Mapping[str, float]) -> Model:
+    """Return the model with sections locked at shortenings by their names [length]."""
+    if not lengths:
         return model
     made = copy.copy(model)
+    locks = [
+        own.locked(model.mesh.points.size, lengths[own.label]) for own in model.pretensions if own.label in lengths
+    ]
     made.relations = [*model.relations, *locks]
     return made

@@ -86,8 +86,13 @@ def sensitivities(
         ``("pressure", pair, point)`` [pressure].
     parameters : sequence of sequences
         ``("E", material)`` [pressure] and ``("nu", material)`` [-] of a `LinearElastic`, by a group that it was given to or
-        by its number in the order of the model; ``("load", group)``, the factor of all loads on a group, or of the force on a
-        rigid obstacle by its name [-]; ``("prescribed", group)``, the factor of the displacements prescribed on a group, or
+        by its number in the order of the model; of an `Orthotropic` with the axes, as ``("E", material, "1")``,
+        ``("nu", material, "12")`` and ``("G", material, "12")`` [pressure]; ``("expansion", material)``, or
+        ``("expansion", material, "1")`` along one axis [1 / temperature]; ``("load", group)``, the factor of all loads on a
+        group, or of the force on a rigid obstacle by its name [-]; ``("speed", group)``, of its centrifugal forces
+        [radian / time]; ``("temperature", group)``, the factor of the rise of its temperatures [-]; of these three also with
+        ``"all solid cells"`` for what names no group; ``("pretension", name)``, the factor of the force or the shortening of
+        a section [-]; ``("prescribed", group)``, the factor of the displacements prescribed on a group, or
         ``("prescribed", group, "y")`` of one component [-]; ``("motion", obstacle)``, the factor of its motion [-];
         ``("clearance", pair)``, a length added to the gap [length]. All factors are 1 now.
     ramp, criteria, linear_solver

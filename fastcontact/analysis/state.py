@@ -46,6 +46,8 @@ class State:
         there [pressure].
     first_contact : dict of str to (ndarray (dim,), ndarray (dim,))
         By contact pair in space, where the bodies met first [length] and the normal there [-].
+    locked : dict of str to float
+        By locked pretension section, its shortening from when it was locked [length].
     extrapolation : Extrapolation
         The last two converged steps.
     gap_round_off : float
@@ -72,6 +74,7 @@ class State:
     never_opening: Mapping[str, tuple[Array, Mask]] = field(default_factory=dict)
     first_contact: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
     traction: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
+    locked: Mapping[str, float] = field(default_factory=dict)
     extrapolation: Extrapolation = field(default_factory=Extrapolation)
     largest_force: float = 0.0
     largest_rigid_force: float = 0.0
@@ -96,6 +99,7 @@ class State:
             },
             "obstacles": self.u[n_dofs:].copy(),
             "touched": sorted(self.touched),
+            "locked": dict(self.locked),
             "active": dict(self.active),
             "pressure": dict(self.pressure),
             "pairs": {
@@ -143,6 +147,7 @@ class State:
             never_opening={name: (both[0], both[1]) for name, both in found["closed"].items()},
             first_contact={name: (both[0], both[1]) for name, both in found["first_contact"].items()},
             traction={name: (both[0], both[1]) for name, both in found["traction"].items()},
+            locked=dict(kept.get("locked", {})),
             extrapolation=Extrapolation.from_dict(kept["extrapolation"], u)
             if "extrapolation" in kept
             else Extrapolation(),

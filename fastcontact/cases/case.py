@@ -13,7 +13,7 @@ from fastcontact.cases.checks import CHECK, Check, read_check
 from fastcontact.cases.decks.blocks import files_of_deck
 from fastcontact.cases.decks.deck import Deck, read_deck
 from fastcontact.cases.input_files import files_named
-from fastcontact.cases.keys import NUMBER, RAMP, SENSITIVITY, SOLVE, STUDY, TOP, UNITS, at, called, check_keys, tables
+from fastcontact.cases.keys import NUMBER, RAMP, SENSITIVITY, TOP, at, called, check_keys, check_settings, tables
 from fastcontact.cases.model_tables import build_model, points
 from fastcontact.cases.shipped import case_path, shipped_cases
 from fastcontact.errors import CaseError, unknown
@@ -182,8 +182,7 @@ def build_case(
     Raises CaseError if a key is unknown or a value wrong, FastcontactError if the mesh or the model is wrong.
     """
     check_keys("", data, TOP)
-    for key, known in (("study", STUDY), ("units", UNITS), ("solve", SOLVE)):
-        check_keys(key, data.get(key, {}), known)
+    check_settings(data)
     for key in ("kinematics", "mesh", "material"):
         if key not in data:
             raise CaseError(f"the key '{key}' is missing")

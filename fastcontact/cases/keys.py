@@ -139,6 +139,14 @@ STUDY: dict[str, Any] = {
     **dict.fromkeys(("halve", "double", "curves", "combinations", "quantities"), list),
     **dict.fromkeys(("triangles", "quadrangles", "options", "parameters"), dict),
 }
+# What the lists and tables in it hold, and how one entry is written.
+STUDY_ENTRIES: dict[str, tuple[Any, str]] = {
+    **dict.fromkeys(("halve", "double"), (str, 'the name of an argument, "size"')),
+    "quantities": (str, 'the name of a quantity, "PROBE.stress.yy"'),
+    "combinations": ((str, list), 'an element and a formulation, "quad8 mortar"'),
+    "options": (dict, "a table of options of a formulation"),
+    "parameters": (dict, 'a table of laws by path, { "material[0].E" = "value" }'),
+}
 TOP: dict[str, Any] = {
     "title": str,
     "kinematics": str,
@@ -159,6 +167,18 @@ def check_keys(where: str, data: Any, known: Mapping[str, Any]) -> None:
         if kind is not None and (not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool)):
             names = " or ".join(k.__name__ for k in (kind if isinstance(kind, tuple) else (kind,)))
             raise CaseError(f"the value of '{label}' must be of type {names}, not {repr(value)}")
+
+
+def check_settings(data: Mapping[str, Any]) -> None:
+    """Raise CaseError if a key of ``[study]``, ``[units]`` or ``[solve]`` is unknown, or a value not of its type."""
+    for key, known in (("study", STUDY), ("units", UNITS), ("solve", SOLVE)):
+        check_keys(key, data.get(key, {}), known)
+    for key, (kind, form) in STUDY_ENTRIES.items():
+        entries = data.get("study", {}).get(key, ())
+        for place, entry in entries.items() if isinstance(entries, dict) else enumerate(entries):
+            if not isinstance(entry, kind):
+                where = f"study.{key}.{place}" if isinstance(entries, dict) else f"study.{key}[{place}]"
+                raise CaseError(f"'{where}' must be {form}, not {entry!r}")
 
 
 def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) -> Any:

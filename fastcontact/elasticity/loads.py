@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 Table = tuple[tuple[float, float], ...]
 Value = float | Callable[[Array], Array]
+# What messages and results call a place where no group is named.
+EVERYWHERE = "all solid cells"
 # Size of any number of a model: squares of products of two of them are still finite.
 LARGEST = 1e60
 Components = Mapping[int, Value]
@@ -62,6 +64,11 @@ class Load:
     def name(self) -> str:
         """Kind of the load and where it acts, for messages."""
         return f"{self.KIND} on '{self.group}'"
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Names of the groups on which it acts."""
+        return (self.group,)
 
     @property
     def values(self) -> list[Value]:
@@ -156,8 +163,13 @@ class VolumeLoad(Load):
     @property
     def name(self) -> str:
         """As for other loads."""
-        where = ", ".join(f"'{group}'" for group in self.groups) if self.groups is not None else "all solid cells"
+        where = ", ".join(f"'{group}'" for group in self.groups) if self.groups is not None else EVERYWHERE
         return f"{self.KIND} on {where}"
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Names of its groups."""
+        return (EVERYWHERE,) if self.groups is None else self.groups
 
     def rows(self, mesh: Mesh) -> Iterator[tuple[str, NDArray[np.intp]]]:
         """Yield each element and the numbers (n,) of the solid cells on which the load acts."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.elasticity.loads import Table, Value, check_number, check_value, evaluated
+from fastcontact.elasticity.loads import EVERYWHERE, Table, Value, check_number, check_value, evaluated
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
 
@@ -47,8 +47,13 @@ class Temperature:
     @property
     def name(self) -> str:
         """Where it is given, for messages."""
-        where = ", ".join(f"'{group}'" for group in self.groups) if self.groups is not None else "all solid cells"
+        where = ", ".join(f"'{group}'" for group in self.groups) if self.groups is not None else EVERYWHERE
         return f"the temperature of {where}"
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Names of its groups."""
+        return (EVERYWHERE,) if self.groups is None else self.groups
 
     def check(self, mesh: Mesh) -> None:
         """Raise MeshError or ModelError if a group, the value or the reference cannot be."""

@@ -60,6 +60,11 @@ class Pretension:
         """What it is, for messages."""
         return f"pretension '{self.label}'"
 
+    @property
+    def prescribed(self) -> str:
+        """What the relation is called that prescribes its shortening."""
+        return f"the shortening of {self.name}"
+
     def row(self, n_dofs: int) -> csr_array:
         """Return the row (1, n_dofs) whose product with displacements is the shortening [-]."""
         m = len(self.nodes)
@@ -80,14 +85,16 @@ class Pretension:
         matrix.eliminate_zeros()
         found = [Relation(f"the sides of {self.name}", matrix)]
         if self.shortening is not None:
-            found.append(Relation(f"the shortening of {self.name}", self.row(n_dofs), self.shortening, self.ramp))
+            found.append(Relation(self.prescribed, self.row(n_dofs), self.shortening, self.ramp))
         return found
 
-    def locked(self, n_dofs: int, displacement: Array) -> Relation:
-        """Return the relation that keeps the shortening of displacements (n_points, dim) [length]."""
-        row = self.row(n_dofs)
-        reached = float((row @ displacement.ravel())[0])
-        return Relation(f"the locked length of {self.name}", row, reached, ((0.0, 1.0),))
+    def shortened(self, displacement: Array) -> float:
+        """Return by how much the sides approach in displacements (n_points, dim) [length]."""
+        return float((self.row(displacement.size) @ displacement.ravel())[0])
+
+    def locked(self, n_dofs: int, reached: float) -> Relation:
+        """Return the relation that keeps a shortening [length]."""
+        return Relation(f"the locked length of {self.name}", self.row(n_dofs), reached, ((0.0, 1.0),))
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +108,11 @@ class PretensionForce(Load):
     def name(self) -> str:
         """Where it acts, for messages."""
         return f"the force of {self.section.name}"
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """None: it is between two sides."""
+        return ()
 
     @property
     def components(self) -> Mapping[int, float]:  # type: ignore[override]
@@ -213,13 +225,16 @@ def _across(normal: Array) -> Array:
     return np.asarray(np.where(np.abs(basis) < 1e-14, 0.0, basis))
 
 
-def with_locks(sections: Sequence[Pretension], begin: float, displacement: Array) -> list[Relation]:
-    """Return the relations of the sections that are locked at an instant, at the lengths of displacements (n_points, dim)."""
-    return [
-        own.locked(displacement.size, displacement)
-        for own in sections
-        if own.locked_from is not None and begin >= own.locked_from
-    ]
+def locked_lengths(
+    sections: Sequence[Pretension], begin: float, displacement: Array, kept: Mapping[str, float]
+) -> dict[str, float]:
+    """Return by name the shortenings of the sections that are locked at an instant [length].
+
+    Those `kept` from when they were locked, those of displacements (n_points, dim) [length] of the others: what a solution
+    keeps of a shortening is round-off beside it.
+    """
+    locked = [own for own in sections if own.locked_from is not None and begin >= own.locked_from]
+    return {own.label: kept[own.label] if own.label in kept else own.shortened(displacement) for own in locked}
 
 
 def check_locks(sections: Sequence[Pretension], instants: Sequence[float]) -> None:
@@ -254,6 +269,6 @@ def section_results(
     for own, factor in zip(sections, factors, strict=True):
         pulled = float(reaction[own.nodes].sum(axis=0) @ own.normal) + factor * own.force
         found[own.label] = {
-            "force": pulled, "shortening": float((own.row(displacement.size) @ displacement.ravel())[0])
+            "force": pulled, "shortening": own.shortened(displacement)
         }  # fmt: skip
     return found

@@ -81,6 +81,7 @@ def adaptive_study(
     """
     case = _checked(case, tolerance)
     chosen = settings(case)
+    quantities.check_names(case, [quantity, *chosen.quantities])
     member = one_combination(chosen, element, formulation)
     forest, curves = _first_mesh(case, chosen, member)
     rounds: list[Round] = []

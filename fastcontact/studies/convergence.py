@@ -16,7 +16,7 @@ from fastcontact.studies.execute import Progress, Result, raise_first, run_all
 from fastcontact.studies.fit import Limit, fit_limit
 from fastcontact.studies.job import Job, fields_of, job_of
 from fastcontact.studies.progress import told
-from fastcontact.studies.quantities import EXACT_THEORIES, LABELS, of_theory
+from fastcontact.studies.quantities import EXACT_THEORIES, LABELS, check_names, of_theory
 from fastcontact.studies.report import of_case
 from fastcontact.studies.series import Level, Series
 from fastcontact.studies.settings import Combination, Settings, combinations, settings
@@ -76,6 +76,7 @@ def convergence_study(
     if levels < 1:
         raise CaseError(f"levels = {levels} must be at least 1; a limit takes 3")
     chosen = settings(case)
+    check_names(case, [*chosen.quantities, *quantities])
     members = combinations(chosen, elements, formulations)
     check_runs(levels * len(members))
     check_levels(case, chosen, members, levels)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,10 @@ from fastcontact.analytic.lame import PressFit
 from fastcontact.analytic.manufactured import HertzBox
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.cases.case import Case
-from fastcontact.cases.checks import STRESS, at_point
+from fastcontact.cases.checks import OF_PROBES, ONLY_IN_SPACE, STRESS, at_point
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.surface import Surface, surface
+from fastcontact.errors import CaseError, unknown
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import quality
@@ -47,6 +48,15 @@ def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
     for name, point in case.probes.items():
         found |= _of_probe(name, point, last)
     return found
+
+
+def check_names(case: Case, names: Iterable[str]) -> None:
+    """Raise CaseError for the name of a quantity that no run of the case can have, see `measure`."""
+    kinds = [kind for kind in OF_PROBES if kind != "shear" and (case.mesh.dim == 3 or kind not in ONLY_IN_SPACE)]
+    of_probes = [f"{probe}.{kind}" for probe in case.probes for kind in kinds]
+    for name in names:
+        if name not in (*LABELS, *of_probes):
+            raise CaseError(unknown("quantity", name, [*LABELS, *of_probes]))
 
 
 def _of_contact(case: Case, contact: ContactResult, pair: str) -> dict[str, float]:

@@ -20,7 +20,7 @@ from fastcontact.studies.execute import Progress, raise_first, run_all
 from fastcontact.studies.job import Job, fields_of, job_of
 from fastcontact.studies.levels import make_mesh, recipe
 from fastcontact.studies.progress import told
-from fastcontact.studies.quantities import of_theory
+from fastcontact.studies.quantities import check_names, of_theory
 from fastcontact.studies.report import of_case
 from fastcontact.studies.settings import data_of, one_combination, settings
 from fastcontact.studies.sweep_figures import label_of
@@ -76,6 +76,8 @@ def parameter_sweep(
     case = case if isinstance(case, Case) else read_case(case)
     if not parameters or not all(len(values) for values in parameters.values()):
         raise CaseError("a sweep needs at least one parameter with at least one value")
+    asked = settings(case).quantities
+    check_names(case, asked)
     check_runs(prod(len(values) for values in parameters.values()))
     choices = [dict(zip(parameters, values, strict=True)) for values in itertools.product(*parameters.values())]
     jobs = [_job(case, choice, element, formulation, level) for choice in choices]
@@ -92,6 +94,7 @@ def parameter_sweep(
         points=[Point(parameters=choice, **fields_of(Point, r)) for choice, r in runs if "error" not in r],
         failed=[(choice, str(result["error"])) for choice, result in runs if "error" in result],
         theories=_theory_curves(case, parameters, jobs[0].pair),
+        asked=asked,
         compared="at equal approach" if jobs[0].pair in case.approach else "",
     )
 

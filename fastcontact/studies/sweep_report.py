@@ -40,6 +40,8 @@ class Sweep(Report):
         The theory over the first parameter, for each choice of the others; none where the parameter is no number.
     compared : str
         At what the theory is the same: ``"at equal approach"``, or empty where the case gives it otherwise.
+    asked : tuple of str
+        Quantities that ``[study]`` asks for beside the main ones: tables and figures show them.
     """
 
     combination: str
@@ -48,6 +50,7 @@ class Sweep(Report):
     failed: list[tuple[dict[str, Value], str]]
     theories: tuple[TheoryCurve, ...] = ()
     compared: str = "at equal approach"
+    asked: tuple[str, ...] = ()
 
     @property
     def quantities(self) -> list[str]:
@@ -104,7 +107,7 @@ class Sweep(Report):
 
     def html(self) -> str:
         """Return the sweep as one self-contained HTML page."""
-        what = ", ".join(title(name) for name in MAIN if name in self.quantities) or "all quantities"
+        what = ", ".join(map(title, self._main()))
         choices = f"{len(self.points)} choices of {' and '.join(self.parameters)}"
         parts = [
             page.paragraph(f"{self.combination}: {what} for {choices}."),
@@ -115,7 +118,8 @@ class Sweep(Report):
         return page.page(f"Sweep: {self.title}", parts, self.text)
 
     def _main(self) -> list[str]:
-        return [name for name in MAIN if name in self.quantities] or self.quantities[:3]
+        shown = dict.fromkeys((*MAIN, *self.asked))
+        return [name for name in shown if name in self.quantities] or self.quantities[:3]
 
     def _failures(self, verb: str) -> list[str]:
         choices = [(", ".join(f"{k} = {_shown(v)}" for k, v in choice.items()), text) for choice, text in self.failed]

@@ -120,13 +120,17 @@ def test_without_a_lock_the_force_stays():
     assert pulled.contact["joint"].force[1] == pytest.approx(FORCE - 1.5, rel=1e-9)
 
 
-def test_the_number_of_steps_does_not_matter_and_a_run_goes_on_from_any():
-    model = joint(4.4)
-    once = fc.solve(model, [1.0, 2.0])
-    steps = fc.solve(model, [0.5, 1.0, 1.5, 2.0])
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_the_number_of_steps_does_not_matter_and_a_run_goes_on_from_any(solver, tmp_path):
+    model, options = joint(4.4), {"linear_solver": solver, "linear_tolerance": 1e-12}
+    once = fc.solve(model, [1.0, 2.0], **options)
+    steps = fc.solve(model, [0.5, 1.0, 1.5, 1.75, 2.0], **options)
     assert steps[-1].displacement == pytest.approx(once[-1].displacement, rel=1e-9, abs=1e-14)
-    for done in (1, 2, 3):
-        begun = list(fc.solve(model, [0.5, 1.0, 1.5, 2.0][:done]))
-        whole = fc.solve(model, [0.5, 1.0, 1.5, 2.0], resume=begun)
-        assert whole[-1].displacement == pytest.approx(steps[-1].displacement, rel=1e-12, abs=1e-16)
-        assert whole[-1].pretension["bolt"]["force"] == pytest.approx(steps[-1].pretension["bolt"]["force"], rel=1e-12)
+    for done in (1, 2, 3, 4):
+        path = tmp_path / f"{done}.vtkhdf"
+        with fc.ResultWriter(path, model) as out:
+            fc.solve(model, [0.5, 1.0, 1.5, 1.75, 2.0][:done], on_step=out.write, **options)
+        whole = fc.solve(model, [0.5, 1.0, 1.5, 1.75, 2.0], resume=fc.open_results(path), **options)
+        # The bolt keeps the length that it was locked at: read from displacements, that would be off by their round-off.
+        np.testing.assert_array_equal(whole[-1].displacement, steps[-1].displacement)
+        assert whole[-1].pretension == steps[-1].pretension

@@ -1,4 +1,4 @@
-"""Friction at nodes that supports hold: there wherever sides slide, none where symmetry leaves no slip, however supports are said."""
+"""Friction at held nodes: there wherever sides slide, none where symmetry leaves no slip, however supports are said."""
 
 import numpy as np
 import pytest

@@ -3,48 +3,61 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.sensitivity.adjoint import Change
+from fastcontact.analysis.sensitivity.material_constants import CONSTANTS, by_constant, check_constant
 from fastcontact.analysis.sensitivity.moving_contact import MovingContact
 from fastcontact.analysis.sensitivity.quantities import Asked
 from fastcontact.analysis.wear import Worn
+from fastcontact.elasticity.inertia_loads import Centrifugal
 from fastcontact.elasticity.loads import Load, evaluated
-from fastcontact.elasticity.materials import LinearElastic
-from fastcontact.elasticity.varying_constants import varying
+from fastcontact.elasticity.temperature import Temperature
 from fastcontact.errors import ModelError, unknown
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.model import Model
 from fastcontact.model.parts.base import Support
+from fastcontact.model.pretension import Pretension, PretensionForce
 from fastcontact.model.ramp import combined, multiplier
 
 Array = NDArray[np.float64]
+Item = TypeVar("Item", bound=Load | Temperature)
 FORMS = {
-    "E": '("E", material)',
-    "nu": '("nu", material)',
+    "E": '("E", material), with the number of the axis, "1", of an Orthotropic',
+    "nu": '("nu", material), with the axes, "12", of an Orthotropic',
+    "G": '("G", material, "12") of an Orthotropic',
+    "expansion": '("expansion", material), or ("expansion", material, "1") along one axis',
     "load": '("load", group)',
-    "prescribed": '("prescribed", group)',
+    "speed": '("speed", group)',
+    "temperature": '("temperature", group)',
+    "pretension": '("pretension", name)',
+    "prescribed": '("prescribed", group) or ("prescribed", group, "y")',
     "motion": '("motion", obstacle)',
     "clearance": '("clearance", pair)',
 }
-# By how much constants of materials are changed, relative to what is allowed, and motions and clearances, by edges of facets.
-CONSTANT, LENGTH = 1e-3, 1e-5
+WITH_COMPONENT = (*CONSTANTS, "prescribed")
 
 
 def check_parameter(model: Model, asked: Asked) -> None:
     """Raise ModelError if a model has no such parameter."""
     kind = str(asked[0]) if asked else ""
+    if kind == "friction":
+        raise ModelError(
+            "results have no sensitivity by friction: where all sticks they do not depend on it, and where it slides they "
+            "depend on all load steps. Take differences of two solutions"
+        )
     if kind not in FORMS:
         raise ModelError(unknown("parameter", kind, FORMS))
-    if len(asked) != 2 and not (kind == "prescribed" and len(asked) == 3):
+    if len(asked) not in (2, 3 if kind in WITH_COMPONENT else 2):
         raise ModelError(f"the parameter {asked} must have the form {FORMS[kind]}")
     known: dict[str, Callable[[Model, Asked], object]] = {
-        "E": _material, "nu": _material, "load": _loads, "prescribed": _prescribing, "motion": _moved, "clearance": _opened,
+        **dict.fromkeys(CONSTANTS, check_constant), "load": _loads, "speed": _speeds, "temperature": _temperatures,
+        "pretension": _pretension, "prescribed": _prescribing, "motion": _moved, "clearance": _opened,
     }  # fmt: skip
     known[kind](model, asked)
 
@@ -52,8 +65,8 @@ def check_parameter(model: Model, asked: Asked) -> None:
 def change_by(contact: MovingContact, asked: Asked) -> Change:
     """Return what a parameter that `check_parameter` has found changes in the equations."""
     kinds: dict[str, Callable[[MovingContact, Asked], Change]] = {
-        "E": _of_material, "nu": _of_material, "load": _of_load, "prescribed": _of_prescribed, "motion": _of_motion,
-        "clearance": _of_clearance,
+        **dict.fromkeys(CONSTANTS, _of_constant), "load": _of_load, "speed": _of_speed, "temperature": _of_temperature,
+        "pretension": _of_pretension, "prescribed": _of_prescribed, "motion": _of_motion, "clearance": _of_clearance,
     }  # fmt: skip
     return kinds[str(asked[0])](contact, asked)
 
@@ -64,29 +77,96 @@ def _nothing(contact: MovingContact) -> Change:
     return Change(np.zeros(n), np.zeros(n), np.zeros(n + len(contact.active) + nodes))
 
 
-def _loads(model: Model, asked: Asked) -> tuple[list[Load], int | None]:
-    """Return the loads on a group, and the number of a rigid obstacle that a force drives."""
-    name, driven = str(asked[1]), model.force_driven
-    found = [load for load in model.loads if load.group == name]
-    if not found and driven.number(name) is None:
-        names = [load.group for load in model.loads] + [pair.name for pair in driven.pairs]
-        raise ModelError(unknown("group with a load, or obstacle with a force,", name, list(dict.fromkeys(names))))
-    return found, driven.number(name)
+def _on(items: Sequence[Item], group: str) -> list[Item]:
+    """Return the loads or temperatures that act on a group, of those that act on others as well the part on it."""
+    return [
+        item if len(item.places) == 1 else replace(item, groups=(group,))  # type: ignore[type-var]
+        for item in items if group in item.places
+    ]  # fmt: skip
+
+
+def _named(kind: str, items: Sequence[Item], asked: Asked, others: Sequence[str] = ()) -> list[Item]:
+    """Return the loads or temperatures on a group; ModelError if there are none, and no other thing has that name."""
+    found = _on(items, str(asked[1]))
+    if not found and asked[1] not in others:
+        names = [place for item in items for place in item.places]
+        raise ModelError(unknown(kind, str(asked[1]), list(dict.fromkeys([*names, *others]))))
+    return found
+
+
+def _loads(model: Model, asked: Asked) -> list[Load]:
+    """Return the loads on a group; none for a rigid obstacle that a force drives."""
+    driven = [pair.name for pair in model.force_driven.pairs]
+    return _named("group with a load, or obstacle with a force,", model.loads, asked, driven)
+
+
+def _forces(contact: MovingContact, loads: Sequence[Load]) -> Array:
+    """Return the nodal forces (n_dofs,) of loads at the end of the step [force]."""
+    problem, found = contact.problem, np.zeros(len(contact.u))
+    for load in loads:
+        forces = problem.model.load_vector(load).ravel() * multiplier(load.ramp, problem.ramp, contact.instant)
+        found[: problem.model.n_dofs] += forces
+    return found
 
 
 def _of_load(contact: MovingContact, asked: Asked) -> Change:
     """Return the change by the factor of the loads on a group, or of the force on an obstacle."""
-    problem, instant = contact.problem, contact.instant
-    model = problem.model
-    found, driven = _loads(model, asked)
-    change = _nothing(contact)
-    for load in found:
-        change.out[: model.n_dofs] -= model.load_vector(load).ravel() * multiplier(load.ramp, problem.ramp, instant)
+    problem = contact.problem
+    driven = problem.force_driven.number(str(asked[1]))
+    out = -_forces(contact, _loads(problem.model, asked))
     if driven is not None:
         pair = problem.force_driven.pairs[driven]
         force = [value or 0.0 for value in pair.force]
-        change.out[problem.force_driven.dofs(driven)] -= np.array(force) * multiplier(pair.ramp, problem.ramp, instant)
+        factor = multiplier(pair.ramp, problem.ramp, contact.instant)
+        out[problem.force_driven.dofs(driven)] -= np.array(force) * factor
+    return replace(_nothing(contact), out=out)
+
+
+def _speeds(model: Model, asked: Asked) -> list[Centrifugal]:
+    """Return the centrifugal forces on a group."""
+    turning = [load for load in model.loads if isinstance(load, Centrifugal)]
+    return _named("group with a centrifugal force", turning, asked)
+
+
+def _of_speed(contact: MovingContact, asked: Asked) -> Change:
+    """Return the change by the angular speed of a group, with whose square its forces grow."""
+    loads = [load for load in _speeds(contact.problem.model, asked) if load.speed]
+    out = [-2.0 / load.speed * _forces(contact, [load]) for load in loads]
+    return replace(_nothing(contact), out=np.sum(out, axis=0) if out else np.zeros(len(contact.u)))
+
+
+def _temperatures(model: Model, asked: Asked) -> list[Temperature]:
+    """Return the temperatures of a group."""
+    return _named("group with a temperature", model.temperatures, asked)
+
+
+def _of_temperature(contact: MovingContact, asked: Asked) -> Change:
+    """Return the change by the factor of the rise of the temperatures of a group."""
+    problem, change = contact.problem, _nothing(contact)
+    heated = copy.copy(problem.model)
+    heated.temperatures = _temperatures(heated, asked)
+    forces = combined(heated.thermal_forces_by_ramp(), problem.ramp, contact.instant, problem.shape)
+    change.out[: heated.n_dofs] = -forces.ravel()
     return change
+
+
+def _pretension(model: Model, asked: Asked) -> Pretension:
+    """Return a pretension section."""
+    sections = {own.label: own for own in model.pretensions}
+    if asked[1] not in sections:
+        raise ModelError(unknown("pretension", str(asked[1]), list(sections)))
+    return sections[str(asked[1])]
+
+
+def _of_pretension(contact: MovingContact, asked: Asked) -> Change:
+    """Return the change by the factor of the force of a pretension section, or of its shortening."""
+    model = contact.problem.model
+    section = _pretension(model, asked)
+    if section.shortening is not None:
+        along = [i for i, relation in enumerate(model.relations) if relation.name == section.prescribed]
+        return _lifted(contact, np.zeros(contact.problem.shape), along)
+    forces = [load for load in model.loads if isinstance(load, PretensionForce) and load.section is section]
+    return replace(_nothing(contact), out=-_forces(contact, forces))
 
 
 def _prescribing(model: Model, asked: Asked) -> tuple[list[Support], list[int]]:
@@ -115,7 +195,16 @@ def _of_prescribed(contact: MovingContact, asked: Asked) -> Change:
         values[nodes, support.component] = given * multiplier(support.ramp, problem.ramp, instant)
     if model.kinematics == "axisymmetric":
         values[model.axis_nodes, 0] = 0.0
-    factors = [multiplier(r.ramp, problem.ramp, instant) if i in along else 0.0 for i, r in enumerate(model.relations)]
+    return _lifted(contact, values, along)
+
+
+def _lifted(contact: MovingContact, values: Array, along: Sequence[int]) -> Change:
+    """Return the change by prescribed displacements (n_points, dim) [length] and the values of some relations."""
+    problem = contact.problem
+    factors = [
+        multiplier(relation.ramp, problem.ramp, contact.instant) if i in along else 0.0
+        for i, relation in enumerate(problem.model.relations)
+    ]
     lift = problem.system.lift(values.ravel(), problem.system.values(factors))
     return replace(_nothing(contact), lift=lift)
 
@@ -172,61 +261,8 @@ def _of_clearance(contact: MovingContact, asked: Asked) -> Change:
     return replace(_nothing(contact), sample=contact.along(changed, contact.step))
 
 
-def _of_material(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by a constant of an isotropic material."""
-    model, constant = contact.problem.model, str(asked[0])
-    number, material = _material(model, asked)
-    value = float(getattr(material, constant))
-    room = value if constant == "E" else min(0.5 - value, 1.0 + value)
-    step = CONSTANT * room
-
-    def at(by: float) -> MovingContact:
-        changed = {"E": material.E, "nu": material.nu, constant: value + by}
-        volumetric = "mean_dilatation" if material.averaged else "plain"
-        other = replace(material, E=changed["E"], nu=changed["nu"], volumetric=volumetric)
-        made = copy.copy(model)
-        made.materials = [(other if i == number else m, groups) for i, (m, groups) in enumerate(model.materials)]
-        return replace(contact, problem=_with_model(contact.problem, made))
-
-    # Of the fourth order: what is left is the step to the fourth power.
-    parts = [
-        weight * (forces_of(at(place * step)) - forces_of(at(-place * step))) for place, weight in ((1, 8.0), (2, -1.0))
-    ]
-    sample = contact.along(at, step) if contact.problem.pairs else _nothing(contact).sample
-    return replace(_nothing(contact), out=(parts[0] + parts[1]) / (12.0 * step), sample=sample)
-
-
-def _material(model: Model, asked: Asked) -> tuple[int, LinearElastic]:
-    """Return an isotropic material with one number for a constant, and its own number in the model."""
-    found = [
-        (i, material) for i, (material, groups) in enumerate(model.materials)
-        if asked[1] == i or (groups is not None and asked[1] in groups)
-    ]  # fmt: skip
-    if not found:
-        names = [name for _, groups in model.materials for name in groups or ()]
-        raise ModelError(unknown("material", str(asked[1]), [*names, *map(str, range(len(model.materials)))]))
-    number, material = found[0]
-    if not isinstance(material, LinearElastic) or varying(getattr(material, str(asked[0]))):
-        raise ModelError(
-            f"the material {asked[1]!r} is no LinearElastic with one number for {asked[0]}: one that varies or has axes "
-            "has no sensitivity by that"
-        )
-    return number, material
-
-
-def _with_model(problem: Problem, model: Model) -> Problem:
-    pairs = {pair.name: model.bind(pair, problem.pairs[pair.name].held) for pair in model.contact}
-    return replace(problem, model=model, pairs=pairs)
-
-
-def forces_of(contact: MovingContact) -> Array:
-    """Return the internal forces of the materials (n_dofs,) less those of heat and initial states [force]."""
-    problem = contact.problem
-    model = problem.model
-    found = np.zeros(len(contact.u))
-    inside = model.internal_forces(problem.displacement(contact.u))
-    for by_ramp in (model.thermal_forces_by_ramp(), model.initial_forces_by_ramp()):
-        if by_ramp:
-            inside = inside - combined(by_ramp, problem.ramp, contact.instant, problem.displacement(contact.u).shape)
-    found[: model.n_dofs] = inside.ravel()
-    return found
+def _of_constant(contact: MovingContact, asked: Asked) -> Change:
+    """Return the change by a constant of a material."""
+    nothing = _nothing(contact)
+    out, sample = by_constant(contact, asked)
+    return replace(nothing, out=out, sample=nothing.sample if sample is None else sample)

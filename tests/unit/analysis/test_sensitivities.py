@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -203,16 +204,19 @@ def test_rigid_obstacles_that_are_moved_and_pushed(kinematics, formulation):
     compare(pushed, ("pressure_max", "ball"), {**STEEL, "force": (("load", "ball"), 1.0, 1e-5)}, within=2e-6)
 
 
-def test_heat_normals_and_the_other_constants():
+def test_heat_normals_and_loads_by_volume():
     mesh = fc.generate.rings("quad8", divisions_inner=(3, 7), divisions_outer=(3, 9))
 
-    def make(E=2e5, nu=0.3, moved=1.0):
+    def make(E=2e5, nu=0.3, moved=1.0, expansion=1e-5, warm=1.0, speed=300.0, weight=1.0, pulled=1.0):
         model = fc.Model(mesh, kinematics="plane_strain")
-        model.add_material(fc.LinearElastic(E=E, nu=nu, expansion=1e-5), "INNER")
-        model.add_material(fc.LinearElastic(E=1.5e5, nu=0.25, expansion=1.2e-5), "OUTER")
+        model.add_material(fc.LinearElastic(E=E, nu=nu, expansion=expansion, density=8e-9), "INNER")
+        model.add_material(fc.LinearElastic(E=1.5e5, nu=0.25, expansion=1.2e-5, density=3e-9), "OUTER")
         model.fix("SYMMETRY_X", "x")
         model.fix("SYMMETRY_Y", "y")
-        model.add_temperature(100.0, groups="INNER")
+        model.add_temperature(100.0 * warm, groups="INNER")
+        model.add_centrifugal(speed, groups=["INNER", "OUTER"])
+        model.add_gravity(y=-9810.0 * weight)
+        model.add_body_force("OUTER", x=1e-3 * pulled)
         model.prescribe("BORE", normal=-0.01 * moved)
         model.add_contact("c", secondary="CONT_INNER", primary="CONT_OUTER", clearance=-0.02)
         return model
@@ -221,8 +225,74 @@ def test_heat_normals_and_the_other_constants():
         "E": (("E", "INNER"), 2e5, 200.0),
         "nu": (("nu", "INNER"), 0.3, 3e-4),
         "moved": (("prescribed", "BORE"), 1.0, 1e-2),
+        "expansion": (("expansion", "INNER"), 1e-5, 1e-7),
+        "warm": (("temperature", "INNER"), 1.0, 1e-2),
+        "weight": (("load", "all solid cells"), 1.0, 1.0),
+        "pulled": (("load", "OUTER"), 1.0, 1e-1),
     }
+    whole = ("load", "INNER"), ("load", "OUTER")
+    model = make(pulled=0.0)
+    found = asked(model, parameters=[("speed", "INNER"), ("speed", "OUTER"), *whole]).derivatives
+    for group, load in zip(("INNER", "OUTER"), whole, strict=True):  # force goes with the square of the speed
+        assert 300.0 * found["speed", group] == pytest.approx(2.0 * found[load], rel=1e-9)
+    del changes["pulled"]
     compare(make, ("pressure_max", "c"), changes)
+
+    def turned(speed=300.0, pulled=1.0):
+        made = make(speed=speed, pulled=pulled)
+        made.loads = [load if "centrifugal" not in load.name else replace(load, groups=None) for load in made.loads]
+        return made
+
+    by_factor = {"speed": (("speed", "all solid cells"), 300.0, 3.0), "pulled": (("load", "OUTER"), 1.0, 1.0)}
+    compare(turned, ("pressure_max", "c"), by_factor)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_constants_along_the_axes_of_a_material(dim):
+    if dim == 3:
+        mesh, side, end = fc.generate.box((3.0, 2.0, 2.0), (3, 2, 2)), "ZMIN", "ZMAX"
+    else:
+        mesh, side, end = fc.generate.block((3.0, 2.0), (4, 3)), "BOTTOM", "TOP"
+    turned = np.array([[0.8, 0.6, 0.0], [-0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+
+    def make(E2=700.0, nu12=0.3, nu23=0.35, G12=600.0, G13=500.0, expansion=2e-4):
+        model = fc.Model(mesh, kinematics="3d" if dim == 3 else "plane_strain")
+        axes = {"axes": turned, "expansion": (1e-4, expansion, 3e-4)}
+        model.add_material(fc.Orthotropic((2000.0, E2, 430.0), (nu12, 0.2, nu23), (G12, G13, 300.0), **axes))
+        model.prescribe(end, **dict.fromkeys("xyz"[:dim], -0.02))
+        model.add_temperature(10.0)
+        plane = fc.obstacles.HalfSpace(point=(0.0,) * dim, normal=(0.0,) * (dim - 1) + (1.0,))
+        model.add_obstacle("c", secondary=side, obstacle=plane)
+        return model
+
+    changes = {
+        "E2": (("E", 0, "2"), 700.0, 0.7),
+        "nu12": (("nu", 0, "12"), 0.3, 3e-4),
+        "nu23": (("nu", 0, "23"), 0.35, 3e-4),
+        "G12": (("G", 0, "12"), 600.0, 0.6),
+        "expansion": (("expansion", 0, "2"), 2e-4, 1e-5),
+    } | ({"G13": (("G", 0, "13"), 500.0, 0.5)} if dim == 3 else {})
+    compare(make, ("contact_force", "c", "xyz"[dim - 1]), changes)
+
+
+@pytest.mark.parametrize("given", ["force", "shortening"])
+def test_pretension(given):
+    mesh = fc.generate.block((1.0, 2.0), (2, 4)).with_facet_group(
+        "CUT", lambda x: np.abs(x[:, 1] - 1.0) < 1e-9, between=True
+    )
+    mesh = fc.generate.cut(mesh, "CUT")
+
+    def make(E=1000.0, pulled=1.0):
+        model = fc.Model(mesh, "plane_stress")
+        model.add_material(fc.LinearElastic(E=E, nu=0.3))
+        model.fix("BOTTOM", "xy")
+        model.fix("TOP", "xy")
+        model.add_pretension("bolt", "CUT", **{given: {"force": 3.0, "shortening": 0.01}[given] * pulled})
+        return model
+
+    compare(
+        make, ("reaction", "TOP", "y"), {"E": (("E", 0), 1000.0, 1.0), "pulled": (("pretension", "bolt"), 1.0, 0.1)}
+    )
 
 
 def asked(model: fc.Model, quantity=("pressure_max", "c"), parameters=(("E", 0),), criteria=TIGHT, **options):
@@ -250,7 +320,13 @@ def test_quantities_that_are_none(quantity, text):
 @pytest.mark.parametrize(
     ("parameter", "text"),
     [
-        (("G", 0), "unknown parameter 'G'"),
+        (("g", 0), "unknown parameter 'g'"),
+        (("G", 0, "12"), r"E = 1000, nu = 0.3: the material 0 has no G, and no sensitivity by it: ask for E, nu or"),
+        (("E", 0, "1"), "E of the material 0 is one number: leave out '1'"),
+        (("friction", "c"), "no sensitivity by friction: where all sticks"),
+        (("speed", "UPPER"), "unknown group with a centrifugal force 'UPPER': there is none here"),
+        (("temperature", "UPPER"), "unknown group with a temperature 'UPPER'"),
+        (("pretension", "bolt"), "unknown pretension 'bolt'"),
         (("E",), r"must have the form \(\"E\", material\)"),
         (("E", "STEEL"), "unknown material 'STEEL'"),
         (("load", "UPPER_TOP"), "unknown group with a load, or obstacle with a force, 'UPPER_TOP'"),
@@ -285,7 +361,7 @@ def test_other_refusals():
     varying = two_blocks()()
     varying.materials.clear()
     varying.add_material(fc.LinearElastic(E=lambda x: 1000.0 + x[:, 0], nu=0.3))
-    with pytest.raises(fc.ModelError, match="one that varies or has axes has no sensitivity by that"):
+    with pytest.raises(fc.ModelError, match="E of the material 0 varies: there is no sensitivity by that"):
         asked(varying)
     model = two_blocks()()
     step = fc.solve(model, 1, criteria=TIGHT)[-1]

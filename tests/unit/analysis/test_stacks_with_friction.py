@@ -9,7 +9,7 @@ from fastcontact.analysis.problem import prepare
 
 
 def stack(element, divisions, friction=0.3, whole_sides=False):
-    """Blocks that do not match, those in the middle a little smaller and held along x and y by a side each, or at half height."""
+    """Blocks that do not match, those in the middle smaller and held along x and y by a side each, or at half height."""
     parts = []
     for level, n in enumerate(divisions):
         width = 1.0 if level % 2 == 0 else 0.9

@@ -1,12 +1,14 @@
 """Sweeps: right numbers, tables and files, the store, failures that do not end the rest."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 
 from fastcontact.cli import main
 from fastcontact.errors import CaseError
+from fastcontact.studies.convergence import convergence_study
 from fastcontact.studies.sweep import parameter_sweep
 from fastcontact.studies.sweep_figures import parameter_label
 
@@ -163,6 +165,39 @@ def test_values_that_are_no_numbers_have_no_curve(case):
 def test_what_is_wrong_is_told_before_anything_runs(case, parameters, words):
     with pytest.raises(CaseError, match=words):
         parameter_sweep(case, parameters, workers=1)
+
+
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        ('quantities = ["bogus.force.x"]', "unknown quantity 'bogus.force.x'"),
+        ("quantities = [3]", r"'study.quantities\[0\]' must be the name of a quantity"),
+        ('parameters = { soft = ["material[0].E"] }', "'study.parameters.soft' must be a table of laws by path"),
+        ("combinations = [3]", r"'study.combinations\[0\]' must be an element and a formulation"),
+        ("options = { mortar = 1 }", "'study.options.mortar' must be a table of options"),
+    ],
+)
+def test_what_is_wrong_in_the_study_is_told_by_every_command(case, entry, words, tmp_path):
+    text = re.sub(rf"(?ms)^{entry.split()[0]} = .*?\]\n", "", case.read_text())
+    text = text.replace('file = "../meshes', f'file = "{case.parent.parent}/meshes').replace(
+        "[study]", f"[study]\n{entry}"
+    )
+    (tmp_path / "case.toml").write_text(re.sub(r"(?ms)^\[study\.(?=parameters|options).*?(?=^\[|\Z)", "", text))
+    with pytest.raises(CaseError, match=words):
+        parameter_sweep(tmp_path / "case.toml", {"approach": (0.4,)}, level=0, workers=1)
+    with pytest.raises(CaseError, match=words):
+        convergence_study(tmp_path / "case.toml", 1, workers=1)
+
+
+def test_quantities_of_the_study_are_in_the_table(case, tmp_path):
+    text = case.read_text().replace('file = "../meshes', f'file = "{case.parent.parent}/meshes')
+    (tmp_path / "case.toml").write_text(
+        text.replace("[study]", '[study]\nquantities = ["C1.stress.yy", "von_mises_max"]')
+    )
+    found = parameter_sweep(tmp_path / "case.toml", {"approach": (0.4,)}, level=0, workers=1)
+    header, row = found.tables()[0][1]
+    assert f"{found.points[0].values['C1.stress.yy']:.7g}" == row[header.index("C1.stress.yy [MPa]")]
+    assert "von_mises_max [MPa]" in header
 
 
 @pytest.mark.parametrize(

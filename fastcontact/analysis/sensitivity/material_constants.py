@@ -1,0 +1,144 @@
+"""What constants of materials change in the equations of a load step, by central differences at its solution."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.sensitivity.moving_contact import MovingContact
+from fastcontact.analysis.sensitivity.quantities import Asked
+from fastcontact.elasticity.anisotropic_materials import NAMES, Anisotropic, Orthotropic
+from fastcontact.elasticity.materials import LinearElastic, Material
+from fastcontact.elasticity.varying_constants import varying
+from fastcontact.errors import ModelError, unknown
+from fastcontact.model.model import Model
+from fastcontact.model.ramp import combined
+
+Array = NDArray[np.float64]
+# Constants, and how the components of an orthotropic material's are called.
+CONSTANTS = {"E": "123", "nu": NAMES, "G": NAMES, "expansion": "123"}
+# By how much constants are changed, relative to what is allowed.
+CHANGED = 1e-3
+
+
+def by_constant(contact: MovingContact, asked: Asked) -> tuple[Array, Array | None]:
+    """Return what a constant changes in `Change.out` (n_dofs,) and `Change.sample`, None for nothing."""
+    model, name = contact.problem.model, str(asked[0])
+    number, material, place = _found(model, asked)
+    step = CHANGED * _room(material, name, place)
+
+    def at(by: float) -> MovingContact:
+        made = copy.copy(model)
+        made.materials = [
+            (_changed(m, name, place, by) if i == number else m, groups)
+            for i, (m, groups) in enumerate(model.materials)
+        ]
+        return replace(contact, problem=_with_model(contact.problem, made))
+
+    # Of the fourth order: what is left is the step to the fourth power.
+    parts = [weight * (_inside(at(far * step)) - _inside(at(-far * step))) for far, weight in ((1, 8.0), (2, -1.0))]
+    return (parts[0] + parts[1]) / (12.0 * step), contact.along(at, step) if contact.problem.pairs else None
+
+
+def check_constant(model: Model, asked: Asked) -> None:
+    """Raise ModelError if no material has such a constant, or one that varies."""
+    _found(model, asked)
+
+
+def _found(model: Model, asked: Asked) -> tuple[int, Material, int | None]:
+    """Return the number of a material in the model, itself, and which of several components is asked for."""
+    found = [
+        (i, material) for i, (material, groups) in enumerate(model.materials)
+        if asked[1] == i or (groups is not None and asked[1] in groups)
+    ]  # fmt: skip
+    if not found:
+        names = [name for _, groups in model.materials for name in groups or ()]
+        raise ModelError(unknown("material", str(asked[1]), [*names, *map(str, range(len(model.materials)))]))
+    (number, material), name = found[0], str(asked[0])
+    value = getattr(material, name, None)
+    if value is None:
+        raise ModelError(
+            f"{material.described}: the material {asked[1]!r} has no {name}, and no sensitivity by it{_by(material)}"
+        )
+    components = value if isinstance(value, tuple) else (value,)
+    if any(map(varying, components)):
+        raise ModelError(
+            f"{name} of the material {asked[1]!r} varies: there is no sensitivity by that, only by one number"
+        )
+    return number, material, _component(asked, components)
+
+
+def _by(material: Material) -> str:
+    """Return what to ask for where a material has no such constant."""
+    if isinstance(material, LinearElastic):
+        return ": ask for E, nu or, where it is heated, expansion"
+    return ": of its moduli D there is none" if isinstance(material, Anisotropic) else ""
+
+
+def _component(asked: Asked, components: Sequence[Any]) -> int | None:
+    """Return the number of the component that is asked for; None where a constant has but one, or all are."""
+    names = list(CONSTANTS[str(asked[0])])
+    if len(components) == 1 or (asked[0] == "expansion" and len(asked) == 2):
+        if len(asked) == 3:
+            raise ModelError(f"{asked[0]} of the material {asked[1]!r} is one number: leave out '{asked[2]}'")
+        return None
+    if len(asked) == 2:
+        raise ModelError(f"{asked[0]} of the material {asked[1]!r} has components: ask for (..., '{names[0]}')")
+    if str(asked[2]) not in names:
+        raise ModelError(unknown(f"component of {asked[0]}", str(asked[2]), names))
+    return names.index(str(asked[2]))
+
+
+def _room(material: Material, name: str, place: int | None) -> float:
+    """Return by how much about a constant may change, all others kept."""
+    value = getattr(material, name)
+    if name == "expansion":  # forces are linear in it
+        return 1.0 / CHANGED
+    if name != "nu":
+        return float(value if place is None else value[place])
+    if isinstance(material, LinearElastic):
+        return min(0.5 - value, 1.0 + value)
+    assert isinstance(material, Orthotropic)
+    assert place is not None
+    i, j = int(NAMES[place][0]) - 1, int(NAMES[place][1]) - 1
+    S = material.local_compliance[:3, :3]
+    size = np.sqrt(np.diag(S))
+    return float(np.linalg.eigvalsh(S / np.outer(size, size))[0] * size[j] / size[i])
+
+
+def _changed(material: Material, name: str, place: int | None, by: float) -> Material:
+    """Return the material with a constant, or one of its components, changed by a number."""
+    value = getattr(material, name)
+    if isinstance(value, tuple):
+        value = tuple(v + by * (place in (None, i)) for i, v in enumerate(value))
+    else:
+        value = value + by
+    if isinstance(material, LinearElastic):
+        volumetric = "mean_dilatation" if material.averaged else "plain"
+        return replace(material, **{"volumetric": volumetric, name: value})
+    assert isinstance(material, Orthotropic | Anisotropic)
+    return replace(material, **{name: value})
+
+
+def _with_model(problem: Problem, model: Model) -> Problem:
+    pairs = {pair.name: model.bind(pair, problem.pairs[pair.name].held) for pair in model.contact}
+    return replace(problem, model=model, pairs=pairs)
+
+
+def _inside(contact: MovingContact) -> Array:
+    """Return the internal forces of the materials (n_dofs,) less those of heat and initial states [force]."""
+    problem = contact.problem
+    model = problem.model
+    found = np.zeros(len(contact.u))
+    inside = model.internal_forces(problem.displacement(contact.u))
+    for by_ramp in (model.thermal_forces_by_ramp(), model.initial_forces_by_ramp()):
+        if by_ramp:
+            inside = inside - combined(by_ramp, problem.ramp, contact.instant, problem.displacement(contact.u).shape)
+    found[: model.n_dofs] = inside.ravel()
+    return found
