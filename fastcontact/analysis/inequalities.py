@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis import active_set
 from fastcontact.analysis.active_dofs import ActiveDofs, constraints_on_unknowns
 from fastcontact.analysis.convergence_messages import no_contact_stops, not_balanced
@@ -15,13 +17,16 @@ from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.state import State
 from fastcontact.analysis.unsupported_bodies import UnsupportedBodies
-from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.constraints import Constraints, StackedConstraints
+from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.rigid_motions import generalised, resisting, stopped_at
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+# Of the largest prescribed motion, what counts as none.
+ROUND_OFF = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +49,30 @@ class StepContext:
     load: StepLoad
     loaded: Loaded
     dofs: ActiveDofs
+
+    @cached_property
+    def prescribed_motion(self) -> Array:
+        """By how much supports and relations alone move all components in the step (n_dofs,) [length]."""
+        system, start, zero = self.problem.system, self.state.u, np.zeros_like(self.state.u)
+        return self.load.lift - (start - system.displacement(system.unknowns(start, zero), zero))
+
+    def held(self, constraints: Constraints) -> Mask | None:
+        """Return which constraints (m,) are those of secondary nodes that supports or relations hold, if only in part."""
+        if constraints.nodes is None:
+            return None
+        dim = constraints.positions.shape[1]
+        return np.asarray(~self.problem.system.free[constraints.nodes[:, None] * dim + np.arange(dim)].all(axis=1))
+
+    def driven(self, constraints: Constraints) -> Mask:
+        """Return which constraints (m,) supports and obstacles move past the other side in the step."""
+        slips = np.stack([T @ self.prescribed_motion for T in constraints.tangents])
+        scale = largest(self.prescribed_motion)
+        if constraints.drift is not None and isinstance(constraints, StackedConstraints):
+            for name, rows in constraints.rows().items():
+                if isinstance(self.problem.pairs[name].primary, RigidSide):
+                    slips[:, rows] += constraints.drift[:, rows]
+                    scale = max(scale, largest(constraints.drift[:, rows]))
+        return np.asarray((np.abs(slips) > ROUND_OFF * scale).any(axis=0))
 
 
 def solve_inequalities(
@@ -86,6 +115,7 @@ def _solve(
         return active_set.solve(step.loaded, own, active, accuracy, u)
     from fastcontact.analysis.friction import solve as friction
 
+    own = replace(own, held=step.held(constraints), driven=step.driven(constraints))
     iterate.frictional = friction.solve(step.loaded, own, active, accuracy, u, iterate.frictional)
     return iterate.frictional
 

@@ -18,11 +18,13 @@ from fastcontact.analysis.state import State
 from fastcontact.analysis.unsupported_bodies import UnsupportedBodies
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.material_sides import MaterialSides, material_sides
+from fastcontact.elasticity.relations import stacked_rows
 from fastcontact.elasticity.springs import stiffened, too_stiff
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.elasticity.temperature import Temperature
@@ -208,7 +210,8 @@ def prepare(
     """Assemble a model that was checked before, and prepare the linear solver; see `run.solve` for the parameters."""
     mesh, driven = model.mesh, model.force_driven
     supported, prescribed = model.prescribed_by_ramp()
-    pairs = {pair.name: model.bind(pair, supported) for pair in model.contact}
+    held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
+    pairs = {pair.name: model.bind(pair, held) for pair in model.contact}
     solver = choice.make(
         linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, precision=linear_precision,
         tolerance=choice.tight_enough(linear_tolerance, criteria.relative),

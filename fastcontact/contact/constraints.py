@@ -128,6 +128,10 @@ class Constraints:
         What the forces along the tangents at the beginning of the step take from its slip by that compliance [length].
     low_rank_compliance : ndarray (1 + len(tangents), m, h), optional
         Z of a compliance ``Z Z.T`` beside C, of normal forces and then of tangential ones; None stands for zero.
+    held : ndarray of bool (m,), optional
+        Constraints of secondary nodes that are held, if only in part; None stands for none.
+    driven : ndarray of bool (m,), optional
+        Constraints that supports and obstacles move past the other side by themselves; None stands for none.
     areas : ndarray (m,), optional
         Area that each constraint stands for [area]; infinite where it does nothing.
     nodes : ndarray of int (m,), optional
@@ -155,6 +159,8 @@ class Constraints:
     nodes: NDArray[np.intp] | None = None
     nodal: NodalField | None = None
     tied: Tied | None = None
+    held: Mask | None = None
+    driven: Mask | None = None
 
     def __len__(self) -> int:
         return len(self.gap0)
@@ -173,6 +179,11 @@ class Constraints:
     def coefficients(self) -> Array:
         """Coefficients of friction (m,), zero where there are none [-]."""
         return np.zeros(len(self)) if self.friction is None else self.friction
+
+    @property
+    def moved_past(self) -> Mask:
+        """Constraints (m,) that supports and obstacles move past the other side."""
+        return np.zeros(len(self), bool) if self.driven is None else self.driven
 
     def gaps(self, displacement: Array) -> Array:
         """Return the gaps (m,) [length] for displacements (n_points, dim) [length], compliance left out."""

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.held_motions import HELD, HeldMotions
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.unrolled_line import UnrolledLine, unrolled
@@ -97,7 +98,7 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
     dim = points.shape[1]
     if pair.axisymmetric and (_meets_axis(points) or abs(mean[0]) <= abs(mean[1])):
         return ContactMiddle(np.array([0.0, float(weight @ points[:, 1])]), direction=np.array([0.0, 1.0]))
-    planes = symmetry_planes(surface, pair.points, pair.supported)
+    planes = symmetry_planes(surface, pair.points, pair.held)
     if closed.any():
         planes = [plane for plane in planes if _reached(surface, plane[1], closed)]
     if dim == 2:
@@ -126,14 +127,17 @@ def _meets_axis(points: Array) -> bool:
     return bool(np.abs(points[:, 0]).min() <= 1e-9 * np.ptp(points, axis=0).max())
 
 
-def symmetry_planes(surface: Surface, coordinates: Array, supported: Mask | None) -> list[tuple[int, NDArray[np.intp]]]:
+def symmetry_planes(
+    surface: Surface, coordinates: Array, motions: HeldMotions | None
+) -> list[tuple[int, NDArray[np.intp]]]:
     """Return the planes of symmetry at the ends of a surface: their axis, and which nodes of the surface lie on them.
 
-    `coordinates` and `supported` (n_points, dim) are those of all points; without supports there is no plane.
+    `coordinates` (n_points, dim) are those of all points; without supports there is no plane.
     """
-    if supported is None:
+    if motions is None:
         return []
-    points, held = coordinates[surface.points], supported[surface.points]
+    points = coordinates[surface.points]
+    held = np.diagonal(motions.at(surface.points), axis1=1, axis2=2) >= HELD
     tolerance, found = 1e-6 * float(np.ptp(points, axis=0).max()), []
     across = np.abs(nodal_normals(surface, coordinates)) < ACROSS
     for axis in range(points.shape[1]):

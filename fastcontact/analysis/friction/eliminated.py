@@ -16,7 +16,7 @@ from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction.cone_newton import EXACT, Forces, newton
 from fastcontact.analysis.friction.coulomb_law import Law
-from fastcontact.analysis.friction.slip_directions import aligning, compliance_of_rows, idle
+from fastcontact.analysis.friction.slip_directions import GIVING, aligning, compliance_of_rows, idle
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
@@ -129,10 +129,13 @@ class Eliminated:
             free = (self._turn @ free.ravel()).reshape(free.shape)
             own = self._own(rows, yielding)
         still = idle(own)
+        moved = still & constraints.moved_past
+        loose = moved if constraints.held is None else moved | (~still & constraints.held)
+        self._gives[1:][loose] += np.broadcast_to(GIVING * own[0, 0], still.shape)[loose]
         slipping = [scaled(T, np.where(off, 0.0, 1.0)) for T, off in zip(rows[1:], still, strict=True)]
         self._rows = (rows[0], *slipping)
-        self._free = np.vstack([free[0], np.where(still, 0.0, free[1:])])
-        self._slips = ~still
+        self._free = np.vstack([free[0], np.where(still & ~moved, 0.0, free[1:])])
+        self._slips = ~still | moved
         softer = SOFTER / np.sqrt(max(1.0, loaded.contrast / MILD))
         self._unit = np.sqrt(1.0 / (np.where(own[0, 0] > 0.0, own[0, 0], 1.0) / softer + self._gives[0]))
         equality = constraints.equality

@@ -18,7 +18,7 @@ from scipy.linalg import lstsq
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction import dense, eliminated
-from fastcontact.analysis.friction.slip_directions import aligning, idle, own_compliance
+from fastcontact.analysis.friction.slip_directions import GIVING, aligning, idle, own_compliance
 from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.flexibility import MOST_ROWS_WITH_FRICTION, check_rows
@@ -109,16 +109,23 @@ def _among(
         slips = np.arange(len(rows), len(F))
         F[slips, slips] += np.tile(constraints.tangential_softness[rows], k)
     Q = aligning(own_compliance(F, 3)) if k == 2 else None
-    still = np.flatnonzero(idle(own_compliance(F if Q is None else np.asarray(Q @ (Q @ F).T), 1 + k))) + len(rows)
+    own = own_compliance(F if Q is None else np.asarray(Q @ (Q @ F).T), 1 + k)
+    idle_slips = idle(own)
+    still = np.flatnonzero(idle_slips) + len(rows)
     _add_compliance(F, constraints, rows)
     free = free.reshape(1 + k, -1) + at_rest[:, rows]
     start = None if forces is None else forces[:, rows]
     if Q is not None:
         F, free = np.asarray(Q @ (Q @ F).T), (Q @ free.ravel()).reshape(free.shape)
         start = None if start is None else (Q @ start.ravel()).reshape(free.shape)
+    if constraints.held is not None:
+        loose = np.flatnonzero(~idle_slips & constraints.held[rows]) + len(rows)
+        F[loose, loose] += np.tile(GIVING * own[0, 0], k)[loose - len(rows)]
     if len(still):
-        F[still], F[:, still], free.ravel()[still] = 0.0, 0.0, 0.0
-        F[still, still] = np.diag(F).max()
+        moved = idle_slips & constraints.moved_past[rows]
+        F[still], F[:, still] = 0.0, 0.0
+        F[still, still] = np.where(moved, GIVING * own[0, 0], np.diag(F).max())[idle_slips]
+        free[1:][idle_slips & ~moved] = 0.0
     equations = np.zeros(len(rows), bool) if constraints.equality is None else constraints.equality[rows]
     found = _on_flexibility(F, free, constraints.coefficients[rows], closed[rows], equations, start)
     y, relative = found.y, found.gaps

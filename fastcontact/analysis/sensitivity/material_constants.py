@@ -127,8 +127,8 @@ def _changed(material: Material, name: str, place: int | None, by: float) -> Mat
 
 
 def _with_model(problem: Problem, model: Model) -> Problem:
-    supported = model.prescribed_by_ramp()[0]
-    return replace(problem, model=model, pairs={pair.name: model.bind(pair, supported) for pair in model.contact})
+    pairs = {pair.name: model.bind(pair, problem.pairs[pair.name].held) for pair in model.contact}
+    return replace(problem, model=model, pairs=pairs)
 
 
 def _inside(contact: MovingContact) -> Array:

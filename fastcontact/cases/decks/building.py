@@ -12,10 +12,11 @@ from scipy.sparse import csr_array
 
 from fastcontact.cases.decks.assembled import Assembled, assembled
 from fastcontact.cases.decks.blocks import Place, folded
-from fastcontact.cases.decks.conditions import Component, Conditions, Distributed, local_axes
+from fastcontact.cases.decks.conditions import Component, Conditions, Distributed
 from fastcontact.cases.decks.content import Content, Material, Pair, Section, Step
 from fastcontact.cases.decks.cyclic_symmetry import add_sectors
 from fastcontact.cases.decks.initial_stresses import add_initial_stresses
+from fastcontact.cases.decks.local_axes import local_axes
 from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface
 from fastcontact.cases.decks.pretension import add_sections, cut_sections
 from fastcontact.cases.decks.relating import make_rotations, relations_of

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from fastcontact.cases.decks.assembled import Key
 from fastcontact.cases.decks.blocks import Place, Row
-from fastcontact.cases.decks.content import Axes, Given
+from fastcontact.cases.decks.content import Given
 from fastcontact.cases.decks.histories import Histories
+from fastcontact.cases.decks.local_axes import local_directions
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.pretension import Locks
 from fastcontact.cases.decks.temperatures import give as give_temperatures
@@ -47,10 +48,7 @@ class Conditions:
         initial = initial_temperatures(self.made, content.initial)
         self.temperatures: Histories[int] = Histories(content, rest=initial)
         self.locks = Locks(self.made)
-        self.directions: dict[int, Array] = {}
-        for axes in content.axes:
-            for point in self.made.nodes(axes.nodes, axes.place):
-                self.directions[point] = local_axes(axes, np.array(self.made.points[point]))
+        self.directions = local_directions(self.made)
 
     def run(self) -> None:
         """Go through all steps."""
@@ -202,19 +200,3 @@ class Conditions:
         if size and not any(vector[-3:]):
             raise row.place.refuse(f"the direction of {label} is missing")
         return [(Distributed(keyword, label, None, tuple(keys), vector), row.number(2))]
-
-
-def local_axes(axes: Axes, point: Array) -> Array:
-    """Return the local axes (3, 3) at a point as rows [-]; CaseError if they are not defined there."""
-    a, b = np.array(axes.points[:3]), np.array(axes.points[3:])
-    if axes.cylindrical:
-        third, first = b - a, point - a
-        third = third / max(np.linalg.norm(third), 1e-300)
-        first = first - (first @ third) * third
-    else:
-        first, third = a, np.cross(a, b)
-    lengths = np.linalg.norm(first), np.linalg.norm(third)
-    if min(lengths) <= ROUND_OFF * max(1.0, float(np.abs(axes.points).max()) if not axes.cylindrical else 0.0):
-        raise axes.place.refuse(f"the local axes are not defined at the point {point.tolist()}")
-    first, third = first / lengths[0], third / lengths[1]
-    return np.array([first, np.cross(third, first), third])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact.cases.decks.assembled import Assembled
+from fastcontact.cases.decks.assembled import Assembled, facet_points
 from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Given, PretensionSection
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
@@ -96,10 +96,24 @@ def add_sections(model: Model, found: DeckMesh, locks: Locks) -> list[Relation]:
         group, place = group_of_surface(found, section.surface), section.place
         normal = None if section.normal is None else section.normal[: found.dim]
         model.add_pretension(group, group, force=0.0, locked_from=locks.begins.get(point), normal=normal)
-        row = model.pretensions[-1].row(model.n_dofs)
+        row = _side(found, section) * model.pretensions[-1].row(model.n_dofs)
         node = csr_array((np.ones(1), ([0], [point * found.dim])), shape=row.shape)
         links.append(Relation(f"*{place.keyword} of line {place.line}", csr_array(row - node)))
         if point in locks.begins:
             locked.append(Relation(f"the locked length of line {place.line}", row))
     model.relations.extend(links)
     return [*model.relations[before:], *locked]
+
+
+def _side(found: DeckMesh, section: PretensionSection) -> float:
+    """Return whether the normal of a section points out of the elements that its surface names (1.0) or into them (-1.0).
+
+    A positive force acts along the normal on these elements: it pulls the sides together in the first case alone.
+    """
+    if section.normal is None:
+        return 1.0
+    made, outward = found.made, np.zeros(3)
+    for key, facet in made.faces(section.surface, section.place):
+        solid, points = made.solids[key], np.array(made.points)
+        outward += points[list(facet_points(solid, facet))].mean(axis=0) - points[list(solid.points)].mean(axis=0)
+    return float(np.copysign(1.0, outward @ np.array(section.normal)))

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.cases.decks.assembled import facet_points
 from fastcontact.cases.decks.content import Equation, Link, Pin
+from fastcontact.cases.decks.local_axes import local_directions
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.elasticity.loads import Traction
 from fastcontact.elasticity.relations import Relation
@@ -32,7 +35,8 @@ def make_rotations(found: DeckMesh) -> None:
 def relations_of(found: DeckMesh, mesh: Mesh) -> list[Relation]:
     """Return the relations of all equations, rigid bodies and couplings."""
     content = found.made.content
-    rows = [_equation(found, equation) for equation in content.equations]
+    axes = local_directions(found.made)
+    rows = [_equation(found, equation, axes) for equation in content.equations]
     rows += [row for pin in content.pins for row in _pinned(found, pin)]
     made = [relation("the equations of the deck", rows, mesh.points.shape)] if rows else []
     for link in content.links:
@@ -41,13 +45,15 @@ def relations_of(found: DeckMesh, mesh: Mesh) -> list[Relation]:
     return made
 
 
-def _equation(found: DeckMesh, equation: Equation) -> list[Term]:
-    terms = []
+def _equation(found: DeckMesh, equation: Equation, axes: Mapping[int, Array]) -> list[Term]:
+    """Return the terms of an equation along the axes of space; components count along the local `axes` of points."""
+    terms: list[Term] = []
     for name, component, coefficient in equation.terms:
         point = found.made.node(name, equation.place)
         if not 1 <= component <= found.dim:
             raise equation.place.refuse(f"component {component} of '{name}' is none of 1 to {found.dim}")
-        terms.append((point, component - 1, coefficient))
+        along = axes.get(point, np.eye(3))[component - 1]
+        terms += [(point, axis, coefficient * along[axis]) for axis in np.flatnonzero(along[: found.dim]).tolist()]
     if not any(coefficient for _, _, coefficient in terms):
         raise equation.place.refuse("all coefficients of the equation are zero")
     return terms

@@ -14,6 +14,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints
+from fastcontact.contact.held_motions import TOGETHER, HeldMotions, distinct_directions
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair, rows_along, tangents
@@ -68,8 +69,8 @@ class Formulation(ABC):
         along the tangents to the primary side is, also of a gap that closes while its normal leans, as in code_aster.
     options : PairOptions
         Options of the pair that do not depend on its formulation, e.g. its clearance.
-    supported : ndarray of bool (n_points, dim), optional
-        Displacement components that supports prescribe, where they are known.
+    held : HeldMotions, optional
+        Directions in which supports and relations hold single nodes, where they are known.
     """
 
     secondary: Surface
@@ -83,7 +84,7 @@ class Formulation(ABC):
     normals: Normals | None = None
     slip: str = "symmetric"
     options: PairOptions = field(default_factory=PairOptions, repr=False)
-    supported: NDArray[np.bool_] | None = field(default=None, repr=False)
+    held: HeldMotions | None = field(default=None, repr=False)
 
     name: ClassVar[str]
     # Pair again after every active-set iteration (True), or after the active set has settled (False).
@@ -238,19 +239,45 @@ class Formulation(ABC):
         now, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
         return self.primary.turning(now, before, at.stance, at.stance_start)
 
-    def supported_along(self, axis: int, candidates: Candidates, pairing: Pairing) -> NDArray[np.bool_]:
-        """Return which secondary nodes (n_nodes,) supports keep from slipping along an axis; see `Projection.compliant`."""
-        m = len(self.secondary.points)
-        if self.supported is None or not self.supported[self.secondary.points, axis].any():
-            return np.zeros(m, bool)
-        supported = self.supported[:, axis]
-        opposite = np.ones(m, bool)
-        if isinstance(self.primary, Surface):  # only nodes that face such nodes of the other side
-            rows = np.flatnonzero(pairing.paired)
-            facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
-            rows = rows[supported[facing.nodes].any(axis=1)]
-            opposite = np.isin(self.secondary.points, candidates.nodes[rows][candidates.shape[rows] != 0.0])
-        return self.without_whole_facets(supported[self.secondary.points] & opposite)
+    def without_slip(self, at: Configuration) -> list[tuple[Array, NDArray[np.bool_]]]:
+        """Return directions (n_nodes, dim) in which both sides are held, and do not move apart, with the nodes (n_nodes,).
+
+        So it is in a plane of symmetry and on an axis: slip is zero there whatever the traction, which nothing determines.
+        Where one side is free, or driven past the other, there is friction. Facets all of whose nodes are held are left out.
+        """
+        nodes = np.flatnonzero(np.isin(self.secondary.points, () if self.held is None else self.held.nodes))
+        if not len(nodes) or self.held is None:
+            return []
+        points = self.secondary.points[nodes]
+        moved = (at.displacement - at.start)[points]
+        candidates = Candidates(points[:, None], np.ones((len(nodes), 1)))
+        if isinstance(self.primary, RigidSide):
+            theirs = np.broadcast_to(np.eye(moved.shape[1]), (len(nodes), *2 * moved.shape[1:]))
+            moved = moved - (at.obstacle - at.obstacle_start)
+            turning = self.turning(candidates, at)
+            moved = moved if turning is None else moved - turning
+        else:
+            pairing = self.facing(candidates, at, max(self.projection_tolerance or 0.0, ON_SYMMETRY))
+            nodes, moved = nodes[pairing.paired], moved[pairing.paired]
+            facing = places(self.primary, pairing.facet[pairing.paired], pairing.xi[pairing.paired])
+            theirs = np.einsum("nk,nkde->nde", facing.shape, self.held.at(facing.nodes))
+            moved = moved - np.einsum("nk,nkd->nd", facing.shape, (at.displacement - at.start)[facing.nodes])
+        ours = self.held.at(self.secondary.points[nodes])
+        round_off = ALIKE * max(np.abs(at.displacement).max(), np.abs(at.start).max())
+        found = []
+        for direction in distinct_directions(ours):
+            both = np.einsum("d,nde,e->n", direction, ours, direction) >= TOGETHER**2
+            both &= np.einsum("d,nde,e->n", direction, theirs, direction) >= 0.5
+            both &= np.abs(moved @ direction) <= round_off
+            mask = np.zeros(len(self.secondary.points), bool)
+            mask[nodes[both]] = True
+            mask = self.without_whole_facets(mask)
+            if mask.any():
+                along = np.tile(direction, (len(mask), 1))
+                along[nodes] = ours @ direction  # round a curved rim each node has its own
+                along[~mask] = direction
+                found.append((along / np.linalg.norm(along, axis=1, keepdims=True), mask))
+        return found
 
     def without_whole_facets(self, nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return secondary `nodes` (n_nodes,) without those of facets all of whose nodes are among them."""

@@ -191,17 +191,17 @@ class PressureFieldFormulation(Formulation):
         """Return the constraints of paired integration points whose forces make up a pressure field."""
         projection = replace(field.projection, eliminable=self.eliminable, quadratic=self.secondary.order > 1)
         part = self.assembled(candidates, pairing, projection, at)
-        undetermined = self._undetermined(candidates, pairing, field, part.directions) if self.friction else None
+        undetermined = self._undetermined(field, part.directions, at) if self.friction else None
         return replace(part, low_rank_compliance=undetermined, areas=field.areas, nodal=field)
 
-    def _undetermined(
-        self, candidates: Candidates, pairing: Pairing, field: PressureField, directions: tuple[Array, ...]
-    ) -> Array | None:
-        """Return a compliance of tangential fields that do no work on any slip, where supports prescribe nodes."""
+    def _undetermined(self, field: PressureField, directions: tuple[Array, ...], at: Configuration) -> Array | None:
+        """Return a compliance of tangential fields that do no work on any slip, where both sides are held."""
         factors = []
-        for axis in range(directions[0].shape[1]):
-            columns = np.flatnonzero(self.supported_along(axis, candidates, pairing)[field.independent])
+        for held, nodes in self.without_slip(at):
+            columns = np.flatnonzero(nodes[field.independent])
             if len(columns):
                 Z = field.projection.compliant(columns)
-                factors.append(np.stack([along[:, axis, None] * Z for along in (normals(directions), *directions)]))
+                at_points = field.projection.P @ held[field.independent]
+                parts = [np.einsum("nd,nd->n", along, at_points) for along in (normals(directions), *directions)]
+                factors.append(np.stack([part[:, None] * Z for part in parts]))
         return np.concatenate(factors, axis=2) if factors else None

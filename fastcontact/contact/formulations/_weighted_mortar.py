@@ -12,6 +12,7 @@ linear between the corners, also on quadratic facets; only corners have gaps.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar
@@ -42,7 +43,7 @@ Mask = NDArray[np.bool_]
 MULTIPLIERS = ("standard", "dual")
 # What faces the other side with less than this fraction of its area is left out.
 LEAST = 1e-3
-# A direction in which less than this part of a motion is free counts as supported.
+# A tangent of which less than this part, squared, is free counts as held.
 FREE = 0.1
 
 
@@ -141,14 +142,14 @@ class WeightedMortar(Formulation):
         if not (self.friction or self.options.tied):
             return part
         directions = tuple(tangents_by_axes(normal))
-        sliding = self._sliding(overlap, covered, kept, mean, weight)
+        slips, apart = self._slips(directions, overlap, covered, kept, mean, weight, at)
         candidates = Candidates(points[:, None], np.ones((len(part), 1)))
         return replace(
             part,
-            tangents=tuple(self._along(direction, sliding) for direction in directions),
+            tangents=slips,
             directions=directions,
             friction=self.options.coefficients(self.friction, candidates),
-            drift=self._closing_slip_of_nodes(sliding, normal, directions, at) if self.slip == "symmetric" else None,
+            drift=self._closing_slip_of_nodes(apart, normal, directions, at) if self.slip == "symmetric" else None,
         )
 
     def _nodal(self, weight: Array) -> WeightedPressures:
@@ -160,8 +161,9 @@ class WeightedMortar(Formulation):
         ]
         m = len(self.secondary.points)
         held = np.zeros(m, bool)
-        if self.supported is not None:
-            held[:] = self.supported[self.secondary.points].all(axis=1)
+        if self.held is not None:
+            projectors = self.held.at(self.secondary.points)
+            held[:] = np.trace(projectors, axis1=1, axis2=2) > self.points.shape[1] - 0.5
         return WeightedPressures(weight, *self._areas, quadratic, held)
 
     @cached_property
@@ -174,57 +176,44 @@ class WeightedMortar(Formulation):
         return tested, whole
 
     def _closing_slip_of_nodes(
-        self, sliding: list[csr_array], normal: Array, directions: tuple[Array, ...], at: Configuration
+        self, apart: Array, normal: Array, directions: tuple[Array, ...], at: Configuration
     ) -> Array:
         """Return the slip (k, m) to add so that closing a gap is none, though the normal leans [length].
 
-        As in `Formulation`, for mean gaps.
+        As in `Formulation`, for mean gaps; `apart` (m, dim) are those at the beginning of the step, as vectors [length].
         """
         between = normal - nodal_normals(self.secondary, self.points + at.displacement)
         between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), 1e-300)  # zero where nothing is faced
-        start = self.points + at.start
-        apart = np.stack([motion @ start[:, axis] for axis, motion in enumerate(sliding)], axis=1)
         closing = np.einsum("nd,nd->n", between, apart)
         return np.stack([closing * np.einsum("nd,nd->n", along, between) for along in directions])
 
-    def _sliding(
-        self, overlap: Overlap, covered: list[Array], kept: Mask, mean: csr_array, weight: Array
-    ) -> list[csr_array]:
-        """Return the relative motions (m, n_points) of nodes that count as slip along each axis; mostly the mean one.
+    def _slips(
+        self, directions: Sequence[Array], overlap: Overlap, covered: list[Array], kept: Mask, mean: csr_array,
+        weight: Array, at: Configuration,
+    ) -> tuple[tuple[csr_array, ...], Array]:  # fmt: skip
+        """Return rows (m, n_dofs) of the slips along tangents (m, dim), and how far apart nodes start (m, dim) [length].
 
-        Where supports prescribe a node along the axis, its slip is that of the other side alone, of which its neighbours
-        leave next to nothing: those take over its friction. Where all nodes of a facet are supported each keeps its own.
+        Mostly they are those of the `mean` relative motion. In a direction in which both sides are held at a node, as in a
+        plane of symmetry, that would be the motion of the other side beside the plane, for want of any at the node: there
+        the functions of its neighbours take the place of the node's own (`Formulation.without_slip`).
         """
-        motions = []
-        for axis in range(self.points.shape[1]):
-            supported = self._supported(axis)
-            if not (supported & kept).any():
-                motions.append(mean)
+        rows = [rows_of(mean, direction) for direction in directions]
+        start = self.points + at.start
+        apart = mean @ start
+        held = np.zeros((len(weight), *2 * self.points.shape[1:]))
+        for along, nodes in self.without_slip(at):
+            if not (nodes & kept).any():
                 continue
-            own, across = self._weighted(overlap, covered, kept & ~supported)
-            motions.append(scaled(csr_array(own - across), 1.0 / weight))
-        return motions
-
-    def _supported(self, axis: int) -> Mask:
-        """Return the nodes (m,) supported along an axis, without those of facets whose nodes are all supported."""
-        if self.supported is None:
-            return np.zeros(len(self.secondary.points), bool)
-        return self.without_whole_facets(self.supported[self.secondary.points, axis])
-
-    def _along(self, direction: Array, sliding: list[csr_array]) -> csr_array:
-        """Return rows (m, n_dofs) of the slip along a tangent (m, dim); none where supports hold most of it."""
-        supported = np.stack([self._supported(axis) for axis in range(direction.shape[1])], axis=1)
-        free = np.einsum("md,md->m", direction**2, ~supported) >= FREE
-        if all(motion is sliding[0] for motion in sliding):
-            return rows_of(sliding[0], np.where(free[:, None], direction, 0.0))
-        rows: csr_array | None = None
-        for axis, motion in enumerate(sliding):
-            component = np.zeros_like(direction)
-            component[free, axis] = direction[free, axis]
-            part = rows_of(motion, component)
-            rows = part if rows is None else csr_array(rows + part)
-        assert rows is not None
-        return rows
+            own, across = self._weighted(overlap, covered, kept & ~nodes)
+            other = csr_array(scaled(csr_array(own - across), 1.0 / weight) - mean)
+            other.eliminate_zeros()
+            for k, direction in enumerate(directions):
+                part = np.einsum("md,md->m", direction, along)
+                rows[k] = csr_array(rows[k] + rows_of(other, part[:, None] * along))
+            apart += np.einsum("md,md->m", other @ start, along)[:, None] * along
+            held[nodes] += np.einsum("md,me->mde", along[nodes], along[nodes])
+        free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FREE for t in directions]
+        return tuple(scaled(row, np.where(own, 1.0, 0.0)) for row, own in zip(rows, free, strict=True)), apart
 
     def _weighted(self, overlap: Overlap, covered: list[Array], kept: Mask) -> tuple[csr_array, csr_array]:
         """Return the integrals of psi with secondary and with primary shape functions, both (m, n_points) [area].

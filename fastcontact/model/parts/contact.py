@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.contact.default_formulation import against_obstacle, default_formulation
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
+from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.obstacles import MeshedSurface, Obstacle
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.side_checks import check_obstacle, check_sides
@@ -189,15 +189,15 @@ class ModelContact(ModelConnections):
         self.contact.append(pair)
 
     @typed(ModelError)
-    def bind(self, pair: ContactPair, supported: NDArray[np.bool_] | None = None) -> Formulation:
+    def bind(self, pair: ContactPair, held: HeldMotions | None = None) -> Formulation:
         """Return the formulation of a contact pair on this mesh; see `add_contact` for the errors.
 
-        `supported` (n_points, dim) are the displacement components that supports prescribe, where they are known.
+        `held` are the motions of nodes that supports and relations prescribe, where they are known.
         """
         if pair.formulation not in FORMULATIONS:
             raise ContactError(unknown("contact formulation", pair.formulation, FORMULATIONS))
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
-        given = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "supported")
+        given = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
         known = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in given)]
         for option in pair.options:
             if option not in known:
@@ -220,6 +220,4 @@ class ModelContact(ModelConnections):
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
         modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
         axisymmetric = self.kinematics == "axisymmetric"
-        return kind(
-            secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, supported=supported, **own
-        )
+        return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, held=held, **own)

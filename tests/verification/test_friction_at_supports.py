@@ -1,0 +1,110 @@
+"""Friction at held nodes: there wherever sides slide, none where symmetry leaves no slip, however supports are said."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+
+FORMULATIONS = {
+    "default": {},
+    "standard": {"formulation": "mortar", "multipliers": "standard"},
+    "node to segment": {"formulation": "node_to_segment"},
+    "continuous": {"formulation": "continuous"},
+}
+
+
+def turn(dim, seed):
+    """A rotation (dim, dim); the identity without a seed."""
+    if seed is None:
+        return np.eye(dim)
+    Q = np.linalg.qr(np.random.default_rng(seed).normal(size=(dim, dim)))[0]
+    Q[:, 0] *= np.linalg.det(Q)
+    return Q
+
+
+def prefixed(mesh, name):
+    return fc.generate.renamed(mesh, lambda group: group if group == name else f"{name}_{group}")
+
+
+def blocks(element, dim):
+    """A wide block A and a smaller one B on it that does not match."""
+    if dim == 2:
+        a = fc.generate.block((10, 4), (8, 4), element, name="A")
+        b = fc.generate.block((6, 4), (5, 3), element, origin=(2, 4), name="B")
+    else:
+        a = fc.generate.box((10, 6, 2), (8, 5, 2), element, name="A")
+        b = fc.generate.box((6, 4, 2), (4, 3, 2), element, origin=(2, 1, 2), name="B")
+    return fc.generate.union(prefixed(a, "A"), prefixed(b, "B"))
+
+
+def sides(dim):
+    """Names of the lower end, of the side that contact is on, of the left and right ones of a block."""
+    return ("BOTTOM", "TOP", "LEFT", "RIGHT") if dim == 2 else ("ZMIN", "ZMAX", "XMIN", "XMAX")
+
+
+@pytest.mark.parametrize(("element", "dim"), [("quad4", 2), ("quad8", 2), ("tri3", 2), ("hex8", 3)])
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("driven", ["upper", "lower"])
+def test_a_block_held_or_drawn_by_its_sides_carries_all_friction(element, dim, formulation, driven):
+    if dim == 3 and formulation in ("standard", "continuous"):
+        pytest.skip("the same in the plane")
+    bottom, top, left, right = sides(dim)
+    model = fc.Model(blocks(element, dim), "plane_strain" if dim == 2 else "3d")
+    model.add_material(fc.LinearElastic(E=1e3, nu=0.3))
+    model.add_pressure(f"B_{top}", 1.0, ramp=[(0, 0), (1, 1), (3, 1)])
+    late = [(0, 0), (1, 0), (3, 1)]
+    model.fix(f"A_{bottom}", "yz"[: dim - 1])
+    model.prescribe(f"A_{bottom}", x=0.1 if driven == "lower" else 0.0, ramp=late)
+    for side in (left, right):
+        model.prescribe(f"B_{side}", x=0.0 if driven == "lower" else 0.1, ramp=late)
+    for side in ("YMIN", "YMAX") if dim == 3 else ():
+        model.fix(f"B_{side}", "y")
+    model.add_contact("c", secondary=f"B_{bottom}", primary=f"A_{top}", friction=0.2, **FORMULATIONS[formulation])
+    contact = fc.solve(model, [1, 2, 3])[-1].contact["c"]
+    normal = abs(contact.force[-1])
+    assert abs(contact.force[0]) == pytest.approx(0.2 * normal, rel=1e-3)
+    held = np.isin(contact.points, np.concatenate([model.mesh.points_of(f"B_{side}") for side in (left, right)]))
+    assert not contact.sticking[held].any()
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+@pytest.mark.parametrize("said", ["supports", "axes"])
+@pytest.mark.parametrize("group", ["LEFT", "BLOCK"])
+def test_a_block_driven_over_a_plane_carries_all_friction(formulation, said, group):
+    mesh = fc.generate.block((6.0, 2.0), (6, 2), "quad4")
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(E=1e3, nu=0.3))
+    model.add_pressure("TOP", 1.0, ramp=[(0, 0), (1, 1), (3, 1)])
+    axes = {"axes": (1.0, 0.0)} if said == "axes" else {}
+    model.prescribe("LEFT" if group == "LEFT" else mesh.group_names[0], x=0.1, ramp=[(0, 0), (1, 0), (3, 1)], **axes)
+    floor = fc.obstacles.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
+    model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, friction=0.2, formulation=formulation)
+    contact = fc.solve(model, [1, 2])[-1].contact["floor"]
+    assert abs(contact.force[0]) == pytest.approx(0.2 * abs(contact.force[1]), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("said", "seed"), [("fix", None), ("normal", None), ("axes", None), ("normal", 3), ("axes", 4)]
+)
+@pytest.mark.parametrize("elements", [("hex8", "tet4"), ("hex20", "hex20")])
+def test_bodies_pressed_uniformly_have_no_shear_in_planes_of_symmetry(said, seed, elements):
+    """A quarter of two boxes: uniform pressure, by whatever words the planes are held, and however the model is turned."""
+    parts = []
+    for name, element, n, z in zip("LU", elements, (2, 3), (-0.5, 0.0), strict=True):
+        parts.append(prefixed(fc.generate.box((1.0, 1.0, 0.5), (n, n, 1), element, origin=(0, 0, z), name=name), name))
+    mesh, Q = fc.generate.union(*parts), turn(3, seed)
+    model = fc.Model(mesh.replace(points=mesh.points @ Q.T), "3d")
+    model.add_material(fc.LinearElastic(E=1e3, nu=0.3))
+    for group, axis in (("L_ZMIN", 2), ("L_XMIN", 0), ("U_XMIN", 0), ("L_YMIN", 1), ("U_YMIN", 1)):
+        if said == "fix":
+            model.fix(group, "xyz"[axis])
+        elif said == "normal":
+            model.fix(group, "normal")
+        else:
+            model.fix(group, "x", axes=[tuple(Q[:, axis]), tuple(Q[:, (axis + 1) % 3])])
+    model.add_pressure("U_ZMAX", 1.0)
+    model.add_contact("c", secondary="U_ZMIN", primary="L_ZMAX", friction=0.3)
+    contact = fc.solve(model, 1)[-1].contact["c"]
+    assert contact.force @ Q == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
+    assert np.abs(contact.shear).max() < 1e-9
+    assert contact.sticking.all()
