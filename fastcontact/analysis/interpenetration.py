@@ -32,8 +32,9 @@ def interpenetration(problem: Problem, state: State, last: StepResult) -> list[s
     mesh, u = problem.model.mesh, problem.displacement(state.u)
     joined = _joined(problem)
     found = list(depths(mesh, problem.model.kinematics, mesh.points + u))
-    return _without_contact(problem, joined, found) + [
-        *_beside_contact(problem, last, joined, found), *_through_obstacles(problem, state, last)
+    return [
+        *_without_contact(problem, joined, found), *_beside_contact(problem, last, joined, found),
+        *_through_obstacles(problem, state, last),
     ]  # fmt: skip
 
 
@@ -60,7 +61,7 @@ def _without_contact(
     texts: dict[frozenset[int], str] = {}
     for number, other, points, depth in sorted(found, key=lambda entry: -float(entry[3].max())):
         both, row = frozenset((number, other)), int(np.argmax(depth))
-        if both not in joined | texts and depth[row] > ROUND_OFF * np.ptp(mesh.points, axis=0).max():
+        if both not in joined and both not in texts and depth[row] > ROUND_OFF * np.ptp(mesh.points, axis=0).max():
             where = mesh.points[points[row]]
             texts[both] = (
                 f"bodies {body_name(mesh, body, number)} and {body_name(mesh, body, other)} interpenetrate by "
@@ -92,7 +93,9 @@ def _beside_contact(
         ):
             pair = problem.pairs[names[0]]
             what = " and ".join(body_name(mesh, body, number) for number in sorted(both))
-            groups = f"'{pair.secondary.group}' and '{pair.primary.group}'"
+            groups = " and ".join(
+                f"'{side.group}'" for side in (pair.secondary, pair.primary) if isinstance(side, Surface)
+            )
             texts.append(
                 _lacking(problem, names[0], f"bodies {what} pass through each other", depth[row], points[row], groups)
             )

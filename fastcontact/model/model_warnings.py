@@ -161,7 +161,7 @@ def _proportions(model: Model) -> list[str]:
 
 
 def _coincident(model: Model) -> list[str]:
-    """Return a warning if nodes of solid cells are at one place, or nearly so, and neither contact nor relations join them."""
+    """Return a warning if nodes of solid cells are nearly at one place, and neither contact nor relations join them."""
     from scipy.spatial import cKDTree
 
     mesh, size = model.mesh, float(np.ptp(model.mesh.points, axis=0).max())
@@ -197,8 +197,8 @@ def _coincident(model: Model) -> list[str]:
 def _friction(model: Model) -> list[str]:
     """Return a warning for each coefficient of friction that no surfaces have."""
     return [
-        f"the friction of contact '{pair.name}' is {friction:g}, more than the {RUBBING:g} that surfaces have at most: is it in "
-        "percent? Where nothing is to slide, take kind='tied'"
+        f"the friction of contact '{pair.name}' is {friction:g}, more than the {RUBBING:g} that surfaces have at most: is it "
+        "in percent? Where nothing is to slide, take kind='tied'"
         for pair in model.contact
         if (friction := pair.options.get("friction") or 0.0) > RUBBING
     ]

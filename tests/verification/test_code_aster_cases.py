@@ -112,8 +112,8 @@ STOPPED = [
         "cells a quarter as long",
     ),
 ]  # fmt: skip
-# These cases go beyond small strain, mix materials, and leave facets beside the axis out of their sides, on purpose; any other
-# warning is an error.
+# These cases go beyond small strain, mix materials, and leave facets beside the axis out of their sides, on purpose; any
+# other warning is an error.
 ON_PURPOSE = (
     "the largest equivalent strain",
     "the largest rotation",
