@@ -141,15 +141,15 @@ class WeightedMortar(Formulation):
         part = Constraints(B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=self._nodal(weight))
         if not (self.friction or self.options.tied):
             return part
-        directions = tuple(tangents_by_axes(normal))
-        slips, apart = self._slips(directions, overlap, covered, kept, mean, weight, at)
         candidates = Candidates(points[:, None], np.ones((len(part), 1)))
+        directions, rubbing = self.options.rubbing(tangents_by_axes(normal), candidates)
+        slips, apart = self._slips(rubbing, overlap, covered, kept, mean, weight, at)
         return replace(
             part,
             tangents=slips,
             directions=directions,
             friction=self.options.coefficients(self.friction, candidates),
-            drift=self._closing_slip_of_nodes(apart, normal, directions, at) if self.slip == "symmetric" else None,
+            drift=self._closing_slip_of_nodes(apart, normal, rubbing, at) if self.slip == "symmetric" else None,
         )
 
     def _nodal(self, weight: Array) -> WeightedPressures:

@@ -69,7 +69,8 @@ class ModelContact(ModelConnections):
             - ``excluded``: groups whose nodes carry no contact, and what they stand for carries no pressure: their share of
               the area with multipliers at nodes (node-to-segment, mortar with one gap per node), where there are integration
               points those nearer to such a node than to any other. The two sides may share such nodes. ``frictionless``:
-              groups whose nodes carry no friction, likewise.
+              groups whose nodes carry no friction, likewise. ``frictionless_along``: a vector (dim,) along which these, or
+              without ``frictionless`` all, have no friction, nor slip that counts; across it they keep it [-].
             - ``penalty``: pressure by penetration [pressure / length], instead of none at all; results tell the
               penetration. It does not soften friction; ``tangential_penalty`` does: shear by slip of what sticks, a number
               or a function of the secondary position [pressure / length].
