@@ -85,20 +85,11 @@ def _beside_contact(
         held, faced = (mask[points] for mask in _held(problem, last, names))
         deformed = max(float(np.ptp(last.displacement[body == number], axis=0).max()) for number in both)
         limit = max(BESIDE * deformed, HELD * float(depth[held].max(initial=0.0)))
-        row = int(np.argmax(np.where(held | faced, 0.0, depth)))
-        if (
-            not (held | faced)[row]
-            and depth[row] > limit
-            and depth[row] - _at_rest(problem, own, int(points[row])) > limit
-        ):
-            pair = problem.pairs[names[0]]
+        depth[held | faced] = 0.0
+        row = int(np.argmax(depth))
+        if depth[row] > limit and depth[row] - _at_rest(problem, own, int(points[row])) > limit:
             what = " and ".join(body_name(mesh, body, number) for number in sorted(both))
-            groups = " and ".join(
-                f"'{side.group}'" for side in (pair.secondary, pair.primary) if isinstance(side, Surface)
-            )
-            texts.append(
-                _lacking(problem, names[0], f"bodies {what} pass through each other", depth[row], points[row], groups)
-            )
+            texts.append(_lacking(problem, names[0], f"bodies {what} pass through each other", depth[row], points[row]))
     return texts
 
 
@@ -128,11 +119,9 @@ def _through_obstacles(problem: Problem, state: State, last: StepResult) -> list
     for name, pair in problem.pairs.items():
         if not isinstance(pair.primary, RigidSide) or pair.options.wear:  # what is worn off is still in the mesh
             continue
-        held = np.zeros(mesh.n_points, bool)
-        held[pair.secondary.points] = True
-        beside = [block[held[block].any(axis=1)].ravel() for block in outer_facets(mesh).values()]
-        points = np.unique(np.concatenate(beside))
-        points = points[~held[points]]
+        own = pair.secondary.points
+        beside = [block[np.isin(block, own).any(axis=1)].ravel() for block in outer_facets(mesh).values()]
+        points = np.setdiff1d(np.concatenate(beside), own)
         if not len(points):
             continue
         at_rest = pair.primary.facing(mesh.points[points], Stance(np.zeros(mesh.dim)))[0]
@@ -143,14 +132,14 @@ def _through_obstacles(problem: Problem, state: State, last: StepResult) -> list
         limit = max(BESIDE * float(np.ptp(u, axis=0).max()), HELD * deepest)
         row = int(np.argmin(np.where(at_rest >= 0.0, gap, np.inf)))
         if at_rest[row] >= 0.0 and -gap[row] > limit:
-            what = "the body passes through the obstacle"
-            texts.append(_lacking(problem, name, what, -gap[row], points[row], f"'{pair.secondary.group}'"))
+            texts.append(_lacking(problem, name, "the body passes through the obstacle", -gap[row], points[row]))
     return texts
 
 
-def _lacking(problem: Problem, name: str, what: str, depth: float, point: int, groups: str) -> str:
-    where = np.array2string(problem.model.mesh.points[point], precision=4)
+def _lacking(problem: Problem, name: str, what: str, depth: float, point: int) -> str:
+    where, pair = np.array2string(problem.model.mesh.points[point], precision=4), problem.pairs[name]
+    between = "' and '".join(side.group for side in (pair.secondary, pair.primary) if isinstance(side, Surface))
     return (
-        f"contact '{name}' lacks facets: {what} by {depth:.4g} at point {point} {where}, beside {groups}; its force is too "
-        f"small, add the facets there"
+        f"contact '{name}' lacks facets: {what} by {depth:.4g} at point {point} {where}, beside '{between}'; "
+        "its force is too small, add the facets there"
     )

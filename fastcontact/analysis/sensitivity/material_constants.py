@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,31 +61,17 @@ def _found(model: Model, asked: Asked) -> tuple[int, Material, int | None]:
         raise ModelError(unknown("material", str(asked[1]), [*names, *map(str, range(len(model.materials)))]))
     (number, material), name = found[0], str(asked[0])
     value = getattr(material, name, None)
-    if value is None:
-        raise ModelError(
-            f"{material.described}: the material {asked[1]!r} has no {name}, and no sensitivity by it{_by(material)}"
-        )
     components = value if isinstance(value, tuple) else (value,)
-    if any(map(varying, components)):
+    if value is None or any(map(varying, components)):
         raise ModelError(
-            f"{name} of the material {asked[1]!r} varies: there is no sensitivity by that, only by one number"
+            f"the material {asked[1]!r} has no {name}, or one that varies: there is no sensitivity by that"
         )
-    return number, material, _component(asked, components)
+    return number, material, _component(asked, list(CONSTANTS[name]) if len(components) > 1 else [])
 
 
-def _by(material: Material) -> str:
-    """Return what to ask for where a material has no such constant."""
-    if isinstance(material, LinearElastic):
-        return ": ask for E, nu or, where it is heated, expansion"
-    return ": of its moduli D there is none" if isinstance(material, Anisotropic) else ""
-
-
-def _component(asked: Asked, components: Sequence[Any]) -> int | None:
+def _component(asked: Asked, names: Sequence[str]) -> int | None:
     """Return the number of the component that is asked for; None where a constant has but one, or all are."""
-    names = list(CONSTANTS[str(asked[0])])
-    if len(components) == 1 or (asked[0] == "expansion" and len(asked) == 2):
-        if len(asked) == 3:
-            raise ModelError(f"{asked[0]} of the material {asked[1]!r} is one number: leave out '{asked[2]}'")
+    if len(asked) == 2 and (not names or asked[0] == "expansion"):
         return None
     if len(asked) == 2:
         raise ModelError(f"{asked[0]} of the material {asked[1]!r} has components: ask for (..., '{names[0]}')")
@@ -106,7 +91,7 @@ def _room(material: Material, name: str, place: int | None) -> float:
         return min(0.5 - value, 1.0 + value)
     assert isinstance(material, Orthotropic)
     assert place is not None
-    i, j = int(NAMES[place][0]) - 1, int(NAMES[place][1]) - 1
+    i, j = (int(axis) - 1 for axis in NAMES[place])
     S = material.local_compliance[:3, :3]
     size = np.sqrt(np.diag(S))
     return float(np.linalg.eigvalsh(S / np.outer(size, size))[0] * size[j] / size[i])

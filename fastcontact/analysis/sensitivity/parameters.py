@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,20 +55,19 @@ def check_parameter(model: Model, asked: Asked) -> None:
         raise ModelError(unknown("parameter", kind, FORMS))
     if len(asked) not in (2, 3 if kind in WITH_COMPONENT else 2):
         raise ModelError(f"the parameter {asked} must have the form {FORMS[kind]}")
-    known: dict[str, Callable[[Model, Asked], object]] = {
-        **dict.fromkeys(CONSTANTS, check_constant), "load": _loads, "speed": _speeds, "temperature": _temperatures,
-        "pretension": _pretension, "prescribed": _prescribing, "motion": _moved, "clearance": _opened,
-    }  # fmt: skip
-    known[kind](model, asked)
+    KINDS[kind][0](model, asked)
 
 
 def change_by(contact: MovingContact, asked: Asked) -> Change:
     """Return what a parameter that `check_parameter` has found changes in the equations."""
-    kinds: dict[str, Callable[[MovingContact, Asked], Change]] = {
-        **dict.fromkeys(CONSTANTS, _of_constant), "load": _of_load, "speed": _of_speed, "temperature": _of_temperature,
-        "pretension": _of_pretension, "prescribed": _of_prescribed, "motion": _of_motion, "clearance": _of_clearance,
-    }  # fmt: skip
-    return kinds[str(asked[0])](contact, asked)
+    return KINDS[str(asked[0])][1](contact, asked)
+
+
+def _one(kind: str, known: Mapping[str, Any], asked: Asked) -> Any:
+    """Return what has the name that is asked for; ModelError if nothing has."""
+    if asked[1] not in known:
+        raise ModelError(unknown(kind, str(asked[1]), known))
+    return known[str(asked[1])]
 
 
 def _nothing(contact: MovingContact) -> Change:
@@ -145,17 +144,15 @@ def _of_temperature(contact: MovingContact, asked: Asked) -> Change:
     problem, change = contact.problem, _nothing(contact)
     heated = copy.copy(problem.model)
     heated.temperatures = _temperatures(heated, asked)
-    forces = combined(heated.thermal_forces_by_ramp(), problem.ramp, contact.instant, problem.shape)
+    forces = combined(heated.thermal_forces_by_ramp(), problem.ramp, contact.instant, heated.mesh.points.shape)
     change.out[: heated.n_dofs] = -forces.ravel()
     return change
 
 
 def _pretension(model: Model, asked: Asked) -> Pretension:
     """Return a pretension section."""
-    sections = {own.label: own for own in model.pretensions}
-    if asked[1] not in sections:
-        raise ModelError(unknown("pretension", str(asked[1]), list(sections)))
-    return sections[str(asked[1])]
+    found: Pretension = _one("pretension", {own.label: own for own in model.pretensions}, asked)
+    return found
 
 
 def _of_pretension(contact: MovingContact, asked: Asked) -> Change:
@@ -212,9 +209,8 @@ def _lifted(contact: MovingContact, values: Array, along: Sequence[int]) -> Chan
 def _moved(model: Model, asked: Asked) -> ContactPair:
     """Return the pair of a rigid obstacle that is moved."""
     moved = {pair.name: pair for pair in model.contact if any(pair.motion)}
-    if asked[1] not in moved:
-        raise ModelError(unknown("rigid obstacle with a motion", str(asked[1]), list(moved)))
-    return moved[str(asked[1])]
+    found: ContactPair = _one("rigid obstacle with a motion", moved, asked)
+    return found
 
 
 def _of_motion(contact: MovingContact, asked: Asked) -> Change:
@@ -241,10 +237,7 @@ def _of_motion(contact: MovingContact, asked: Asked) -> Change:
 
 def _opened(model: Model, asked: Asked) -> None:
     """Refuse clearances of pairs that are not there, or tied."""
-    pairs = {pair.name: pair for pair in model.contact}
-    if asked[1] not in pairs:
-        raise ModelError(unknown("contact pair", str(asked[1]), list(pairs)))
-    if pairs[str(asked[1])].options.get("kind") == "tied":
+    if _one("contact pair", {pair.name: pair for pair in model.contact}, asked).options.get("kind") == "tied":
         raise ModelError(f"contact '{asked[1]}' is tied: it keeps its gaps, and has no clearance")
 
 
@@ -266,3 +259,16 @@ def _of_constant(contact: MovingContact, asked: Asked) -> Change:
     nothing = _nothing(contact)
     out, sample = by_constant(contact, asked)
     return replace(nothing, out=out, sample=nothing.sample if sample is None else sample)
+
+
+# By kind: what raises ModelError if there is no such parameter, and what it changes.
+KINDS: dict[str, tuple[Callable[[Model, Asked], object], Callable[[MovingContact, Asked], Change]]] = {
+    **dict.fromkeys(CONSTANTS, (check_constant, _of_constant)),
+    "load": (_loads, _of_load),
+    "speed": (_speeds, _of_speed),
+    "temperature": (_temperatures, _of_temperature),
+    "pretension": (_pretension, _of_pretension),
+    "prescribed": (_prescribing, _of_prescribed),
+    "motion": (_moved, _of_motion),
+    "clearance": (_opened, _of_clearance),
+}
