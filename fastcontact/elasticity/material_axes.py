@@ -66,8 +66,8 @@ class CylindricalAxes:
         bad = np.flatnonzero(length <= ROUND_OFF * np.abs(places - self.origin).max(initial=0.0))
         if len(bad):
             raise ModelError(
-                f"the point {places[bad[0]]} of a cell lies on the line of the cylindrical axes, where no direction is radial: "
-                "give the cells there a material with other axes, or move a node"
+                f"a point of a cell at {places[bad[0]]} lies on the line of the cylindrical axes, where no direction is "
+                "radial: give the cells there a material with other axes, or move a node"
             )
         radial /= length[:, None]
         return np.stack([radial, np.cross(along, radial), np.broadcast_to(along, radial.shape)], axis=1)
