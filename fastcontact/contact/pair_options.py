@@ -110,7 +110,7 @@ class PairOptions:
     def rubbing(
         self, directions: Sequence[Array], candidates: Candidates
     ) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-        """Return tangents (n, dim), turned so that friction acts along one or does not, and zero where it does not."""
+        """Return tangents (n, dim), turned so that friction acts along all of one or not at all; zero where it does not."""
         along = self.frictionless_along
         if along is None:
             return tuple(directions), tuple(directions)
