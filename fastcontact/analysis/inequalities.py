@@ -56,13 +56,6 @@ class StepContext:
         system, start, zero = self.problem.system, self.state.u, np.zeros_like(self.state.u)
         return self.load.lift - (start - system.displacement(system.unknowns(start, zero), zero))
 
-    def held(self, constraints: Constraints) -> Mask | None:
-        """Return which constraints (m,) are those of secondary nodes that supports or relations hold, if only in part."""
-        if constraints.nodes is None:
-            return None
-        dim = constraints.positions.shape[1]
-        return np.asarray(~self.problem.system.free[constraints.nodes[:, None] * dim + np.arange(dim)].all(axis=1))
-
     def driven(self, constraints: Constraints) -> Mask:
         """Return which constraints (m,) supports and obstacles move past the other side in the step."""
         slips = np.stack([T @ self.prescribed_motion for T in constraints.tangents])
@@ -115,7 +108,7 @@ def _solve(
         return active_set.solve(step.loaded, own, active, accuracy, u)
     from fastcontact.analysis.friction import solve as friction
 
-    own = replace(own, held=step.held(constraints), driven=step.driven(constraints))
+    own = replace(own, driven=step.driven(constraints))
     iterate.frictional = friction.solve(step.loaded, own, active, accuracy, u, iterate.frictional)
     return iterate.frictional
 

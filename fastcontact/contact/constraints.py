@@ -128,8 +128,6 @@ class Constraints:
         What the forces along the tangents at the beginning of the step take from its slip by that compliance [length].
     low_rank_compliance : ndarray (1 + len(tangents), m, h), optional
         Z of a compliance ``Z Z.T`` beside C, of normal forces and then of tangential ones; None stands for zero.
-    held : ndarray of bool (m,), optional
-        Constraints of secondary nodes that are held, if only in part; None stands for none.
     driven : ndarray of bool (m,), optional
         Constraints that supports and obstacles move past the other side by themselves; None stands for none.
     areas : ndarray (m,), optional
@@ -159,7 +157,6 @@ class Constraints:
     nodes: NDArray[np.intp] | None = None
     nodal: NodalField | None = None
     tied: Tied | None = None
-    held: Mask | None = None
     driven: Mask | None = None
 
     def __len__(self) -> int:

@@ -73,7 +73,10 @@ class Linearised(Protocol):
         ...
 
 
-def newton(problem: Linearised, y: Array, gaps: Array, exact: float = EXACT, patience: int | None = None) -> Forces:
+def newton(
+    problem: Linearised, y: Array, gaps: Array, exact: float = EXACT, patience: int | None = None,
+    line_search: bool = True,
+) -> Forces:  # fmt: skip
     """Go down to a zero of the residual from forces and gaps (1 + k, m).
 
     Parameters
@@ -84,6 +87,8 @@ def newton(problem: Linearised, y: Array, gaps: Array, exact: float = EXACT, pat
         The residual that is small enough, over the largest force.
     patience : int, optional
         Iterations allowed; PATIENCE by default.
+    line_search : bool
+        Whether steps are cut until the residual goes down; else all are whole.
     """
     patience = PATIENCE if patience is None else patience
     law = problem.law
@@ -103,7 +108,10 @@ def newton(problem: Linearised, y: Array, gaps: Array, exact: float = EXACT, pat
         there, gaps_there = problem.step(y, gaps, *law.state(y, gaps))
         step, change = there - y, gaps_there - gaps
         part = 1.0
-        while np.linalg.norm(law.residual(y + part * step, gaps + part * change)) > (1 - 1e-4 * part) * size:
+        while (
+            line_search
+            and np.linalg.norm(law.residual(y + part * step, gaps + part * change)) > (1 - 1e-4 * part) * size
+        ):
             part *= 0.5
             if part < SHORTEST:  # at a kink no step may go down: the whole one leads elsewhere
                 part, uphill = 1.0, uphill + 1

@@ -31,6 +31,9 @@ ACCEPTABLE = 1e-9
 SWEPT, MOST_SWEEPS = (1e-1, 1e-2, 1e-3, 1e-4), 2000
 # Edges of the cones in three dimensions, and the largest complementarity problem.
 EDGES, LARGEST = (8, 16, 32), 2500
+# Slips that depend on each other get this compliance, in units of that of the gaps: at nodes that several sides hold, or that
+# supports hold on one side, forces along the surface would be any. So do problems with a pivot below DEPENDENT.
+YIELDING, DEPENDENT = 1e-9, 1e-8
 # Edges repeat each other, which pivots do not bear: their problem is shifted by this fraction.
 SHIFT = 1e-6
 
@@ -58,12 +61,12 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
     unit = 1.0 / np.sqrt(np.maximum(own, np.finfo(float).eps * own.max()))
     length = float(np.abs(free * unit).max()) or 1.0
     everywhere = np.tile(unit, parts)
-    problem = _Problem(everywhere[:, None] * F * everywhere, free * unit / length, mu)
+    problem = _Problem(_determined(everywhere[:, None] * F * everywhere, m), free * unit / length, mu)
     best, iterations = None, 0
     if guess is not None:
         guess = guess / (length * unit)
-    for start in _starts(problem, closed, guess):
-        found = newton(problem, start, problem.gaps(start))
+    for start, line_search in _starts(problem, closed, guess):
+        found = newton(problem, start, problem.gaps(start), line_search=line_search)
         iterations += 1 + found.iterations
         if best is None or found.residual < best.residual:
             best = found
@@ -73,6 +76,19 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
     settled = best.settled or best.residual <= ACCEPTABLE
     gaps = best.gaps * length / unit
     return Forces(best.y * length * unit, gaps, best.closed, best.sticking, settled, best.residual, iterations)
+
+
+def _determined(F: Array, m: int) -> Array:
+    """Return a scaled compliance F whose slips, those behind the m gaps, yield a little if some of them are dependent."""
+    try:
+        lower = np.linalg.cholesky(F + 1e-2 * DEPENDENT * np.eye(len(F)))
+        if np.diag(lower).min() ** 2 >= DEPENDENT:
+            return F
+    except np.linalg.LinAlgError:
+        pass
+    slips = np.arange(m, len(F))
+    F[slips, slips] += YIELDING
+    return F
 
 
 class _Problem:
@@ -90,21 +106,29 @@ class _Problem:
         return there, self.gaps(there)
 
 
-def _starts(problem: _Problem, closed: Mask, guess: Array | None) -> Iterator[Array]:
-    """Yield forces for Newton's method to start from, the more laborious the later."""
-    if guess is not None and guess.any():
-        yield guess
+def _starts(problem: _Problem, closed: Mask, guess: Array | None) -> Iterator[tuple[Array, bool]]:
+    """Yield forces for Newton's method to start from, the more laborious the later, and whether it searches along its steps.
+
+    At kinks of the residual whole steps often lead on where no part of one goes down.
+    """
+    guessed = guess is not None and guess.any()
+    if guess is not None and guessed:
+        yield guess, True
     sticking = closed | (problem.free[0] < 0) if not closed.any() else closed
-    yield _step(problem, np.zeros_like(problem.free), problem.free, sticking, sticking)
+    stuck = _step(problem, np.zeros_like(problem.free), problem.free, sticking, sticking)
+    yield stuck, True
+    if guess is not None and guessed:
+        yield guess, False
+    yield stuck, False
     y, gaps = np.zeros_like(problem.free), np.empty_like(problem.free)
     for exactness in SWEPT:
         if sweep_kernels.sweep(problem.F, problem.free, problem.mu, y, gaps, exactness, MOST_SWEEPS) == MOST_SWEEPS:
             break
-        yield y.copy()
+        yield y.copy(), True
     for edges in EDGES if len(problem.free) == 3 else (2,):
         found = _on_edges(problem, edges)
         if found is not None:
-            yield found
+            yield found, True
 
 
 def _step(problem: _Problem, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> Array:

@@ -130,8 +130,7 @@ class Eliminated:
             own = self._own(rows, yielding)
         still = idle(own)
         moved = still & constraints.moved_past
-        loose = moved if constraints.held is None else moved | (~still & constraints.held)
-        self._gives[1:][loose] += np.broadcast_to(GIVING * own[0, 0], still.shape)[loose]
+        self._gives[1:][moved] += np.broadcast_to(GIVING * own[0, 0], still.shape)[moved]
         slipping = [scaled(T, np.where(off, 0.0, 1.0)) for T, off in zip(rows[1:], still, strict=True)]
         self._rows = (rows[0], *slipping)
         self._free = np.vstack([free[0], np.where(still & ~moved, 0.0, free[1:])])

@@ -118,9 +118,6 @@ def _among(
     if Q is not None:
         F, free = np.asarray(Q @ (Q @ F).T), (Q @ free.ravel()).reshape(free.shape)
         start = None if start is None else (Q @ start.ravel()).reshape(free.shape)
-    if constraints.held is not None:
-        loose = np.flatnonzero(~idle_slips & constraints.held[rows]) + len(rows)
-        F[loose, loose] += np.tile(GIVING * own[0, 0], k)[loose - len(rows)]
     if len(still):
         moved = idle_slips & constraints.moved_past[rows]
         F[still], F[:, still] = 0.0, 0.0
