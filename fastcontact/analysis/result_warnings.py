@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.analysis.facet_sag import sag_warnings
 from fastcontact.analysis.interpenetration import interpenetration
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.seams import seam_warnings
@@ -46,13 +47,14 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
     found += _carrying_springs(problem, state) + locking_warning(problem, state.u)
     found += [problem.solver.gave_up] if problem.solver.gave_up else []
     load = problem.load_at(last.load_factor)
-    loaded = bool(load.force.any() or load.lift.any())
+    loaded, sagging = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)
     for name, pair in problem.pairs.items():
         contact = last.contact[name]
         if pair.options.gap_only:
             continue
         found += _deep(pair, contact, state.u) + _lost(pair, contact, name in state.touched, loaded)
-        found += _unresolved(name, pair, contact) + _too_fast(name, pair, state)
+        found += [sagging[name]] if name in sagging else _unresolved(name, pair, contact)
+        found += _too_fast(name, pair, state)
     return found + seam_warnings(problem, last) + _unsettled(state) + _loose(problem, last)
 
 

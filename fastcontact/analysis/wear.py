@@ -75,7 +75,7 @@ def worn_in_step(
 def slip_of_nodes(pair: Formulation, at: Configuration) -> Array:
     """Return the slip (m, dim) of the secondary nodes in a step along what they face, else zero [length]."""
     dim = at.displacement.shape[1]
-    nodes = Candidates(pair.secondary.points[:, None], np.ones((len(pair.secondary.points), 1)))
+    nodes = Candidates.nodes_of(pair.secondary)
     pairing = pair.facing(nodes, at, max(pair.projection_tolerance or 0.0, STANDS_OUT))
     moved = (at.displacement - at.start).ravel()
     slip = np.zeros((len(nodes.nodes), dim))

@@ -57,16 +57,15 @@ class Continuous(PressureFieldFormulation):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        nodes, local, shapes, areas, shortest = [], [], [], [], np.inf
+        local, areas, rules, shortest = [], [], [], np.inf
         for block in self.secondary.blocks:
             xi, weights = self._rule(block.element)
-            nodes.append(np.repeat(block.facets, len(xi), axis=0))
             local.append(np.repeat(block.local, len(xi), axis=0))
-            shapes.append(np.tile(elements.get(block.element).shape(xi), (len(block.facets), 1)))
             areas.append(self._areas(block, xi, weights))
+            rules.append(xi)
             size = facet_measure(block.facets, block.element, self.points, xi, False) @ weights
             shortest = min(shortest, size.min() ** (1 / xi.shape[1]))
-        self._candidates = Candidates(filled_up(nodes), filled_up(shapes))
+        self._candidates = Candidates.inside(self.secondary, rules)
         rho = self.augmentation * self.modulus / shortest
         whole = np.concatenate(areas)
         areas_of_points = np.where(self.options.out(self._candidates), 0.0, whole)

@@ -66,6 +66,8 @@ class ModelContact(ModelConnections):
               side to lengths (n,); positive opens the gap, negative is an interference, as of a press fit [length].
               ``clearance_primary``: the same on the primary side, at the positions faced. ``clearance_ramp``: their
               history, as pairs (instant, multiplier); without one they are there from the beginning.
+            - ``surface_smoothing``: whether gaps are those between the smooth surfaces that straight facets of curved sides
+              stand for; by default with mortar alone.
             - ``excluded``: groups whose nodes carry no contact, and what they stand for carries no pressure: their share of
               the area with multipliers at nodes (node-to-segment, mortar with one gap per node), where there are integration
               points those nearer to such a node than to any other. The two sides may share such nodes. ``frictionless``:
