@@ -30,9 +30,9 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 # Heights below this part of the size of a facet are rounding errors of node positions.
 ROUND_OFF = 1e-10
-# Columns of a fit are scaled by this with each degree, and singular values below that count as zero: where nodes leave terms
-# undetermined, as on a strip one facet wide, those of low degree take all.
-LOWER, SINGULAR = 0.1, 1e-9
+# Columns of a fit are scaled by this with each degree, and its squares damped: where nodes leave terms undetermined, as on a
+# strip one facet wide, those of low degree take all.
+LOWER, DAMPING = 0.1, 1e-13
 # Circles, spheres and cylinders are matched to (L / R)^(2 PASSES).
 PASSES = 3
 
@@ -73,8 +73,8 @@ class Smoothing:
     @classmethod
     def of(cls, secondary: Surface, primary: Surface, points: Array) -> Smoothing | None:
         """Return the smooth surfaces of two sides at reference `points` (n_points, dim); None where one has no sag."""
-        ours = smooth_side(secondary, points)
-        theirs = None if ours is None else smooth_side(primary, points)
+        theirs = smooth_side(primary, points)
+        ours = None if theirs is None else smooth_side(secondary, points)
         return None if ours is None or theirs is None else cls(ours, theirs)
 
     def shared(self, ours: Indices, theirs: Indices, frames: tuple[Array, Array]) -> Array:
@@ -125,36 +125,50 @@ def _axes(block: FacetBlock, coordinates: Array, normal: Array) -> Array:
 
 def smooth_side(side: Surface, points: Array) -> SmoothSide | None:
     """Return the smooth surface of a side at `points` (n_points, dim); None where its facets have no sag."""
-    near = _neighbours(side, np.concatenate([_normals(block, points) for block in side.blocks]))
-    nodes, count = _stencils(near, side)
-    fits = []
-    for block, first in _numbered(side):
+    near, nodes, taken = _neighbours(side, np.concatenate([_normals(block, points) for block in side.blocks]))
+    around, first, fits = points[side.points[nodes]], 0, []
+    if _flat(points[side.points], around, taken):
+        return None
+    for block in side.blocks:
         rows = slice(first, first + len(block.facets))
-        taken = np.arange(nodes.shape[1]) < count[rows, None]
-        fits.append(
-            _heights(block, points, _fit(block, points, points[side.points[nodes[rows]]], taken, 2 * side.order))
-        )
+        fits.append(_heights(block, points, _fit(block, points, around[rows], taken[rows], 2 * side.order)))
+        first += len(block.facets)
     heights, curvature, axes = (np.concatenate(parts) for parts in zip(*fits, strict=True))
     if not heights.any():
         return None
     return SmoothSide(heights * _limiter(near, curvature, axes)[:, None, None], curvature)
 
 
-def _neighbours(side: Surface, normal: Array) -> csr_array:
-    """Return a matrix (n_facets, n_facets) of the facets that share a node and meet at no corner, each facet with itself."""
-    facet = np.concatenate([np.repeat(np.arange(len(b.local)), b.local.shape[1]) + n for b, n in _numbered(side)])
-    at = facet, np.concatenate([block.local.ravel() for block in side.blocks])
-    incidence = csr_array((np.ones(len(facet)), at), shape=(side.n_facets, len(side.points)))
-    near = (incidence @ incidence.T).tocoo()
-    i, j = near.coords
+def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, NDArray[np.bool_]]:
+    """Return which facets share a node and meet at no corner, and the nodes of all these for each facet.
+
+    A matrix (n_facets, n_facets), each facet with itself, positions (n_facets, most) in the points of the side, and which of
+    them are taken.
+    """
+    size = [block.local.shape[1] for block in side.blocks for _ in block.local]
+    nodes = np.concatenate([block.local.ravel() for block in side.blocks])
+    at = np.repeat(np.arange(side.n_facets), size), nodes
+    incidence = csr_array((np.ones(len(nodes)), at), shape=(side.n_facets, len(side.points)))
+    i, j = (incidence @ incidence.T).tocoo().coords
     smooth = np.einsum("nd,nd->n", normal[i], normal[j]) > np.cos(np.radians(CORNER))
-    return csr_array((np.ones(smooth.sum()), (i[smooth], j[smooth])), shape=near.shape)
+    near = csr_array((np.ones(smooth.sum()), (i[smooth], j[smooth])), shape=(side.n_facets, side.n_facets))
+    around = csr_array(near @ incidence)
+    taken = np.arange(np.diff(around.indptr).max()) < np.diff(around.indptr)[:, None]
+    padded = np.zeros(taken.shape, np.intp)
+    padded[taken] = around.indices
+    return near, padded, taken
 
 
-def _numbered(side: Surface) -> list[tuple[FacetBlock, int]]:
-    """Return the blocks of a side with the number of their first facet."""
-    first = np.cumsum([0] + [len(block.facets) for block in side.blocks])
-    return list(zip(side.blocks, first[:-1].tolist(), strict=True))
+def _flat(points: Array, around: Array, taken: NDArray[np.bool_]) -> bool:
+    """Return whether points (n, dim) lie in one plane, or the points `around` (n, m, dim) every facet in one of their own."""
+    away = points - points.mean(axis=0)
+    if np.linalg.svd(away, compute_uv=False)[-1] <= ROUND_OFF * np.linalg.norm(away):
+        return True
+    count = taken.sum(axis=1)[:, None]
+    away = np.where(taken[:, :, None], around, 0.0)
+    away = np.where(taken[:, :, None], away - (away.sum(axis=1) / count)[:, None], 0.0)
+    least = np.linalg.eigvalsh(away.transpose(0, 2, 1) @ away)[:, 0]
+    return bool((least <= (ROUND_OFF * np.linalg.norm(away, axis=(1, 2))) ** 2).all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,9 +195,11 @@ class _Fit:
         """Return this one with polynomials fitted to those `points` (n, m, dim) that are `taken` (n, m)."""
         (plane, height), (i, j) = self.in_planes(points), self.powers
         lower = LOWER ** (i + j) * np.sqrt(comb(i + j, i))  # no direction counts more than others (Bombieri's norm)
-        inverse = np.linalg.pinv(taken[..., None] * lower * _terms(plane, i, j), rcond=SINGULAR)
-        rest = np.where(taken, height - _conic(self.curvature, plane), 0.0)
-        return replace(self, polynomial=lower * np.einsum("ntk,nk->nt", inverse, rest))
+        columns = np.where(taken[..., None], lower * _terms(plane, i, j), 0.0)
+        rest = (height - _conic(self.curvature, plane))[..., None]
+        normal = columns.transpose(0, 2, 1) @ columns
+        normal += DAMPING * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(len(i))
+        return replace(self, polynomial=lower * np.linalg.solve(normal, columns.transpose(0, 2, 1) @ rest)[..., 0])
 
     def at(self, plane: Array) -> Array:
         """Return the heights (n, m) over points (n, m, d) of the planes."""
@@ -240,17 +256,6 @@ def _conic(curvature: Array, plane: Array) -> Array:
     return np.asarray(-(bent * plane).sum(axis=2) / (1.0 + root))
 
 
-def _stencils(near: csr_array, side: Surface) -> tuple[Indices, Indices]:
-    """Return the nodes (n, most) of the facets near each one, positions in the points of the side, and their numbers (n,)."""
-    facet = np.concatenate([np.repeat(np.arange(len(b.local)), b.local.shape[1]) + n for b, n in _numbered(side)])
-    at = facet, np.concatenate([block.local.ravel() for block in side.blocks])
-    nodes = csr_array(near @ csr_array((np.ones(len(facet)), at), shape=(side.n_facets, len(side.points))))
-    count = np.diff(nodes.indptr)
-    padded = np.zeros((len(count), count.max()), np.intp)
-    padded[np.arange(count.max()) < count[:, None]] = nodes.indices
-    return padded, count
-
-
 def _powers(dim: int, degree: int) -> tuple[Indices, Indices]:
     """Return the exponents of the terms of a polynomial in one or two variables."""
     i, j = (part.ravel() for part in np.indices((degree + 1, degree + 1 if dim == 2 else 1)))
@@ -260,7 +265,11 @@ def _powers(dim: int, degree: int) -> tuple[Indices, Indices]:
 
 def _terms(x: Array, i: Indices, j: Indices) -> Array:
     """Return the terms with exponents `i` and `j` (n_terms,) at coordinates (..., 1 or 2)."""
-    return np.asarray(x[..., :1] ** i * x[..., -1:] ** j)
+    powers = [np.ones_like(x)]
+    for _ in range(int(i.max())):
+        powers.append(powers[-1] * x)
+    table = np.stack(powers, axis=-1)
+    return np.asarray(table[..., 0, i] * table[..., -1, j])
 
 
 def _lattice(element: elements.Element, k: int) -> tuple[Array, tuple[Indices, Indices]]:
