@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fastcontact.elasticity.incompatible_modes import MODES
 from fastcontact.elasticity.initial_states import InitialState, StressOffset
 from fastcontact.elasticity.materials import MODULI, Material
-from fastcontact.elasticity.varying_constants import middle
+from fastcontact.elasticity.varying_constants import middle, positions
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
@@ -31,7 +31,7 @@ class Places:
     first : int
         Number of the first of them in `MaterialField.moduli`.
     points : ndarray (n, dim)
-        Where axes are taken: the middles of the cells [length].
+        Where axes are taken: the middles of cells, or their quadrature points [length].
     constants : SimpleNamespace
         Of `Material.constants_at`.
     """
@@ -221,10 +221,9 @@ def material_field(
         for name, block in mesh.solids.items() if material.varies_inside else ():
             cells = np.flatnonzero(number[name] == index)
             N = elements.get(name).tables[0]
-            middles = np.repeat(mesh.points[block[cells]].mean(axis=1), len(N), axis=0)
             if name not in inside:
                 inside[name] = np.repeat(rows[name][:, None], len(N), axis=1)
-            found = added(index, middles, material.constants_at(name, cells, N))
+            found = added(index, positions(mesh, block[cells], N), material.constants_at(name, cells, N))
             inside[name][cells] = found.reshape(len(cells), len(N))
     return MaterialField(
         materials, kinematics, np.concatenate(moduli), places, np.concatenate(owner), dict(number), rows, inside

@@ -99,12 +99,12 @@ class Material:
 
     @property
     def varies_inside(self) -> bool:
-        """Whether moduli or expansion vary inside cells: by functions, or by numbers at points.
+        """Whether axes, moduli or expansion vary inside cells: by functions, or by numbers at points.
 
-        Cells with a mean dilatation or incompatible modes have the constants of their middle.
+        Cells with a mean dilatation have the constants of their middle.
         """
         own = [v for name in (*MODULI, "expansion") for v in varying(getattr(self, name, None))]
-        return any(v.inside for v in own) and not (self.averaged or self.incompatible_modes)
+        return (callable(self.axes) or any(v.inside for v in own)) and not self.averaged
 
     def bound(self: AnyMaterial, cells: Cells) -> AnyMaterial:
         """Return the material that knows its cells, which constants that vary need; ModelError where these cannot be."""

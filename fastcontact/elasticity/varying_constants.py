@@ -100,7 +100,7 @@ class Cells:
 
 
 def middle(name: str) -> Array:
-    """Return the weights (1, n_nodes) [-] of the nodes in the middle of a cell, where axes of materials are taken too."""
+    """Return the weights (1, n_nodes) [-] of the nodes in the middle of a cell."""
     n = elements.get(name).n_nodes
     return np.full((1, n), 1.0 / n)
 

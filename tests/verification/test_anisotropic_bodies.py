@@ -128,9 +128,9 @@ def ring_errors(kinematics, n):
 
 @pytest.mark.parametrize("kinematics", ["plane_stress", "axisymmetric", "3d"])
 def test_an_orthotropic_ring_under_internal_pressure(kinematics):
-    """Radius and circumference have moduli of their own; axes are constant in a cell, so that the error falls with h^2."""
-    coarse, fine = ring_errors(kinematics, 12), ring_errors(kinematics, 24)
-    assert fine[0] < 0.01
-    assert fine[1] < 0.004
-    assert fine[0] < 0.5 * coarse[0]
-    assert fine[1] < 0.4 * coarse[1]
+    """Radius and circumference have moduli of their own; axes turn inside cells, so that the error falls as that of others."""
+    coarse, fine = ring_errors(kinematics, 8), ring_errors(kinematics, 16)
+    assert fine[0] < 0.011
+    assert fine[1] < 2e-5
+    assert fine[0] < 0.4 * coarse[0]
+    assert fine[1] < 0.09 * coarse[1]
