@@ -18,7 +18,7 @@ from fastcontact._jit.decorators import kernel
 
 @kernel
 def _derivatives(x, dN, q, J, inverse):
-    """Fill `inverse` (dim, dim) with reference coordinates by those of the cell with nodes `x` (n_nodes, dim); return det J."""
+    """Fill `inverse` (dim, dim) with the inverse Jacobian of the nodes `x` (n_nodes, dim); return det J."""
     dim = x.shape[1]
     J[:] = 0.0
     for a in range(x.shape[0]):

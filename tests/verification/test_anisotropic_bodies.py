@@ -128,7 +128,7 @@ def ring_errors(kinematics, n):
 
 @pytest.mark.parametrize("kinematics", ["plane_stress", "axisymmetric", "3d"])
 def test_an_orthotropic_ring_under_internal_pressure(kinematics):
-    """Radius and circumference have moduli of their own; axes turn inside cells, so that the error falls as that of others."""
+    """Radius and circumference have moduli of their own; axes turn inside cells, so the error falls as that of others."""
     coarse, fine = ring_errors(kinematics, 8), ring_errors(kinematics, 16)
     assert fine[0] < 0.011
     assert fine[1] < 2e-5
