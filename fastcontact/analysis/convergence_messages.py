@@ -67,12 +67,24 @@ def no_contact_stops(bodies: UnsupportedBodies, work: Array) -> str:
     )
 
 
-def not_balanced(bodies: UnsupportedBodies, found: RigidPosition, load: float) -> str:
-    """Return the message for bodies whose springs still carry force under a load [force]."""
+def friction_exceeded(bodies: UnsupportedBodies, work: Array, friction: tuple[float, float]) -> str:
+    """Return the message for loads beyond what `friction`, the coefficient needed and the largest that is there, holds."""
+    needed, largest = friction
+    return (
+        f"friction cannot hold {', '.join(bodies.motions.by_body())} against loads of up to {np.abs(work).max():.3g}: that "
+        f"would take a coefficient of about {needed:.2g} where the largest is {largest:.3g}, so that "
+        f"{1.0 - largest / needed:.0%} of the loads along the contact have no reaction. Lower these, press harder, or "
+        "support the bodies along the contact"
+    )
+
+
+def not_balanced(bodies: UnsupportedBodies, found: RigidPosition, load: float, friction: bool) -> str:
+    """Return the message for bodies whose springs still carry force under a load [force], with `friction` or without."""
+    more = "Add a support or more friction, for which the loads may be too large," if friction else "Add a support,"
     return (
         f"contact does not hold {'; '.join(bodies.moving(found))}: after {found.positions} positions "
         f"tried, a force of {np.abs(found.spring_force).max():.3g} is still missing for equilibrium under a load of "
-        f"{load:.3g}. Add a support, or use more load steps"
+        f"{load:.3g}. {more} or use more load steps"
     )
 
 

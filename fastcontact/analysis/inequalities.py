@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis import active_set
 from fastcontact.analysis.active_dofs import ActiveDofs, constraints_on_unknowns
-from fastcontact.analysis.convergence_messages import no_contact_stops, not_balanced
+from fastcontact.analysis.convergence_messages import friction_exceeded, no_contact_stops, not_balanced
 from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Accuracy, Solution
@@ -21,7 +21,7 @@ from fastcontact.contact.constraints import Constraints, StackedConstraints
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
-from fastcontact.model.rigid_motions import generalised, resisting, stopped_at
+from fastcontact.model.rigid_motions import generalised, needed_friction, resisting, stopped_at
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -149,7 +149,9 @@ def _with_unsupported_bodies(
         None if iterate.rigid is None else iterate.rigid.derivative,
     )  # fmt: skip
     if found.state.settled and not found.slack:
-        raise ConvergenceError(not_balanced(bodies, found, state.largest_rigid_force), iterate.history)
+        rubbing = bool(constraints.coefficients.any())
+        text = not_balanced(bodies, found, state.largest_rigid_force, rubbing)
+        raise ConvergenceError(text, iterate.history)
     iterate.rigid = found
     at = lift + bodies.rigid(found.position)
     return found.state, problem.system.displacement(found.state.u, at)
@@ -168,5 +170,7 @@ def _approach(step: StepContext, bodies: UnsupportedBodies, constraints: Constra
     size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
     found = stopped_at(rows @ bodies.motions.displacement, gap0 + rows @ u, work, size)
     if found is None:
-        raise ConvergenceError(no_contact_stops(bodies, work), smaller_steps_help=False)
+        more = needed_friction(constraints, bodies.motions.displacement, u, work, size)
+        text = no_contact_stops(bodies, work) if more is None else friction_exceeded(bodies, work, more)
+        raise ConvergenceError(text, smaller_steps_help=False)
     return found

@@ -66,7 +66,7 @@ class CylindricalAxes:
         bad = np.flatnonzero(length <= ROUND_OFF * np.abs(places - self.origin).max(initial=0.0))
         if len(bad):
             raise ModelError(
-                f"the middle of a cell at {places[bad[0]]} lies on the line of the cylindrical axes, where no direction is "
+                f"a point of a cell at {places[bad[0]]} lies on the line of the cylindrical axes, where no direction is "
                 "radial: give the cells there a material with other axes, or move a node"
             )
         radial /= length[:, None]

@@ -32,6 +32,10 @@ MODE_NAMES = {
 ZERO = 1e-8
 # A motion that contact does not stop within so many times the size of the model is not stopped at all.
 FAR = 1e3
+# Of the pyramid that stands for Coulomb's cone in space: forces up to 8 % outside of the cone are left to the solution.
+EDGES = 8
+# So much more friction is as good as none that could hold a body.
+MOST_FRICTION = 100.0
 # A mesh of more motions of parts between hinges is no structure that anybody meant.
 MANY = 1500
 
@@ -193,8 +197,8 @@ def _null_space(A: Array) -> Array:
 def resisting(constraints: Constraints) -> tuple[csr_array, Array]:
     """Return rows and gaps at u = 0 that must stay >= 0 if nothing slides: gaps, and edges of the friction cone.
 
-    A contact force lies in the cone of the rows: normal, and with friction ``n + mu t`` and ``n - mu t`` for each
-    tangent t. Equations resist both ways.
+    A contact force lies in the cone of the rows: normal, with friction in the plane ``n + mu t`` and ``n - mu t``, in space
+    in the pyramid of EDGES that is circumscribed to Coulomb's cone. Equations resist both ways.
     """
     rows, gap0 = _edges(constraints)
     if constraints.equality is None:
@@ -208,10 +212,19 @@ def _edges(constraints: Constraints) -> tuple[csr_array, Array]:
     """Return the rows and gaps of contact that may open."""
     if not constraints.tangents or constraints.friction is None:
         return constraints.B, constraints.gap0
+    if len(constraints.tangents) == 1:
+        around = np.array([[1.0], [-1.0]])
+    else:
+        angle = 2.0 * np.pi * np.arange(EDGES) / EDGES
+        around = np.column_stack([np.cos(angle), np.sin(angle)]) / np.cos(np.pi / EDGES)
     edges = [
-        csr_array(constraints.B + tangent.multiply(sign * constraints.friction[:, None]))
-        for tangent in constraints.tangents
-        for sign in (1.0, -1.0)
+        csr_array(
+            sum(
+                (T.multiply((part * constraints.friction)[:, None]) for T, part in zip(constraints.tangents, parts)),
+                start=constraints.B,
+            )
+        )
+        for parts in around
     ]
     return csr_array(vstack(edges, format="csr")), np.tile(constraints.gap0, len(edges))
 
@@ -257,6 +270,30 @@ def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | Non
     open_by = np.maximum(gap[rows], 0.0) / size
     found = _extreme(work / np.abs(work).max(), gaps[rows], open_by, np.empty((0, len(work))), FAR)
     return None if np.abs(found).max() > 0.99 * FAR else found * size
+
+
+def needed_friction(
+    constraints: Constraints, motions: Array, u: Array, work: Array, size: float
+) -> tuple[float, float] | None:
+    """Return the coefficient of friction that would stop rigid bodies, and the largest that there is [-]; None if none would.
+
+    `motions` (n_dofs, k) of the bodies, displacements `u` (n_dofs,) [length]; `work` and `size` as in `stopped_at`.
+    """
+    if not constraints.coefficients.any():
+        return None
+    low, high = 1.0, MOST_FRICTION
+
+    def stops(factor: float) -> bool:
+        rows, gap0 = resisting(replace(constraints, friction=factor * constraints.coefficients))
+        return stopped_at(rows @ motions, gap0 + rows @ u, work, size) is not None
+
+    if not stops(high):
+        return None
+    while high > 1.001 * low:
+        middle = float(np.sqrt(low * high))
+        low, high = (low, middle) if stops(middle) else (middle, high)
+    largest = float(constraints.coefficients.max())
+    return high * largest * (1.0 if len(constraints.tangents) == 1 else 1.0 / np.cos(np.pi / EDGES)), largest
 
 
 def _extreme(along: Array, gaps: Array, gap: Array, held: Array, bound: float) -> Array:

@@ -108,3 +108,27 @@ def test_bodies_pressed_uniformly_have_no_shear_in_planes_of_symmetry(said, seed
     assert contact.force @ Q == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
     assert np.abs(contact.shear).max() < 1e-9
     assert contact.sticking.all()
+
+
+@pytest.mark.parametrize("azimuth", [0.0, np.pi / 8, 3 * np.pi / 4])
+def test_a_block_within_the_cone_is_held_whatever_the_direction_of_its_load(azimuth):
+    model = fc.Model(fc.generate.box((1.0, 1.0, 0.25), (3, 3, 1), "hex8"), "3d")
+    model.add_material(fc.LinearElastic(E=1e3, nu=0.3))
+    along = 0.95 * 0.5 * np.array([np.cos(azimuth), np.sin(azimuth)])
+    model.add_body_force(x=along[0], y=along[1], z=-1.0)
+    floor = fc.obstacles.HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
+    model.add_obstacle("floor", secondary="ZMIN", obstacle=floor, friction=0.5)
+    force = fc.solve(model, 1)[-1].contact["floor"].force
+    assert force == pytest.approx(0.25 * np.array([*-along, 1.0]), abs=1e-8)
+
+
+def test_a_push_beyond_friction_is_told_as_such():
+    model = fc.Model(fc.generate.box((1.0, 1.0, 1.0), (2, 2, 2), "hex8"), "3d")
+    model.add_material(fc.LinearElastic(E=1e3, nu=0.3))
+    model.add_pressure("ZMAX", 1.0, ramp=[(0, 0), (1, 1), (2, 1)])
+    model.add_traction("XMIN", x=0.5, ramp=[(0, 0), (1, 0), (2, 1)])
+    floor = fc.obstacles.HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
+    model.add_obstacle("floor", secondary="ZMIN", obstacle=floor, friction=0.3)
+    message = r"friction cannot hold body .* coefficient of about 0\.\d+ where the largest is 0\.3"
+    with pytest.raises(fc.ConvergenceError, match=message):
+        fc.solve(model, [1.0, 2.0])

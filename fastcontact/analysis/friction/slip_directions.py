@@ -14,7 +14,7 @@ from fastcontact.analysis.friction import slip_directions_kernels
 Array = NDArray[np.float64]
 # A direction of slip in which a constraint gives less than this, relative to its gap, is none.
 IDLE = 1e-10
-# What slips of held nodes give way, relative to their gaps: next to nothing. Those of several nodes may be linearly dependent,
+# What slips of held nodes give way, relative to their gaps: next to nothing. Those of several nodes may depend on each other,
 # being motions of the other side alone; and sticking against a prescribed slip has an equation so, which no force in the cone
 # obeys.
 GIVING = 1e-8

@@ -90,7 +90,7 @@ class ModelSupports(ModelContact):
         try:
             own = frames(checked_axes(axes), places, self.kinematics)
         except ModelError as error:
-            raise ModelError(str(error).replace("a material", name).replace("the middle of a cell", "a node")) from None
+            raise ModelError(str(error).replace("a material", name).replace("a point of a cell", "a node")) from None
         for axis, value in axes_of(f"prescribe('{group}')", components, dim).items():
             what = f"the displacement {'xyz'[axis]} prescribed on '{group}'"
             check_value(what, value)
