@@ -95,12 +95,13 @@ class MaterialField:
     def treatment(self) -> NDArray[np.uint8]:
         """What elements make of the strain, by moduli (n_moduli,): 1 a mean dilatation, 2 incompatible modes, 0 nothing.
 
-        Axisymmetric cells have no incompatible modes.
+        The sum of both is incompatible modes in the elements that have them, a mean dilatation in others. Axisymmetric cells
+        have no incompatible modes.
         """
-        modes = np.array([material.incompatible_modes for material in self.materials], bool)[self.owner]
+        modes = np.array([material.bends for material in self.materials], bool)[self.owner]
         found = self.averaged.astype(np.uint8)
         if self.kinematics != "axisymmetric":
-            found[modes] = MODES
+            found[modes] += MODES
         return found
 
     @cached_property
