@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.analysis.interpenetration import interpenetration
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.seams import seam_warnings
 from fastcontact.analysis.state import State
@@ -19,9 +20,6 @@ from fastcontact.elasticity import element_kernels, recovery
 from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.mesh.topology import bodies
-from fastcontact.model.body_overlap import penetration
-from fastcontact.model.rigid_motions import body_name
 from fastcontact.results.step import ContactResult, StepResult
 
 Array = NDArray[np.float64]
@@ -45,7 +43,7 @@ LOOSE = 1e-4
 
 def result_warnings(problem: Problem, state: State, last: StepResult) -> list[str]:
     """Return the warnings about an analysis whose `last` step ended in a state."""
-    found = _interpenetration(problem, state) + _large_strain(problem, last) + _large_rotation(problem, state)
+    found = interpenetration(problem, state, last) + _large_strain(problem, last) + _large_rotation(problem, state)
     found += _carrying_springs(problem, state) + (locking_warning(problem, state.u) or scatter_warnings(problem, last))
     found += [problem.solver.gave_up] if problem.solver.gave_up else []
     load = problem.load_at(last.load_factor)
@@ -124,31 +122,6 @@ def _loose(problem: Problem, last: StepResult) -> list[str]:
             "results are no more accurate than that"
         )
     return found
-
-
-def _interpenetration(problem: Problem, state: State) -> list[str]:
-    mesh = problem.model.mesh
-    _, body = bodies(mesh)
-    joined = {
-        frozenset((int(body[p.secondary.points[0]]), int(body[p.primary.points[0]])))
-        for p in problem.pairs.values()
-        if isinstance(p.primary, Surface)
-    }
-    joined |= {frozenset((int(body[s.nodes[0]]), int(body[s.opposite[0]]))) for s in problem.model.pretensions}
-    texts: list[str] = []
-    seen: set[frozenset[int]] = set()
-    coordinates = mesh.points + problem.displacement(state.u)
-    inside = sorted(penetration(mesh, problem.model.kinematics, coordinates), key=lambda entry: -entry[2])
-    for number, other, depth, where in inside:
-        both = frozenset((number, other))
-        if both not in joined | seen and depth > 1e-9 * np.ptp(mesh.points, axis=0).max():
-            seen.add(both)
-            texts.append(
-                f"bodies {body_name(mesh, body, number)} and {body_name(mesh, body, other)} interpenetrate by "
-                f"{depth:.6g} near {np.array2string(where, precision=4)}, and no contact is defined between them: "
-                "add_contact for the groups that meet"
-            )
-    return texts
 
 
 def _carrying_springs(problem: Problem, state: State) -> list[str]:

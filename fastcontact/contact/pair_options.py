@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array, eye_array
 
-from fastcontact.contact.pairing import Candidates, Pairing
+from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.contact.projection import places
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 KINDS = ("unilateral", "bilateral", "bilateral_once_closed", "tied", "gap_only")
 Field = Callable[[Array], Array]
+# A vector of which less than this lies in a tangent plane is normal to it.
+ACROSS = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +33,8 @@ class PairOptions:
         to lengths (n,), positive where the gap opens, negative for an interference [length].
     excluded, frictionless : ndarray of bool (n_points,), optional
         Nodes without contact, and without friction.
+    frictionless_along : ndarray (dim,), optional
+        What has no friction, all without `frictionless`, has none along this vector alone [-].
     kind : str
         One of `KINDS`.
     penalty : float, optional
@@ -49,6 +53,7 @@ class PairOptions:
     clearance_primary: Field | None = None
     excluded: Mask | None = None
     frictionless: Mask | None = None
+    frictionless_along: Array | None = None
     kind: str = "unilateral"
     penalty: float | None = None
     tangential_penalty: Field | None = None
@@ -94,9 +99,28 @@ class PairOptions:
 
     def coefficients(self, friction: float, candidates: Candidates) -> Array:
         """Return the coefficients of friction (n,) of candidates."""
-        without = self.frictionless
-        slippery = np.zeros(len(candidates.nodes), bool) if without is None else candidates.belonging_to(without)
-        return np.where(slippery, 0.0, friction)
+        return np.where(self._slippery(candidates) & (self.frictionless_along is None), 0.0, friction)
+
+    def _slippery(self, candidates: Candidates) -> Mask:
+        """Return which candidates (n,) have no friction, or none along `frictionless_along`."""
+        if self.frictionless is None:
+            return np.full(len(candidates.nodes), self.frictionless_along is not None)
+        return candidates.belonging_to(self.frictionless)
+
+    def rubbing(
+        self, directions: Sequence[Array], candidates: Candidates
+    ) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+        """Return tangents (n, dim), turned so that friction acts along all of one or not at all; zero where it does not."""
+        along = self.frictionless_along
+        if along is None:
+            return tuple(directions), tuple(directions)
+        normal = normals(directions)
+        free = along - (normal @ along)[:, None] * normal
+        length = np.linalg.norm(free, axis=1, keepdims=True)
+        own = self._slippery(candidates)[:, None] & (length > ACROSS * np.linalg.norm(along))
+        first = np.where(own, free / np.where(own, length, 1.0), directions[0])
+        turned = (first, *(np.where(own, np.cross(normal, first), other) for other in directions[1:]))
+        return turned, (np.where(own, 0.0, first), *turned[1:])
 
     def added_gap(
         self, candidates: Candidates, pairing: Pairing, primary: object, reference: Array, factor: float

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,20 +24,33 @@ ON_SURFACE = 1e-10
 def penetration(mesh: Mesh, kinematics: str, coordinates: Array) -> list[tuple[int, int, float, Array]]:
     """Return (body, other, depth, where) for each pair of bodies of which the first has nodes inside the second.
 
-    Depth is the largest distance of such a node to the other body's outside [length]. The axis of an axisymmetric body
-    is not its outside. Facets count as they are curved. Two meshes of one smooth curved surface stray from it, each by
-    less than the square of the rise of a facet over its length: within that bodies touch and do not overlap.
+    Depth is the largest of `depths` [length].
+    """
+    found = []
+    for number, other, points, depth in depths(mesh, kinematics, coordinates):
+        deepest = int(np.argmax(depth))
+        if depth[deepest] > 0.0:
+            found.append((number, other, float(depth[deepest]), coordinates[points[deepest]]))
+    return found
+
+
+def depths(mesh: Mesh, kinematics: str, coordinates: Array) -> Iterator[tuple[int, int, Indices, Array]]:
+    """Yield (body, other, points (n,), depth (n,)) for each pair of bodies that may overlap.
+
+    Depths are distances of points on the outside of the first body to the outside of the second, zero where they do not lie
+    in it [length]. The axis of an axisymmetric body is not its outside. Facets count as they are curved. Two meshes of one
+    smooth curved surface stray from it, each by less than the square of the rise of a facet over its length: within that
+    bodies touch and do not overlap.
     """
     count, body = bodies(mesh)
     if count < 2:
-        return []
+        return
     outer = outer_facets(mesh)
     sides = [{name: facets[body[facets[:, 0]] == number] for name, facets in outer.items()} for number in range(count)]
     nodes = [np.unique(np.concatenate([facets.ravel() for facets in side.values()])) for side in sides]
     own = np.zeros(mesh.n_points)
     for name, facets in outer.items():
         np.maximum.at(own, facets, _strays(name, coordinates[facets])[:, None])
-    found = []
     for number, other in ((a, b) for a in range(count) for b in range(count) if a != b):
         low, high = coordinates[nodes[other]].min(axis=0), coordinates[nodes[other]].max(axis=0)
         near = nodes[number]
@@ -49,11 +64,7 @@ def penetration(mesh: Mesh, kinematics: str, coordinates: Array) -> list[tuple[i
         else:
             depth, facet = _depths_in_plane(coordinates[near], corners, kinematics == "axisymmetric")
         play = np.concatenate([_strays(name, block) for name, block in kinds])[facet]
-        depth[depth <= play + own[near]] = 0.0
-        deepest = int(np.argmax(depth))
-        if depth[deepest] > 0.0:
-            found.append((number, other, float(depth[deepest]), coordinates[near[deepest]]))
-    return found
+        yield number, other, near, np.where(depth <= play + own[near], 0.0, depth)
 
 
 def _strays(name: str, corners: Array) -> Array:

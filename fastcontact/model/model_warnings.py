@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact._jit.parallel import on_one_blas_thread
+from fastcontact.contact.configuration import Configuration
 from fastcontact.elasticity.energy import integration_rule
 from fastcontact.elasticity.loads import BodyForce, Load, Pressure, Traction, Value, evaluated, facets_of
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.elements import Element
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import poorest_cell
+from fastcontact.mesh.topology import outer_facets
 from fastcontact.model.facet_sag import sag_warnings
 from fastcontact.model.hanging_nodes import hanging_nodes_warning
 from fastcontact.model.prescribed_overlap import Supports, prescribed_overlap_warnings
@@ -44,17 +46,19 @@ NEWTONS = {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "lbf": 4.448222}
 SOME = 1000
 # Relative error of the integral of a load, and of the stiffness (1.6 % on regular pyramids), above which there is a warning.
 INTEGRAL, STIFFNESS = 1e-3, 5e-2
-# Nodes closer than this part of the size of the model are at one place.
-COINCIDENT = 1e-9
-# Large odd factors by which three integers are combined into one.
-MIXED = np.array([0x1E3779B97F4A7C15, 0x3F58476D1CE4E5B9, 0x14D049BB133111EB], np.int64)
+# Nodes nearer to each other than these parts of the size of the model and of the edges there are meant to be one; those
+# nearer than the last are.
+COINCIDENT, NEAR, ROUND_OFF = 1e-6, 1e-2, 1e-9
+# Rubber on rough ground has a coefficient of friction of 1 to 2.
+RUBBING = 3.0
 
 
 @on_one_blas_thread
 def model_warnings(model: Model, ramp: Ramp) -> list[str]:
     """Return the warnings about a model that `Model.check` has found complete, for an analysis along a ramp."""
     found = _moduli(model) + _named_units(model) + _proportions(model)
-    found += [text for text in (poorest_cell(model.mesh), _coincident(model), hanging_nodes_warning(model)) if text]
+    found += [text for text in (poorest_cell(model.mesh), hanging_nodes_warning(model)) if text] + _coincident(model)
+    found += _friction(model) + _penetrating(model) + _unramped(model, ramp)
     found += _prescribed_overlaps(model, ramp) + _lost_loads(model) + _split_sides(model) + sag_warnings(model)
     return found + _stiffness(model.mesh) + [text for load in model.loads for text in _load_integral(model, load)]
 
@@ -156,34 +160,88 @@ def _proportions(model: Model) -> list[str]:
     return texts
 
 
-def _coincident(model: Model) -> str:
-    """Return a warning if nodes of solid cells are at one place and neither contact nor relations join them."""
-    mesh = model.mesh
-    lone = np.zeros(mesh.n_points, bool)
-    for block in mesh.solids.values():
-        lone[block] = True
+def _coincident(model: Model) -> list[str]:
+    """Return a warning if nodes of solid cells are nearly at one place, and neither contact nor relations join them."""
+    from scipy.spatial import cKDTree
+
+    mesh, size = model.mesh, float(np.ptp(model.mesh.points, axis=0).max())
+    edge = np.full(mesh.n_points, np.inf)  # the shortest one at each node on the outside of a body, where cracks lie
+    for name, facets in outer_facets(mesh).items():
+        corners = mesh.points[facets[:, : elements.get(name).n_corners]]
+        lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+        np.minimum.at(edge, facets, lengths.min(axis=1)[:, None])
+    lone = np.isfinite(edge)
     for pair in model.contact:
         for group in (pair.secondary, pair.primary):
             lone[mesh.points_of(group) if group else []] = False
     lone[model.holding_rows().indices // mesh.dim] = False
     numbers = np.flatnonzero(lone)
-    low = mesh.points.min(axis=0)
-    # The grid begins at an odd place, so that round numbers do not lie on its lines.
-    grid = np.floor((mesh.points[numbers] - low) / (COINCIDENT * np.ptp(mesh.points, axis=0).max()) + 0.3183)
-    # Nodes at one place have the same sum, and others very rarely.
-    sums = np.sort(grid.astype(np.int64) @ MIXED[: mesh.dim])
-    if not (sums[1:] == sums[:-1]).any():
-        return ""
-    order = np.lexsort(grid.T)
-    same = np.flatnonzero((grid[order[1:]] == grid[order[:-1]]).all(axis=1))
-    if len(same) < mesh.dim:  # bodies that touch at a corner only
-        return ""
-    first = sorted((int(numbers[order[same[0]]]), int(numbers[order[same[0] + 1]])))
+    pairs = cKDTree(mesh.points[numbers]).query_pairs(COINCIDENT * size, output_type="ndarray")
+    pairs = numbers[pairs.reshape(-1, 2)]
+    apart = np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1)
+    near = apart < NEAR * edge[pairs].min(axis=1)
+    pairs, apart = pairs[near], apart[near]
+    count = len(np.unique(pairs[:, 1]))
+    if count < mesh.dim:  # bodies that touch at a corner only
+        return []
+    first = pairs[np.lexsort(mesh.points[pairs[:, 0]].T)[0]]
     place = ", ".join(f"{x:.6g}" for x in mesh.points[first[0]])
-    return (
-        f"{len(same)} nodes lie where another one is, and no contact joins them (first: points {first[0]} and {first[1]} "
-        f"at ({place})): merge them in the mesher or with generate.transform.merge_points, or define the contact"
-    )
+    largest = float(apart.max())
+    where = "where another one is" if largest <= ROUND_OFF * size else f"within {largest:.3g} of another one"
+    return [
+        f"{count} nodes lie {where}, and no contact joins them (first: points {first[0]} and {first[1]} at ({place})): merge "
+        "them in the mesher or with generate.transform.merge_points, or define the contact"
+    ]
+
+
+def _friction(model: Model) -> list[str]:
+    """Return a warning for each coefficient of friction that no surfaces have."""
+    return [
+        f"the friction of contact '{pair.name}' is {friction:g}, more than the {RUBBING:g} that surfaces have at most: is it "
+        "in percent? Where nothing is to slide, take kind='tied'"
+        for pair in model.contact
+        if (friction := pair.options.get("friction") or 0.0) > RUBBING
+    ]
+
+
+def _penetrating(model: Model) -> list[str]:
+    """Return a warning for each contact whose sides penetrate by more than supports push before they do."""
+    pushed = max((float(np.abs(v).max(initial=0.0)) for v in model.prescribed_by_ramp()[1].values()), default=0.0)
+    texts = []
+    for pair in model.contact if pushed else ():
+        bound = model.bind(pair)
+        if bound.options.tied or bound.options.gap_only:
+            continue
+        at_rest = Configuration.undeformed(model.mesh.points)
+        gap = np.maximum(*(bound.nodal_gap(at_rest, with_clearance)[0] for with_clearance in (True, False)))
+        row = int(np.argmin(np.where(bound.options.excluded_nodes(bound.secondary), np.inf, gap)))
+        if -gap[row] > pushed:
+            point = bound.secondary.points[row]
+            texts.append(
+                f"contact '{pair.name}' begins with a penetration of {-gap[row]:.4g} at point {point} "
+                f"{np.array2string(model.mesh.points[point], precision=4)}, more than the {pushed:.4g} that supports push: "
+                "forces are those of the penetration. Move a body apart, or give an interference that is meant as clearance"
+            )
+    return texts
+
+
+def _unramped(model: Model, ramp: Ramp) -> list[str]:
+    """Return a warning if some loads have histories of their own, and others grow on beyond their values with the ramp."""
+    top = max(ramp.value(instant) for instant in ramp.instants)
+    if top <= 1.0 or len(ramp.table) > 2:
+        return []
+    items: list[Any] = [*(s for s in model.supports if s.value), *model.loads, *model.temperatures]
+    found = [(item.name, item.ramp) for item in items]
+    found += [(f"the motion of obstacle '{pair.name}'", pair.ramp) for pair in model.contact if any(pair.motion)]
+    found += [(f"the force on obstacle '{pair.name}'", pair.ramp) for pair in model.contact if any(pair.force)]
+    without = [name for name, own in found if own is None]
+    if not without or len(without) == len(found):
+        return []
+    return [
+        f"{', '.join(without)} {'has' if len(without) == 1 else 'have'} no ramp, as others have: at load factor {top:g} "
+        f"{'it is' if len(without) == 1 else 'they are'} {top:g} times what was given; to hold it from 1 on give "
+        f"ramp=[(0, 0), (1, 1), ({top:g}, 1)]"
+    ]
 
 
 def _stiffness(mesh: Mesh) -> list[str]:

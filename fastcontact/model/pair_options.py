@@ -17,8 +17,8 @@ from fastcontact.model.ramp import Table, table_of
 
 # Options that every contact pair takes, beside those of its formulation.
 SHARED_OPTIONS = (
-    "clearance", "clearance_primary", "clearance_ramp", "excluded", "frictionless", "kind", "penalty", "search_distance",
-    "tangential_penalty", "wear",
+    "clearance", "clearance_primary", "clearance_ramp", "excluded", "frictionless", "frictionless_along", "kind", "penalty",
+    "search_distance", "tangential_penalty", "wear",
 )  # fmt: skip
 
 
@@ -41,6 +41,7 @@ def pair_options(
         _function(f"the clearance_primary of contact '{name}'", options.get("clearance_primary")),
         excluded=_nodes(name, "excluded", options, mesh, side),
         frictionless=_nodes(name, "frictionless", options, mesh, side),
+        frictionless_along=_vector(name, "frictionless_along", options, mesh.dim),
         kind=_kind(name, options, against_obstacle),
         penalty=_positive(name, "penalty", options, "no penetration"),
         tangential_penalty=_tangential_penalty(name, options.get("tangential_penalty")),
@@ -83,6 +84,20 @@ def _positive(name: str, option: str, options: Mapping[str, Any], without: str) 
     if not value > 0:
         raise ContactError(f"{option} = {value} of contact '{name}' must be positive; leave it out for {without}")
     return float(value)
+
+
+def _vector(name: str, option: str, options: Mapping[str, Any], dim: int) -> Array | None:
+    """Return the vector (dim,) that an option gives, None where it is not given."""
+    value = options.get(option)
+    if value is None:
+        return None
+    try:
+        found = np.asarray(value, float)
+    except (TypeError, ValueError):
+        found = np.empty(0)
+    if found.shape != (dim,) or not np.isfinite(found).all() or not found.any():
+        raise ContactError(f"{option} = {value!r} of contact '{name}' must be a vector of {dim} numbers, not all zero")
+    return found
 
 
 def _tangential_penalty(name: str, value: Any) -> Field | None:

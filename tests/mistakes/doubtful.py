@@ -78,6 +78,15 @@ def raised(height):
     return mesh.replace(points=points)
 
 
+def lacking():
+    """Two blocks of which the lower one has but some of its facets in its contact group."""
+    mesh = block_on_block()
+    lower = mesh.cell_groups["CONT_LOWER"]
+    kept = {**mesh.cell_groups, "CONT_LOWER": lower[: len(lower) // 2]}
+    points = {name: numbers for name, numbers in mesh.point_groups.items() if name != "CONT_LOWER"}
+    return fc.Mesh(mesh.points, dict(mesh.cells), cell_groups=kept, point_groups=points)
+
+
 def bent():
     """A quadratic triangle with a side that is bent far inward."""
     nodes = [[0, 0], [1, 0], [0, 1], [0.5, 0], [0.25, 0.25], [0, 0.5]]
@@ -248,6 +257,66 @@ DOUBTS = [
         ),
         (
             r"contact 'drum' wears off \S+, \S+ times the size of the model, in steps \S+ times as long as pressures can follow: is its wear Archard's coefficient by the hardness, in the unit of one over pressure\?",
+        ),
+    ),
+    Doubt(
+        "a contact group lacks facets",
+        lacking,
+        of(STEEL, BLOCKS, PAIR),
+        (
+            r"contact 'pair' lacks facets: bodies 'LOWER' and 'UPPER' pass through each other by 0\.00\d+ at point \d+ \[.*\], beside 'CONT_UPPER' and 'CONT_LOWER'; its force is too small, add the facets there",
+        ),
+    ),
+    Doubt(
+        "a contact group against an obstacle lacks facets",
+        lambda: block((1.0, 1.0), (8, 8)).with_facet_group("HALF", lambda x: (x[:, 1] > 0.999) & (x[:, 0] < 0.51)),
+        of(
+            STEEL,
+            held("BOTTOM", x=0.0, y=0.0),
+            '[obstacle.pair]\nsecondary = "HALF"\nmotion = { y = -0.02 }\n',
+            'shape = { kind = "half_space", point = [0.0, 1.0], normal = [0.0, -1.0] }\n',
+        ),
+        (
+            r"contact 'pair' lacks facets: the body passes through the obstacle by 0\.01\d+ at point \d+ \[0\.625 1\. +\], beside 'HALF'; its force is too small, add the facets there",
+        ),
+    ),
+    Doubt(
+        "nodes nearly lie where others are",
+        lambda: generate.union(
+            block((0.5, 1.0), (2, 2), name="A"), block((0.5, 1.0), (2, 2), origin=(0.5 + 1e-7, 0.0), name="B")
+        ),
+        of(STEEL, held("BOTTOM", x=0.0, y=0.0)),
+        (
+            r"3 nodes lie within 1e-07 of another one, and no contact joins them \(first: points \d+ and \d+ at \(0\.5, 0\)\): merge them in the mesher or with generate\.transform\.merge_points, or define the contact",
+        ),
+    ),
+    Doubt(
+        "friction in percent",
+        block_on_block,
+        of(STEEL, BLOCKS, PAIR, "friction = 30.0\n"),
+        (
+            r"the friction of contact 'pair' is 30, more than the 3 that surfaces have at most: is it in percent\? Where nothing is to slide, take kind='tied'",
+        ),
+    ),
+    Doubt(
+        "bodies begin deeper inside each other than they are pushed",
+        lambda: raised(-0.02),
+        of(STEEL, BLOCKS, PAIR),
+        (
+            r"contact 'pair' begins with a penetration of 0\.02 at point \d+ \[.*\], more than the 0\.01 that supports push: forces are those of the penetration\. Move a body apart, or give an interference that is meant as clearance",
+        ),
+    ),
+    Doubt(
+        "a load without a ramp beside one that has one",
+        lambda: block((1.0, 1.0), (2, 2)),
+        of(
+            STEEL,
+            held("BOTTOM", x=0.0, y=0.0),
+            '[[pressure]]\ngroup = "TOP"\nvalue = 1.0\n[[traction]]\ngroup = "RIGHT"\nx = 1.0\n',
+            "ramp = [[0.0, 0.0], [1.0, 0.0], [2.0, 1.0]]\n",
+        ).replace("ramp.steps = 1", "ramp = { instants = [1.0, 2.0], table = [[0.0, 0.0], [2.0, 2.0]] }"),
+        (
+            r"the pressure on 'TOP' has no ramp, as others have: at load factor 2 it is 2 times what was given; to hold it from 1 on give ramp=\[\(0, 0\), \(1, 1\), \(2, 1\)\]",
         ),
     ),
 ]

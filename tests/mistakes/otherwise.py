@@ -114,7 +114,8 @@ OTHERWISE = {
         "a cell names a point that is not there", "a group names a cell that is not there",
     ),
     "nothing is said, or a line in a long list: the body has a crack": (
-        "nodes that were not merged", "nodes were not merged", "a fine mesh merged with a coarse one",
+        "nodes that were not merged", "nodes were not merged", "nodes nearly lie where others are",
+        "a fine mesh merged with a coarse one",
     ),
     "nothing is said: stresses are wrong near the cell": (
         "a cell with an angle near 180 degrees", "a cell with a Jacobian near zero", "a cell is poor",
@@ -162,4 +163,11 @@ OTHERWISE = {
     ),
     "two programs write into one file, which nobody can read afterwards": ("another run writes the result file",),
     "the program stops in the middle, with a damaged file": ("the disk is full",),
+    "nothing is said: the force is a third too small, and pictures show it": (
+        "a contact group lacks facets", "a contact group against an obstacle lacks facets",
+    ),
+    "nothing is said: an answer to another question than the one that was meant": (
+        "friction in percent", "bodies begin deeper inside each other than they are pushed",
+        "a load without a ramp beside one that has one",
+    ),
 }  # fmt: skip

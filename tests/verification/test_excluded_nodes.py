@@ -47,6 +47,23 @@ def test_excluded_nodes_carry_nothing(formulation, space):
         assert not contact.force_vectors[out].any()
 
 
+@pytest.mark.parametrize("space", ["plane", "space"])
+def test_an_excluded_node_is_the_same_to_dual_multipliers(space):
+    """Where nodes lie opposite nodes, dual multipliers are the forces of node-to-segment; neighbours take nothing over."""
+    mesh = boxes(lower=(6, 2, 2), upper=(6, 2, 2)) if space == "space" else blocks(lower=(6, 3), upper=(6, 3))
+    mesh = with_group(mesh, SIDES[space][0], lambda x: np.abs(x[:, 0] - 5.0) > 4.9)
+    kinematics, found = "3d" if space == "space" else "plane_strain", {}
+    for formulation, options in (("node_to_segment", {}), ("mortar", {"multipliers": "dual"})):
+        for excluded in ([], ["OUT"]):
+            model = touching(held(mesh, kinematics), formulation, excluded=excluded, normals="averaged", **options)
+            found[formulation, len(excluded)] = fc.solve(model, 1)[-1].contact["pair"]
+    out = np.isin(found["mortar", 1].points, mesh.points_of("OUT"))
+    assert not found["mortar", 1].force_vectors[out].any()
+    lost = [found[name, 1].force[-1] / found[name, 0].force[-1] for name in ("node_to_segment", "mortar")]
+    assert lost[1] == pytest.approx(lost[0], rel=1e-3)
+    assert lost[0] < 0.97
+
+
 @pytest.mark.parametrize("element", ["quad4", "quad8", "tri6"])
 @pytest.mark.parametrize("formulation", ["continuous", "mortar"])
 @pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric"])
@@ -96,7 +113,39 @@ def test_nodes_without_friction_slide_freely(formulation, space):
     assert abs(contact.force[0]) == pytest.approx(sliding, rel=1e-10 if exact else 0.1)
 
 
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar", "obstacle"])
+@pytest.mark.parametrize(("along", "expected"), [((2.0, 0.0, 0.0), (0.0, -0.3)), ((1.0, 1.0, 0.0), (0.0, 0.0)), (
+    (1.0, -1.0, 9.0), (-0.3 / 2**0.5, -0.3 / 2**0.5))])  # fmt: skip
+def test_friction_along_one_direction_alone(formulation, along, expected):
+    """Sliding along the diagonal: what has no friction along x has mu N along y, as DIRE_EXCL_FROT of code_aster."""
+    mesh = with_group(boxes(lower=(4, 2, 2), upper=(4, 2, 2)), "U_ZMIN", left_half)
+    model = fc.Model(mesh, "3d")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    model.fix("L_ZMIN", "xyz")
+    options = {"friction": 0.3, "frictionless_along": along}
+    if formulation == "obstacle":
+        model.fix("U_ZMAX", "xyz")
+        floor = fc.obstacles.HalfSpace(point=mesh.points[mesh.points_of("U_ZMIN")[0]], normal=(0.0, 0.0, 1.0))
+        model.add_obstacle(
+            "pair", secondary="U_ZMIN", obstacle=floor, motion={"x": -0.1, "y": -0.1, "z": 0.02}, **options
+        )
+    else:
+        model.prescribe("U_ZMAX", x=0.1, y=0.1, z=-0.02)
+        touching(model, formulation, **options)
+    kept = fc.Criteria(geometry_updates=0)
+    force = fc.solve(model, 1, criteria=kept)[-1].contact["pair"].force
+    assert force[:2] == pytest.approx(np.array(expected) * force[2], abs=1e-8 * force[2])
+    if formulation == "node_to_segment":
+        model.contact[0].options["frictionless"] = "OUT"
+        contact = fc.solve(model, 1, criteria=kept)[-1].contact["pair"]
+        out = np.isin(contact.points, mesh.points_of("OUT"))
+        ratio = np.linalg.norm(contact.force_vectors[:, :2], axis=1) / contact.force_vectors[:, 2]
+        assert ratio[~out] == pytest.approx(0.3, abs=1e-8)
+        assert contact.force_vectors[out][:, :2] @ along[:2] == pytest.approx(0.0, abs=1e-8 * force[2])
+
+
 @pytest.mark.parametrize(("options", "words"), [
+    ({"friction": 0.2, "frictionless_along": (0.0, 0.0)}, "must be a vector of 2 numbers, not all zero"),
     ({"excluded": "LOWER_BOTTOM"}, "'LOWER_BOTTOM', excluded in contact 'pair', has no nodes on the secondary side"),
     ({"excluded": "CONT_UPPER"}, "contact 'pair' excludes all nodes of 'CONT_UPPER'"),
     ({"frictionless": 3}, "frictionless = 3 of contact 'pair' must be a group or a list of groups"),

@@ -213,16 +213,16 @@ class Formulation(ABC):
         positions = candidates.positions(self.points)
         if not (self.friction or self.options.tied):
             return Constraints(B, gap0, positions, compliance)
-        directions = tuple(tangents(pairing.normal))
-        along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
+        directions, rubbing = self.options.rubbing(tangents(pairing.normal), candidates)
+        along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in rubbing)
         drift: Array | None = None
         if isinstance(self.primary, RigidSide):
-            drift = -np.stack([t @ (at.obstacle - at.obstacle_start) for t in directions])
+            drift = -np.stack([t @ (at.obstacle - at.obstacle_start) for t in rubbing])
             turning = self.turning(candidates, at)
             if turning is not None:
-                drift -= np.stack([np.einsum("nd,nd->n", t, turning) for t in directions])
+                drift -= np.stack([np.einsum("nd,nd->n", t, turning) for t in rubbing])
         elif self.slip == "symmetric":
-            drift = self._closing_slip(candidates, pairing, directions, at)
+            drift = self._closing_slip(candidates, pairing, rubbing, at)
         friction = self.options.coefficients(self.friction, candidates)
         return Constraints(B, gap0, positions, compliance, along, directions, friction, drift)
 

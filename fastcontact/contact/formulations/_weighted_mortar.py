@@ -128,7 +128,8 @@ class WeightedMortar(Formulation):
         covered = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
         kept = self._taking_part(covered)
         own, across = self._weighted(overlap, covered, kept)
-        sums = np.asarray(own.sum(axis=1)).ravel()
+        # Left out as a whole: its neighbours' functions do not take over what an excluded node stands for.
+        sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(own.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
         mean = scaled(csr_array(own - across), 1.0 / weight)
         normal = self._mean_normals(overlap, deformed)
@@ -140,15 +141,15 @@ class WeightedMortar(Formulation):
         part = Constraints(B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=self._nodal(weight))
         if not (self.friction or self.options.tied):
             return part
-        directions = tuple(tangents_by_axes(normal))
-        slips, apart = self._slips(directions, overlap, covered, kept, mean, weight, at)
         candidates = Candidates(points[:, None], np.ones((len(part), 1)))
+        directions, rubbing = self.options.rubbing(tangents_by_axes(normal), candidates)
+        slips, apart = self._slips(rubbing, overlap, covered, kept, mean, weight, at)
         return replace(
             part,
             tangents=slips,
             directions=directions,
             friction=self.options.coefficients(self.friction, candidates),
-            drift=self._closing_slip_of_nodes(apart, normal, directions, at) if self.slip == "symmetric" else None,
+            drift=self._closing_slip_of_nodes(apart, normal, rubbing, at) if self.slip == "symmetric" else None,
         )
 
     def _nodal(self, weight: Array) -> WeightedPressures:
@@ -254,7 +255,7 @@ class WeightedMortar(Formulation):
             lost = ~enough[block.local].any(axis=1) & (weights.sum(axis=1) > LEAST * full.sum(axis=1))
             most = np.argmax(total[block.local[lost]], axis=1)
             rescued[block.local[lost][np.arange(len(most)), most]] = True
-        return (enough | rescued) & (whole > 0.0) & ~self.options.excluded_nodes(self.secondary)
+        return (enough | rescued) & (whole > 0.0)
 
     def _mean_normals(self, overlap: Overlap, deformed: Array) -> Array:
         """Return unit means (m, dim) of the primary normals that the nodes face; the last axis for nodes without."""

@@ -66,9 +66,11 @@ class ModelContact(ModelConnections):
               side to lengths (n,); positive opens the gap, negative is an interference, as of a press fit [length].
               ``clearance_primary``: the same on the primary side, at the positions faced. ``clearance_ramp``: their
               history, as pairs (instant, multiplier); without one they are there from the beginning.
-            - ``excluded``: groups whose nodes carry no contact. Where the formulation has integration points, those
-              nearer to such a node than to any other take no part. The two sides may share such nodes. ``frictionless``:
-              groups whose nodes carry no friction, likewise.
+            - ``excluded``: groups whose nodes carry no contact, and what they stand for carries no pressure: their share of
+              the area with multipliers at nodes (node-to-segment, mortar with one gap per node), where there are integration
+              points those nearer to such a node than to any other. The two sides may share such nodes. ``frictionless``:
+              groups whose nodes carry no friction, likewise. ``frictionless_along``: a vector (dim,) along which these, or
+              without ``frictionless`` all, have no friction, nor slip that counts; across it they keep it [-].
             - ``penalty``: pressure by penetration [pressure / length], instead of none at all; results tell the
               penetration. It does not soften friction; ``tangential_penalty`` does: shear by slip of what sticks, a number
               or a function of the secondary position [pressure / length].

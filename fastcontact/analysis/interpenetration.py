@@ -1,0 +1,156 @@
+"""Warnings about bodies that lie inside each other at the end of an analysis: where no contact is defined, and beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.state import State
+from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
+from fastcontact.contact.surface import Surface
+from fastcontact.mesh.topology import bodies, outer_facets
+from fastcontact.model.body_overlap import depths
+from fastcontact.model.rigid_motions import body_name
+from fastcontact.results.step import StepResult
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.signedinteger]
+Mask = NDArray[np.bool_]
+# Bodies by their numbers, and nodes on the outside of the first (n,) with their depths (n,) in the second [length].
+Inside = tuple[int, int, Indices, Array]
+# Depths worth a warning where no contact is defined, relative to the size of the model.
+ROUND_OFF = 1e-9
+# Beside the facets of a contact: relative to the deformation of the bodies, and to the depth of nodes that contact holds.
+BESIDE, HELD = 0.01, 2.0
+
+
+def interpenetration(problem: Problem, state: State, last: StepResult) -> list[str]:
+    """Return warnings about bodies inside of each other, and of rigid obstacles, at the end of the `last` step."""
+    mesh, u = problem.model.mesh, problem.displacement(state.u)
+    joined = _joined(problem)
+    found = list(depths(mesh, problem.model.kinematics, mesh.points + u))
+    return [
+        *_without_contact(problem, joined, found), *_beside_contact(problem, last, joined, found),
+        *_through_obstacles(problem, state, last),
+    ]  # fmt: skip
+
+
+def _joined(problem: Problem) -> Mapping[frozenset[int], Sequence[str]]:
+    """Return by two bodies the contact pairs between them; none where they are the sides of a pretension section."""
+    body = bodies(problem.model.mesh)[1]
+    found: dict[frozenset[int], list[str]] = {}
+    for name, pair in problem.pairs.items():
+        if isinstance(pair.primary, Surface):
+            for a in np.unique(body[pair.secondary.points]).tolist():
+                for b in np.unique(body[pair.primary.points]).tolist():
+                    found.setdefault(frozenset((a, b)), []).append(name)
+    for cut in problem.model.pretensions:
+        found[frozenset((int(body[cut.nodes[0]]), int(body[cut.opposite[0]])))] = []
+    return found
+
+
+def _without_contact(
+    problem: Problem, joined: Mapping[frozenset[int], Sequence[str]], found: Sequence[Inside]
+) -> list[str]:
+    """Return warnings about bodies that no contact pair joins, the deepest first, two bodies once."""
+    mesh = problem.model.mesh
+    _, body = bodies(mesh)
+    texts: dict[frozenset[int], str] = {}
+    for number, other, points, depth in sorted(found, key=lambda entry: -float(entry[3].max())):
+        both, row = frozenset((number, other)), int(np.argmax(depth))
+        if both not in joined and both not in texts and depth[row] > ROUND_OFF * np.ptp(mesh.points, axis=0).max():
+            where = mesh.points[points[row]]
+            texts[both] = (
+                f"bodies {body_name(mesh, body, number)} and {body_name(mesh, body, other)} interpenetrate by "
+                f"{depth[row]:.6g} near {np.array2string(where, precision=4)}, and no contact is defined between them: "
+                "add_contact for the groups that meet"
+            )
+    return list(texts.values())
+
+
+def _beside_contact(
+    problem: Problem, last: StepResult, joined: Mapping[frozenset[int], Sequence[str]], found: Sequence[Inside]
+) -> list[str]:
+    """Return warnings about bodies that pass through each other where the groups of their contact pairs lack facets."""
+    mesh, texts = problem.model.mesh, []
+    _, body = bodies(mesh)
+    for both, names in joined.items():
+        own = [entry for entry in found if names and {*entry[:2]} == both]
+        if not own or any(problem.pairs[name].options.wear for name in names):  # what is worn off is still in the mesh
+            continue
+        points, depth = np.concatenate([entry[2] for entry in own]), np.concatenate([entry[3] for entry in own])
+        held, faced = (mask[points] for mask in _held(problem, last, names))
+        deformed = max(float(np.ptp(last.displacement[body == number], axis=0).max()) for number in both)
+        limit = max(BESIDE * deformed, HELD * float(depth[held].max(initial=0.0)))
+        row = int(np.argmax(np.where(held | faced, 0.0, depth)))
+        if (
+            not (held | faced)[row]
+            and depth[row] > limit
+            and depth[row] - _at_rest(problem, own, int(points[row])) > limit
+        ):
+            pair = problem.pairs[names[0]]
+            what = " and ".join(body_name(mesh, body, number) for number in sorted(both))
+            groups = " and ".join(
+                f"'{side.group}'" for side in (pair.secondary, pair.primary) if isinstance(side, Surface)
+            )
+            texts.append(
+                _lacking(problem, names[0], f"bodies {what} pass through each other", depth[row], points[row], groups)
+            )
+    return texts
+
+
+def _held(problem: Problem, last: StepResult, names: Sequence[str]) -> tuple[Mask, Mask]:
+    """Return the points (n_points,) of secondary sides that face the other one, or need not, and those of primary sides."""
+    held, faced = np.zeros((2, problem.model.mesh.n_points), bool)
+    for name in names:
+        pair = problem.pairs[name]
+        facing = np.isfinite(last.contact[name].gap) | pair.options.excluded_nodes(pair.secondary)
+        held[pair.secondary.points[facing]] = True
+        faced[pair.primary.points] = True
+    return held, faced
+
+
+def _at_rest(problem: Problem, bodies_of: Sequence[Inside], point: int) -> float:
+    """Return how deep a point of one of two bodies lies in the other before any load [length]."""
+    mesh = problem.model.mesh
+    for number, other, points, depth in depths(mesh, problem.model.kinematics, mesh.points):
+        if any((number, other) == entry[:2] for entry in bodies_of) and point in points:
+            return float(depth[points == point][0])
+    return 0.0
+
+
+def _through_obstacles(problem: Problem, state: State, last: StepResult) -> list[str]:
+    """Return warnings about nodes beside a contact surface that pass through its rigid obstacle."""
+    mesh, u, texts = problem.model.mesh, problem.displacement(state.u), []
+    for name, pair in problem.pairs.items():
+        if not isinstance(pair.primary, RigidSide) or pair.options.wear:  # what is worn off is still in the mesh
+            continue
+        held = np.zeros(mesh.n_points, bool)
+        held[pair.secondary.points] = True
+        beside = [block[held[block].any(axis=1)].ravel() for block in outer_facets(mesh).values()]
+        points = np.unique(np.concatenate(beside))
+        points = points[~held[points]]
+        if not len(points):
+            continue
+        at_rest = pair.primary.facing(mesh.points[points], Stance(np.zeros(mesh.dim)))[0]
+        now = Stance(state.obstacles[name], state.angles.get(name, 0.0))
+        gap = pair.primary.facing(mesh.points[points] + u[points], now)[0]
+        inside = last.contact[name].gap
+        deepest = -float(np.min(inside, initial=0.0, where=np.isfinite(inside)))
+        limit = max(BESIDE * float(np.ptp(u, axis=0).max()), HELD * deepest)
+        row = int(np.argmin(np.where(at_rest >= 0.0, gap, np.inf)))
+        if at_rest[row] >= 0.0 and -gap[row] > limit:
+            what = "the body passes through the obstacle"
+            texts.append(_lacking(problem, name, what, -gap[row], points[row], f"'{pair.secondary.group}'"))
+    return texts
+
+
+def _lacking(problem: Problem, name: str, what: str, depth: float, point: int, groups: str) -> str:
+    where = np.array2string(problem.model.mesh.points[point], precision=4)
+    return (
+        f"contact '{name}' lacks facets: {what} by {depth:.4g} at point {point} {where}, beside {groups}; its force is too "
+        f"small, add the facets there"
+    )
