@@ -112,12 +112,12 @@ def _starts(problem: _Problem, closed: Mask, guess: Array | None) -> Iterator[tu
     At kinks of the residual whole steps often lead on where no part of one goes down.
     """
     guessed = guess is not None and guess.any()
-    if guess is not None and guessed:
+    if guess is not None and guess.any():
         yield guess, True
     sticking = closed | (problem.free[0] < 0) if not closed.any() else closed
     stuck = _step(problem, np.zeros_like(problem.free), problem.free, sticking, sticking)
     yield stuck, True
-    if guess is not None and guessed:
+    if guess is not None and guess.any():
         yield guess, False
     yield stuck, False
     y, gaps = np.zeros_like(problem.free), np.empty_like(problem.free)
