@@ -111,7 +111,6 @@ def _starts(problem: _Problem, closed: Mask, guess: Array | None) -> Iterator[tu
 
     At kinks of the residual whole steps often lead on where no part of one goes down.
     """
-    guessed = guess is not None and guess.any()
     if guess is not None and guess.any():
         yield guess, True
     sticking = closed | (problem.free[0] < 0) if not closed.any() else closed
