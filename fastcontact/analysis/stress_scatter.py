@@ -42,7 +42,7 @@ class StressScatter:
     Attributes
     ----------
     elements : list of str
-        Linear triangles, tetrahedra, wedges and pyramids; there may be none.
+        Of first order, those with incompatible modes left out; there may be none.
     energy : float
         Energy norm of recovered stress less stress, over that of the stress [-].
     pressure : float
@@ -53,7 +53,11 @@ class StressScatter:
 
     def __init__(self, problem: Problem, step: StepResult) -> None:
         field, mesh = problem.field, problem.model.mesh
-        self.elements = [name for name in mesh.solids if elements.get(name).order == 1 and name not in BENDING_ELEMENTS]
+        bends = all(material.bends for material, _ in problem.model.materials)
+        self.elements = [
+            name for name in mesh.solids
+            if elements.get(name).order == 1 and not (bends and name in BENDING_ELEMENTS)
+        ]  # fmt: skip
         self.energy = self.pressure = 0.0
         laws = [material for material, _ in problem.model.materials]
         nu = np.array([law.largest_nu if isinstance(law, LinearElastic) else -1.0 for law in laws])[field.owner]
@@ -106,7 +110,7 @@ def scatter_warnings(problem: Problem, step: StepResult) -> list[str]:
     ):  # where cells at the axis scatter by as much
         return [
             f"{names} cells are too stiff, as where thin parts bend: their stress is off by {found.energy:.0%} (energy norm "
-            "of the difference from stress recovered at the nodes); use hexahedra or quadrangles with incompatible modes, "
-            "quadratic elements (generate.to_quadratic), or smaller ones"
+            "of the difference from stress recovered at the nodes); use hexahedra or quadrangles with "
+            "LinearElastic(incompatible_modes=True), quadratic elements (generate.to_quadratic), or smaller ones"
         ]
     return []

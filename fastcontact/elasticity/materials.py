@@ -57,12 +57,12 @@ class Material:
     expansion: Any
     axes: Axes = None
     averaged: bool = False
-    incompatible_modes: bool | None = None
+    incompatible_modes: bool = False
 
     @property
     def bends(self) -> bool:
         """Whether linear quadrangles and hexahedra have incompatible modes, where kinematics are not axisymmetric."""
-        return self.incompatible_modes is not False
+        return bool(self.incompatible_modes)
 
     @property
     def young(self) -> tuple[float, float]:
@@ -317,10 +317,10 @@ class LinearElastic(Material):
         Mass per volume [mass / length^3], for gravity and centrifugal loads; zero or more; as E.
     expansion : float, callable or ndarray (n,), optional
         Coefficient of thermal expansion [1 / temperature]; as E.
-    incompatible_modes : bool, optional
+    incompatible_modes : bool
         Whether linear quadrangles and hexahedra have incompatible modes, so that thin parts of them bend without locking in
-        shear, and do not lock in volume either; nothing changes in other elements and in axisymmetry. By default they have
-        them with ``volumetric="auto"``. Where they have them they have no mean dilatation.
+        shear, and do not lock in volume either; nothing changes in other elements and in axisymmetry. Where they have them
+        they have no mean dilatation. They cost three times the assembly and ten times the recovery of stress.
     """
 
     E: Constant
@@ -328,7 +328,7 @@ class LinearElastic(Material):
     volumetric: str = "auto"
     density: Constant | None = None
     expansion: Constant | None = None
-    incompatible_modes: bool | None = None
+    incompatible_modes: bool = False
 
     def __post_init__(self) -> None:
         for name in ("E", "nu", "density", "expansion"):
@@ -395,11 +395,6 @@ class LinearElastic(Material):
         """Whether elements have a mean dilatation, where they can and kinematics are not plane stress."""
         nearly = self.largest_nu >= NEARLY_INCOMPRESSIBLE
         return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and nearly)
-
-    @property
-    def bends(self) -> bool:
-        """Whether linear quadrangles and hexahedra have incompatible modes, where kinematics are not axisymmetric."""
-        return self.volumetric == "auto" if self.incompatible_modes is None else self.incompatible_modes
 
     @property
     def shear_modulus(self) -> float:

@@ -30,8 +30,8 @@ def test_every_part_is_told():
     )
     told = "\n".join(lines[1:])
     for text in (
-        "Material: E = 1000, nu = 0.3 in 'LOWER', with incompatible modes.",
-        "Material: E = 2000, nu = 0.499 in 'UPPER', with incompatible modes.",
+        "Material: E = 1000, nu = 0.3 in 'LOWER'.",
+        "Material: E = 2000, nu = 0.499 in 'UPPER', with a mean dilatation against locking.",
         "Support: x = 0, y = 0 on 'LOWER_BOTTOM' (9 points).",
         "Support: y = -0.1 on 'UPPER_TOP' (7 points), with a history of its own.",
         "Load: the pressure on 'UPPER_LEFT': a function of position.",
