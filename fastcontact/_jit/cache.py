@@ -2,7 +2,7 @@
 
 Numba knows a kernel by the time and size of its own source file, reads whatever lies in its cache, and stops where that is
 damaged. Here the name of a file tells the contents of all sources that the kernel depends on, so that kernels outlive another
-installation of the same version, and its first bytes tell what follows, so that damage costs a compilation.
+installation of the same version, and its last bytes tell what stands before, so that damage costs a compilation.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import contextlib
 import hashlib
 import logging
 import os
-import pickle
 import secrets
 import stat
 import sys
@@ -29,6 +28,8 @@ from fastcontact._version import __version__
 log = logging.getLogger("fastcontact")
 # What Numba compiles by, and does not tell apart in its cache.
 OPTIONS = ("OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "CPU_NAME", "CPU_FEATURES", "THREADING_LAYER")
+# Characters of a digest.
+DIGEST = 64
 CONSTANTS = (bool, int, float, complex, str, tuple, np.ndarray, np.generic, type(None))
 
 
@@ -47,14 +48,12 @@ class KernelFiles:
         The kernel in Python.
     options : str
         By which it is compiled.
-    dumps : callable
-        Returns an object of Numba as bytes, which `pickle` reads.
+    numbas : object
+        Numba's own file of the kernel, which turns its objects into bytes and back.
     """
 
-    def __init__(
-        self, folder: Path, name: str, function: Callable[..., Any], options: str, dumps: Callable[[Any], bytes]
-    ) -> None:
-        self.folder, self._name, self._function, self._options, self._dumps = folder, name, function, options, dumps
+    def __init__(self, folder: Path, name: str, function: Callable[..., Any], options: str, numbas: Any) -> None:
+        self.folder, self._name, self._function, self._options, self._numbas = folder, name, function, options, numbas
 
     def load(self, key: Any) -> Any:
         """Return what was kept for a signature; None if there is nothing that may be used."""
@@ -64,9 +63,9 @@ class KernelFiles:
                 if not _is_own(os.fstat(file.fileno())):
                     _tell(f"others may write to the compiled kernel '{path}'")
                     return None
-                digest, data = file.read(hashlib.sha256().digest_size), file.read()
-            if hashlib.sha256(data).digest() == digest:
-                return pickle.loads(data)
+                content = file.read()
+            if _digest(content[:-DIGEST]).encode() == content[-DIGEST:]:
+                return self._numbas._load_data(str(path))
             _tell(f"the compiled kernel '{path}' is damaged")
         except FileNotFoundError:
             pass
@@ -76,11 +75,11 @@ class KernelFiles:
 
     def save(self, key: Any, data: Any) -> None:
         """Keep what was compiled for a signature; the file appears whole or not at all."""
-        path, content = self._path(key), self._dumps(data)
+        path, content = self._path(key), self._numbas._dump(data)
         temporary = path.with_name(f"{path.name}.{secrets.token_hex(8)}")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            temporary.write_bytes(hashlib.sha256(content).digest() + content)
+            temporary.write_bytes(content + _digest(content).encode())
             os.replace(temporary, path)
         except OSError as error:
             _tell(f"compiled kernels cannot be kept in '{path.parent}' ({error.strerror or error})")
@@ -110,7 +109,7 @@ def keep(kernel: Any, function: Callable[..., Any], options: str) -> str:
     if not is_trusted(folder):
         return f"others may write to the folder of compiled kernels, {folder}"
     name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
-    numbas._cache_file = KernelFiles(folder, name, function, options, numbas._cache_file._dump)
+    numbas._cache_file = KernelFiles(folder, name, function, options, numbas._cache_file)
     return ""
 
 

@@ -80,6 +80,7 @@ def test_shear_lies_on_the_cone_outside_the_stick_zone_and_pulls_inward_everywhe
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3])
+@pytest.mark.filterwarnings("ignore:the friction of contact")
 def test_much_friction_bonds_the_punch(nu):
     """Muskhelishvili's tractions, but at the edge, where they would oscillate."""
     (contact,) = pressed(nu, 100.0)

@@ -32,8 +32,10 @@ SWEPT, MOST_SWEEPS = (1e-1, 1e-2, 1e-3, 1e-4), 2000
 # Edges of the cones in three dimensions, and the largest complementarity problem.
 EDGES, LARGEST = (8, 16, 32), 2500
 # Slips that depend on each other get this compliance, in units of that of the gaps: at nodes that several sides hold, or that
-# supports hold on one side, forces along the surface would be any. So do problems with a pivot below DEPENDENT.
-YIELDING, DEPENDENT = 1e-9, 1e-8
+# supports hold on one side, forces along the surface would be any. So do problems with a pivot below DEPENDENT. Forces that
+# make slips yield by more than JAMMED of the gaps balance nothing: bodies jam.
+JAMMED = 1e-6
+YIELDING, DEPENDENT = 1e-11, 1e-8
 # Edges repeat each other, which pivots do not bear: their problem is shifted by this fraction.
 SHIFT = 1e-6
 
@@ -73,9 +75,11 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
         if found.settled:
             break
     assert best is not None
-    settled = best.settled or best.residual <= ACCEPTABLE
+    yielded = YIELDING * float(np.abs(best.y[1:]).max(initial=0.0))
+    settled = (best.settled or best.residual <= ACCEPTABLE) and yielded <= JAMMED
+    residual = best.residual if yielded <= JAMMED else max(best.residual, yielded)
     gaps = best.gaps * length / unit
-    return Forces(best.y * length * unit, gaps, best.closed, best.sticking, settled, best.residual, iterations)
+    return Forces(best.y * length * unit, gaps, best.closed, best.sticking, settled, residual, iterations)
 
 
 def _determined(F: Array, m: int) -> Array:
