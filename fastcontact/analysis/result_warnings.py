@@ -12,6 +12,7 @@ from fastcontact.analysis.interpenetration import interpenetration
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.seams import seam_warnings
 from fastcontact.analysis.state import State
+from fastcontact.analysis.stress_scatter import scatter_warnings
 from fastcontact.analysis.volumetric_locking import locking_warning
 from fastcontact.analysis.wear import too_fast
 from fastcontact.contact.formulations import Formulation
@@ -44,7 +45,7 @@ LOOSE = 1e-4
 def result_warnings(problem: Problem, state: State, last: StepResult) -> list[str]:
     """Return the warnings about an analysis whose `last` step ended in a state."""
     found = interpenetration(problem, state, last) + _large_strain(problem, last) + _large_rotation(problem, state)
-    found += _carrying_springs(problem, state) + locking_warning(problem, state.u)
+    found += _carrying_springs(problem, state) + (locking_warning(problem, state.u) or scatter_warnings(problem, last))
     found += [problem.solver.gave_up] if problem.solver.gave_up else []
     load = problem.load_at(last.load_factor)
     loaded, sagging = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)

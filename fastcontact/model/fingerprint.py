@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact.contact.formulations import FORMULATIONS
+from fastcontact.elasticity.incompatible_modes import BENDING
 from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.elasticity.varying_constants import Varying
 from fastcontact.mesh.mesh import Mesh
@@ -33,6 +34,8 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
     By the name of the part in messages: "the mesh", "the materials", "contact 'hertz'", ...
     """
     mesh = model.mesh
+    elements = model.kinematics != "axisymmetric" and any(name in BENDING for name in mesh.solids)
+    bends = [elements and material.bends for material, _ in model.materials]
     parts: dict[str, Any] = {
         "the mesh": mesh,
         "the kinematics": model.kinematics,
@@ -41,6 +44,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         "the loads": _unordered(model.loads, mesh),
         **({"the temperatures": _unordered(model.temperatures, mesh)} if model.temperatures else {}),
         **({"the initial states": _unordered(model.initial_states, mesh)} if model.initial_states else {}),
+        **({"the incompatible modes": bends} if any(bends) else {}),
         "the relations": _unordered(model.relations, mesh),
         "the springs": _unordered(model.springs, mesh),
         **({"the pretension sections": _unordered(model.pretensions, mesh)} if model.pretensions else {}),
@@ -126,7 +130,8 @@ def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: A
     elif not fields and callable(value):
         _take(_called(value, points), add, mesh, points)
     if isinstance(value, Material):  # a density or expansion that is not given counts as little as in older files
-        fields = [field for field in fields if getattr(value, field.name) not in (None, False)]
+        fields = [field for field in fields if getattr(value, field.name) is not None]
+        fields = [field for field in fields if field.name != "incompatible_modes"]
     if isinstance(value, ContactPair) and value.rotation is None:  # likewise
         fields = [field for field in fields if not field.name.startswith("rotation")]
     if isinstance(value, LinearElastic):  # what the choice comes to, and nothing where it is plain, as in older files
