@@ -85,7 +85,7 @@ class StressScatter:
             rows = np.arange(first, min(first + BATCH, len(mesh.cells[name])))
             cells, numbers = mesh.cells[name][rows], field.rows[name][rows]
             own = stress.at(name, xi, cells, field.loops[name][rows], rows)
-            off = np.einsum("qa,cai->cqi", N, smooth[rows]) - own
+            off = N @ smooth[rows] - own
             volume = cell_volumes(mesh.points[cells], N, dN, problem.model.kinematics == "axisymmetric") * weights
             compliance, nearly = field.compliance[numbers][:, None], volume * (self._nearly[numbers] & simplex)[:, None]
             found += [
