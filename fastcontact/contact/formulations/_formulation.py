@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -232,17 +232,27 @@ class Formulation(ABC):
         if not (self.friction or self.options.tied):
             return Constraints(B, gap0, positions, compliance)
         directions, rubbing = self.options.rubbing(tangents(pairing.normal), candidates)
-        along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in rubbing)
-        drift: Array | None = None
-        if isinstance(self.primary, RigidSide):
-            drift = -np.stack([t @ (at.obstacle - at.obstacle_start) for t in rubbing])
-            turning = self.turning(candidates, at)
-            if turning is not None:
-                drift -= np.stack([np.einsum("nd,nd->n", t, turning) for t in rubbing])
-        elif self.slip == "symmetric":
-            drift = self._closing_slip(candidates, pairing, rubbing, at)
+        along, drift = self.slips(candidates, pairing, rubbing, at)
         friction = self.options.coefficients(self.friction, candidates)
         return Constraints(B, gap0, positions, compliance, along, directions, friction, drift)
+
+    def slips(
+        self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
+    ) -> tuple[tuple[csr_array, ...], Array | None]:
+        """Return rows (n, n_dofs) of the slip of candidates along k tangents (n, dim), and what it is beside these (k, n).
+
+        The latter: what a rigid primary side moves in the step, or minus the part that closes a gap [length]; None is zero.
+        """
+        along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
+        drift: Array | None = None
+        if isinstance(self.primary, RigidSide):
+            drift = -np.stack([t @ (at.obstacle - at.obstacle_start) for t in directions])
+            turning = self.turning(candidates, at)
+            if turning is not None:
+                drift -= np.stack([np.einsum("nd,nd->n", t, turning) for t in directions])
+        elif self.slip == "symmetric":
+            drift = self._closing_slip(candidates, pairing, directions, at)
+        return along, drift
 
     def added_gap(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Array:
         """Return what clearances and wear add to the gaps (n,) of candidates, zero where nothing is faced [length]."""
@@ -323,7 +333,7 @@ class Formulation(ABC):
         return found
 
     def _closing_slip(
-        self, candidates: Candidates, pairing: Pairing, directions: tuple[Array, ...], at: Configuration
+        self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
     ) -> Array:
         """Return the slip (k, n) to add so that closing a gap is none, though the normal leans.
 
