@@ -118,10 +118,11 @@ def _loose(problem: Problem, last: StepResult) -> list[str]:
             f"round-off makes contact forces scatter by {scatter['force']:.1e} of the largest one from update to update, and "
             f"displacements by {scatter['displacement']:.1e}: results are no more accurate than that"
         )
-    if residual > LOOSE:
+    if residual > min(LOOSE, criteria.relative):
+        cause = "by round-off of a stiff body that moves far, in whose place a rigid obstacle may stand, "
         found.append(
             f"forces are out of balance by {residual:.1e} of the largest force (Criteria.relative = {criteria.relative:g}): "
-            "results are no more accurate than that"
+            f"{cause if residual > criteria.relative else ''}results are no more accurate than that"
         )
     return found
 

@@ -93,4 +93,4 @@ class SegmentMortar(PressureFieldFormulation):
         np.add.at(mass, facet, area[:, None, None] * shape[:, :, None] * shape[:, None, :])
         field = determined(self.secondary, self._whole, [mass], self.options.excluded_nodes(self.secondary))
         points = self.secondary.local[facet], shape
-        return PressureField.of_points(points, (area, whole), self._rho, field, renewed=True)
+        return PressureField.of_points(points, (area, whole), self._rho, self.repeated(field), renewed=True)

@@ -71,7 +71,7 @@ class Continuous(PressureFieldFormulation):
         areas_of_points = np.where(self.options.out(self._candidates), 0.0, whole)
         around = filled_up(local)
         P = shapes_at(self._candidates.shape, around, len(self.secondary.points))
-        field = self._determined(P, areas_of_points)
+        field = self.repeated(self._determined(P, areas_of_points))
         points = around, self._candidates.shape
         self._field = PressureField.of_points(points, (areas_of_points, whole), float(rho), field, renewed=False)
 

@@ -27,6 +27,7 @@ from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.obstacle_rotation import rotation_of
 from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
 from fastcontact.model.parts.connections import ModelConnections
+from fastcontact.model.periodicity import same_place
 from fastcontact.model.ramp import History, table_of
 from fastcontact.model.repeated_pairs import check_repeated
 
@@ -223,4 +224,7 @@ class ModelContact(ModelConnections):
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
         modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
         axisymmetric = self.kinematics == "axisymmetric"
+        # Tangential fields that turn from one end to the other are not one field of components.
+        seams = [seam for seam in self.seams if seam.turn is None or not pair.options.get("friction")]
+        options = dataclasses.replace(options, same_place=same_place(seams, self.mesh.n_points))
         return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, held=held, **own)
