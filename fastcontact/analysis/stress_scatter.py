@@ -53,7 +53,7 @@ class StressScatter:
 
     def __init__(self, problem: Problem, step: StepResult) -> None:
         field, mesh = problem.field, problem.model.mesh
-        bends = all(material.bends for material, _ in problem.model.materials)
+        bends = all(material.incompatible_modes for material, _ in problem.model.materials)
         self.elements = [
             name for name in mesh.solids
             if elements.get(name).order == 1 and not (bends and name in BENDING_ELEMENTS)

@@ -52,7 +52,7 @@ class Orthotropic(Material):
     expansion : float, callable, ndarray (n,) or three of them, optional
         Coefficients of thermal expansion, one for all or one along each axis [1 / temperature]; functions or arrays where
         they vary.
-    incompatible_modes : bool, optional
+    incompatible_modes : bool
         As of `LinearElastic`; by default cells have them.
 
     Notes
@@ -73,7 +73,7 @@ class Orthotropic(Material):
     axes: Axes = None
     density: Constant | None = None
     expansion: Constant | Sequence[Constant] | None = None
-    incompatible_modes: bool | None = None
+    incompatible_modes: bool = False
 
     def __post_init__(self) -> None:
         for name in ("E", "nu", "G", "axes", "density", "expansion"):
@@ -180,7 +180,7 @@ class Anisotropic(Material):
         Mass per volume [mass / length^3].
     expansion : float, callable, ndarray (n,) or three of them, optional
         As of `Orthotropic` [1 / temperature].
-    incompatible_modes : bool, optional
+    incompatible_modes : bool
         As of `LinearElastic`.
     """
 
@@ -188,7 +188,7 @@ class Anisotropic(Material):
     axes: Axes = None
     density: Constant | None = None
     expansion: Constant | Sequence[Constant] | None = None
-    incompatible_modes: bool | None = None
+    incompatible_modes: bool = False
 
     def __post_init__(self) -> None:
         for name in ("D", "axes", "density", "expansion"):

@@ -98,7 +98,7 @@ class MaterialField:
         The sum of both is incompatible modes in the elements that have them, a mean dilatation in others. Axisymmetric cells
         have no incompatible modes.
         """
-        modes = np.array([material.bends for material in self.materials], bool)[self.owner]
+        modes = np.array([material.incompatible_modes for material in self.materials], bool)[self.owner]
         found = self.averaged.astype(np.uint8)
         if self.kinematics != "axisymmetric":
             found[modes] += MODES

@@ -48,7 +48,7 @@ class Material:
         Unit vectors in rows (3, 3) [-], or a function, see `Orthotropic`; None: those of the mesh.
     averaged : bool
         Whether elements have a mean dilatation, where they can and kinematics are not plane stress.
-    bends : bool
+    incompatible_modes : bool
         Whether linear quadrangles and hexahedra have incompatible modes, where kinematics are not axisymmetric, in place of a
         mean dilatation.
     """
@@ -58,11 +58,6 @@ class Material:
     axes: Axes = None
     averaged: bool = False
     incompatible_modes: bool = False
-
-    @property
-    def bends(self) -> bool:
-        """Whether linear quadrangles and hexahedra have incompatible modes, where kinematics are not axisymmetric."""
-        return bool(self.incompatible_modes)
 
     @property
     def young(self) -> tuple[float, float]:

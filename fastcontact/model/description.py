@@ -29,7 +29,11 @@ def sentences(model: Any) -> Iterator[str]:
         yield f"Units: {', '.join(named)}."
     for material, groups in model.materials:
         where = "all solid cells" if groups is None else _listed(groups)
-        modes = material.bends and model.kinematics != "axisymmetric" and any(name in BENDING for name in mesh.solids)
+        modes = (
+            material.incompatible_modes
+            and model.kinematics != "axisymmetric"
+            and any(name in BENDING for name in mesh.solids)
+        )
         locking = ", with a mean dilatation against locking" if material.averaged and not modes else ""
         locking += ", with incompatible modes" if modes else ""
         yield f"Material: {material.described} in {where}{locking}."

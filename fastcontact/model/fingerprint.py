@@ -35,7 +35,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
     """
     mesh = model.mesh
     elements = model.kinematics != "axisymmetric" and any(name in BENDING for name in mesh.solids)
-    bends = [elements and material.bends for material, _ in model.materials]
+    bends = [elements and material.incompatible_modes for material, _ in model.materials]
     parts: dict[str, Any] = {
         "the mesh": mesh,
         "the kinematics": model.kinematics,
