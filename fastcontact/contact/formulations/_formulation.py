@@ -61,8 +61,8 @@ class Formulation(ABC):
         planes of symmetry point by point, half a facet.
     normals : str or sequence of float, optional
         Along which the gap is measured. ``"facet"``: that of the primary facet at the projection; ``"averaged"``:
-        interpolated between nodal means. By default the former in 2D and the latter in 3D, where a point opposite an edge
-        between facets often flips for ever. ``"secondary"``: opposite to the mean normal of the secondary side at the
+        interpolated between nodal means. By default the former in 2D, without `surface_smoothing`, and the latter in 3D,
+        where a point opposite an edge between facets often flips for ever. ``"secondary"``: opposite to the mean normal of the secondary side at the
         point. A vector (dim,) of any length: that one for the whole primary side, out of its body; points are projected
         along it.
     slip : str
@@ -97,7 +97,7 @@ class Formulation(ABC):
 
     def __post_init__(self) -> None:
         if self.normals is None:
-            self.normals = "facet" if self.points.shape[1] == 2 else "averaged"
+            self.normals = "facet" if self.points.shape[1] == 2 and not self.surface_smoothing else "averaged"
         self.normals = checked_normals(self.normals, self.points, self.primary)
         if self.slip not in SLIPS:
             raise ContactError(unknown("kind of slip", self.slip, SLIPS))

@@ -104,7 +104,7 @@ def fit(element="quad4", divisions=(24, 36), clearance=-0.05, **options):
 
 @pytest.mark.parametrize("options", [
     {}, {"multipliers": "standard"}, {"formulation": "continuous", "surface_smoothing": True},
-    {"formulation": "node_to_segment", "normals": "averaged", "surface_smoothing": True},
+    {"formulation": "node_to_segment", "surface_smoothing": True},
 ], ids=["dual", "standard", "continuous", "node_to_segment"])  # fmt: skip
 def test_rings_touch_all_round_where_their_circles_do(options):
     """Two circles of one radius have no gap, whatever their facets."""
