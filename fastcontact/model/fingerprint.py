@@ -26,6 +26,7 @@ from fastcontact.model.model import Model
 
 Array = NDArray[np.float64]
 LENGTH = 16
+SMOOTHING = "surface_smoothing of contact"
 
 
 def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[str, str]:
@@ -49,7 +50,8 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         "the springs": _unordered(model.springs, mesh),
         **({"the pretension sections": _unordered(model.pretensions, mesh)} if model.pretensions else {}),
         "the list of contact pairs": [pair.name for pair in model.contact],
-        **{f"contact '{pair.name}'": pair for pair in model.contact},
+        **{f"contact '{pair.name}'": _without(pair, "surface_smoothing") for pair in model.contact},
+        **{f"{SMOOTHING} '{pair.name}'": True for pair in model.contact if model.bind(pair).smoothing},
         **{f"the option {name}": value for name, value in (options or {}).items()},
     }
     return {name: _digest(part, mesh) for name, part in parts.items()}
@@ -66,12 +68,17 @@ def formulation_behind(model: Model, name: str, digest: str | None) -> str | Non
     None where it is not: pairs that named none had other defaults in earlier versions.
     """
     (pair,) = (one for one in model.contact if one.name == name)
-    plain = {key: value for key, value in pair.options.items() if key != "multipliers"}
+    plain = _without(_without(pair, "surface_smoothing"), "multipliers")
     for formulation, options in _choices():
-        other = dataclasses.replace(pair, formulation=formulation, options={**plain, **options})
+        other = dataclasses.replace(plain, formulation=formulation, options={**plain.options, **options})
         if _digest(other, model.mesh) == digest:
             return ", ".join(f"{key}='{value}'" for key, value in {"formulation": formulation, **options}.items())
     return None
+
+
+def _without(pair: ContactPair, option: str) -> ContactPair:
+    """Return a pair without an option."""
+    return dataclasses.replace(pair, options={key: value for key, value in pair.options.items() if key != option})
 
 
 def _choices() -> Iterable[tuple[str, dict[str, str]]]:

@@ -61,10 +61,10 @@ class Formulation(ABC):
         planes of symmetry point by point, half a facet.
     normals : str or sequence of float, optional
         Along which the gap is measured. ``"facet"``: that of the primary facet at the projection; ``"averaged"``:
-        interpolated between nodal means. By default the former in 2D, without `surface_smoothing`, and the latter in 3D,
-        where a point opposite an edge between facets often flips for ever. ``"secondary"``: opposite to the mean normal of the secondary side at the
-        point. A vector (dim,) of any length: that one for the whole primary side, out of its body; points are projected
-        along it.
+        interpolated between nodal means. By default the former in 2D without `surface_smoothing`, and the latter in 3D,
+        where a point opposite an edge between facets often flips for ever. ``"secondary"``: opposite to the mean normal
+        of the secondary side at the point. A vector (dim,) of any length: that one for the whole primary side, out of its
+        body; points are projected along it.
     slip : str
         ``"symmetric"``: closing a gap along the mean of both sides' normals is no slip. ``"primary"``: all relative motion
         along the tangents to the primary side is, also of a gap that closes while its normal leans, as in code_aster.

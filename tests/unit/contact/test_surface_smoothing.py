@@ -10,6 +10,7 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.surface import surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames, smooth_side
 from fastcontact.mesh import elements
+from fastcontact.model.fingerprint import different, fingerprint
 
 STEEL = fc.LinearElastic(E=210e3, nu=0.3)
 
@@ -142,6 +143,15 @@ def test_chords_against_exact_shapes_are_told(n, told):
     texts = [str(warning.message) for warning in found if "stand off their arcs" in str(warning.message)]
     assert bool(texts) == told
     assert all("formulation 'node_to_segment'" in text for text in texts)
+
+
+def test_steps_with_and_without_smoothing_are_of_different_cases():
+    """A file that was begun without goes on without; where nothing is smoothed, the option makes no difference."""
+    curved = [
+        fingerprint(fit(**options)) for options in ({}, {"surface_smoothing": False}, {"surface_smoothing": True})
+    ]
+    assert different(curved[0], curved[1]) == ["surface_smoothing of contact 'fit'"]
+    assert different(curved[0], curved[2]) == []
 
 
 def test_an_obstacle_has_no_facets_to_smooth():
