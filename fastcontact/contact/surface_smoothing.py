@@ -23,6 +23,7 @@ from scipy.sparse import csr_array
 from scipy.special import comb
 
 from fastcontact.contact.projection import CORNER
+from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 
@@ -72,10 +73,18 @@ class Smoothing:
 
     @classmethod
     def of(cls, secondary: Surface, primary: Surface, points: Array) -> Smoothing | None:
-        """Return the smooth surfaces of two sides at reference `points` (n_points, dim); None where one has no sag."""
+        """Return the smooth surfaces of two sides at reference `points` (n_points, dim); None if no curvature is shared."""
         theirs = smooth_side(primary, points)
         ours = None if theirs is None else smooth_side(secondary, points)
-        return None if ours is None or theirs is None else cls(ours, theirs)
+        if ours is None or theirs is None:
+            return None
+        made, axes = cls(ours, theirs), (frames(secondary, points), frames(primary, points))
+        middles = [points[b.facets[:, : elements.get(b.element).n_corners]].mean(axis=1) for b in secondary.blocks]
+        opposite = closest_of_kinds(np.concatenate(middles), primary.corners(points)).facet
+        factor = made.shared(np.arange(len(opposite)), opposite, axes)
+        counts = factor[:, 0] * np.abs(ours.heights).max(axis=(1, 2)) > 0.0
+        counts |= factor[:, 1] * np.abs(theirs.heights[opposite]).max(axis=(1, 2)) > 0.0
+        return made if counts.any() else None
 
     def shared(self, ours: Indices, theirs: Indices, frames: tuple[Array, Array]) -> Array:
         """Return the factors (n, 2) of the heights of secondary and primary facets, both (n,), that face each other.
