@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.iterate import gaps_and_forces
 from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.slip import slip_in_step
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import Worn
@@ -39,20 +40,21 @@ def keep_contact(problem: Problem, start: State, load: StepLoad, settled: Settle
     )  # fmt: skip
 
 
-def keep_wear(
+def keep_slip(
     problem: Problem, start: State, load: StepLoad, end: State, results: dict[str, ContactResult]
 ) -> tuple[State, dict[str, ContactResult]]:
-    """Return the state at the end of a step with what has been worn off, and the results of contact pairs with it."""
-    worn, told, displacement = dict(start.worn), dict(results), problem.displacement(end.u)
+    """Return the state at the end of a step with slip and wear so far, and the results of contact pairs with both."""
+    worn, slipped, told, displacement = dict(start.worn), dict(start.slipped), {}, problem.displacement(end.u)
     for name, contact in results.items():
-        pair = problem.pairs[name]
-        if pair.options.wear is None:
-            continue
-        before = start.worn.get(name, Worn.nothing(len(contact.points)))
-        at = problem.configuration(name, start, load, displacement, end.u)
-        worn[name] = before.after(pair, at, contact, pair.options.wear)
-        told[name] = replace(contact, wear=worn[name].depth)
-    return replace(end, worn=worn), told
+        pair, at = problem.pairs[name], problem.configuration(name, start, load, displacement, end.u)
+        slip = slip_in_step(pair, at, contact)
+        slipped[name] = slip + start.slipped.get(name, 0.0)
+        told[name] = replace(contact, slip=slip, slip_total=slipped[name])
+        if pair.options.wear is not None:
+            before = start.worn.get(name, Worn.nothing(len(contact.points)))
+            worn[name] = before.after(pair, at, contact, pair.options.wear)
+            told[name] = replace(told[name], wear=worn[name].depth)
+    return replace(end, worn=worn, slipped=slipped), told
 
 
 def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> dict[str, tuple[Array, Array]]:

@@ -19,7 +19,7 @@ from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis.balance import Balance, balance
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import StepContext
-from fastcontact.analysis.keep_contact import keep_contact, keep_wear
+from fastcontact.analysis.keep_contact import keep_contact, keep_slip
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_result import contact_results, counted, recover
@@ -142,5 +142,5 @@ def after_contact(
     """Return the end of the step with what later steps start from, and the results of all contact pairs."""
     end = keep_contact(problem, start, load, settled, end)
     results = contact_results(problem, start, load, settled, end)
-    end, results = keep_wear(problem, start, load, end, results)
+    end, results = keep_slip(problem, start, load, end, results)
     return end.after_touching(name for name, pair in results.items() if pair.active.any()), results

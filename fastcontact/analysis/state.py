@@ -39,6 +39,8 @@ class State:
         By contact pair, by how much its rigid obstacle has turned, where one does [radian].
     worn : dict of str to Worn
         By contact pair that wears, what has been worn off.
+    slipped : dict of str to ndarray (m, dim)
+        By contact pair, the slip of its secondary nodes so far [length].
     never_opening : dict of str to (ndarray (m, dim), ndarray of bool (m,))
         By contact pair that is bilateral once closed, places of constraints [length] and which of them are closed for good.
     traction : dict of str to (ndarray (m, dim), ndarray (m, dim))
@@ -71,6 +73,7 @@ class State:
     obstacles: Mapping[str, Array] = field(default_factory=dict)
     angles: Mapping[str, float] = field(default_factory=dict)
     worn: Mapping[str, Worn] = field(default_factory=dict)
+    slipped: Mapping[str, Array] = field(default_factory=dict)
     never_opening: Mapping[str, tuple[Array, Mask]] = field(default_factory=dict)
     first_contact: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
     traction: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
@@ -109,6 +112,7 @@ class State:
                     "first_contact": _listed(self.first_contact.get(name)),
                     "traction": _listed(self.traction.get(name)),
                     "angle": self.angles.get(name),
+                    "slipped": self.slipped.get(name),
                     "worn": [self.worn[name].depth, self.worn[name].pressure, self.worn[name].pace]
                     if name in self.worn
                     else None,
@@ -134,7 +138,7 @@ class State:
         pairs, numbers = kept["pairs"], kept["numbers"]
         found = {
             key: {name: own[key] for name, own in pairs.items() if own.get(key) is not None}
-            for key in ("closed", "now", "first_contact", "traction", "angle", "worn")
+            for key in ("closed", "now", "first_contact", "traction", "angle", "slipped", "worn")
         }
         return cls(
             u,
@@ -144,6 +148,7 @@ class State:
             obstacles={name: now.copy() for name, now in found["now"].items()},
             angles=dict(found["angle"]),
             worn={name: Worn(*parts) for name, parts in found["worn"].items()},
+            slipped=dict(found["slipped"]),
             never_opening={name: (both[0], both[1]) for name, both in found["closed"].items()},
             first_contact={name: (both[0], both[1]) for name, both in found["first_contact"].items()},
             traction={name: (both[0], both[1]) for name, both in found["traction"].items()},

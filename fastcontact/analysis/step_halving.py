@@ -6,6 +6,8 @@ import logging
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from fastcontact.analysis.load_step import load_step
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
@@ -70,7 +72,11 @@ def _joined(parts: list[StepResult]) -> StepResult:
     for name in ("geometry_updates", "active_set_iterations", "linear_iterations"):
         iterations[name] = sum(log[name] for log in logs)
     contact = {
-        name: replace(result, dissipation=sum(part.contact[name].dissipation for part in parts))
+        name: replace(
+            result,
+            dissipation=sum(part.contact[name].dissipation for part in parts),
+            slip=np.sum([part.contact[name].slip for part in parts], axis=0),
+        )
         for name, result in end.contact.items()
     }
     return replace(end, contact=contact, iterations=iterations)

@@ -7,16 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.analysis.slip import slip_of_nodes
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.obstacles.rigid_side import RigidSide
-from fastcontact.contact.pairing import Candidates, rows_along
 from fastcontact.mesh import elements
 from fastcontact.results.step import ContactResult
 
 Array = NDArray[np.float64]
-# In facet lengths: nodes that stand out as far beyond the other side may still be pressed, by parts of their facets.
-STANDS_OUT = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,24 +67,6 @@ def worn_in_step(
         distance = np.where(contact.sticking, 0.0, distance)
     pressure = np.maximum(contact.pressure + before, 0.0)
     return np.asarray(coefficient * 0.5 * pressure * distance)
-
-
-def slip_of_nodes(pair: Formulation, at: Configuration) -> Array:
-    """Return the slip (m, dim) of the secondary nodes in a step along what they face, else zero [length]."""
-    dim = at.displacement.shape[1]
-    nodes = Candidates(pair.secondary.points[:, None], np.ones((len(pair.secondary.points), 1)))
-    pairing = pair.facing(nodes, at, max(pair.projection_tolerance or 0.0, STANDS_OUT))
-    moved = (at.displacement - at.start).ravel()
-    slip = np.zeros((len(nodes.nodes), dim))
-    for axis, unit in enumerate(np.eye(dim)):
-        along = np.tile(unit, (len(slip), 1))
-        slip[:, axis] = rows_along(along, nodes, pairing, pair.primary, moved.size) @ moved
-    if isinstance(pair.primary, RigidSide):
-        slip -= at.obstacle - at.obstacle_start
-        turning = pair.turning(nodes, at)
-        slip -= 0.0 if turning is None else turning
-    slip -= np.einsum("nd,nd->n", slip, pairing.normal)[:, None] * pairing.normal
-    return np.where(pairing.paired[:, None], slip, 0.0)
 
 
 def too_fast(pair: Formulation, worn: Worn) -> float:

@@ -25,13 +25,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     what.add_argument(
         "--zones", action="store_true", help="where the contact is open, closed and slides, over the load"
     )
-    what.add_argument("--map", action="store_true", help="pressure and shear over the contact surface (3D)")
+    what.add_argument(
+        "--map", action="store_true", help="pressure and shear (or --field contact_slip) over the contact (3D)"
+    )
     what.add_argument("--section", metavar="PLANE", help="a section, such as y=0 or x=12.5 (3D)")
     what.add_argument("--animate", metavar="FILE", help="a moving picture over the load: .gif, with ffmpeg .mp4")
     what.add_argument("--view", action="store_true", help="an interactive window (PyVista) instead of a picture")
     parser.add_argument(
         "--field", metavar="NAME", default="von_mises",
-        help="what colours the mesh: von_mises (default), stress.xx, stress.principal_min, displacement, displacement.y ...",
+        help="what colours the mesh: von_mises (default), stress.xx, stress.principal_min, displacement.y, contact_slip ...",
     )  # fmt: skip
     parser.add_argument("--zoom", metavar="LENGTH", type=float, help="half the width to draw around the largest value")
     parser.add_argument("--mirrored", action="store_true", help="draw the full section beyond the axis, too")
@@ -118,7 +120,8 @@ def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict
     theories = case["theories"].get(name, {})
     if options.map:
         labels["title"] = f"{case['title']}\ncontact '{name}', load factor {step.load_factor:g}".strip()
-        return plot.contact_map(results.mesh, step.contact[name], **labels)[0]
+        beside = options.field.removeprefix("contact_") if options.field.startswith("contact_") else "shear"
+        return plot.contact_map(results.mesh, step.contact[name], beside=beside, **labels)[0]
     if options.zones:
         return plot.contact_zones(list(results), name, **labels)
     if options.history:

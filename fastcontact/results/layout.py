@@ -43,8 +43,8 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.int8]
 
 # 1: until the restart state came in. 2: restart state of the last step, any number of run records. 3: the middle of a
-# contact, and places measured from it.
-SCHEMA = 3
+# contact, and places measured from it. 4: slip.
+SCHEMA = 4
 # Files from this schema on can be resumed.
 RESUMABLE = 2
 
@@ -56,6 +56,8 @@ POINT_FIELDS = {
     "von_mises_signed": 1,
     "reaction": 3,
     "contact_pressure": 1,
+    "contact_slip": 3,
+    "contact_slip_total": 3,
 }
 
 # Cell data of models in which materials meet: the nodal stress on each cell's own side, averaged over its nodes.
@@ -88,7 +90,9 @@ def contact_row(dim: int, wears: bool = False) -> np.dtype[Any]:
     """Return the type of one row of a contact table: one secondary node in one step; with depth where the pair `wears`."""
     names = ("abscissa", "place", "gap", "pressure", "multiplier", *(("wear",) if wears else ()))
     scalars = [(name, "<f8") for name in names]
-    vectors = [(name, "<f8", (dim,)) for name in ("coordinates", "force_vectors", "normal", "shear")]
+    vectors = [
+        (name, "<f8", (dim,)) for name in ("coordinates", "force_vectors", "normal", "shear", "slip", "slip_total")
+    ]
     return np.dtype([("points", "<i4"), ("active", "i1"), ("sticking", "i1"), *scalars, *vectors])
 
 
@@ -168,10 +172,21 @@ def contact_pressure(mesh: Mesh, step: StepResult) -> Array:
     return pressure
 
 
+def contact_slip(mesh: Mesh, step: StepResult, name: str) -> Array:
+    """Return ``"slip"`` or ``"slip_total"`` at every point (n_points, dim), the larger one of several pairs [length]."""
+    found = np.zeros((mesh.n_points, mesh.dim))
+    for contact in step.contact.values():
+        own = getattr(contact, name)
+        larger = ~(np.abs(own).max(axis=1) < np.abs(found[contact.points]).max(axis=1))
+        found[contact.points[larger]] = own[larger]
+    return found
+
+
 def point_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
     """Return the point data of a step by name, padded to the components of `POINT_FIELDS`."""
-    values = {name: getattr(step, name) for name in POINT_FIELDS if name != "contact_pressure"}
+    values = {name: getattr(step, name) for name in POINT_FIELDS if not name.startswith("contact_")}
     values["contact_pressure"] = contact_pressure(mesh, step)
+    values |= {f"contact_{name}": contact_slip(mesh, step, name) for name in ("slip", "slip_total")}
     return {name: padded(values[name], width) for name, width in POINT_FIELDS.items()}
 
 

@@ -318,6 +318,11 @@ class Results(Sequence[StepResult]):
         return MaterialStress(cells, *columns)
 
     @property
+    def point_field_names(self) -> list[str]:
+        """Names of the point fields that change from step to step: earlier versions wrote fewer."""
+        return [name for name in layout.POINT_FIELDS if name in self._file["VTKHDF/PointData"]]
+
+    @property
     def cell_field_names(self) -> list[str]:
         """Names of the cell fields that change from step to step."""
         static = {*layout.cell_fields(self.mesh), *layout.MATERIAL_FIELDS, "material"}

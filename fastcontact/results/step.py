@@ -99,6 +99,9 @@ class ContactResult:
         axisymmetry, in 3D, and on a ring that is pressed all round.
     wear : ndarray (m,), optional
         Depth worn off so far, with the option ``wear`` [length]; the next load step begins with it. None without.
+    slip, slip_total : ndarray (m, dim)
+        Relative tangential displacement of closed nodes over what they face, in this step and the sum of all steps so far;
+        zero at nodes that friction holds, and for the step at open ones [length]. NaN in files from before it was told.
     primary_points : ndarray of int (k,)
         Point numbers of the primary side; none for a rigid obstacle.
     primary_force_vectors : ndarray (k, dim)
@@ -130,6 +133,8 @@ class ContactResult:
     obstacle_angle: float | None = None
     torque: float | None = None
     wear: Array | None = None
+    slip: Array = None  # type: ignore[assignment]
+    slip_total: Array = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         if self.middle is None:
@@ -144,6 +149,9 @@ class ContactResult:
             object.__setattr__(self, "shear", np.zeros_like(self.coordinates))
         if self.sticking is None:
             object.__setattr__(self, "sticking", self.active.copy())
+        for name in ("slip", "slip_total"):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, np.full_like(self.coordinates, np.nan))
 
     @property
     def shown(self) -> dict[str, str]:

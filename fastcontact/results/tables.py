@@ -38,9 +38,9 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Tab
     structured ndarray (m,)
         ``point``; ``x``, ``y`` (``z``), ``abscissa``, ``radius`` (distance from the middle of the contact), ``place`` (the
         same with a sign, see `ContactResult`), ``gap`` [length]; ``pressure`` [pressure]; ``multiplier`` [force or
-        pressure]; ``force_x`` ... [force]; ``shear_x`` ... [pressure]; ``active``, ``sticking`` (true or false). With
-        `step` also ``displacement_x`` ... [length], ``stress_xx`` ..., ``normal_stress``, ``von_mises``,
-        ``von_mises_signed`` [pressure].
+        pressure]; ``force_x`` ... [force]; ``shear_x`` ... [pressure]; ``slip_x`` ..., ``slip_total_x`` ... [length];
+        ``active``, ``sticking`` (true or false). With `step` also ``displacement_x`` ... [length], ``stress_xx`` ...,
+        ``normal_stress``, ``von_mises``, ``von_mises_signed`` [pressure].
     """
     columns = {
         **_places(contact.points, contact.coordinates, contact.abscissa),
@@ -51,6 +51,8 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Tab
         "multiplier": contact.multiplier,
         **_by_axis("force_", contact.force_vectors),
         **_by_axis("shear_", contact.shear),
+        **_by_axis("slip_", contact.slip),
+        **_by_axis("slip_total_", contact.slip_total),
         "active": contact.active,
         "sticking": contact.sticking,
     }

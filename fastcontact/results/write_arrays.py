@@ -175,6 +175,8 @@ def append_fields(file: Any, mesh: Mesh, number: int, step: StepResult, cell_fie
     first = number * mesh.n_points
     data = file["VTKHDF/PointData"]
     for name, values in layout.point_fields(mesh, step).items():
+        if name not in data:  # of a file that an earlier version began
+            continue
         data[name].resize(first + len(values), axis=0)
         data[name][first:] = values
     for name in cell_fields:

@@ -36,7 +36,7 @@ def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
     """
     target = checked_target(xdmf_path)
     with open_results(result_path) as results:
-        mesh, load_factors = results.mesh, results.load_factors.tolist()
+        mesh, load_factors, fields = results.mesh, results.load_factors.tolist(), results.point_field_names
     if not load_factors:
         raise FileError(f"'{result_path}' holds no complete step yet: export it after the first one")
     topology = layout.xdmf_topology(mesh)
@@ -51,7 +51,7 @@ def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
         "Node": {name: values.dtype for name, values in layout.point_flags(mesh).items()},
         "Cell": {name: values.dtype for name, values in layout.cell_fields(mesh).items()},
     }
-    document = _document(reference, load_factors, sizes, static)
+    document = _document(reference, load_factors, fields, sizes, static)
     ElementTree.indent(document)
     with replacing(target) as temporary, open(temporary, "w", encoding="utf-8") as file:
         file.write('<?xml version="1.0" encoding="utf-8"?>\n')
@@ -59,8 +59,9 @@ def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
 
 
 def _document(
-    reference: str, load_factors: list[float], sizes: dict[str, int], static: dict[str, dict[str, Any]]
-) -> Node:
+    reference: str, load_factors: list[float], fields: list[str], sizes: dict[str, int],
+    static: dict[str, dict[str, Any]],
+) -> Node:  # fmt: skip
     root = Node("Xdmf", Version="2.0")
     domain = ElementTree.SubElement(root, "Domain")
     collection = _child(domain, "Grid", Name="steps", GridType="Collection", CollectionType="Temporal")
@@ -68,7 +69,8 @@ def _document(
         grid = _child(collection, "Grid", Name=f"step {number + 1}", GridType="Uniform")
         _child(grid, "Time", Value=repr(load_factor))
         _geometry(grid, reference, sizes)
-        _fields(grid, reference, sizes["points"], number, len(load_factors))
+        for field in fields:
+            _field(grid, f"{reference}:/VTKHDF/PointData/{field}", sizes["points"], number, len(load_factors))
         for center, arrays in static.items():
             count = sizes["points"] if center == "Node" else sizes["cells"]
             group = "PointData" if center == "Node" else "CellData"
@@ -95,18 +97,18 @@ def _geometry(grid: Node, reference: str, sizes: dict[str, int]) -> None:
     _hdf(geometry, f"{reference}:/VTKHDF/Points", f"{sizes['points']} 3", "Float", 8)
 
 
-def _fields(grid: Node, reference: str, n_points: int, number: int, n_steps: int) -> None:
-    for name, width in layout.POINT_FIELDS.items():
-        address, rows = f"{reference}:/VTKHDF/PointData/{name}", n_points * n_steps
-        parts = [(name, 0, width)]  # label, first column and number of columns of each field
-        if name == "stress":  # XDMF orders the components of a symmetric tensor otherwise than VTK: each is a field
-            parts = [(f"stress_{component}", column, 1) for column, component in enumerate(STRESS_COMPONENTS)]
-        for label, column, count in parts:
-            kind = "Vector" if count == 3 else "Scalar"
-            attribute = _child(grid, "Attribute", Name=label, AttributeType=kind, Center="Node")
-            shape, selection = (rows, width), ((number * n_points, column), (1, 1), (n_points, count))
-            dims = 1 if width == 1 else 2
-            _hyperslab(attribute, address, shape[:dims], tuple(row[:dims] for row in selection))
+def _field(grid: Node, address: str, n_points: int, number: int, n_steps: int) -> None:
+    name = address.rpartition("/")[2]
+    width, rows = layout.POINT_FIELDS[name], n_points * n_steps
+    parts = [(name, 0, width)]  # label, first column and number of columns of each field
+    if name == "stress":  # XDMF orders the components of a symmetric tensor otherwise than VTK: each is a field
+        parts = [(f"stress_{component}", column, 1) for column, component in enumerate(STRESS_COMPONENTS)]
+    for label, column, count in parts:
+        kind = "Vector" if count == 3 else "Scalar"
+        attribute = _child(grid, "Attribute", Name=label, AttributeType=kind, Center="Node")
+        shape, selection = (rows, width), ((number * n_points, column), (1, 1), (n_points, count))
+        dims = 1 if width == 1 else 2
+        _hyperslab(attribute, address, shape[:dims], tuple(row[:dims] for row in selection))
 
 
 def _hyperslab(parent: Node, address: str, shape: tuple[int, ...], selection: tuple[tuple[int, ...], ...]) -> None:

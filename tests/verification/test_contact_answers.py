@@ -167,6 +167,12 @@ def test_wear_of_two_bodies_and_of_an_obstacle_that_moves():
     moved.fix("TOP", "x")
     steps = fc.solve(moved, [1.0, 5.0, 9.0])
     assert fc.wear(moved, steps, "plane", WEAR)[-1] == pytest.approx(WEAR * 5.0 * 0.3, rel=1e-8)
+    for own, tolerance in ((found, 1e-3), (steps, 1e-8)):  # slip: the way of the step, and all of it
+        slips = [step.contact["plane"] for step in own]
+        for name, ways in (("slip", (0.0, 0.15, 0.15)), ("slip_total", (0.0, 0.15, 0.3))):
+            for contact, way in zip(slips, ways, strict=True):
+                assert getattr(contact, name)[:, 0] == pytest.approx(way, rel=tolerance, abs=1e-3 * tolerance)
+                assert getattr(contact, name)[:, 1] == pytest.approx(0.0, abs=1e-3 * tolerance)
 
 
 @pytest.mark.parametrize("element", ["quad4", "quad8"])

@@ -23,7 +23,11 @@ def pressed_block(formulation, friction, push, steps=4, nu=0.0):
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_a_block_pushed_far_slides_on_the_cone(formulation):
-    contact = pressed_block(formulation, 0.3, 1e-3)[-1].contact["pair"]
+    steps = pressed_block(formulation, 0.3, 1e-3)
+    contact = steps[-1].contact["pair"]
+    assert contact.slip[:, 0] == pytest.approx(contact.slip_total[:, 0] / 4, rel=2e-3)  # the load is proportional
+    assert contact.slip_total[:, 0] == pytest.approx(9e-4, rel=0.03)  # a tenth of the push shears the bodies
+    np.testing.assert_array_equal(contact.slip_total, np.sum([s.contact["pair"].slip for s in steps], axis=0))
     assert not contact.sticking.any()
     assert abs(contact.force[0] / contact.force[1]) == pytest.approx(0.3, rel=2e-3)  # the facets tilt a little
     assert contact.dissipation > 0
@@ -34,6 +38,7 @@ def test_a_block_pushed_a_little_sticks_and_dissipates_nothing(formulation):
     contact = pressed_block(formulation, 0.9, 2e-6)[-1].contact["pair"]
     assert contact.sticking[contact.active].all()
     assert contact.dissipation == pytest.approx(0.0, abs=1e-16)
+    assert not contact.slip_total.any()
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)

@@ -1,4 +1,4 @@
-"""The pressure over a contact surface in three dimensions, and the shear beside it."""
+"""The pressure over a contact surface in three dimensions, and shear or slip beside it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.contact.search.facet_tables import flat_triangles
-from fastcontact.errors import FastcontactError
+from fastcontact.errors import FastcontactError, unknown
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
@@ -28,6 +28,12 @@ Indices = NDArray[np.intp]
 MARGIN = 0.35
 # Least length of the mean of the facets' normals for a surface to be drawn as it is seen along it.
 LEAST_MEAN = 0.3
+# What may stand beside the pressure: its name in words, and what its unit belongs to.
+BESIDE = {
+    "shear": ("shear traction", "pressure"),
+    "slip": ("slip of the step", "length"),
+    "slip_total": ("slip so far", "length"),
+}
 
 
 @typed(FastcontactError)
@@ -36,14 +42,15 @@ def contact_map(
     contact: ContactResult,
     *,
     everything: bool = False,
+    beside: str = "shear",
     title: str = "",
     units: Units = UNKNOWN,
     axes: Sequence[Axes] | None = None,
 ) -> Sequence[Axes]:
-    """Plot the pressure over the secondary surface of a contact, and the shear beside it where there is any.
+    """Plot the pressure over the secondary surface of a contact, and shear or slip beside it where there is any.
 
     The undeformed surface is seen along its mean normal. Closed nodes are dots, open ones are not marked; where there is
-    shear, the nodes that slide are orange and arrows show its direction.
+    shear or slip, the nodes that slide are orange and arrows show its direction.
 
     Parameters
     ----------
@@ -52,12 +59,14 @@ def contact_map(
     contact : ContactResult
     everything : bool
         Draw the whole surface; by default the closed part and its surroundings.
+    beside : {"shear", "slip", "slip_total"}
+        What is drawn beside the pressure; see `ContactResult`.
     title, units
         As in `pressure_profile`.
     axes : matplotlib Axes, two where there is shear, optional
 
-    Returns a tuple of Axes: of the pressure, and where there is any of the shear. Raises FastcontactError if the mesh is not
-    three-dimensional, its surface is not that of the contact, or what is closed of it goes around a body.
+    Returns a tuple of Axes: of the pressure, and where there is any of the shear or slip. Raises FastcontactError if the
+    mesh is not three-dimensional, its surface is not that of the contact, or what is closed of it goes around a body.
     """
     if mesh.dim != 3:
         raise FastcontactError("maps of a contact are for meshes in three dimensions: draw the pressure profile")
@@ -67,22 +76,23 @@ def contact_map(
     if labels is None:
         flat -= contact.middle @ basis.T
         labels = ("across the contact", "up the contact")
-    shear = np.linalg.norm(contact.shear, axis=1)
-    both = bool(shear.max(initial=0.0) > 1e-9 * contact.pressure_max > 0.0)
+    if beside not in BESIDE:
+        raise FastcontactError(unknown("field beside the pressure", beside, BESIDE))
+    caption, quantity, vectors = *BESIDE[beside], getattr(contact, beside)
+    size = np.linalg.norm(vectors, axis=1)
+    both = bool(size.max(initial=0.0) > (1e-9 * contact.pressure_max if beside == "shear" else 0.0) >= 0.0)
     panels = _panels(axes, both)
-    fields = [(contact.pressure, "contact pressure"), (shear, "shear traction")]
-    for ax, (values, caption) in zip(panels, fields, strict=False):
+    fields = [(contact.pressure, "contact pressure", "pressure"), (size, caption, quantity)]
+    for ax, (values, caption, quantity) in zip(panels, fields, strict=False):
         ends = min(0.0, float(values.min(initial=0.0))), float(values.max(initial=0.0)) or 1.0
         drawn = fill(ax, blocks, flat, values, "viridis", ends)
         high = _limit(ax, flat, contact.active & ~np.array(everything))
-        ax.figure.colorbar(drawn, ax=ax, label=labelled(caption, units, "pressure"), shrink=0.75 * high)
+        ax.figure.colorbar(drawn, ax=ax, label=labelled(caption, units, quantity), shrink=0.75 * high)
         _nodes(ax, flat, contact, both)
         ax.set(xlabel=labelled(labels[0], units, "length"), ylabel=labelled(labels[1], units, "length"), aspect="equal")
-        ax.set_title(
-            f"{caption}, largest {valued(float(values.max(initial=0.0)), units, 'pressure')}", fontsize="medium"
-        )
+        ax.set_title(f"{caption}, largest {valued(float(values.max(initial=0.0)), units, quantity)}", fontsize="medium")
     if both:
-        _arrows(panels[1], flat, contact.shear @ basis.T, shear)
+        _arrows(panels[1], flat, vectors @ basis.T, size)
     if axes is None:
         panels[0].figure.set_figheight(1.6 + 3.0 * high)
     panels[0].figure.suptitle(title or f"Contact '{contact.name}'", fontsize="large")
@@ -151,10 +161,10 @@ def _nodes(ax: Any, flat: Array, contact: ContactResult, both: bool) -> None:
             ax.plot(*flat[here].T, "o", ms=3, mfc=colour, mec="black", mew=0.4, label=name)
 
 
-def _arrows(ax: Any, flat: Array, shear: Array, size: Array) -> None:
-    """Draw the direction of the shear at the nodes that have a tenth of the largest."""
+def _arrows(ax: Any, flat: Array, vectors: Array, size: Array) -> None:
+    """Draw the direction of shear or slip at the nodes that have a tenth of the largest."""
     here = size > 0.1 * size.max()
-    ax.quiver(*flat[here].T, *shear[here].T, color="white", width=0.004, pivot="tail")
+    ax.quiver(*flat[here].T, *vectors[here].T, color="white", width=0.004, pivot="tail")
 
 
 def _limit(ax: Any, flat: Array, closed: NDArray[np.bool_]) -> float:

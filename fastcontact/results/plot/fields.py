@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fastcontact.elasticity.recovery import von_mises, von_mises_signed
 from fastcontact.errors import FastcontactError, unknown
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.results.layout import contact_slip
 from fastcontact.results.separated import separated
 from fastcontact.results.step import StepResult
 from fastcontact.results.tables import AXES, STRESS_COMPONENTS
@@ -76,6 +77,9 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
             raise FastcontactError(unknown("field", name, names(mesh)))
         values = np.linalg.norm(step.displacement, axis=1) if axis is None else step.displacement[:, axis]
         return Field(mesh, kept, values, "displacement" if axis is None else f"displacement along {name[-1]}", "length")
+    if name in SLIPS:
+        slip = np.linalg.norm(contact_slip(mesh, step, name.removeprefix("contact_")), axis=1)
+        return Field(mesh, np.arange(mesh.n_points, dtype=np.int32), slip, SLIPS[name], "length")
     apart, node, stress = separated(mesh, step)
     if name == "von_mises" and apart is mesh:
         return Field(mesh, node, step.von_mises, CAPTIONS[name], "pressure")
@@ -92,7 +96,7 @@ def names(mesh: Mesh) -> list[str]:
     """Return the names of all fields that a mesh can have."""
     components = STRESS_COMPONENTS[: 4 if mesh.dim == 2 else 6]
     displacements = [name for name in DISPLACEMENTS if "." not in name or name[-1] in AXES[: mesh.dim]]
-    return [*CAPTIONS, *(f"stress.{name}" for name in components), *displacements]
+    return [*CAPTIONS, *(f"stress.{name}" for name in components), *displacements, *SLIPS]
 
 
 def principal_stresses(stress: Array) -> Array:
@@ -125,4 +129,5 @@ OF_STRESS: dict[str, Callable[[Array], Array]] = {
     "stress.principal_mid": lambda stress: principal_stresses(stress)[:, 1],
     "stress.principal_min": lambda stress: principal_stresses(stress)[:, 0],
 }
+SLIPS = {"contact_slip": "slip of the step", "contact_slip_total": "slip so far"}
 DISPLACEMENTS = ("displacement", "displacement.x", "displacement.y", "displacement.z")

@@ -302,7 +302,7 @@ def test_all_that_a_step_changes_is_kept_or_set_anew():
     learnt = {"solver"}  # from what the solver remembers
     names = {"u": "obstacles", "gap_round_off": "numbers", "largest_force": "numbers", "largest_rigid_force": "numbers"}
     of_pairs = {"traction": "traction", "obstacles": "now", "angles": "angle", "never_opening": "closed"}
-    of_pairs |= {"first_contact": "first_contact", "worn": "worn"}
+    of_pairs |= {"first_contact": "first_contact", "worn": "worn", "slipped": "slipped"}
     (step,) = fc.solve(spheres(), fc.linear_ramp(1), linear_solver="amg")
     for field in fields(State):
         if field.name in of_pairs:

@@ -44,6 +44,8 @@ def test_every_field_is_what_its_name_says():
     n = mesh.n_points
     stress, u = random.normal(size=(n, 6)), random.normal(size=(n, 3))
     step = step_of(mesh, stress=stress, displacement=u)
+    for name in ("contact_slip", "contact_slip_total"):
+        assert not field_of(mesh, step, name).values.any(), "without contact"
     tensor = stress[:, [0, 3, 5, 3, 1, 4, 5, 4, 2]].reshape(n, 3, 3)
     principal = np.linalg.eigvalsh(tensor)
     expected = {
@@ -57,7 +59,7 @@ def test_every_field_is_what_its_name_says():
     }
     for name, values in expected.items():
         np.testing.assert_allclose(field_of(mesh, step, name).values, values, atol=1e-12)
-    assert {*expected, "von_mises", "von_mises_signed"} == set(names(mesh))
+    assert {*expected, "von_mises", "von_mises_signed", "contact_slip", "contact_slip_total"} == set(names(mesh))
     deviator = tensor - np.trace(tensor, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
     equivalent = np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2)))
     signs = np.where(np.trace(tensor, axis1=1, axis2=2) < 0, -1, 1)
@@ -305,6 +307,13 @@ def test_a_contact_map_with_friction_has_shear_beside_the_pressure():
     assert sliding > 0
     (arrows,) = (c for c in shear.collections if hasattr(c, "U"))
     np.testing.assert_allclose(np.column_stack([arrows.U, arrows.V]), contact.shear[size > 0.1 * size.max()][:, :2])
+    for name in ("slip", "slip_total"):
+        drawn = fc.plot.contact_map(mesh, contact, beside=name)[1].collections[0].get_array()
+        size = np.linalg.norm(getattr(contact, name), axis=1)
+        assert drawn.max() == pytest.approx(size.max())
+        assert field_of(mesh, steps[-1], f"contact_{name}").values[contact.points] == pytest.approx(size)
+    with pytest.raises(FastcontactError, match="unknown field beside the pressure 'gap': known are shear, slip"):
+        fc.plot.contact_map(mesh, contact, beside="gap")
     from matplotlib.figure import Figure
 
     own = Figure().subplots(1, 2)

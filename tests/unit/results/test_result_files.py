@@ -87,6 +87,8 @@ def contact_result(number: int, name: str, formulation: str, mesh: Mesh = MESH) 
         active=random.random(m) > 0.5,
         force=vectors(random, dim),
         radius=(float(number), np.nan),
+        slip=vectors(random, m, dim),
+        slip_total=vectors(random, m, dim),
     )
 
 
@@ -711,7 +713,7 @@ def test_a_file_from_the_future(path: Path) -> None:
     write(path)
     with h5py.File(path, "r+") as file:
         file["fastcontact"].attrs.modify("schema", 7)
-    with pytest.raises(FileError, match="has schema 7, this fastcontact reads up to 3: update it"):
+    with pytest.raises(FileError, match="has schema 7, this fastcontact reads up to 4: update it"):
         open_results(path)
 
 

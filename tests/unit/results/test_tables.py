@@ -74,7 +74,7 @@ def test_contact_table() -> None:
     table = contact_table(contact)
     assert table.dtype.names == (
         "point", "x", "y", "abscissa", "radius", "place", "gap", "pressure", "multiplier", "force_x", "force_y",
-        "shear_x", "shear_y", "active", "sticking",
+        "shear_x", "shear_y", "slip_x", "slip_y", "slip_total_x", "slip_total_y", "active", "sticking",
     )  # fmt: skip
     assert table["point"].tolist() == [0, 4, 1]
     assert table["x"].tolist() == [-3.0, -1.5, 0.0]

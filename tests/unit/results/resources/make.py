@@ -23,7 +23,8 @@ from fastcontact.results import layout
 HERE = Path(__file__).parent
 CASE_TEXT = 'title = "old"\n'
 FIELDS = ("displacement", "stress", "von_mises", "von_mises_signed", "reaction")
-CONTACT = ("points", "gap", "pressure", "multiplier", "force", "radius", "active", "dissipation", "shear")
+CONTACT = ("points", "gap", "pressure", "multiplier", "force", "radius", "active", "dissipation", "shear", "slip")
+CONTACT += ("slip_total",)
 
 
 def spheres() -> fc.Model:

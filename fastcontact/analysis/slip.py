@@ -1,0 +1,35 @@
+"""Slip of the secondary nodes of a contact pair: their motion in a load step along what they face."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.contact.configuration import Configuration
+from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.pairing import Candidates, tangents
+from fastcontact.results.step import ContactResult
+
+Array = NDArray[np.float64]
+# In facet lengths: nodes that stand out as far beyond the other side may still be pressed, by parts of their facets.
+STANDS_OUT = 3.0
+
+
+def slip_in_step(pair: Formulation, at: Configuration, contact: ContactResult) -> Array:
+    """Return the slip (m, dim) of the closed nodes in a step that ends `at` [length]; friction may hold them."""
+    if pair.options.tied or not contact.active.any():
+        return np.zeros_like(contact.coordinates)
+    held = contact.sticking & bool(pair.friction) & (pair.options.tangential_penalty is None)
+    return np.where((contact.active & ~held)[:, None], slip_of_nodes(pair, at), 0.0)
+
+
+def slip_of_nodes(pair: Formulation, at: Configuration) -> Array:
+    """Return the slip (m, dim) of the secondary nodes in a step along what they face, else zero [length]."""
+    nodes = Candidates.nodes_of(pair.secondary)
+    pairing = pair.facing(nodes, at, max(pair.projection_tolerance or 0.0, STANDS_OUT))
+    directions = tangents(pairing.normal)
+    rows, drift = pair.slips(nodes, pairing, directions, at)
+    along = np.stack([row @ (at.displacement - at.start).ravel() for row in rows])
+    along += 0.0 if drift is None else drift
+    slip = np.einsum("kn,knd->nd", along, np.stack(directions))
+    return np.where(pairing.paired[:, None], slip, 0.0)
