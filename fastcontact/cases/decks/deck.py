@@ -124,7 +124,8 @@ class Deck:
             )
             for name, c in step.contact.items()
         }  # fmt: skip
-        return replace(step, reaction=t * reaction, contact=whole)
+        work = {"work": {name: t * value for name, value in step.work.items()}} if step.work else {}
+        return replace(step, reaction=t * reaction, contact=whole, iterations=step.iterations | work)
 
     def _supports_alone(self, reaction: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return nodal forces (n_points, dim) without those of relations, found where no support acts [force]."""
