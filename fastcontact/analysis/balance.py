@@ -36,11 +36,11 @@ class Balance:
     largest : float
         The largest force of all steps so far [force].
     residual : float
-        The largest force that nothing balances [force].
+        The largest force that nothing balances; where that is beyond the bound, beyond round-off of its own row [force].
     bound : float
         What is allowed of it [force].
     relative : float
-        The residual over the largest force of this step, zero where that is round-off.
+        The largest force that nothing balances over the largest one of this step, zero where that is round-off.
     noise : float
         Forces up to this are round-off [force].
     energy : float
@@ -113,32 +113,37 @@ def balance(problem: Problem, u: Array, contact_force: Array, external: Array, l
     force = max(largest(part) for part in forces)
     largest_so_far = max(largest_so_far, force)
     bound = max(criteria.relative * force, criteria.absolute or 0.0)
-    round_off = noise = 0.0
+    off, round_off, noise = residual, 0.0, 0.0
     if not 0.0 < residual <= bound:
-        # Without forces the criterion is 0/0: round-off of the internal forces decides, which costs a product with K.
-        round_off, noise = _round_off(problem, u, forces, largest_so_far)
+        # Stiff parts that moved far are off by round-off of their own rows, which may be more than the forces of soft ones.
+        # Without forces the criterion is 0/0: round-off of all rows decides. Either costs a product with K.
+        row_sums = problem.system.K.row_sums(u)
+        residual = problem.system.balance(out, ROUND_OFF * row_sums)[1]
+        round_off, noise = _round_off(problem, row_sums, forces, largest_so_far)
     n_dofs = problem.model.n_dofs
     return Balance(
         reaction[:n_dofs] + ground_force(problem.model.springs, u[:n_dofs]),
         largest_so_far,
         residual,
         max(bound, round_off),
-        float(residual / force) if force > round_off else 0.0,
+        float(off / force) if force > round_off else 0.0,
         noise,
         energy,
     )
 
 
-def _round_off(problem: Problem, u: Array, forces: tuple[Array, ...], largest_force: float) -> tuple[float, float]:
+def _round_off(
+    problem: Problem, row_sums: Array, forces: tuple[Array, ...], largest_force: float
+) -> tuple[float, float]:
     """Return how far internal forces may be off where there are no other `forces` (n_dofs,) than their round-off [force].
 
-    And up to which size forces are round-off [force].
+    And up to which size forces are round-off [force]. `row_sums` (n_dofs,) is ``|K| |u|`` [force].
 
     That is so where no degree of freedom knows its force to the criterion, or the force itself may be round-off from
     elsewhere. Where forces are there, they are what counts: stiff parts that move far may not hide what is missing from
     soft ones.
     """
-    row_sums, slack = problem.system.K.row_sums(u), SLACK * largest_force
+    slack = SLACK * largest_force
     noise = max(slack, THERE * ROUND_OFF * largest(row_sums))
     for part in map(np.abs, forces):
         if ((part > noise) & (part * problem.criteria.relative > ROUND_OFF * row_sums)).any():

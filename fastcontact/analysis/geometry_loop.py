@@ -119,7 +119,7 @@ def settle_geometry(
     except ConvergenceError as error:
         error.history = error.history or iterate.history
         raise
-    nodes = SharedNodes.of(settled.constraints)
+    nodes = SharedNodes.of(settled.constraints, step.problem.model.seams)
     if nodes is None:
         return settled
     return replace(settled, solution=nodes.shared(settled.solution, settled.constraints, settled.iterate.u))
@@ -170,8 +170,8 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
 def _solve_once(
     step: StepContext, constraints: StackedConstraints, iterate: Iterate, active: Mask, accuracy: Accuracy
 ) -> tuple[Solution, Array]:
-    """Solve the inequalities of a pairing, those of nodes in several pairs once."""
-    nodes = SharedNodes.of(constraints)
+    """Solve the inequalities of a pairing, those of nodes in several pairs or at both ends of a seam once."""
+    nodes = SharedNodes.of(constraints, step.problem.model.seams)
     if nodes is None:
         return solve_inequalities(step, constraints, iterate, active & constraints.usable, accuracy)
     once = nodes.once(constraints)

@@ -7,10 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.analysis.facet_sag import sag_warnings
 from fastcontact.analysis.interpenetration import interpenetration
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.seams import seam_warnings
 from fastcontact.analysis.state import State
+from fastcontact.analysis.stress_scatter import scatter_warnings
 from fastcontact.analysis.volumetric_locking import locking_warning
 from fastcontact.analysis.wear import too_fast
 from fastcontact.contact.formulations import Formulation
@@ -47,16 +49,17 @@ IMBALANCE = 0.02
 def result_warnings(problem: Problem, state: State, last: StepResult) -> list[str]:
     """Return the warnings about an analysis whose `last` step ended in a state."""
     found = interpenetration(problem, state, last) + _large_strain(problem, last) + _large_rotation(problem, state)
-    found += _carrying_springs(problem, state) + locking_warning(problem, state.u)
+    found += _carrying_springs(problem, state) + (locking_warning(problem, state.u) or scatter_warnings(problem, last))
     found += [problem.solver.gave_up] if problem.solver.gave_up else []
     load = problem.load_at(last.load_factor)
-    loaded = bool(load.force.any() or load.lift.any())
+    loaded, sagging = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)
     for name, pair in problem.pairs.items():
         contact = last.contact[name]
         if pair.options.gap_only:
             continue
         found += _deep(pair, contact, state.u) + _lost(pair, contact, name in state.touched, loaded)
-        found += _unresolved(name, pair, contact) + _too_fast(name, pair, state)
+        found += [sagging[name]] if name in sagging else _unresolved(name, pair, contact)
+        found += _too_fast(name, pair, state)
     return found + seam_warnings(problem, last) + _unsettled(state) + _loose(problem, last) + _unbalanced(state)
 
 
@@ -133,10 +136,11 @@ def _loose(problem: Problem, last: StepResult) -> list[str]:
             f"round-off makes contact forces scatter by {scatter['force']:.1e} of the largest one from update to update, and "
             f"displacements by {scatter['displacement']:.1e}: results are no more accurate than that"
         )
-    if residual > LOOSE:
+    if residual > min(LOOSE, criteria.relative):
+        cause = "by round-off of a stiff body that moves far, in whose place a rigid obstacle may stand, "
         found.append(
             f"forces are out of balance by {residual:.1e} of the largest force (Criteria.relative = {criteria.relative:g}): "
-            "results are no more accurate than that"
+            f"{cause if residual > criteria.relative else ''}results are no more accurate than that"
         )
     return found
 

@@ -1,7 +1,7 @@
 """Contact at the ends of a part that repeats itself, where two nodes are one place.
 
-Their gaps are one and the same condition, or nearly so, which fixes the sum of their forces alone. Their pressure is that of
-the place: the sum of both forces over both areas.
+Their gaps are one and the same condition (`shared_nodes`) or one value of a field of pressures, which fixes the sum of their
+forces alone. Their traction is that of the place: the sum of both forces over both areas.
 """
 
 from __future__ import annotations
@@ -21,17 +21,20 @@ APART = 0.02
 
 
 def joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
-    """Return the results of contact pairs with one pressure for each place, and closed where one of its nodes is."""
+    """Return the results of contact pairs with one traction for each place, and closed where one of its nodes is."""
     found = dict(results)
     for name, contact in results.items() if problem.model.seams else ():
         pair = problem.pairs[name]
         areas = lumped_areas(pair.secondary, pair.points, pair.axisymmetric)
-        pressure, active = contact.pressure.copy(), contact.active.copy()
+        pressure, shear, active = contact.pressure.copy(), contact.shear.copy(), contact.active.copy()
         for seam in problem.model.seams:
             a, b = _rows(problem, contact, seam)
-            pressure[a] = pressure[b] = (areas[a] * pressure[a] + areas[b] * pressure[b]) / (areas[a] + areas[b])
+            part, turn = areas[a] / (areas[a] + areas[b]), np.eye(shear.shape[1]) if seam.turn is None else seam.turn
+            pressure[a] = pressure[b] = part * pressure[a] + (1.0 - part) * pressure[b]
+            shear[a] = part[:, None] * shear[a] + (1.0 - part[:, None]) * (shear[b] @ turn)
+            shear[b] = shear[a] @ turn.T
             active[a] = active[b] = active[a] | active[b]
-        found[name] = replace(contact, pressure=pressure, active=active)
+        found[name] = replace(contact, pressure=pressure, shear=shear, active=active)
     return found
 
 
@@ -46,12 +49,12 @@ def _rows(problem: Problem, contact: ContactResult, seam: Seam) -> tuple[NDArray
 def seam_warnings(problem: Problem, last: StepResult) -> list[str]:
     """Return a warning for each contact whose forces are split unevenly between nodes of one place.
 
-    Not for node-to-segment, where no other node has a part in it.
+    Formulations with a condition a node know of such nodes (`shared_nodes`), fields of pressures unless tractions turn.
     """
     found = []
     for name, contact in last.contact.items():
         largest, pair = contact.pressure_max, problem.pairs[name]
-        if pair.options.gap_only or pair.name == "node_to_segment" or not largest > 0.0:
+        if pair.options.gap_only or not hasattr(pair, "augmentation") or not largest > 0.0:
             continue
         for seam in problem.model.seams:
             a, b = _rows(problem, contact, seam)
@@ -63,6 +66,7 @@ def seam_warnings(problem: Problem, last: StepResult) -> list[str]:
                     f"contact '{name}' is closed where a period or sector begins and ends: at {int(wrong.sum())} places its "
                     f"forces are split unevenly between the two nodes of one place, by {apart[worst]:.4g} in pressure "
                     f"(points {contact.points[a[worst]]} and {contact.points[b[worst]]}). Their pressure is the mean, but "
-                    "that of neighbours may waver: let the period end where the contact is open"
+                    "that of neighbours may waver: let the period end where the contact is open, or use "
+                    'formulation="mortar", against an obstacle "node_to_segment"'
                 )
     return found

@@ -1,22 +1,28 @@
-"""Nodes in several contact pairs that face the same place: one condition, whose forces the pairs share.
+"""Nodes in several contact pairs, and at both ends of a period or sector: one condition, whose forces are shared.
 
 A node of several pairs behaves as that of one pair over all their facets. Its conditions are one and the same, which fixes
-the sum of their forces alone, and equations that repeat each other cannot be eliminated: one is solved for. It stands for
-the area of all, so that penalties add up, and has the mean of their coefficients of friction. Each pair then carries the
+the sum of their forces alone, and equations that repeat each other cannot be eliminated: their mean is solved for. It stands
+for the area of all, so that penalties add up, and has the mean of their coefficients of friction. Each pair then carries the
 part that its area is of all their areas, so that the pressure is the same. Of several clearances at one place the smallest
 alone can close. What gives way along the normal by penalties and different clearances repeats nothing.
+
+Two nodes at the ends of a part that repeats itself are one node, too: its gap, weighted over the facets at both ends, is the
+mean of theirs by area. Tangents at the second end are turned to the first one before they are compared.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
 from fastcontact.contact.constraints import Constraints, StackedConstraints
+from fastcontact.model.periodicity import Seam
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -39,25 +45,27 @@ class SharedNodes:
         Constraints that cannot close, for others are in front of them.
     part, along : ndarray (m,)
         Of the normal and of the tangential forces of a place, the part of each constraint [-].
+    frame : ndarray (m, k, dim)
+        Tangents of the constraints, at second ends of seams as they are at the first one [-].
     """
 
     place: Indices
     behind: Indices
     part: Array
     along: Array
+    frame: Array
 
     @classmethod
-    def of(cls, constraints: StackedConstraints) -> SharedNodes | None:
-        """Return those of the constraints of all pairs; None where no node is in several."""
-        if len(constraints.parts) < 2:
+    def of(cls, constraints: StackedConstraints, seams: Sequence[Seam] = ()) -> SharedNodes | None:
+        """Return those of the constraints of all pairs; None where no node is in several, or at both ends of a seam."""
+        if len(constraints.parts) < 2 and not seams:
             return None
         first, second, behind = _alike(constraints)
-        if not len(second) + len(behind):
+        ends = _at_seams(constraints, seams, behind)
+        if not len(second) + len(behind) + ends.shape[1]:
             return None
-        place = np.arange(len(constraints))
-        place[second] = first
-        part, along = _parts(constraints, place)
-        return cls(place, behind, part, along)
+        place = _places(constraints, np.hstack([np.stack([first, second]), ends]))
+        return cls(place, behind, *_parts(constraints, place), _frame(constraints, seams))
 
     @property
     def idle(self) -> Mask:
@@ -78,7 +86,14 @@ class SharedNodes:
 
     def once(self, constraints: StackedConstraints) -> Constraints:
         """Return constraints of which each place has one, for the area of all of its constraints."""
-        merged: dict[str, Array] = {}
+        mean = self._at_places(self.part)
+        merged = {
+            "B": csr_array(mean @ constraints.B),
+            "gap0": mean @ constraints.gap0,
+            "tangents": self._tangents(constraints),
+        }
+        if constraints.equality is not None:
+            merged["equality"] = constraints.equality & ~self.idle
         if constraints.softness is not None:
             total = self.summed(_stiffness(constraints.softness))
             merged["softness"] = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)
@@ -89,18 +104,31 @@ class SharedNodes:
             merged["tangential_softness"] = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)
             if constraints.elastic_slip is not None:
                 weight = np.divide(stiffness, total[self.place], out=np.zeros_like(total), where=np.isfinite(stiffness))
-                merged["elastic_slip"] = self._mean(constraints, constraints.elastic_slip.T, weight).T
+                merged["elastic_slip"] = self._mean(constraints.elastic_slip.T, weight).T
         if constraints.drift is not None:
-            merged["drift"] = self._mean(constraints, constraints.drift.T, self.along).T
+            merged["drift"] = self._mean(constraints.drift.T, self.along).T
         if constraints.friction is not None:
             merged["friction"] = self.summed(self.part * constraints.friction)
         return replace(constraints, **merged).without(self.idle)  # type: ignore[arg-type]
 
-    def _mean(self, constraints: Constraints, along: Array, weight: Array) -> Array:
+    def _at_places(self, weight: Array) -> csr_array:
+        """Return the matrix (m, m) that sums values with weights (m,) at each place."""
+        m = len(weight)
+        return csr_array((weight, (self.place, np.arange(m))), shape=(m, m))
+
+    def _tangents(self, constraints: Constraints) -> tuple[csr_array, ...]:
+        """Return the rows (m, n_dofs) of the mean slips of each place along its own tangents."""
+        turn = np.einsum("mjd,mkd->jkm", self.frame, self.frame[self.place])
+        parts = [[self._at_places(self.along * each) for each in along] for along in turn]
+        return tuple(
+            csr_array(sum(each[k] @ T for each, T in zip(parts, constraints.tangents, strict=True)))
+            for k in range(len(parts))
+        )
+
+    def _mean(self, along: Array, weight: Array) -> Array:
         """Return the mean with weights (m,) of components along the tangents (m, k) at each place, along its own tangents."""
-        frame = _frame(constraints)
-        vectors = np.einsum("mk,mkd->md", weight[:, None] * along, frame)
-        return np.einsum("md,mkd->mk", self.summed(vectors), frame)
+        vectors = np.einsum("mk,mkd->md", weight[:, None] * along, self.frame)
+        return np.einsum("md,mkd->mk", self.summed(vectors), self.frame)
 
     def shared(self, solution: Solution, constraints: StackedConstraints, u: Array) -> Solution:
         """Return a solution of `once` at displacements `u` (n_dofs,) [length] with forces that all constraints share."""
@@ -110,7 +138,7 @@ class SharedNodes:
         active = solution.active[place]
         if not isinstance(solution, FrictionalEquilibrium):
             return replace(solution, multiplier=normal, gap=gap, active=active, wanted=active)
-        frame = _frame(constraints)
+        frame = self.frame
 
         def turned(along: Array) -> Array:
             return np.einsum("md,mkd->mk", np.einsum("mk,mkd->md", along, frame)[place], frame)
@@ -127,9 +155,43 @@ class SharedNodes:
         )
 
 
-def _frame(constraints: Constraints) -> Array:
-    """Return the tangents (m, k, dim) of constraints [-]."""
-    return np.stack(constraints.directions, axis=1)
+def _frame(constraints: StackedConstraints, seams: Sequence[Seam]) -> Array:
+    """Return the tangents (m, k, dim) of constraints, those at second ends of seams turned back to the first one [-]."""
+    m, dim = constraints.positions.shape
+    frame = np.stack(constraints.directions, axis=1) if constraints.directions else np.zeros((m, 0, dim))
+    for seam in seams:
+        if seam.turn is not None and constraints.nodes is not None:
+            there = np.isin(constraints.nodes, seam.second)
+            frame[there] = frame[there] @ seam.turn
+    return frame
+
+
+def _at_seams(constraints: StackedConstraints, seams: Sequence[Seam], behind: Indices) -> Indices:
+    """Return constraints (2, k) of a pair at the two nodes of one place."""
+    nodes, usable = _nodes(constraints), np.isfinite(_areas(constraints)) & constraints.usable
+    usable[behind] = False
+    found = [np.empty((2, 0), np.intp)]
+    for rows in constraints.rows().values() if seams else ():
+        own = rows.start + np.flatnonzero(usable[rows] & (nodes[rows] >= 0))
+        row = np.full(max(*(max(seam.first.max(), seam.second.max()) for seam in seams), nodes.max()) + 1, -1)
+        row[nodes[own]] = own
+        for seam in seams:
+            both = row[np.stack([seam.first, seam.second])]
+            found.append(both[:, (both >= 0).all(axis=0) & (both[0] != both[1])])
+    ends = np.hstack(found)
+    if constraints.equality is not None:
+        ends = ends[:, constraints.equality[ends[0]] == constraints.equality[ends[1]]]
+    return ends
+
+
+def _places(constraints: Constraints, pairs: Indices) -> Indices:
+    """Return the place (m,) of each constraint, `pairs` (2, k) being at one: of these one with friction, of low number."""
+    m = len(constraints)
+    label = connected_components(csr_array((np.ones(pairs.shape[1]), tuple(pairs)), shape=(m, m)), directed=False)[1]
+    last_to_first = np.lexsort((np.arange(m), constraints.coefficients == 0.0))[::-1]
+    first = np.empty(m, np.intp)
+    first[label[last_to_first]] = last_to_first
+    return first[label]
 
 
 def _stiffness(softness: Array) -> Array:
@@ -178,7 +240,7 @@ def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
     """Return constraints (k,) of a pair, those of other pairs (k,) that repeat them, and others that lie behind some.
 
     The latter face the same place along the same normal, with a larger clearance: what is in front of them holds their node,
-    unless it gives way. Of those that repeat each other the first one with friction is solved for.
+    unless it gives way.
     """
     first, second = _of_one_node(constraints)
     if not len(first):
@@ -192,21 +254,7 @@ def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
     behind = np.setdiff1d(second[~level & ~yields[first]], [])
     first, second = first[level], second[level]
     kept = ~(np.isin(first, behind) | np.isin(second, behind))
-    first, second = _ordered(constraints, first[kept], second[kept])
-    second, at = np.unique(second, return_index=True)
-    first = first[at]
-    none_before = ~np.isin(first, second)
-    return first[none_before], second[none_before], behind
-
-
-def _ordered(constraints: Constraints, first: Indices, second: Indices) -> tuple[Indices, Indices]:
-    """Return pairs (k,) of constraints, the one to solve for first, sorted by these: one with friction, of a low number."""
-    rank = np.arange(len(constraints))
-    rank[constraints.coefficients == 0.0] += len(constraints)
-    swap = rank[first] > rank[second]
-    first, second = np.where(swap, second, first), np.where(swap, first, second)
-    order = np.argsort(rank[first], kind="stable")
-    return first[order], second[order]
+    return first[kept], second[kept], behind
 
 
 def _of_one_node(constraints: StackedConstraints) -> tuple[Indices, Indices]:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.analysis.problem import Problem
-from fastcontact.elasticity import recovery
+from fastcontact.elasticity import incompatible_modes, recovery
 from fastcontact.elasticity.energy import cell_volumes
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.mesh import elements
@@ -53,10 +53,10 @@ class Comparison:
         self._model = model
         field = model.material_field()
         self._moduli, self._material = field.moduli, field.rows
-        self._averaged, self._owner = field.averaged, field.owner
+        self._treatment, self._owner = field.treatment, field.owner
         nu = np.full(len(self._moduli), -1.0)  # only isotropic materials have a mean dilatation; modes do not lock
         for number, (material, _) in enumerate(model.materials):
-            if isinstance(material, LinearElastic) and not material.incompatible_modes:
+            if isinstance(material, LinearElastic):
                 nu[field.owner == number] = material.largest_nu
         self._suspicious = (nu >= SUSPICIOUS) & (model.kinematics != "plane_stress")
         self._cells = {name: rows for name in model.mesh.solids if (rows := self._may_lock(name)).any()}
@@ -66,14 +66,16 @@ class Comparison:
     def _may_lock(self, name: str) -> NDArray[np.bool_]:
         """Return which cells (n_cells,) of an element may lock."""
         numbers = self._material[name]
-        return self._suspicious[numbers] & ((name in AT_NODES) | ~self._averaged[numbers])
+        bends = incompatible_modes.asked(name, self._treatment)
+        treated = self._treatment[numbers] & 1 > 0 if bends is None else self._treatment[numbers] > 0
+        return self._suspicious[numbers] & ((name in AT_NODES) | ~treated)
 
     def force(self, displacement: Array) -> Array:
         """Return the nodal forces (n_points, dim) [force] of displacements (n_points, dim) [length]."""
         mesh, kinematics = self._model.mesh, self._model.kinematics
         given = mesh, kinematics, self._moduli, self._material, displacement
-        own = recovery.stress_at_points(*given, self._averaged)
-        reference = recovery.stress_at_points(*given, self._averaged | self._suspicious)
+        own = recovery.stress_at_points(*given, self._treatment)
+        reference = recovery.stress_at_points(*given, self._treatment | self._suspicious)
         surplus = {name: np.zeros_like(own[name]) for name in self._cells}
         for name in self._cells:
             surplus[name][..., :3] = (own[name] - reference[name])[..., :3].mean(axis=2, keepdims=True)

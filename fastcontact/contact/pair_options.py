@@ -47,6 +47,8 @@ class PairOptions:
     search_distance : float, optional
         What is farther off, or deeper inside, now and as the load step begins, is not faced [length]; None: at any
         distance.
+    same_place : ndarray of int (n_points,), optional
+        For each node, the one whose multiplier it has, too, where the model repeats itself; None where it does not.
     """
 
     clearance: Field | None = None
@@ -59,6 +61,7 @@ class PairOptions:
     tangential_penalty: Field | None = None
     search_distance: float | None = None
     wear: float | None = None
+    same_place: NDArray[np.intp] | None = None
 
     @property
     def gap_only(self) -> bool:

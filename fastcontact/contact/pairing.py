@@ -25,6 +25,7 @@ from fastcontact.contact.projection import (
 )
 from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.contact.surface import Surface
+from fastcontact.mesh import elements
 
 Array = NDArray[np.float64]
 # In facet lengths: how far beyond both facets at a node a point may lie and still face it; what is rounding.
@@ -42,10 +43,40 @@ class Candidates:
         Point numbers.
     shape : ndarray (n, k)
         Weight of each node.
+    facet : ndarray of int (n,), optional
+        The secondary facet they lie on, counted through the blocks.
+    xi : ndarray (n, dim - 1), optional
+        Their reference coordinates in it.
     """
 
     nodes: NDArray[np.int32]
     shape: Array
+    facet: NDArray[np.intp] | None = None
+    xi: Array | None = None
+
+    @classmethod
+    def inside(cls, side: Surface, xi: Sequence[Array]) -> Candidates:
+        """Return points at the same reference coordinates (n, dim - 1) in all facets of a block, `xi` for each block."""
+        nodes, shapes, facets, first = [], [], [], 0
+        for block, own in zip(side.blocks, xi, strict=True):
+            nodes.append(np.repeat(block.facets, len(own), axis=0))
+            shapes.append(np.tile(elements.get(block.element).shape(own), (len(block.facets), 1)))
+            facets.append(np.repeat(first + np.arange(len(block.facets)), len(own)))
+            first += len(block.facets)
+        places = [np.tile(own, (len(block.facets), 1)) for block, own in zip(side.blocks, xi, strict=True)]
+        return cls(filled_up(nodes), filled_up(shapes), np.concatenate(facets), np.concatenate(places))
+
+    @classmethod
+    def nodes_of(cls, side: Surface) -> Candidates:
+        """Return the nodes of a side, each on one of its facets."""
+        facet, xi, first = np.zeros(len(side.points), np.intp), np.zeros((len(side.points), 1)), 0
+        for block in side.blocks:
+            own = elements.get(block.element).nodes
+            xi = np.broadcast_to(xi, (len(xi), own.shape[1])).copy()
+            facet[block.local] = first + np.arange(len(block.local))[:, None]
+            xi[block.local] = own
+            first += len(block.local)
+        return cls(side.points[:, None], np.ones((len(side.points), 1)), facet, xi)
 
     def positions(self, coordinates: Array) -> Array:
         """Return the positions (n, dim) for nodal `coordinates` (n_points, dim)."""

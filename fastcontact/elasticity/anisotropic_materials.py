@@ -45,15 +45,15 @@ class Orthotropic(Material):
     axes : sequence or callable, optional
         The material's axes, by default those of the mesh (in axisymmetry: radius, axis, circumference). Two or three vectors
         (x, y, z) at right angles, of any length; in the plane also the first one, (x, y), alone. Or a function from
-        positions (n, dim) [length] to unit vectors in rows (n, 3, 3), such as `CylindricalAxes`, taken at integration
-        points, or in cells with a mean dilatation at their middle.
+        positions (n, dim) [length] to unit vectors in rows (n, 3, 3), such as `CylindricalAxes`, taken at the quadrature
+        points of each cell.
     density : float, callable or ndarray (n,), optional
         Mass per volume [mass / length^3].
     expansion : float, callable, ndarray (n,) or three of them, optional
         Coefficients of thermal expansion, one for all or one along each axis [1 / temperature]; functions or arrays where
         they vary.
     incompatible_modes : bool
-        As of `LinearElastic`.
+        As of `LinearElastic`; by default cells have them.
 
     Notes
     -----

@@ -6,7 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact._jit import parallel
-from fastcontact.elasticity import dilatation, dilatation_kernels, element_kernels, incompatible_modes
+from fastcontact.elasticity import (
+    dilatation,
+    dilatation_kernels,
+    element_kernels,
+    incompatible_modes,
+    incompatible_modes_kernels,
+)
 from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.stiffness import of_cells
 from fastcontact.mesh import elements
@@ -20,7 +26,7 @@ Numbers = NDArray[np.intp]
 VARYING = 2_000
 
 
-def _beside(name: str, xi: Array) -> Array:
+def beside(name: str, xi: Array) -> Array:
     """Return the weights (n, n_q) [-] of values at the quadrature points for those at points `xi` (n, dim) [-]."""
     element = elements.get(name)
     if xi is element.quadrature[0]:
@@ -89,8 +95,8 @@ class CellStress:
             N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
         loops, points = element_kernels.loops(self._mesh.dim), self._mesh.points
 
-        def part(rows: tuple[int, int]) -> None:
-            own = slice(*rows)
+        def part(span: tuple[int, int]) -> None:
+            own = slice(*span)
             if material.ndim == 1:
                 loops.stress(
                     points, cells[own], N, dN, moduli, material[own], self._axisymmetric, self._displacement, out[own]
@@ -104,6 +110,7 @@ class CellStress:
                     points, cells[own], *element.tables, polynomials, split.bulk, *shared, dilatation.basis(name, xi),
                     out[own],
                 )  # fmt: skip
+            self._add_modes((name, xi, dN), cells[own], material[own], out[own], None if rows is None else rows[own])
 
         parallel.shared(part, parallel.portions(len(out), cells.shape[1]))
         if self._offset is not None:
@@ -111,7 +118,6 @@ class CellStress:
             if self._offset.states:
                 assert rows is not None
                 self._add_initial(self._offset, (name, xi, rows), cells, material, out)
-        self._add_modes(name, xi, cells, of_cells(material), out, rows)
 
     def _fill_varying(
         self, at: tuple[str, Array, Array, Array], cells: NDArray[np.int32], material: NDArray[np.int32], moduli: Array,
@@ -134,37 +140,38 @@ class CellStress:
         unit, first = np.eye(self._moduli.shape[1])[None], np.zeros(len(cells), np.int32)
         strain = np.empty_like(out)
         loops.stress(self._mesh.points, cells, N, dN, unit, first, *shared, strain)
-        weights = _beside(name, xi)
+        weights = beside(name, xi)
         for rows in range(0, len(cells), VARYING):
             part = slice(rows, rows + VARYING)
             local = np.einsum("nq,cqij->cnij", weights, moduli[material[part]], optimize=True)
             out[part] = np.einsum("cnij,cnj->cni", local, strain[part])
 
     def _add_modes(
-        self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32], out: Array,
-        numbers: Numbers | None,
+        self, at: tuple[str, Array, Array], cells: NDArray[np.int32], material: NDArray[np.int32], out: Array,
+        rows: Numbers | None,
     ) -> None:  # fmt: skip
         """Add the stresses of incompatible modes."""
-        for rows in incompatible_modes.batches(incompatible_modes.asked(name, self._averaged, material)):
-            own, corners = cells[rows], self._mesh.points[cells[rows]]
-            moduli, lost = self._moduli[material[rows]], None
-            if self._offset is not None:
-                N = elements.get(name).tables[0]
-                rise = self._offset.rise[own] @ N.T
-                lost = rise[:, :, None] * self._offset.per_degree[material[rows]][:, None, :]
-                if numbers is not None:
-                    lost += self._lost_by_initial(self._offset, name, numbers[rows], N, moduli)
-            found = incompatible_modes.operators(name, corners, moduli.shape[1])
-            displacement = self._displacement[own].reshape(len(rows), -1)
-            amounts = incompatible_modes.amplitudes(found, moduli, displacement, lost)
-            strains = incompatible_modes.mode_strains(name, corners, xi, moduli.shape[1])
-            out[rows] += np.einsum("cij,cqja,ca->cqi", moduli, strains, amounts, optimize=True)
+        name, xi, dN = at
+        bends = incompatible_modes.asked(name, self._averaged)
+        if bends is None:
+            return
+        numbers = material.reshape(len(cells), -1)
+        lost = np.empty((0, 0, 0))
+        if self._offset is not None:
+            N = elements.get(name).tables[0]
+            lost = (self._offset.rise[cells] @ N.T)[:, :, None] * self._offset.per_degree[numbers]
+            if rows is not None:
+                lost += self._lost_by_initial(self._offset, name, rows, N, self._moduli[numbers])
+        incompatible_modes_kernels.add_stress(
+            self._mesh.points, cells, *incompatible_modes.tables(name), self._moduli, bends, numbers, self._displacement,
+            lost, xi, dN, beside(name, xi), out,
+        )  # fmt: skip
 
     @staticmethod
     def _lost_by_initial(offset: StressOffset, name: str, rows: Numbers, N: Array, moduli: Array) -> Array | float:
         """Return what stresses (n_cells, n, n_components) [pressure] lose by initial strains, less initial stresses."""
         strain, stress = (offset.initial(kind, name, rows, N) for kind in ("strain", "stress"))
-        lost = 0.0 if strain is None else np.einsum("cij,cnj->cni", moduli, strain)
+        lost = 0.0 if strain is None else (moduli @ strain[..., None])[..., 0]
         return lost if stress is None else lost - stress
 
     def _add_initial(
@@ -184,7 +191,7 @@ class CellStress:
         if material.ndim == 1:
             out -= np.einsum("cij,cnj->cni", moduli[material], strain)
         else:
-            local = np.einsum("nq,cqij->cnij", _beside(name, xi), moduli[material], optimize=True)
+            local = np.einsum("nq,cqij->cnij", beside(name, xi), moduli[material], optimize=True)
             out -= np.einsum("cnij,cnj->cni", local, strain)
         if split is None:
             return
@@ -211,7 +218,7 @@ class CellStress:
         if material.ndim == 1:
             per_degree = thermal.per_degree[material][:, None, :]
         else:
-            per_degree = np.einsum("nq,cqi->cni", _beside(name, xi), thermal.per_degree[material])
+            per_degree = np.einsum("nq,cqi->cni", beside(name, xi), thermal.per_degree[material])
             material = of_cells(material)
         projected = np.zeros(len(cells), bool) if split is None else split.bulk[material, 0] != 0.0
         out -= np.where(projected[:, None], 0.0, rise)[:, :, None] * per_degree

@@ -175,12 +175,15 @@ class System:
             dofs = np.unique(self.T[dofs].indices)
         return dofs[self.free[dofs]].astype(np.intp)
 
-    def balance(self, out: Array) -> tuple[Array, float]:
+    def balance(self, out: Array, round_off: Array | None = None) -> tuple[Array, float]:
         """Return the forces (n,) of supports and relations, and the largest force on an unknown, the residual.
 
-        `out` (n,) is the internal minus all other forces [force].
+        `out` (n,) is the internal minus all other forces [force]. Of its `round_off` (n,) nothing counts as residual.
         """
-        return np.where(self._reacting, out, 0.0), largest(self.reduced(out))
+        residual = self.reduced(out)
+        if round_off is not None:
+            residual = np.maximum(np.abs(residual) - (round_off if self.T is None else abs(self.T).T @ round_off), 0.0)
+        return np.where(self._reacting, out, 0.0), largest(residual)
 
 
 class ConstrainedMotion:

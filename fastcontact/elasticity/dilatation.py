@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.elasticity.energy import cell_volumes
+from fastcontact.elasticity.incompatible_modes import BENDING, MODES
 from fastcontact.mesh import elements
 
 Array = NDArray[np.float64]
@@ -52,9 +53,12 @@ def split(name: str, moduli: Array, averaged: Mask | None) -> Split | None:
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
         From `LinearElastic.moduli` [pressure].
     averaged : ndarray of bool (n_materials,), optional
-        Which materials have a mean dilatation, those with a 1 (`MaterialField.treatment`); none by default.
+        Which materials have a mean dilatation, those with a 1, outside `BENDING` with a 3
+        (`MaterialField.treatment`); none by default.
     """
-    averaged = None if averaged is None else np.asarray(averaged) == 1
+    if averaged is not None:
+        treatment = np.asarray(averaged).astype(np.uint8)
+        averaged = (treatment == 1) | ((treatment == 1 + MODES) & (name not in BENDING))
     if averaged is None or not averaged.any() or elements.get(name).dilatation is None:
         return None
     bulk = np.where(averaged, moduli[:, :3, :3].sum(axis=(1, 2)) / 9.0, 0.0)

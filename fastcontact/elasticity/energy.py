@@ -14,10 +14,10 @@ Array = NDArray[np.float64]
 def elastic_energy(stress: Array, compliance: Array) -> Array:
     """Return stress : strain (n_cells, n) [pressure] at points of cells.
 
-    From `stress` (n_cells, n, n_components) [pressure] and `compliance` (n_cells, n_components, n_components) [1 / pressure],
-    see `Material.compliance_at`.
+    From `stress` (n_cells, n, n_components) [pressure] and `compliance` (n_cells, 1 or n, n_components, n_components)
+    [1 / pressure], that of the cells or of the points, see `Material.compliance_at`.
     """
-    return np.asarray(((stress @ compliance) * stress).sum(axis=-1))
+    return np.asarray((stress * (compliance @ stress[..., None])[..., 0]).sum(axis=-1))
 
 
 def cell_volumes(corners: Array, N: Array, dN: Array, axisymmetric: bool) -> Array:
@@ -26,7 +26,9 @@ def cell_volumes(corners: Array, N: Array, dN: Array, axisymmetric: bool) -> Arr
     From the nodes of the cells, `corners` (n_cells, n_nodes, dim) [length], shape functions `N` (n_q, n_nodes) [-] and their
     derivatives `dN` (n_q, n_nodes, dim) [-].
     """
-    volume = np.linalg.det(np.einsum("qaj,cad->cqdj", dN, corners))
+    n_q, n_nodes, dim = dN.shape
+    slopes = corners.transpose(0, 2, 1) @ dN.transpose(1, 0, 2).reshape(n_nodes, -1)
+    volume = np.linalg.det(slopes.reshape(-1, dim, n_q, dim).transpose(0, 2, 1, 3))
     if axisymmetric:
         volume *= 2.0 * np.pi * np.einsum("qa,ca->cq", N, corners[:, :, 0])
     return np.asarray(volume)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fastcontact.elasticity.incompatible_modes import MODES
 from fastcontact.elasticity.initial_states import InitialState, StressOffset
 from fastcontact.elasticity.materials import MODULI, Material
-from fastcontact.elasticity.varying_constants import middle
+from fastcontact.elasticity.varying_constants import middle, positions
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
@@ -31,7 +31,7 @@ class Places:
     first : int
         Number of the first of them in `MaterialField.moduli`.
     points : ndarray (n, dim)
-        Where axes are taken: middles of cells, or quadrature points [length].
+        Where axes are taken: the middles of cells, or their quadrature points [length].
     constants : SimpleNamespace
         Of `Material.constants_at`.
     """
@@ -95,12 +95,13 @@ class MaterialField:
     def treatment(self) -> NDArray[np.uint8]:
         """What elements make of the strain, by moduli (n_moduli,): 1 a mean dilatation, 2 incompatible modes, 0 nothing.
 
-        Axisymmetric cells have no incompatible modes.
+        The sum of both is incompatible modes in the elements that have them, a mean dilatation in others. Axisymmetric cells
+        have no incompatible modes.
         """
         modes = np.array([material.incompatible_modes for material in self.materials], bool)[self.owner]
         found = self.averaged.astype(np.uint8)
         if self.kinematics != "axisymmetric":
-            found[modes] = MODES
+            found[modes] += MODES
         return found
 
     @cached_property
@@ -221,10 +222,9 @@ def material_field(
         for name, block in mesh.solids.items() if material.varies_inside else ():
             cells = np.flatnonzero(number[name] == index)
             N = elements.get(name).tables[0]
-            points = np.einsum("qn,cnd->cqd", N, mesh.points[block[cells]]).reshape(-1, mesh.dim)
             if name not in inside:
                 inside[name] = np.repeat(rows[name][:, None], len(N), axis=1)
-            found = added(index, points, material.constants_at(name, cells, N))
+            found = added(index, positions(mesh, block[cells], N), material.constants_at(name, cells, N))
             inside[name][cells] = found.reshape(len(cells), len(N))
     return MaterialField(
         materials, kinematics, np.concatenate(moduli), places, np.concatenate(owner), dict(number), rows, inside

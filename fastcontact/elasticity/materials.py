@@ -49,7 +49,8 @@ class Material:
     averaged : bool
         Whether elements have a mean dilatation, where they can and kinematics are not plane stress.
     incompatible_modes : bool
-        Whether linear quadrangles and hexahedra have incompatible modes, where kinematics are not axisymmetric.
+        Whether linear quadrangles and hexahedra have incompatible modes, where kinematics are not axisymmetric, in place of a
+        mean dilatation.
     """
 
     density: Any
@@ -101,11 +102,10 @@ class Material:
     def varies_inside(self) -> bool:
         """Whether axes, moduli or expansion vary inside cells: by functions, or by numbers at points.
 
-        Cells with a mean dilatation or incompatible modes have the axes and constants of their middle.
+        Cells with a mean dilatation have the constants of their middle.
         """
         own = [v for name in (*MODULI, "expansion") for v in varying(getattr(self, name, None))]
-        inside = callable(self.axes) or any(v.inside for v in own)
-        return inside and not (self.averaged or self.incompatible_modes)
+        return (callable(self.axes) or any(v.inside for v in own)) and not self.averaged
 
     def bound(self: AnyMaterial, cells: Cells) -> AnyMaterial:
         """Return the material that knows its cells, which constants that vary need; ModelError where these cannot be."""
@@ -313,8 +313,9 @@ class LinearElastic(Material):
     expansion : float, callable or ndarray (n,), optional
         Coefficient of thermal expansion [1 / temperature]; as E.
     incompatible_modes : bool
-        Linear quadrangles and hexahedra get incompatible modes, so that thin parts of them bend without locking in shear;
-        nothing changes in other elements and in axisymmetry. Excludes a mean dilatation.
+        Whether linear quadrangles and hexahedra have incompatible modes, so that thin parts of them bend without locking in
+        shear, and do not lock in volume either; nothing changes in other elements and in axisymmetry. Where they have them
+        they have no mean dilatation. They cost three times the assembly and ten times the recovery of stress.
     """
 
     E: Constant
@@ -337,8 +338,6 @@ class LinearElastic(Material):
             )
         if self.volumetric not in VOLUMETRIC:
             raise ModelError(unknown("volumetric", self.volumetric, VOLUMETRIC))
-        if self.incompatible_modes and self.volumetric == "mean_dilatation":
-            raise ModelError("a material has either incompatible modes or a mean dilatation, not both")
         check_density(self.density)
         check_expansion(self.expansion, 1)
 
@@ -389,8 +388,6 @@ class LinearElastic(Material):
     @property
     def averaged(self) -> bool:  # type: ignore[override]
         """Whether elements have a mean dilatation, where they can and kinematics are not plane stress."""
-        if self.incompatible_modes:  # which do not lock in volume either
-            return False
         nearly = self.largest_nu >= NEARLY_INCOMPRESSIBLE
         return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and nearly)
 

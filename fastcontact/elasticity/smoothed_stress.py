@@ -48,7 +48,7 @@ def smoothed_stress(
         What stresses have by temperature and initial states.
     """
     components = field.moduli.shape[1]
-    stress = CellStress(mesh, kinematics, field.moduli, displacement, field.averaged, offset)
+    stress = CellStress(mesh, kinematics, field.moduli, displacement, field.treatment, offset)
     found = {name: np.empty((*block.shape, components)) for name, block in mesh.solids.items()}
     material = field.distinct
     for number in np.unique(np.concatenate([*material.values()])):

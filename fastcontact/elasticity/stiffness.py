@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 
 from fastcontact._jit import parallel
-from fastcontact.elasticity import dilatation, dilatation_kernels, element_kernels, incompatible_modes
+from fastcontact.elasticity import (
+    dilatation,
+    dilatation_kernels,
+    element_kernels,
+    incompatible_modes,
+    incompatible_modes_kernels,
+)
 from fastcontact.elasticity import stiffness_kernels as pattern_kernels
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
@@ -121,31 +127,17 @@ def stiffness(
     for name, block in mesh.solids.items():
         split = dilatation.split(name, moduli, averaged)
         add = _Addition(mesh, name, kinematics == "axisymmetric", material[name], pattern, data)
-        found = parallel.shared(partial(add.part, moduli=moduli, special=special, split=split), range(add.n_parts))
+        bends = incompatible_modes.asked(name, averaged)
+        add_part = partial(add.part, moduli=moduli, special=special, split=split, bends=bends)
+        found = parallel.shared(add_part, range(add.n_parts))
         bad = min((number for number in found if number >= 0), default=-1)
         if bad >= 0:
             where = mesh.points[block[bad]].mean(axis=0)
             raise MeshError(
                 f"cell {bad} of {name} near {where} is degenerate or inside out: its Jacobian is not positive"
             )
-        _take_modes(mesh, name, moduli, of_cells(material[name]), averaged, pattern, data)
     size = mesh.n_points * mesh.dim
     return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
-
-
-def _take_modes(
-    mesh: Mesh, name: str, moduli: Array, material: NDArray[np.int32], treatment: dilatation.Mask | None,
-    pattern: Sparsity, data: Array,
-) -> None:  # fmt: skip
-    """Take what incompatible modes give way from `data` (n_blocks, dim, dim), in place."""
-    dim = mesh.dim
-    for rows in incompatible_modes.batches(incompatible_modes.asked(name, treatment, material)):
-        cells = mesh.cells[name][rows]
-        found = incompatible_modes.operators(name, mesh.points[cells], moduli.shape[1])
-        taken = incompatible_modes.condensed(found, moduli[material[rows]])
-        nodes = cells.shape[1]
-        blocks = taken.reshape(len(rows), nodes, dim, nodes, dim).transpose(0, 1, 3, 2, 4)
-        np.subtract.at(data, pattern.slots[name][rows], blocks)
 
 
 def of_special_form(moduli: Array) -> NDArray[np.bool_]:
@@ -203,7 +195,10 @@ class _Addition:
         """How many threads share the cells."""
         return len(self._parts)
 
-    def part(self, number: int, moduli: Array, special: dilatation.Mask, split: dilatation.Split | None) -> int:
+    def part(
+        self, number: int, moduli: Array, special: dilatation.Mask, split: dilatation.Split | None,
+        bends: NDArray[np.bool_] | None,
+    ) -> int:  # fmt: skip
         """Add the rows of a part; return the number of the first cell with a Jacobian that is not positive, or -1."""
         rows = slice(*self._parts[number])
         cells, material, slots = self._cells[rows], self._material[rows], self._slots[rows]
@@ -214,6 +209,11 @@ class _Addition:
             )
             if bad >= 0:
                 return int(bad) + rows.start
+        if bends is not None:
+            incompatible_modes_kernels.subtract_stiffness(
+                self._points, cells, *incompatible_modes.tables(self._name), moduli, bends,
+                material.reshape(len(cells), -1), slots, self._owner, number, self._data,
+            )  # fmt: skip
         if split is not None:
             material = of_cells(material)
             polynomials = dilatation.basis(self._name, elements.get(self._name).quadrature[0])

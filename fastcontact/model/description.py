@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact.elasticity.incompatible_modes import BENDING
 from fastcontact.elasticity.initial_states import ALWAYS, COMPONENTS
 from fastcontact.model.contact_pair import ContactPair
 
@@ -28,8 +29,13 @@ def sentences(model: Any) -> Iterator[str]:
         yield f"Units: {', '.join(named)}."
     for material, groups in model.materials:
         where = "all solid cells" if groups is None else _listed(groups)
-        locking = ", with a mean dilatation against locking" if material.averaged else ""
-        locking += ", with incompatible modes" if material.incompatible_modes else ""
+        modes = (
+            material.incompatible_modes
+            and model.kinematics != "axisymmetric"
+            and any(name in BENDING for name in mesh.solids)
+        )
+        locking = ", with a mean dilatation against locking" if material.averaged and not modes else ""
+        locking += ", with incompatible modes" if modes else ""
         yield f"Material: {material.described} in {where}{locking}."
     if not model.materials:
         yield "Material: none yet."

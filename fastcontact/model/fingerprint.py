@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact.contact.formulations import FORMULATIONS
+from fastcontact.elasticity.incompatible_modes import BENDING
 from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.elasticity.varying_constants import Varying
 from fastcontact.mesh.mesh import Mesh
@@ -25,6 +26,7 @@ from fastcontact.model.model import Model
 
 Array = NDArray[np.float64]
 LENGTH = 16
+SMOOTHING = "surface_smoothing of contact"
 
 
 def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[str, str]:
@@ -33,6 +35,8 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
     By the name of the part in messages: "the mesh", "the materials", "contact 'hertz'", ...
     """
     mesh = model.mesh
+    elements = model.kinematics != "axisymmetric" and any(name in BENDING for name in mesh.solids)
+    bends = [elements and material.incompatible_modes for material, _ in model.materials]
     parts: dict[str, Any] = {
         "the mesh": mesh,
         "the kinematics": model.kinematics,
@@ -41,11 +45,13 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         "the loads": _unordered(model.loads, mesh),
         **({"the temperatures": _unordered(model.temperatures, mesh)} if model.temperatures else {}),
         **({"the initial states": _unordered(model.initial_states, mesh)} if model.initial_states else {}),
+        **({"the incompatible modes": bends} if any(bends) else {}),
         "the relations": _unordered(model.relations, mesh),
         "the springs": _unordered(model.springs, mesh),
         **({"the pretension sections": _unordered(model.pretensions, mesh)} if model.pretensions else {}),
         "the list of contact pairs": [pair.name for pair in model.contact],
-        **{f"contact '{pair.name}'": pair for pair in model.contact},
+        **{f"contact '{pair.name}'": _without(pair, "surface_smoothing") for pair in model.contact},
+        **{f"{SMOOTHING} '{pair.name}'": True for pair in model.contact if model.bind(pair).smoothing},
         **{f"the option {name}": value for name, value in (options or {}).items()},
     }
     return {name: _digest(part, mesh) for name, part in parts.items()}
@@ -62,12 +68,17 @@ def formulation_behind(model: Model, name: str, digest: str | None) -> str | Non
     None where it is not: pairs that named none had other defaults in earlier versions.
     """
     (pair,) = (one for one in model.contact if one.name == name)
-    plain = {key: value for key, value in pair.options.items() if key != "multipliers"}
+    plain = _without(_without(pair, "surface_smoothing"), "multipliers")
     for formulation, options in _choices():
-        other = dataclasses.replace(pair, formulation=formulation, options={**plain, **options})
+        other = dataclasses.replace(plain, formulation=formulation, options={**plain.options, **options})
         if _digest(other, model.mesh) == digest:
             return ", ".join(f"{key}='{value}'" for key, value in {"formulation": formulation, **options}.items())
     return None
+
+
+def _without(pair: ContactPair, option: str) -> ContactPair:
+    """Return a pair without an option."""
+    return dataclasses.replace(pair, options={key: value for key, value in pair.options.items() if key != option})
 
 
 def _choices() -> Iterable[tuple[str, dict[str, str]]]:
@@ -126,7 +137,8 @@ def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: A
     elif not fields and callable(value):
         _take(_called(value, points), add, mesh, points)
     if isinstance(value, Material):  # a density or expansion that is not given counts as little as in older files
-        fields = [field for field in fields if getattr(value, field.name) not in (None, False)]
+        fields = [field for field in fields if getattr(value, field.name) is not None]
+        fields = [field for field in fields if field.name != "incompatible_modes"]
     if isinstance(value, ContactPair) and value.rotation is None:  # likewise
         fields = [field for field in fields if not field.name.startswith("rotation")]
     if isinstance(value, LinearElastic):  # what the choice comes to, and nothing where it is plain, as in older files

@@ -20,7 +20,6 @@ from fastcontact.mesh.elements import Element
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import poorest_cell
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.model.facet_sag import sag_warnings
 from fastcontact.model.hanging_nodes import hanging_nodes_warning
 from fastcontact.model.prescribed_overlap import Supports, prescribed_overlap_warnings
 from fastcontact.model.ramp import Ramp
@@ -59,7 +58,7 @@ def model_warnings(model: Model, ramp: Ramp) -> list[str]:
     found = _moduli(model) + _named_units(model) + _proportions(model)
     found += [text for text in (poorest_cell(model.mesh), hanging_nodes_warning(model)) if text] + _coincident(model)
     found += _friction(model) + _penetrating(model) + _unramped(model, ramp)
-    found += _prescribed_overlaps(model, ramp) + _lost_loads(model) + _split_sides(model) + sag_warnings(model)
+    found += _prescribed_overlaps(model, ramp) + _lost_loads(model) + _split_sides(model)
     return found + _stiffness(model.mesh) + [text for load in model.loads for text in _load_integral(model, load)]
 
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
+from scipy.sparse.csgraph import connected_components
 
 from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.elasticity.relations import Relation
@@ -24,10 +25,25 @@ CANCELLED = 1e-12
 
 
 class Seam(NamedTuple):
-    """Nodes of two groups that are one and the same place of a part that repeats itself: each (m,)."""
+    """Nodes of two groups that are one and the same place of a part that repeats itself: each (m,).
+
+    Vectors at the second node are those at the first one times `turn` (dim, dim); None where nothing turns.
+    """
 
     first: Nodes
     second: Nodes
+    turn: Array | None = None
+
+
+def same_place(seams: Sequence[Seam], n_points: int) -> Nodes | None:
+    """Return for each node (n_points,) the first of those at its place; None without seams."""
+    if not seams:
+        return None
+    ends = tuple(np.concatenate(side) for side in zip(*(seam[:2] for seam in seams), strict=True))
+    label = connected_components(csr_array((np.ones(len(ends[0])), ends), shape=(n_points, n_points)), directed=False)[
+        1
+    ]
+    return np.unique(label, return_index=True)[1][label]
 
 
 def periodic(
@@ -103,7 +119,7 @@ def cyclic(
             f"{name}: point {first[far]} of '{ends[0]}', turned by 1/{sectors} of a turn, lies {distance[far]:.3g} from the "
             f"nearest node of '{ends[1]}': the ends need nodes upon nodes; check axis and sectors, or mesh them alike"
         )
-    seam = Seam(first, second[place])
+    seam = Seam(first, second[place], turn)
     # u_second = Q u_first: rows (u_second - Q u_first) along the axes of the mesh, none for what lies along the axis on it.
     rows = csr_array(
         vstack([_differences(seam, np.column_stack([unit, -turn.T @ unit]), mesh) for unit in np.eye(mesh.dim)])

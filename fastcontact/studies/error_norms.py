@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastcontact.elasticity.cell_stress import CellStress
+from fastcontact.elasticity.cell_stress import CellStress, beside
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
 from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.errors import ModelError
@@ -163,17 +163,19 @@ def stress_in_cells(
     """Return shape functions, stresses, volumes and elastic constants at the quadrature points of some cells of a kind.
 
     Shape functions (n_q, n_nodes) [-]; stresses (n_cells, n_q, n_components) [pressure]; volumes (n_cells, n_q) [length^dim];
-    compliances (n_cells, n_components, n_components), where they vary those of the middle [1 / pressure]. `displacement` is
-    (n_points, dim) [length].
+    compliances (n_cells, 1 or n_q, n_components, n_components), where they vary inside cells those of the points
+    [1 / pressure]. `displacement` is (n_points, dim) [length].
     """
     mesh, element, axisymmetric = model.mesh, elements.get(name), model.kinematics == "axisymmetric"
     xi, weights = integration_rule(element, n_points)
     N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
     cells, field = mesh.cells[name][rows], model.material_field()
-    numbers = field.rows[name][rows]
+    numbers = field.loops[name][rows]
     found = CellStress(mesh, model.kinematics, field.moduli, displacement, field.treatment, offset)
-    stress = found.at(name, xi, cells, field.loops[name][rows], np.arange(len(mesh.cells[name]))[rows])
-    elastic = field.compliance[numbers]
+    stress = found.at(name, xi, cells, numbers, np.arange(len(mesh.cells[name]))[rows])
+    elastic = field.compliance[numbers.reshape(len(numbers), -1)]
+    if elastic.shape[1] > 1:
+        elastic = np.einsum("nq,cqij->cnij", beside(name, xi), elastic)
     return N, stress, cell_volumes(mesh.points[cells], N, dN, axisymmetric) * weights, elastic
 
 

@@ -106,7 +106,7 @@ def _exchange(entry: dict[str, Any], formulation: str, settings: Settings, own: 
         known = {f.name for f in dataclasses.fields(FORMULATIONS[formulation])} | KEYS | set(SHARED_OPTIONS)
         for key in [key for key in entry if key not in known]:
             del entry[key]
-    entry["formulation"] = formulation
+        entry["formulation"] = formulation
     entry.update(settings.options.get(formulation, {}))
 
 

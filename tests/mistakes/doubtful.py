@@ -192,16 +192,16 @@ DOUBTS = [
         ),
     ),
     Doubt(
-        "an interference as small as the sag of facets",
+        "pressures that follow facets instead of arcs",
         lambda: generate.rings("quad4", divisions_inner=(2, 12), divisions_outer=(2, 8)),
         of(
             STEEL,
             held("SYMMETRY_X", x=0.0),
             held("SYMMETRY_Y", y=0.0),
-            '[contact.pair]\nsecondary = "CONT_INNER"\nprimary = "CONT_OUTER"\nformulation = "mortar"\nclearance = -0.2\n',
+            '[contact.pair]\nsecondary = "CONT_INNER"\nprimary = "CONT_OUTER"\nformulation = "continuous"\nclearance = -0.2\n',
         ),
         (
-            r"contact 'pair': the interference of 0\.2 between its sides is not large beside the sag of the facets of 'CONT_OUTER', 0\.239 between chord and arc \(120%\): gaps are off by up to as much; facets of length 2\.8\d instead of 9\.7\d bring it to 10%, or quadratic elements",
+            r"contact 'pair': facets of 'CONT_INNER' and of what it faces stand off their arcs by up to 0\.297, which may move pressures by the order of 49\.9, beside a mean of 3\.85: surface_smoothing=True measures the gap between the arcs; quadratic elements, or facets of length 0\.25 instead of 6\.5 bring it down",
         ),
     ),
     Doubt(

@@ -124,7 +124,7 @@ OTHERWISE = {
     "nothing is said: the model is several times too stiff, and forces are wrong by as much": (
         "nearly incompressible elements lock",
     ),
-    "nothing is said: pressures follow the facets, not the curve": ("an interference as small as the sag of facets",),
+    "nothing is said: pressures follow the facets, not the curve": ("pressures that follow facets instead of arcs",),
     "nothing is said: programs know no units, and the result is off by a factor of a thousand or a million": (
         "E of one body in Pa, of the other in MPa", "E in Pa where MPa is named", "E in GPa where Pa is named",
         "units that do not fit each other", "E in Pa with a force and mm", "a pressure in Pa with E in MPa",

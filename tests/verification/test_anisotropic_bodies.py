@@ -128,10 +128,9 @@ def ring_errors(kinematics, n):
 
 @pytest.mark.parametrize("kinematics", ["plane_stress", "axisymmetric", "3d"])
 def test_an_orthotropic_ring_under_internal_pressure(kinematics):
-    """Radius and circumference have moduli of their own; axes turn inside of cells, which keeps the order of the elements."""
-    coarse, fine = ring_errors(kinematics, 12), ring_errors(kinematics, 24)
-    assert fine[0] < 0.005
-    assert fine[1] < 4e-6
-    assert fine[1] < coarse[1] / 12.0
-    assert fine[0] < 0.5 * coarse[0]
-    assert fine[1] < 0.4 * coarse[1]
+    """Radius and circumference have moduli of their own; axes turn inside cells, so the error falls as that of others."""
+    coarse, fine = ring_errors(kinematics, 8), ring_errors(kinematics, 16)
+    assert fine[0] < 0.011
+    assert fine[1] < 2e-5
+    assert fine[0] < 0.4 * coarse[0]
+    assert fine[1] < 0.09 * coarse[1]

@@ -15,7 +15,7 @@ from fastcontact.mesh.generate.box import SOLIDS
 
 # What multigrid leaves to factors is told, and is no other result.
 pytestmark = pytest.mark.filterwarnings(
-    "ignore:.*beside the sag of the facets", "ignore:.*raise its penalty", "ignore:multigrid gave up"
+    "ignore:.*stand off their arcs", "ignore:.*raise its penalty", "ignore:multigrid gave up"
 )
 FORMULATIONS = {
     "node_to_segment": {"formulation": "node_to_segment"},

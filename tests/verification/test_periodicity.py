@@ -242,6 +242,84 @@ def test_an_uneven_split_where_the_period_ends_is_told():
     assert "at 1 places its forces are split unevenly between the two nodes of one place, by 1.0" in text
 
 
+def fitted(sectors, cells, element, cyclic, **options):
+    """A sector of two rings with an interference, between planes of symmetry or with cyclic symmetry."""
+    angle, parts = 2.0 * np.pi / sectors, []
+    for name, inside, count in (("A", 1.0, cells[0]), ("B", 2.0, cells[1])):
+        mesh = block((1.0, 1.0), (4, count), element)
+        r, t = inside + mesh.points[:, 0], angle * mesh.points[:, 1]
+        mesh = mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t)]))
+        parts.append(renamed(mesh, {group: name + group for group in mesh.group_names}))
+    model = ring(union(*parts))
+    for name in "AB":
+        model.fix(f"{name}BOTTOM", "y")
+        if cyclic:
+            model.add_cyclic_symmetry(f"{name}BOTTOM", f"{name}TOP", sectors=sectors)
+        else:
+            model.fix(f"{name}TOP", "normal")
+    model.add_contact("fit", secondary="ARIGHT", primary="BLEFT", clearance=-1e-3, **options)
+    return fc.solve(model, 1)[-1].contact["fit"]
+
+
+@pytest.mark.filterwarnings("ignore:.*across its radius", "ignore:.*facets", "ignore:.*sag")
+@pytest.mark.parametrize(
+    ("sectors", "cells", "element", "options"),
+    [
+        (10, (5, 3), "quad8", {}),
+        (10, (12, 12), "quad4", {}),
+        (10, (12, 12), "quad4", {"penalty": 1e5}),
+        (10, (3, 5), "quad8", {"formulation": "node_to_segment"}),
+        (8, (4, 4), "quad8", {"formulation": "continuous"}),
+    ],
+)
+def test_a_closed_contact_at_the_ends_of_a_sector_is_that_between_planes_of_symmetry(sectors, cells, element, options):
+    """Both nodes of a place have one condition: the split of their forces was round-off, and the geometry did not settle."""
+    cyclic, mirrored = (fitted(sectors, cells, element, kind, **options) for kind in (True, False))
+    assert cyclic.pressure == pytest.approx(mirrored.pressure, rel=1e-8)
+
+
+@pytest.mark.filterwarnings("ignore:.*across its radius")
+@pytest.mark.parametrize("slides", [0.5, 1.5])
+@pytest.mark.parametrize("element", ["hex8", "tet4", "hex20", "tet10"])
+def test_a_period_pushed_along_a_plane_has_uniform_pressure_and_shear(element, slides):
+    """Pressed and pushed to the fraction `slides` of the limit of friction."""
+    mu, depth = 0.3, 1e-3
+    model = ring(box((1.0, 1.0, 0.5), (2, 2, 1), element), "3d")
+    model.add_periodicity("XMIN", "XMAX")
+    model.add_periodicity("YMIN", "YMAX")
+    pressure = E * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU)) * depth / 0.5
+    push = slides * mu * pressure * 0.5 * 2.0 * (1.0 + NU) / E
+    model.prescribe("ZMAX", x=0.8 * push, y=0.6 * push, z=-depth)
+    model.add_obstacle(
+        "c", secondary="ZMIN", obstacle=fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), friction=mu
+    )
+    contact = fc.solve(model, 1)[-1].contact["c"]
+    assert contact.pressure == pytest.approx(np.full(len(contact.points), pressure), rel=1e-9)
+    shear = -min(slides, 1.0) * mu * pressure * np.array([0.8, 0.6, 0.0])
+    assert contact.shear == pytest.approx(np.tile(shear, (len(contact.points), 1)), abs=1e-9 * pressure)
+
+
+@pytest.mark.filterwarnings("ignore:.*across its radius", "ignore:a displacement of", "ignore:.*rotat")
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+def test_friction_of_a_sector_that_turns_on_a_plane_follows_it_round(solver):
+    mesh = box((1.0, 1.0, 0.5), (3, 4, 2), "hex8", (1.0, 0.0, 0.0))
+    r, t = mesh.points[:, 0], 2.0 * np.pi / 5.0 * mesh.points[:, 1]
+    model = fc.Model(mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t), mesh.points[:, 2]])), "3d")
+    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model.add_cyclic_symmetry("YMIN", "YMAX", sectors=5)
+    model.prescribe("ZMAX", x=0.0, y=0.05, z=-0.01, axes=fc.CylindricalAxes())
+    model.add_obstacle(
+        "c", secondary="ZMIN", obstacle=fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), friction=0.3
+    )
+    contact = fc.solve(model, 2, linear_solver=solver)[-1].contact["c"]
+    assert contact.pressure == pytest.approx(np.full(len(contact.points), 20.0))
+    x, y, _ = contact.coordinates.T
+    assert np.linalg.norm(contact.shear, axis=1) == pytest.approx(np.full(len(x), 6.0))
+    assert (contact.shear[:, 1] * x - contact.shear[:, 0] * y) / np.hypot(x, y) == pytest.approx(
+        np.full(len(x), -6.0), rel=0.01
+    )
+
+
 def test_ends_that_do_not_match_are_refused():
     model = ring(sector(5))
     with pytest.raises(fc.ModelError, match=r"turned by 1/6 of a turn, lies 0\.\d+ from the nearest node of 'RIGHT'"):

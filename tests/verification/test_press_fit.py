@@ -106,13 +106,13 @@ def tubes(element, n, along):
 def test_an_interference_by_clearance_is_that_of_the_geometry_to_first_order():
     """A shaft made too large, and one that is told to be: they differ by the interference over the radius."""
     apart = []
-    for scale in (1.0, 0.1):
+    for scale in (1.0, 0.25):  # below, what the arcs of facets of unequal length leave of their sag, 2e-6, would show
         d = scale * INTERFERENCE
         told = errors(*quarter("quad8", 9, 9, "mortar", clearance=-d))[1]
         made = errors(*quarter("quad8", 9, 9, "mortar", overlap=d))[1]
         apart.append((1 + made) / (1 + told) - 1)
     assert abs(apart[0]) < INTERFERENCE / 2.0
-    assert apart[0] / apart[1] == pytest.approx(10.0, rel=0.02)
+    assert apart[0] / apart[1] == pytest.approx(4.0, rel=0.02)
 
 
 @pytest.mark.parametrize("element", ["quad4", "quad8"])

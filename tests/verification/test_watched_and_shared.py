@@ -241,16 +241,18 @@ def pin_in_hole(formulation, **options):
     return model
 
 
+@pytest.mark.filterwarnings("ignore:.*stand off their arcs")
 @each
 def test_forces_lie_along_the_normals_that_are_asked_for(formulation, options):
     model = pin_in_hole(formulation, normals="secondary", **options)
     contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["pair"]
     along = contact.coordinates / np.linalg.norm(contact.coordinates, axis=1, keepdims=True)
-    inside = slice(1, -1)  # at the ends the mean of one chord's normal leans by half its angle
+    # At the ends the mean of one chord's normal leans by half its angle, which the next node feels, too.
+    inside = slice(1, -1) if formulation == "node_to_segment" else slice(2, -2)
     across = np.column_stack([-along[:, 1], along[:, 0]])
     sideways = np.abs((contact.force_vectors * across).sum(axis=1))[inside].max()
     assert np.abs(contact.normal[inside] + along[inside]).max() < 5e-3
-    assert sideways < (5e-3 if formulation == "node_to_segment" else 2e-2) * np.abs(contact.force_vectors).max()
+    assert sideways < 5e-3 * np.abs(contact.force_vectors).max()
 
 
 @each

@@ -106,7 +106,9 @@ def _changed(material: Material, name: str, place: int | None, by: float) -> Mat
         value = value + by
     if isinstance(material, LinearElastic):
         volumetric = "mean_dilatation" if material.averaged else "plain"
-        return replace(material, **{"volumetric": volumetric, name: value})
+        return replace(
+            material, **{"volumetric": volumetric, "incompatible_modes": material.incompatible_modes, name: value}
+        )
     assert isinstance(material, Orthotropic | Anisotropic)
     return replace(material, **{name: value})
 

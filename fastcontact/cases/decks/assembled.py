@@ -174,6 +174,8 @@ class Assembled:
         if rest not in surfaces:
             known = ", ".join(sorted(other.name for other in surfaces.values())) or "none"
             raise place.refuse(f"surface '{name[:80]}' is not defined; surfaces: {known}")
+        if not surfaces[rest].faces:
+            raise surfaces[rest].place.refuse(f"surface '{surfaces[rest].name[:80]}' has no faces")
         return surfaces[rest], scope
 
     def facet(self, key: Key, label: int, place: Place) -> int:

@@ -87,10 +87,11 @@ class Block:
 
     def choice(self, name: str, known: tuple[str, ...]) -> str:
         """Return the value of a parameter in upper case, the first of `known` by default; CaseError if it is another."""
-        value = " ".join(self.get(name, known[0]).upper().split())
-        if value not in known:
-            raise self.place.refuse(f"{name}={value[:LONGEST_QUOTED]} is not supported; known are {', '.join(known)}")
-        return value
+        value = self.get(name, known[0]).upper()
+        for one in known:
+            if value.replace(" ", "") == one.replace(" ", ""):
+                return one
+        raise self.place.refuse(f"{name}={value[:LONGEST_QUOTED]} is not supported; known are {', '.join(known)}")
 
     def required(self, name: str) -> str:
         """Return the value of a parameter; CaseError if there is none."""

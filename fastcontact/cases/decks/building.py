@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
 
 from fastcontact.cases.decks.assembled import Assembled, assembled
 from fastcontact.cases.decks.blocks import Place, folded
@@ -16,7 +17,7 @@ from fastcontact.cases.decks.conditions import Component, Conditions, Distribute
 from fastcontact.cases.decks.content import Content, Material, Pair, Section, Step
 from fastcontact.cases.decks.cyclic_symmetry import add_sectors
 from fastcontact.cases.decks.initial_stresses import add_initial_stresses
-from fastcontact.cases.decks.local_axes import local_axes
+from fastcontact.cases.decks.local_axes import local_axes, orientation_of
 from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface
 from fastcontact.cases.decks.pretension import add_sections, cut_sections
 from fastcontact.cases.decks.relating import make_rotations, relations_of
@@ -128,10 +129,7 @@ class Building:
         """Return the axes of the material of a section, None for those of the mesh."""
         if not section.orientation:
             return None
-        axes = self.content.orientations.get(folded(section.orientation))
-        if axes is None:
-            known = ", ".join(self.content.orientations).lower() or "none"
-            raise section.place.refuse(f"orientation '{section.orientation}' is not defined; orientations: {known}")
+        axes = orientation_of(self.content, section.orientation, section.place)
         if axes.cylindrical:
             a, b = np.array(axes.points[:3]), np.array(axes.points[3:])
             return CylindricalAxes(tuple(a.tolist()), tuple((b - a).tolist()))
@@ -308,7 +306,7 @@ class Building:
     def _fitted(self, pair: Pair) -> dict[str, Any]:
         """Return the clearance that brings the sides to where ADJUST or *CLEARANCE say; refused where no number does."""
         secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
-        gaps = nodal_gaps(self.model, secondary, primary)
+        gaps, places = nodal_gaps(self.model, secondary, primary)
         size = TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max())
         if pair.clearance is not None:
             if np.ptp(gaps) > size:
@@ -324,13 +322,16 @@ class Building:
         moved = gaps[(gaps <= within) & (np.abs(gaps) > size)]
         if not len(moved):
             return {}
-        if np.ptp(gaps) > size:
-            raise pair.place.refuse(
-                f"ADJUST={within:g} would move {len(moved)} nodes of '{pair.secondary}', by {moved.min():.6g} to "
-                f"{moved.max():.6g}: supported only where all nodes move by the same; move them in the mesh"
-            )
-        self.content.note(pair.place, f"ADJUST: the distance {gaps.mean():.6g} of the sides counts as none")
-        return {"clearance": -float(gaps.mean())}
+        apart = (
+            f"{gaps.mean():.6g}"
+            if np.ptp(gaps) <= size
+            else f"of {moved.min():.6g} to {moved.max():.6g} at {len(moved)} nodes"
+        )
+        self.content.note(pair.place, f"ADJUST: the distance {apart} of the sides counts as none")
+        if np.ptp(gaps) <= size:
+            return {"clearance": -float(gaps.mean())}
+        nodes, closing = cKDTree(places), -np.where(gaps <= within, gaps, 0.0)
+        return {"clearance": lambda points: closing[nodes.query(points)[1]]}
 
     def _gap_groups(self) -> dict[str, tuple[str, list[tuple[int, int]]]]:
         """Make groups of the facets behind gap elements; return their names, with the points of each element."""
@@ -432,15 +433,16 @@ def _body_force(name: Distributed, density: float, dim: int) -> dict[str, Any]:
     return {"xyz"[k]: component(k) for k in range(dim) if abs(axis[k]) < 1.0}
 
 
-def nodal_gaps(model: Model, secondary: str, primary: str) -> Array:
-    """Return the distances (n,) of the nodes of one side from the other, where they face it [length]."""
+def nodal_gaps(model: Model, secondary: str, primary: str) -> tuple[Array, Array]:
+    """Return how far nodes of one side that face the other are from it (n,), and where they are (n, dim) [length]."""
     from fastcontact.contact.configuration import Configuration
     from fastcontact.model.contact_pair import ContactPair
 
     pair = ContactPair("gaps", secondary, primary, "continuous", {})
-    found = model.bind(pair).constraints(Configuration.undeformed(model.mesh.points))
-    faced = np.diff(found.B.indptr) > 0
-    return found.gap0[faced] if faced.any() else np.zeros(1)
+    found, places = model.bind(pair), model.mesh.points
+    gaps, _ = found.nodal_gap(Configuration.undeformed(places))
+    faced = np.isfinite(gaps)
+    return (gaps[faced], places[found.secondary.points[faced]]) if faced.any() else (np.zeros(1), places[:1])
 
 
 def _along(axis: int) -> dict[str, Any]:

@@ -116,7 +116,7 @@ class Conditions:
             if not 1 <= first <= last <= 6:
                 raise row.place.refuse(f"components {row.text(1)} to {row.text(2)} are none of 1 to 6")
             if before and value:
-                raise row.place.refuse("a displacement other than zero belongs into a step")
+                self.made.content.note(row.place, "a displacement before the first step is reached in that step")
             components = named or tuple(range(first, last + 1))
             for point in points:
                 for component in components:

@@ -117,11 +117,10 @@ def coupling(content: Content, block: Block, inner: Block) -> None:
         components.update(range(first, last + 1))
     chosen = tuple(sorted(components)) or (1, 2, 3, 4, 5, 6)
     distributing = inner.keyword == "DISTRIBUTING"
-    if distributing and not {1, 2, 3} <= set(chosen):
-        raise inner.place.refuse("*DISTRIBUTING is supported with the components 1 to 3, or 1 to 6")
     content.links.append(
         Link(
-            block.place, block.required("REF NODE"), block.required("SURFACE"), "surface", chosen, distributing
+            block.place, block.required("REF NODE"), block.required("SURFACE"), "surface", chosen, distributing,
+            orientation=block.get("ORIENTATION"),
         )
     )  # fmt: skip
 

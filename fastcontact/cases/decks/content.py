@@ -182,6 +182,7 @@ class Link:
     components: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
     distributing: bool = False
     rotation: str = ""
+    orientation: str = ""  # along whose axes the components count
 
 
 @dataclass(frozen=True)

@@ -111,8 +111,6 @@ def surface(content: Content, part: Part, block: Block) -> None:
         if not made.of_nodes and label and not (label[0] == "S" and label[1:].isdigit()):
             raise row.place.refuse(f"face '{row.text(1)[:40]}' is not supported: faces of solids are S1, S2, ...")
         made.faces.append(Face(row.place, row.text(0), "" if made.of_nodes else label))
-    if not made.faces:
-        raise block.place.refuse(f"surface '{name}' has no faces")
     part.surfaces[folded(name)] = made
 
 

@@ -47,13 +47,14 @@ class Histories(Generic[Name]):
     """Histories by what they act on.
 
     `changing` are those given in the current step, with the place of each; `rest` what quantities have before they are given,
-    zero where it does not say.
+    zero where it does not say; `first` what was given before all steps for the first one, unless that says otherwise.
     """
 
     content: Content
     tracks: dict[Name, Track] = field(default_factory=dict)
     changing: dict[Name, tuple[float, str, Place]] = field(default_factory=dict)
     rest: Mapping[Name, float] = field(default_factory=dict)
+    first: dict[Name, tuple[float, str, Place]] = field(default_factory=dict)
 
     def give(self, name: Name, value: float, amplitude: str, place: Place) -> None:
         """Give a value for the current step; CaseError if the step has another one for the same."""
@@ -70,20 +71,22 @@ class Histories(Generic[Name]):
             self.changing[name] = (self.tracks[name].last, "", place)
 
     def begin(self) -> None:
-        """Take what was given before all steps as there from the beginning, at zero."""
+        """Take what was given before all steps as there from the beginning, at zero, and reached in the first step."""
         for name, (_, _, place) in self.changing.items():
             self.tracks[name] = Track([(0.0, 0.0)], place)
-        self.changing = {}
+        self.first, self.changing = self.changing, {}
 
     def forget(self) -> None:
         """Drop what earlier steps gave."""
+        self.first = {}
         for name, track in self.tracks.items():
             track.alive = name in self.changing
 
     def advance(self, number: int, step: Step) -> list[Name]:
         """Go on to the end of step `number`, from 1; return what the step newly has, beyond those of before."""
         begin, start = float(number - 1), sum(s.period for s in self.content.steps[: number - 1])
-        new = []
+        new: list[Name] = []
+        self.changing, self.first = {**self.first, **self.changing}, {}
         for name, (value, amplitude, place) in self.changing.items():
             if name not in self.tracks:
                 new.append(name)

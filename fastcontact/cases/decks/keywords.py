@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fastcontact.cases.decks.blocks import Block
 
@@ -29,7 +29,7 @@ TRANSLATED = {
     "CLEARANCE": _keyword("SLAVE; MASTER; SECONDARY; MAIN; VALUE"),
     "CLOAD": _keyword("OP; AMPLITUDE"),
     "CONTACT PAIR": _keyword("INTERACTION; TYPE; ADJUST; SMALL SLIDING", "CPSET"),
-    "COUPLING": _keyword("REF NODE; SURFACE", "CONSTRAINT NAME"),
+    "COUPLING": _keyword("REF NODE; SURFACE; ORIENTATION", "CONSTRAINT NAME"),
     "CONDUCTIVITY": Keyword(anything=True),
     "CYCLIC SYMMETRY MODEL": _keyword("N; TIE", "NGRAPH; CHECK; ELSET"),
     "DENSITY": _keyword(),
@@ -54,7 +54,7 @@ TRANSLATED = {
     "MATERIAL": _keyword("NAME"),
     "MPC": _keyword(),
     "NODE": _keyword("NSET; SYSTEM"),
-    "NSET": _keyword("NSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED"),
+    "NSET": _keyword("NSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED; FREQUENCY"),
     "ORIENTATION": _keyword("NAME; SYSTEM"),
     "PART": _keyword("NAME"),
     "PRE-TENSION SECTION": _keyword("SURFACE; NODE"),
@@ -113,6 +113,18 @@ REFUSED = {
          "CONNECTOR BEHAVIOR", "EMBEDDED ELEMENT", "FIELD", "VALUES AT INFINITY", "FILTER", "IMPERFECTION",
          "IMPORT"), NOT_YET),
 }  # fmt: skip
+
+
+_SPELLED = {name.replace(" ", ""): name for name in (*TRANSLATED, *OUTPUT, *REFUSED)}
+
+
+def spelled(block: Block) -> Block:
+    """Return a block with blanks in its keyword and parameters where they belong: CalculiX reads it without any."""
+    keyword = _SPELLED.get(block.keyword.replace(" ", ""), block.keyword)
+    known = TRANSLATED.get(keyword, Keyword())
+    names = {name.replace(" ", ""): name for name in known.used | known.harmless}
+    parameters = {names.get(name.replace(" ", ""), name): value for name, value in block.parameters.items()}
+    return replace(block, place=replace(block.place, keyword=keyword), parameters=parameters)
 
 
 def check(block: Block, about: str) -> None:

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.cases.decks.assembled import Assembled
-from fastcontact.cases.decks.content import Axes
+from fastcontact.cases.decks.blocks import Place, folded
+from fastcontact.cases.decks.content import Axes, Content
 
 Array = NDArray[np.float64]
 ROUND_OFF = 1e-9
@@ -19,6 +20,15 @@ def local_directions(made: Assembled) -> dict[int, Array]:
         for axes in made.content.axes
         for point in made.nodes(axes.nodes, axes.place)
     }
+
+
+def orientation_of(content: Content, name: str, place: Place) -> Axes:
+    """Return the axes of an *ORIENTATION; CaseError if there is none of that name."""
+    axes = content.orientations.get(folded(name))
+    if axes is None:
+        known = ", ".join(content.orientations).lower() or "none"
+        raise place.refuse(f"orientation '{name}' is not defined; orientations: {known}")
+    return axes
 
 
 def local_axes(axes: Axes, point: Array) -> Array:

@@ -139,9 +139,9 @@ def _name_sets(found: DeckMesh) -> None:
             points = [made.index[key] for key in made.members("node", scope, name, members[0].place)] if members else []
             found.point_groups[prefix + part.set_names[name]] = sorted(set(points))
         for name, definition in part.surfaces.items():
-            found.add_facets(
-                prefix + definition.name, made.faces(f"{scope}.{name}" if scope else name, definition.place)
-            )
+            if definition.faces:  # one that nothing uses may be empty
+                faces = made.faces(f"{scope}.{name}" if scope else name, definition.place)
+                found.add_facets(prefix + definition.name, faces)
         for name, members in part.element_sets.items():
             if name not in part.surfaces and members:
                 found.add_solids(prefix + part.set_names[name], made.members("element", scope, name, members[0].place))

@@ -16,7 +16,7 @@ from fastcontact.cases.decks import (
 )
 from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Instance, Interaction, Material, Part, Step
-from fastcontact.cases.decks.keywords import OUTPUT, check
+from fastcontact.cases.decks.keywords import OUTPUT, check, spelled
 
 IN_PARTS: dict[str, Callable[[Content, Part, Block], None]] = {
     "NODE": geometry.nodes,
@@ -180,7 +180,7 @@ def read_content(blocks: Iterable[Block]) -> Content:
     """Return what the blocks of a deck say; CaseError with file, line and keyword where something is wrong."""
     reader = Reader()
     for block in blocks:
-        reader.take(block)
+        reader.take(spelled(block))
     if reader.step is not None:
         raise reader.step.place.refuse("the step has no *END STEP: the deck is cut off, or the line is missing")
     if reader.coupling is not None:

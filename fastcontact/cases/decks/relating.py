@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.cases.decks.assembled import facet_points
 from fastcontact.cases.decks.content import Equation, Link, Pin
-from fastcontact.cases.decks.local_axes import local_directions
+from fastcontact.cases.decks.local_axes import local_axes, local_directions, orientation_of
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.elasticity.loads import Traction
 from fastcontact.elasticity.relations import Relation
@@ -97,9 +97,32 @@ def _reference(found: DeckMesh, link: Link) -> ReferencePoint:
 
 def _rigid(found: DeckMesh, link: Link) -> list[list[Term]]:
     """Return the equations by which nodes follow the motion of a reference point with its rotation."""
-    points = np.array(_points(found, link), np.intp)
-    axes = [component - 1 for component in link.components if component <= found.dim]
-    return rigid_rows(_reference(found, link), points, np.array(found.made.points)[points, : found.dim], axes)
+    points, dim = np.array(_points(found, link), np.intp), found.dim
+    rows = rigid_rows(_reference(found, link), points, np.array(found.made.points)[points, :dim], range(dim))
+    along = [_directions(found, link, point) for point in points.tolist()]
+    return [row for i, axes in enumerate(along) for row in _along(rows[i * dim : (i + 1) * dim], axes)]
+
+
+def _directions(found: DeckMesh, link: Link, point: int) -> Array:
+    """Return the directions (n, dim) of the components that a coupling relates at a point [-]."""
+    axes = np.eye(3)
+    if link.orientation:
+        axes = local_axes(
+            orientation_of(found.made.content, link.orientation, link.place), np.array(found.made.points[point])
+        )
+    return axes[[component - 1 for component in link.components if component <= found.dim], : found.dim]
+
+
+def _along(rows: Sequence[Sequence[Term]], directions: Array) -> list[list[Term]]:
+    """Return equations of displacement components, one for each axis, as such along `directions` (n, dim)."""
+    return [
+        [
+            (point, axis, float(factor) * value)
+            for factor, row in zip(direction, rows, strict=True)
+            for point, axis, value in row
+        ]
+        for direction in directions
+    ]
 
 
 def _distributing(found: DeckMesh, mesh: Mesh, link: Link) -> list[list[Term]]:
@@ -110,9 +133,11 @@ def _distributing(found: DeckMesh, mesh: Mesh, link: Link) -> list[list[Term]]:
     points = np.array(_points(found, link), np.intp)
     weight = areas[points] / areas[points].sum()
     try:
-        return distributing_rows(_reference(found, link), points, np.array(made.points)[points, : found.dim], weight)
+        rows = distributing_rows(_reference(found, link), points, np.array(made.points)[points, : found.dim], weight)
     except ModelError as error:
         raise link.place.refuse(str(error)) from error
+    turns = len(rows) - found.dim
+    return rows[:turns] + _along(rows[turns:], _directions(found, link, made.node(link.reference, link.place)))
 
 
 def _known(mesh: Mesh, found: DeckMesh, group: str) -> str:

@@ -17,6 +17,7 @@ from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.search.facet_tables import tables
 from fastcontact.contact.surface import FacetBlock, Surface
+from fastcontact.contact.surface_smoothing import Smoothing
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements, quadrature
 
@@ -29,7 +30,9 @@ DISTANCES, RADII = 2.0, 3.0
 DEGREE = {3: 1, 4: 2, 6: 2, 8: 3, 9: 4}
 
 
-def face_overlap(secondary: Surface, primary: Surface, reference: Array, deformed: Array) -> Overlap:
+def face_overlap(
+    secondary: Surface, primary: Surface, reference: Array, deformed: Array, smoothing: Smoothing | None
+) -> Overlap:
     """Cut and integrate the secondary facets on the deformed configuration; areas are those of the reference.
 
     Parameters
@@ -37,6 +40,8 @@ def face_overlap(secondary: Surface, primary: Surface, reference: Array, deforme
     secondary, primary : Surface
     reference, deformed : ndarray (n_points, 3)
         Coordinates of all points [length].
+    smoothing : Smoothing or None
+        The smooth surfaces that facets stand for, if they count.
 
     Raises
     ------
@@ -47,18 +52,40 @@ def face_overlap(secondary: Surface, primary: Surface, reference: Array, deforme
     theirs = [_Polygons.of(block, deformed) for block in primary.blocks]
     centres = np.concatenate([polygons.origin for polygons in ours])
     away = closest_of_kinds(centres, primary.corners(deformed)).distance
-    masses, couplings, first = [], [], 0
+    masses, couplings, closer, first = [], [], [], 0
     for mine in ours:
         size, nodes = mine.block.facets.shape
         reach = DISTANCES * away[first : first + size] + RADII * mine.radius
-        mass = np.zeros((size, nodes, nodes))
+        mass, depth, first_other = np.zeros((size, nodes, nodes)), np.zeros((size, nodes)), 0
         for other in theirs:
-            coupling, part = _integrated(mine, other, _facing(mine, other, reach), reference)
+            pairs = _facing(mine, other, reach)
+            heights = _heights(smoothing, pairs, (first, first_other), (mine, other))
+            coupling, part, deep = _integrated(mine, other, pairs, reference, heights)
             couplings.append(coupling)
             mass += part
+            depth += deep
+            first_other += len(other.nodes)
         masses.append(mass)
+        closer.append(depth[:, :, None] * -mine.axes[:, None, 2])
         first += size
-    return Overlap(masses, couplings)
+    return Overlap(masses, couplings, closer)
+
+
+def _heights(
+    smoothing: Smoothing | None, pairs: NDArray[np.intp], first: tuple[int, int], blocks: tuple[_Polygons, _Polygons]
+) -> tuple[Array, Array, Array]:
+    """Return the heights of the facets of two blocks above their planes, and the factors (n_pairs, 2) of `Smoothing.shared`.
+
+    Heights of degree zero for none; `first` are the numbers of the first facets.
+    """
+    if smoothing is None:
+        none = np.zeros((0, 0, 0))
+        return none, none, np.zeros((len(pairs), 2))
+    rows = [slice(start, start + len(polygons.nodes)) for start, polygons in zip(first, blocks, strict=True)]
+    secondary, primary = smoothing.secondary.part(rows[0]), smoothing.primary.part(rows[1])
+    axes = blocks[0].axes[:, :2], blocks[1].axes[:, :2]
+    factor = Smoothing(secondary, primary).shared(pairs[:, 0], pairs[:, 1], axes)
+    return secondary.heights, primary.heights, factor
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,24 +129,24 @@ def _facing(ours: _Polygons, theirs: _Polygons, reach: Array) -> NDArray[np.intp
 
 
 def _integrated(
-    ours: _Polygons, theirs: _Polygons, pairs: NDArray[np.intp], reference: Array
-) -> tuple[Coupling, Array]:
-    """Return the coupling of pairs of facets, and the mass of the secondary ones over what they face there."""
+    ours: _Polygons, theirs: _Polygons, pairs: NDArray[np.intp], reference: Array, heights: tuple[Array, Array, Array]
+) -> tuple[Coupling, Array, Array]:
+    """Return the coupling of pairs of facets, and of the secondary ones over what they face there the mass and `closer`."""
     one, other = elements.get(ours.block.element), elements.get(theirs.block.element)
     to_terms, other_to_terms = tables(one.n_nodes).to_terms, tables(other.n_nodes).to_terms
     n, k = ours.block.facets.shape
-    mass, integrals = np.empty((n, k, k)), np.empty((len(pairs), k, other.n_nodes))
+    mass, integrals, closer = np.empty((n, k, k)), np.empty((len(pairs), k, other.n_nodes)), np.empty((n, k))
     degree = DEGREE[one.n_nodes] + max(DEGREE[one.n_nodes], DEGREE[other.n_nodes])
     wrong = _cut_faces_kernels.integrate(
         ours.nodes, ours.count, ours.origin, ours.axes,
         to_terms @ ours.nodes, to_terms @ reference[ours.block.facets], to_terms, _middle(one),
         theirs.nodes, theirs.count, other_to_terms @ theirs.nodes, other_to_terms, _middle(other),
-        pairs, *quadrature.triangle(min(degree + degree % 2, 8)), mass, integrals,
+        pairs, *quadrature.triangle(min(degree + degree % 2, 8)), *heights, mass, integrals, closer,
     )  # fmt: skip
     if wrong >= 0:
         first, second = (side.origin[row] for side, row in zip((ours, theirs), pairs[wrong], strict=True))
         raise ContactError(f"the facets near {first} and {second} are too distorted to be cut: improve the mesh there")
-    return Coupling(ours.block, theirs.block, pairs, integrals), mass
+    return Coupling(ours.block, theirs.block, pairs, integrals), mass, closer
 
 
 def _middle(element: elements.Element) -> Array:

@@ -297,6 +297,18 @@ def _add_products(area, shape, other_shape, mass, coupling, s, i):
             coupling[i, a, b] += area * shape[a] * other_shape[b]
 
 
+@innermost_kernel
+def _height(powers, xi):
+    """Return a polynomial with coefficients (k, k) of the powers of both reference coordinates (2,)."""
+    height = 0.0
+    for i in range(powers.shape[0] - 1, -1, -1):
+        row = 0.0
+        for j in range(powers.shape[1] - 1, -1, -1):
+            row = row * xi[1] + powers[i, j]
+        height = height * xi[0] + row
+    return height
+
+
 @kernel
 def _symmetrise(mass):
     """Copy the lower triangles of matrices (n, m, m) to the upper ones."""
@@ -320,14 +332,15 @@ def first_pairs(pairs, n_facets):
 @kernel
 def _integrate(
     low, high, start, secondary, n_secondary, origin, axes, deformed, reference, to_terms, middle,
-    primary, n_primary, other_deformed, other_to_terms, other_middle, pairs, points, weights, mass, coupling,
+    primary, n_primary, other_deformed, other_to_terms, other_middle, pairs, points, weights, heights, other_heights,
+    factor, mass, coupling, closer,
 ):  # fmt: skip
     """Integrate over the parts of the secondary facets [low, high), whose pairs begin at `start`; see `integrate`."""
     subject, window, spare = np.empty((MOST, 2)), np.empty((MOST, 2)), np.empty((MOST, 2))
     n, m = to_terms.shape[0], other_to_terms.shape[0]
     terms, other_terms, shape, other_shape = np.empty((n, 3)), np.empty((m, 3)), np.empty(n), np.empty(m)
     flat, other_flat, xi, other_xi = np.empty((n, 2)), np.empty((m, 2)), np.empty(2), np.empty(2)
-    mass[low:high], coupling[start[low] : start[high]] = 0.0, 0.0
+    mass[low:high], coupling[start[low] : start[high]], closer[low:high] = 0.0, 0.0, 0.0
     exact = n == 3 and m == 3
     for i in range(start[low], start[high]):
         s, p = pairs[i, 0], pairs[i, 1]
@@ -353,6 +366,11 @@ def _integrate(
                 _fill_shape(other_to_terms, other_terms, other_shape)
                 area = weights[q] * twice * _stretch(reference[s], terms) / seen
                 _add_products(area, shape, other_shape, mass, coupling, s, i)
+                if heights.shape[1] > 0:
+                    above = factor[i, 0] * _height(heights[s], xi)
+                    above += factor[i, 1] * _height(other_heights[p], other_xi)
+                    for a in range(n):
+                        closer[s, a] += area * above * shape[a]
     _symmetrise(mass[low:high])
     return -1
 
@@ -360,7 +378,8 @@ def _integrate(
 @parallel_kernel
 def integrate(
     secondary, n_secondary, origin, axes, deformed, reference, to_terms, middle,
-    primary, n_primary, other_deformed, other_to_terms, other_middle, pairs, points, weights, mass, coupling,
+    primary, n_primary, other_deformed, other_to_terms, other_middle, pairs, points, weights, heights, other_heights,
+    factor, mass, coupling, closer,
 ):  # fmt: skip
     """Integrate products of shape functions over the parts where facets face each other.
 
@@ -372,9 +391,10 @@ def integrate(
     `deformed` and `reference` (n_facets, n_terms, 3) are the terms of the secondary facets where they are and where they
     were, `to_terms` (n_terms, n_nodes) leads to them from nodal values, `middle` (2,) are the reference coordinates to start
     from; the same with `other` for the primary facets. `points` (n_q, 2) and `weights` (n_q,) are a rule on the triangle.
+    `heights` (n_facets, k, k) of both sides' smooth surfaces, k = 0 for none, count by the `factor` (n_pairs, 2) of the pair.
     Filled in place: `mass` (n_facets, n_nodes, n_nodes) of the secondary shape functions over the part that faces the primary
-    side, and `coupling` (n_pairs, n_nodes, n_other_nodes), secondary times primary shape functions. Each facet is one
-    thread's.
+    side, `coupling` (n_pairs, n_nodes, n_other_nodes), secondary times primary shape functions, and `closer` (n_facets,
+    n_nodes), the former times the sum of both heights. Each facet is one thread's.
 
     Returns -1, or the number of a pair with a facet too distorted to be followed.
     """
@@ -385,7 +405,8 @@ def integrate(
         low, high = part * CHUNK, min(n_facets, (part + 1) * CHUNK)
         wrong[part] = _integrate(
             low, high, start, secondary, n_secondary, origin, axes, deformed, reference, to_terms, middle, primary,
-            n_primary, other_deformed, other_to_terms, other_middle, pairs, points, weights, mass, coupling,
+            n_primary, other_deformed, other_to_terms, other_middle, pairs, points, weights, heights, other_heights,
+            factor, mass, coupling, closer,
         )  # fmt: skip
     for part in range(parts):
         if wrong[part] >= 0:

@@ -17,6 +17,7 @@ from fastcontact.contact.pairing import Candidates, pair
 from fastcontact.contact.projection import CORNER, facet_normals, nodal_normals
 from fastcontact.contact.search.closest import closest
 from fastcontact.contact.surface import FacetBlock, Surface
+from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.mesh import elements, quadrature
 
 Array = NDArray[np.float64]
@@ -173,8 +174,9 @@ def _zeros(values: Array) -> tuple[NDArray[np.intp], Array]:
 
 
 def line_overlap(
-    secondary: Surface, primary: Surface, reference: Array, deformed: Array, axisymmetric: bool, tolerance: float
-) -> Overlap:
+    secondary: Surface, primary: Surface, reference: Array, deformed: Array, axisymmetric: bool, tolerance: float,
+    smoothing: Smoothing | None,
+) -> Overlap:  # fmt: skip
     """Cut and integrate the secondary facets on the deformed configuration; areas are those of the reference.
 
     Parameters
@@ -186,9 +188,12 @@ def line_overlap(
         Integrals run over the full circle.
     tolerance : float
         How far a point may stand out beyond the end of the primary side and still face it, in facet lengths.
+    smoothing : Smoothing or None
+        The smooth surfaces that facets stand for, if they count.
     """
     first = np.cumsum([0] + [len(block.facets) for block in primary.blocks])
-    masses, couplings = [], []
+    masses, couplings, closer, number_of_first = [], [], [], 0
+    axes = None if smoothing is None else (frames(secondary, deformed), frames(primary, deformed))
     for block in secondary.blocks:
         n, k = block.facets.shape
         points = line_points(block, primary, reference, deformed, axisymmetric, k + 2, tolerance)
@@ -201,6 +206,13 @@ def line_overlap(
         mass = np.zeros((n, k, k))
         np.add.at(mass, points.facet, area[:, None, None] * points.shape[:, :, None] * points.shape[:, None, :])
         masses.append(mass)
+        heights = np.zeros((n, k, 2))
+        if smoothing is not None and axes is not None:
+            ours = number_of_first + points.facet, points.xi[:, None]
+            depth = area * smoothing.overlap(ours, (facing.facet, facing.xi), axes)
+            np.add.at(heights, points.facet, points.shape[:, :, None] * (depth[:, None] * facing.normal)[:, None])
+        closer.append(heights)
+        number_of_first += n
         for number, other in enumerate(primary.blocks):
             rows = np.flatnonzero((area > 0) & (facing.facet >= first[number]) & (facing.facet < first[number + 1]))
             shape = elements.get(other.element).shape(facing.xi[rows])
@@ -210,4 +222,4 @@ def line_overlap(
             integrals = np.zeros((len(pairs), *products.shape[1:]))
             np.add.at(integrals, place.ravel(), products)
             couplings.append(Coupling(block, other, pairs, integrals))
-    return Overlap(masses, couplings)
+    return Overlap(masses, couplings, closer)

@@ -21,6 +21,7 @@ from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair, row
 from fastcontact.contact.prescribed_normals import Normals, checked_normals, opposed
 from fastcontact.contact.projection import at_nodes_of_facets, interpolated, nodal_normals, places, smooth_normals
 from fastcontact.contact.surface import Surface
+from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.contact.tied import TiedPair, tied
 from fastcontact.contact.tied_offset import with_arms
 from fastcontact.errors import ContactError, unknown
@@ -60,13 +61,16 @@ class Formulation(ABC):
         planes of symmetry point by point, half a facet.
     normals : str or sequence of float, optional
         Along which the gap is measured. ``"facet"``: that of the primary facet at the projection; ``"averaged"``:
-        interpolated between nodal means. By default the former in 2D and the latter in 3D, where a point opposite an edge
-        between facets often flips for ever. ``"secondary"``: opposite to the mean normal of the secondary side at the
-        point. A vector (dim,) of any length: that one for the whole primary side, out of its body; points are projected
-        along it.
+        interpolated between nodal means. By default the former in 2D without `surface_smoothing`, and the latter in 3D,
+        where a point opposite an edge between facets often flips for ever. ``"secondary"``: opposite to the mean normal
+        of the secondary side at the point. A vector (dim,) of any length: that one for the whole primary side, out of its
+        body; points are projected along it.
     slip : str
         ``"symmetric"``: closing a gap along the mean of both sides' normals is no slip. ``"primary"``: all relative motion
         along the tangents to the primary side is, also of a gap that closes while its normal leans, as in code_aster.
+    surface_smoothing : bool
+        Whether the gap is that between the smooth surfaces which straight facets of curved sides stand for, see
+        `surface_smoothing`; for mortar it is by default.
     options : PairOptions
         Options of the pair that do not depend on its formulation, e.g. its clearance.
     held : HeldMotions, optional
@@ -83,6 +87,7 @@ class Formulation(ABC):
     projection_tolerance: float | None = None
     normals: Normals | None = None
     slip: str = "symmetric"
+    surface_smoothing: bool = False
     options: PairOptions = field(default_factory=PairOptions, repr=False)
     held: HeldMotions | None = field(default=None, repr=False)
 
@@ -92,7 +97,7 @@ class Formulation(ABC):
 
     def __post_init__(self) -> None:
         if self.normals is None:
-            self.normals = "facet" if self.points.shape[1] == 2 else "averaged"
+            self.normals = "facet" if self.points.shape[1] == 2 and not self.surface_smoothing else "averaged"
         self.normals = checked_normals(self.normals, self.points, self.primary)
         if self.slip not in SLIPS:
             raise ContactError(unknown("kind of slip", self.slip, SLIPS))
@@ -102,6 +107,19 @@ class Formulation(ABC):
             self.projection_tolerance = ON_SYMMETRY if self.points.shape[1] == 2 else LEAVING
         if not self.projection_tolerance >= 0:
             raise ContactError(f"projection_tolerance = {self.projection_tolerance} must not be negative")
+        if self.surface_smoothing and not isinstance(self.primary, Surface):
+            raise ContactError(
+                "surface_smoothing corrects two meshed sides against each other: leave it out at an obstacle"
+            )
+
+    @cached_property
+    def smoothing(self) -> Smoothing | None:
+        """The smooth surfaces of both sides, where they count and differ from the facets; not along one normal for all."""
+        if not self.surface_smoothing or self.options.tied or not isinstance(self.primary, Surface):
+            return None
+        if not isinstance(self.normals, str):
+            return None
+        return Smoothing.of(self.secondary, self.primary, self.points)
 
     @property
     def eliminable(self) -> bool:
@@ -209,7 +227,7 @@ class Formulation(ABC):
     ) -> Constraints:
         """Return the constraints of paired candidates, with tangential rows where there is friction."""
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
-        gap0 += self.added_gap(candidates, pairing, at)
+        gap0 += self.added_gap(candidates, pairing, at) - self.overlap_of_smooth(candidates, pairing, at)
         positions = candidates.positions(self.points)
         if not (self.friction or self.options.tied):
             return Constraints(B, gap0, positions, compliance)
@@ -242,6 +260,24 @@ class Formulation(ABC):
         if at.worn is None:
             return added
         return added + np.where(pairing.paired, np.einsum("nk,nk->n", candidates.shape, at.worn[candidates.nodes]), 0.0)
+
+    def overlap_of_smooth(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Array:
+        """Return by how much the smooth surfaces are closer than the facets at candidates (n,) with known facets [length]."""
+        closer, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
+        if (
+            self.smoothing is None
+            or candidates.facet is None
+            or candidates.xi is None
+            or not isinstance(self.primary, Surface)
+        ):
+            return closer
+        axes = (
+            frames(self.secondary, self.points + at.displacement),
+            frames(self.primary, self.points + at.displacement),
+        )
+        ours, theirs = (candidates.facet[rows], candidates.xi[rows]), (pairing.facet[rows], pairing.xi[rows])
+        closer[rows] = self.smoothing.overlap(ours, theirs, axes)
+        return closer
 
     def turning(self, candidates: Candidates, at: Configuration) -> Array | None:
         """Return how far the rotation of an obstacle carries what candidates face (n, dim) [length]; None without any."""
@@ -343,9 +379,10 @@ class Formulation(ABC):
         Infinite where a node faces no primary facet. Clearances count unless they are left out. Where `displacement`
         (n_points, dim) is given, the gaps are those that it leaves in the pairing of `at` [length].
         """
-        nodes = Candidates(self.secondary.points[:, None], np.ones((len(self.secondary.points), 1)))
+        nodes = Candidates.nodes_of(self.secondary)
         pairing = self.facing(nodes, at, max(self.projection_tolerance or 0.0, ON_SYMMETRY))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
+        gap0 -= self.overlap_of_smooth(nodes, pairing, at)
         if with_clearance:
             gap0 += self.added_gap(nodes, pairing, at)
         u = at.displacement if displacement is None else displacement

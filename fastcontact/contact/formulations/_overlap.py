@@ -41,7 +41,11 @@ class Overlap:
         For each block of the secondary side, integrals of products of two of its shape functions over the part that
         faces the primary side [area].
     couplings : list of Coupling
+    closer : list of ndarray (n_facets, n_nodes, dim)
+        For each block, integrals of its shape functions times by how much the smooth surfaces are closer to each other than
+        the facets, see `surface_smoothing`, along the normals that the secondary side faces [volume].
     """
 
     mass: list[Array]
     couplings: list[Coupling]
+    closer: list[Array]

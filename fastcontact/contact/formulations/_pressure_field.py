@@ -185,6 +185,16 @@ class PressureFieldFormulation(Formulation):
         if not self.augmentation > 0:
             raise ContactError(f"augmentation = {self.augmentation} must be positive; 1 suits most problems")
 
+    def repeated(self, field: tuple[csr_array, NDArray[np.intp]]) -> tuple[csr_array, NDArray[np.intp]]:
+        """Return a field, its nodal by its independent values and their nodes, with one value for nodes at one place."""
+        same, (values, nodes) = self.options.same_place, field
+        if same is None:
+            return field
+        first, column = np.unique(same[self.secondary.points[nodes]], return_inverse=True)
+        independent = np.empty(len(first), np.intp)
+        independent[column] = nodes
+        return csr_array(values @ csr_array((np.ones(len(nodes)), (np.arange(len(nodes)), column)))), independent
+
     def of_points(
         self, candidates: Candidates, pairing: Pairing, field: PressureField, at: Configuration
     ) -> Constraints:

@@ -47,6 +47,7 @@ class SegmentMortar(PressureFieldFormulation):
 
     projection_tolerance: float = 1e-6
     normals: Normals | None = "averaged"
+    surface_smoothing: bool = True
     n_gauss: int | None = None
     multipliers: str = "standard"
 
@@ -72,7 +73,7 @@ class SegmentMortar(PressureFieldFormulation):
             block, self.primary, self.points, deformed, self.axisymmetric, n_gauss, self.projection_tolerance, borders
         )
         facet, shape, area = points.facet, points.shape, points.area
-        candidates = Candidates(self.secondary.facets[facet], shape)
+        candidates = Candidates(self.secondary.facets[facet], shape, facet, points.xi[:, None])
         found = self.facing(candidates, at)
         paired = np.repeat(found.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
         total = np.bincount(facet, weights=area)
@@ -92,4 +93,4 @@ class SegmentMortar(PressureFieldFormulation):
         np.add.at(mass, facet, area[:, None, None] * shape[:, :, None] * shape[:, None, :])
         field = determined(self.secondary, self._whole, [mass], self.options.excluded_nodes(self.secondary))
         points = self.secondary.local[facet], shape
-        return PressureField.of_points(points, (area, whole), self._rho, field, renewed=True)
+        return PressureField.of_points(points, (area, whole), self._rho, self.repeated(field), renewed=True)

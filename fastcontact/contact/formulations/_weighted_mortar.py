@@ -62,6 +62,7 @@ class WeightedMortar(Formulation):
 
     projection_tolerance: float = 1e-6
     normals: Normals | None = "averaged"
+    surface_smoothing: bool = True
     multipliers: str = "standard"
 
     name: ClassVar[str] = "mortar"
@@ -116,9 +117,15 @@ class WeightedMortar(Formulation):
     def _overlap(self, deformed: Array) -> Overlap:
         assert isinstance(self.primary, Surface)
         if deformed.shape[1] == 3:
-            return face_overlap(self.secondary, self.primary, self.points, deformed)
+            return face_overlap(self.secondary, self.primary, self.points, deformed, self.smoothing)
         return line_overlap(
-            self.secondary, self.primary, self.points, deformed, self.axisymmetric, self.projection_tolerance
+            self.secondary,
+            self.primary,
+            self.points,
+            deformed,
+            self.axisymmetric,
+            self.projection_tolerance,
+            self.smoothing,
         )
 
     def unilateral(self, at: Configuration) -> Constraints:
@@ -127,7 +134,7 @@ class WeightedMortar(Formulation):
         overlap = self._overlap(deformed)
         covered = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
         kept = self._taking_part(covered)
-        own, across = self._weighted(overlap, covered, kept)
+        own, across, closer = self._weighted(overlap, covered, kept)
         # Left out as a whole: its neighbours' functions do not take over what an excluded node stands for.
         sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(own.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
@@ -135,6 +142,7 @@ class WeightedMortar(Formulation):
         normal = self._mean_normals(overlap, deformed)
         B = rows_of(mean, normal)
         gap0 = B @ self.points.ravel() + at.clearance_factor * self._clearance(own, across, weight)
+        gap0 -= np.einsum("nd,nd->n", closer, normal) / weight
         if at.worn is not None:
             gap0 += own @ at.worn / weight
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
@@ -204,7 +212,7 @@ class WeightedMortar(Formulation):
         for along, nodes in self.without_slip(at):
             if not (nodes & kept).any():
                 continue
-            own, across = self._weighted(overlap, covered, kept & ~nodes)
+            own, across, _ = self._weighted(overlap, covered, kept & ~nodes)
             other = csr_array(scaled(csr_array(own - across), 1.0 / weight) - mean)
             other.eliminate_zeros()
             for k, direction in enumerate(directions):
@@ -215,24 +223,27 @@ class WeightedMortar(Formulation):
         free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FREE for t in directions]
         return tuple(scaled(row, np.where(own, 1.0, 0.0)) for row, own in zip(rows, free, strict=True)), apart
 
-    def _weighted(self, overlap: Overlap, covered: list[Array], kept: Mask) -> tuple[csr_array, csr_array]:
+    def _weighted(self, overlap: Overlap, covered: list[Array], kept: Mask) -> tuple[csr_array, csr_array, Array]:
         """Return the integrals of psi with secondary and with primary shape functions, both (m, n_points) [area].
 
+        And those of psi with by how much the smooth surfaces are closer than the facets (m,) [volume].
         `covered` are the weights (n_facets, k) of the functions of each block, `kept` (m,) the nodes with gaps.
         """
         size = (len(self.secondary.points), len(self.points))
         own, across, functions = Entries(), Entries(), {}
+        closer = np.zeros((size[0], self.points.shape[1]))
         for number, (block, mass) in enumerate(zip(self.secondary.blocks, overlap.mass, strict=True)):
             whole = self._whole[number]
             fraction = np.where(whole > 0.0, covered[number] / np.where(whole > 0.0, whole, 1.0), 0.0)
             psi, products = self._functions(self._test[number], mass, kept[block.local], fraction)
             own.add(block.local, block.facets, products)
             functions[block.element] = psi
+            np.add.at(closer, block.local, psi @ overlap.closer[number])
         for coupling in overlap.couplings:
             ours, theirs = coupling.pairs.T
             values = functions[coupling.secondary.element][ours] @ coupling.integrals
             across.add(coupling.secondary.local[ours], coupling.primary.facets[theirs], values)
-        return own.matrix(size), across.matrix(size)
+        return own.matrix(size), across.matrix(size), closer
 
     def _functions(self, T: Array, mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Array]:
         """Return psi of facets by their shape functions, and its integrals with those, both (n_facets, k, k)."""

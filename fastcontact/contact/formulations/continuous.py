@@ -57,22 +57,21 @@ class Continuous(PressureFieldFormulation):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        nodes, local, shapes, areas, shortest = [], [], [], [], np.inf
+        local, areas, rules, shortest = [], [], [], np.inf
         for block in self.secondary.blocks:
             xi, weights = self._rule(block.element)
-            nodes.append(np.repeat(block.facets, len(xi), axis=0))
             local.append(np.repeat(block.local, len(xi), axis=0))
-            shapes.append(np.tile(elements.get(block.element).shape(xi), (len(block.facets), 1)))
             areas.append(self._areas(block, xi, weights))
+            rules.append(xi)
             size = facet_measure(block.facets, block.element, self.points, xi, False) @ weights
             shortest = min(shortest, size.min() ** (1 / xi.shape[1]))
-        self._candidates = Candidates(filled_up(nodes), filled_up(shapes))
+        self._candidates = Candidates.inside(self.secondary, rules)
         rho = self.augmentation * self.modulus / shortest
         whole = np.concatenate(areas)
         areas_of_points = np.where(self.options.out(self._candidates), 0.0, whole)
         around = filled_up(local)
         P = shapes_at(self._candidates.shape, around, len(self.secondary.points))
-        field = self._determined(P, areas_of_points)
+        field = self.repeated(self._determined(P, areas_of_points))
         points = around, self._candidates.shape
         self._field = PressureField.of_points(points, (areas_of_points, whole), float(rho), field, renewed=False)
 

@@ -55,8 +55,7 @@ class NodeToSegment(Formulation):
             raise ContactError("a rigid obstacle has no nodes: leave out opposite = 'node'")
         for block in self.secondary.blocks:
             self._check_areas(block.element)
-        nodes = self.secondary.points[:, None]
-        self._candidates = Candidates(nodes, np.ones(nodes.shape))
+        self._candidates = Candidates.nodes_of(self.secondary)
 
     def _check_areas(self, element: str) -> None:
         """Refuse facets whose nodes do not all push under a uniform pressure."""

@@ -27,6 +27,7 @@ from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.obstacle_rotation import rotation_of
 from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
 from fastcontact.model.parts.connections import ModelConnections
+from fastcontact.model.periodicity import same_place
 from fastcontact.model.ramp import History, table_of
 from fastcontact.model.repeated_pairs import check_repeated
 
@@ -66,6 +67,8 @@ class ModelContact(ModelConnections):
               side to lengths (n,); positive opens the gap, negative is an interference, as of a press fit [length].
               ``clearance_primary``: the same on the primary side, at the positions faced. ``clearance_ramp``: their
               history, as pairs (instant, multiplier); without one they are there from the beginning.
+            - ``surface_smoothing``: whether gaps are those between the smooth surfaces that straight facets of curved sides
+              stand for; by default with mortar alone.
             - ``excluded``: groups whose nodes carry no contact, and what they stand for carries no pressure: their share of
               the area with multipliers at nodes (node-to-segment, mortar with one gap per node), where there are integration
               points those nearer to such a node than to any other. The two sides may share such nodes. ``frictionless``:
@@ -221,4 +224,7 @@ class ModelContact(ModelConnections):
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
         modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
         axisymmetric = self.kinematics == "axisymmetric"
+        # Tangential fields that turn from one end to the other are not one field of components.
+        seams = [seam for seam in self.seams if seam.turn is None or not pair.options.get("friction")]
+        options = dataclasses.replace(options, same_place=same_place(seams, self.mesh.n_points))
         return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, held=held, **own)

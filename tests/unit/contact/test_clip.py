@@ -33,8 +33,11 @@ def facing(secondary, primary, room=1000, reach=2.0):
     return pairs[: min(count, room)], count
 
 
-def integrated(secondary, primary, kinds, reference=None):
-    """Pairs, mass and coupling of facets given by their nodes, with the rule of degree 8."""
+def integrated(secondary, primary, kinds, reference=None, heights=None):
+    """Pairs, mass and coupling of facets given by their nodes, with the rule of degree 8; with heights, their integrals, too.
+
+    `heights` (2, k, k) are powers of the reference coordinates, the same for all facets of a side, that count by a half.
+    """
     one, other = (elements.get(kind) for kind in kinds)
     corners, opposite = secondary[:, : one.n_corners].copy(), primary[:, : other.n_corners].copy()
     pairs, _ = facing(corners, opposite)
@@ -43,13 +46,19 @@ def integrated(secondary, primary, kinds, reference=None):
     reference = secondary if reference is None else reference
     mass = np.empty((len(secondary), one.n_nodes, one.n_nodes))
     coupling = np.empty((len(pairs), one.n_nodes, other.n_nodes))
+    closer = np.empty((len(secondary), one.n_nodes))
+    above = [np.tile(powers, (len(side), 1, 1)) for powers, side in zip(
+        np.zeros((2, 0, 0)) if heights is None else heights, (secondary, primary), strict=True
+    )]  # fmt: skip
+    factor = np.full((len(pairs), 2), 0.5)
     wrong = _cut_faces_kernels.integrate(
         corners, one.n_corners, origin, axes, to_terms @ secondary, to_terms @ reference, to_terms,
         one.nodes[: one.n_corners].mean(axis=0), opposite, other.n_corners, other_to_terms @ primary,
-        other_to_terms, other.nodes[: other.n_corners].mean(axis=0), pairs, *quadrature.triangle(8), mass, coupling,
+        other_to_terms, other.nodes[: other.n_corners].mean(axis=0), pairs, *quadrature.triangle(8), *above, factor,
+        mass, coupling, closer,
     )  # fmt: skip
     assert wrong == -1
-    return pairs, mass, coupling
+    return (pairs, mass, coupling) if heights is None else (pairs, mass, coupling, closer)
 
 
 def rotation(seed):
@@ -108,7 +117,9 @@ def test_products_agree_with_a_rule_on_rectangles(kinds):
     """
     lower, upper = grid(2, 3, 0.0, True, kinds[0]), grid(3, 2, 0.2, False, kinds[1])
     stretched = lower * np.array([3.0, 1.0, 1.0])
-    pairs, mass, coupling = integrated(lower, upper, kinds, stretched)
+    heights = np.random.default_rng(1).normal(size=(2, 3, 3))
+    pairs, mass, coupling, closer = integrated(lower, upper, kinds, stretched, heights)
+    expected_closer = np.zeros_like(closer)
     (one, other), points = (elements.get(kind) for kind in kinds), quadrature.gauss_square(4)
     expected_mass = np.zeros_like(mass)
     seen = 0
@@ -122,16 +133,20 @@ def test_products_agree_with_a_rule_on_rectangles(kinds):
         x = x0 + 0.5 * (1 + points[0][:, 0]) * (x1 - x0)
         y = y0 + 0.5 * (1 + points[0][:, 1]) * (y1 - y0)
         weights = points[1] * 0.25 * (x1 - x0) * (y1 - y0) * 3.0
-        shapes = []
+        shapes, above = [], np.zeros(len(weights))
         for element, nodes, box in ((one, lower[s], boxes[:2]), (other, upper[p], boxes[2:])):
             xi = np.column_stack([2 * (v - a) / (b - a) - 1 for v, (a, b) in zip((x, y), box, strict=True)])
-            shapes.append(element.shape(xi[:, ::-1] if shapes else xi))  # what looks down has s and t swapped
+            xi = xi[:, ::-1] if shapes else xi  # what looks down has s and t swapped
+            above += 0.5 * np.polynomial.polynomial.polyval2d(*xi.T, heights[len(shapes)])
+            shapes.append(element.shape(xi))
             assert shapes[-1] @ nodes[:, :2] == pytest.approx(np.column_stack([x, y]), abs=1e-12)
         assert found == pytest.approx(np.einsum("q,qa,qb->ab", weights, *shapes), abs=1e-13)
         expected_mass[s] += np.einsum("q,qa,qb->ab", weights, shapes[0], shapes[0])
+        expected_closer[s] += np.einsum("q,qa,q->a", weights, shapes[0], above)
         seen += 1
     assert seen == 16  # pieces in 4 columns and 4 rows
     assert mass == pytest.approx(expected_mass, abs=1e-13)
+    assert closer == pytest.approx(expected_closer, abs=1e-13)
 
 
 def test_a_triangle_and_a_quadrangle_share_their_common_part():

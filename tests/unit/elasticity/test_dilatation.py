@@ -1,5 +1,7 @@
 """Mean dilatation: element loops against NumPy twins, patch tests, no motion free but rigid ones, no locking."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ import fastcontact as fc
 from fastcontact import recovery
 from fastcontact._jit import parallel
 from fastcontact._jit.decorators import set_threads, threads
+from fastcontact.elasticity import dilatation
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.mesh import elements
 from fastcontact.mesh.topology import outer_facets
@@ -202,11 +205,12 @@ def test_an_unknown_choice_is_refused():
 
 
 def test_only_what_the_choice_comes_to_changes_the_fingerprint():
-    plain, chosen = block(nu=0.3), block(nu=0.3, volumetric="plain")
+    plain, chosen = block(nu=0.3, incompatible_modes=False), block(nu=0.3, volumetric="plain")
     assert fingerprint(plain) == fingerprint(chosen)
     averaged = block(nu=0.3, volumetric="mean_dilatation")
     assert fingerprint(plain)["the materials"] != fingerprint(averaged)["the materials"]
-    assert fingerprint(block(nu=0.499)) == fingerprint(block(nu=0.499, volumetric="mean_dilatation"))
+    own = block(nu=0.499, incompatible_modes=False)
+    assert fingerprint(own) == fingerprint(block(nu=0.499, volumetric="mean_dilatation"))
 
 
 def test_two_materials_of_one_mesh_are_each_as_alone():
@@ -222,10 +226,17 @@ def test_two_materials_of_one_mesh_are_each_as_alone():
     assert np.abs(K - expected).max() < 1e-13 * np.abs(expected).max()
 
 
-def test_incompatible_modes_exclude_a_mean_dilatation():
-    with pytest.raises(fc.ModelError, match="either incompatible modes or a mean dilatation, not both"):
-        fc.LinearElastic(E=1.0, nu=0.3, volumetric="mean_dilatation", incompatible_modes=True)
-    assert not fc.LinearElastic(E=1.0, nu=0.4999, incompatible_modes=True).averaged
+def test_incompatible_modes_come_before_a_mean_dilatation():
+    """In the elements that have them, which are not those of axisymmetry."""
+    rubber = fc.LinearElastic(E=1.0, nu=0.4999, incompatible_modes=True)
+    model = fc.Model(fc.generate.block(), "plane_strain")
+    model.add_material(rubber)
+    field = model.material_field()
+    assert rubber.averaged
+    assert rubber.incompatible_modes
+    assert dilatation.split("quad4", field.moduli, field.treatment) is None
+    assert dilatation.split("quad8", field.moduli, field.treatment) is not None
+    assert replace(field, kinematics="axisymmetric").treatment.tolist() == [1]
 
 
 def test_modes_count_in_the_fingerprint_and_their_absence_does_not():
@@ -235,5 +246,6 @@ def test_modes_count_in_the_fingerprint_and_their_absence_does_not():
     for options in ({}, {"incompatible_modes": False}, {"incompatible_modes": True}):
         model = fc.Model(fc.generate.block(), "plane_strain")
         model.add_material(fc.LinearElastic(E=1.0, nu=0.3, **options))
-        prints.append(fingerprint(model)["the materials"])
+        prints.append(fingerprint(model))
     assert prints[0] == prints[1] != prints[2]
+    assert "the incompatible modes" not in prints[1]

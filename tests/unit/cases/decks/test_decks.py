@@ -59,7 +59,6 @@ def test_two_cubes_are_a_bar(tmp_path):
         ("roof, P, 100.\n", "roof, P, 100.\nroof, P, 50.\n", "roof, P, 50.", "second value here in one step"),
         ("*Dsload\n", "*Dsload, amplitude=none\n", "*Dsload", "amplitude 'none' is not defined"),
         ("roof, P, 100.\n", "roof, P, 100.\n*Dload\nup, GRAV, 9.81, 0, 0, -1\n", "up, GRAV", r"no \*DENSITY"),
-        ("bottom, 3\n", "bottom, 3, 3, 0.1\n", "bottom, 3", "belongs into a step"),
         ("bottom, 3\n", "bottom, 11\n", "bottom, 11", "none of 1 to 6"),
         ("type=C3D8, elset=up", "type=S4, elset=up", "*Element, type=S4",
          r"S4 \(shell\) is not supported; 1 element in set 'up'"),

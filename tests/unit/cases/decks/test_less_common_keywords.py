@@ -325,3 +325,56 @@ def test_temperatures_of_nodes_that_each_go_their_own_way(tmp_path):
     for step, values in zip(deck.solve(), given, strict=True):
         rise = deck.model.temperature_rise(step.iterations["temperature_factors"])
         assert [rise[deck.point(n)] for n in nodes] == pytest.approx([values[n] - 20.0 for n in nodes])
+
+
+def test_blanks_in_keywords_do_not_matter(tmp_path):
+    text = WHOLE.replace("*Solid Section", "*SOLIDSECTION").replace("*Contact Pair", "*CONTACTPAIR")
+    text = text.replace("type=SURFACE TO SURFACE", "type=SURFACETOSURFACE").replace("*End Step", "*ENDSTEP")
+    assert deck_of(tmp_path, text).solve()[0].contact["ss/sm"].force[2] == pytest.approx(100.0)
+
+
+def test_a_surface_that_nothing_uses_may_be_empty(tmp_path):
+    text = WHOLE.replace("*Surface, name=roof", "*Surface, name=none\n*Surface, name=roof")
+    assert deck_of(tmp_path, text).solve()[0].contact["ss/sm"].force[2] == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize("in_step", ["", "*Boundary\ntop, 3, 3, -0.002\n"])
+def test_a_displacement_before_the_first_step_is_reached_in_it(tmp_path, in_step):
+    """200 000 MPa, two cubes of 1 pressed by 0.001 or, where the step says otherwise, by 0.002."""
+    text = WHOLE.replace("bottom, 3\n", "bottom, 3\ntop, 3, 3, -0.001\n").replace("*Dsload\nroof, P, 100.\n", in_step)
+    deck = deck_of(tmp_path, text)
+    force = 200.0 if in_step else 100.0
+    assert deck.solve()[0].contact["ss/sm"].force[2] == pytest.approx(force)
+    assert "a displacement before the first step is reached in that step" in notes_of(deck)
+
+
+def test_adjust_closes_gaps_that_vary(tmp_path):
+    """The lower corner of the upper cube stands 1e-3 off: it is taken for closed within 0.5, and left open within 1e-4."""
+    skewed = WHOLE.replace("11, 0., 0., 1.", "11, 0., 0., 1.001")
+    found = [
+        deck_of(tmp_path, skewed.replace("type=SURFACE TO", f"adjust={within}, type=SURFACE TO"))
+        for within in (0.5, 1e-4)
+    ]
+    pressure = [deck.solve()[0].contact["ss/sm"].pressure for deck in found]
+    assert pressure[0] == pytest.approx(100.0, rel=5e-3)
+    assert np.ptp(pressure[1]) > 50.0
+    assert "ADJUST: the distance of 0.001 to 0.001 at 1 nodes of the sides counts as none" in notes_of(found[0])
+
+
+COUPLED = "*Node\n90, 0.5, 0.5, 3.\n"
+
+
+@pytest.mark.parametrize("kind", ["Kinematic", "Distributing"])
+def test_components_of_a_coupling_count_along_its_orientation(tmp_path, kind):
+    """Along the second of axes whose second is z, the same as along z of the mesh; the others stay free."""
+    text = WHOLE.replace("*Dsload\nroof, P, 100.", "*Cload\n90, 3, -100.").replace(
+        "*Boundary\n", "*Boundary\n90, 1, 2\n90, 4, 6\n"
+    )
+    oriented = "*Orientation, name=o\n0., 1., 0., 0., 0., 1.\n*Coupling, ref node=90, surface=roof, orientation=o\n"
+    plain = "*Coupling, ref node=90, surface=roof\n"
+    steps = [
+        deck_of(tmp_path, text.replace("*Material", f"{COUPLED}{head}*{kind}\n{component}\n*Material", 1)).solve()[0]
+        for head, component in ((plain, 3), (oriented, 2))
+    ]
+    assert steps[0].contact["ss/sm"].force[2] == pytest.approx(100.0)
+    np.testing.assert_allclose(steps[1].displacement, steps[0].displacement, atol=1e-12)

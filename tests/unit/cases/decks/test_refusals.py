@@ -161,9 +161,10 @@ CONTACTS = {
         r"\*CLEARANCE is supported between sides of one distance, these are",
     ),
     "adjust by a word": (instead("type=SURFACE TO", "adjust=some, type=SURFACE TO"), "ADJUST=some: only a distance"),
-    "adjust a wedge": (
-        instead("type=SURFACE TO", "adjust=0.5, type=SURFACE TO", instead("11, 0., 0., 1.", "11, 0., 0., 1.1")),
-        r"ADJUST=0\.5 would move \d+ nodes of 'ss'",
+    "a surface without faces": (instead("up, S1\n", ""), "surface 'ss' has no faces"),
+    "an orientation that is not there": (
+        before("*Boundary", "*Coupling, ref node=15, surface=roof, orientation=o\n*Kinematic\n3\n"),
+        "orientation 'o' is not defined",
     ),
     "pair of one": (
         instead("ss, sm\n*B", "ss\n*B"),
@@ -196,10 +197,6 @@ RELATIONS = {
     "coupling of component 7": (
         before("*Boundary", "*Coupling, ref node=15, surface=roof\n*Kinematic\n7\n"),
         "the components 7 to 7 are none of 1 to 6",
-    ),
-    "distributing of one component": (
-        before("*Boundary", "*Coupling, ref node=15, surface=roof\n*Distributing\n3\n"),
-        "is supported with the components 1 to 3, or 1",
     ),
     "rigid body of its own node": (
         before("*Boundary", "*Rigid Body, nset=alone, ref node=15\n", before("*Nset, nset=top", "*Nset, nset=alone\n15\n")),

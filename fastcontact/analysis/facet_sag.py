@@ -1,0 +1,91 @@
+"""Warnings about facets of curved sides where the gap follows chords: the pressure error beside the pressure.
+
+Chords that stand off the arc by up to h push sides of modulus E apart by pressures of the order of E h / L, whatever the
+interference is: L is the length of the facets where both sides have some, which do not match, and that of the contact where
+the other side is an exact shape.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.state import State
+from fastcontact.contact.configuration import Configuration
+from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.integration import fine_rule
+from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
+from fastcontact.contact.pairing import Candidates
+from fastcontact.contact.surface_smoothing import Smoothing, frames
+from fastcontact.results.step import ContactResult, StepResult
+
+Array = NDArray[np.float64]
+# The estimate over the mean pressure above which there is a warning, by the order of facets. On rings nodal pressures were
+# off by 0.02 to 0.5 of it on linear facets, by up to 3 on quadratic ones; against rigid shapes by 1.1 to 1.3.
+DOUBTFUL, AGAINST_RIGID = {1: 0.5, 2: 0.1}, 0.2
+
+
+def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, str]:
+    """Return by name a warning for each pair that chords may push apart by much of its pressure in the `last` step."""
+    found, load, displacement = {}, problem.load_at(last.load_factor), problem.displacement(state.u)
+    for name, pair in problem.pairs.items():
+        contact = last.contact[name]
+        corrected = pair.smoothing is not None or not isinstance(pair.normals, str)
+        if corrected or pair.options.tied or pair.options.gap_only or not (contact.pressure > 0.0).any():
+            continue
+        at = problem.configuration(name, state, load, displacement, state.u)
+        off = _standing_off(pair, at, contact.active)
+        text = _text(pair, float(np.ptp(off)), contact) if len(off) else ""
+        if text:
+            found[name] = f"contact '{name}': {text}"
+    return found
+
+
+def _text(pair: Formulation, spread: float, contact: ContactResult) -> str:
+    """Return what a `spread` [length] of the distance between chords and arcs does to pressures; empty where little."""
+    side, order = pair.secondary, pair.secondary.order
+    size = float(
+        np.median(np.concatenate([np.linalg.norm(np.ptp(pair.points[b.facets], axis=1), axis=1) for b in side.blocks]))
+    )
+    doubtful, length, power = DOUBTFUL[order], size, 2 * order - 1
+    remedy = "surface_smoothing=True measures the gap between the arcs"
+    if isinstance(pair.primary, RigidSide):
+        doubtful, power = AGAINST_RIGID, 2 * order
+        length = float(np.linalg.norm(np.ptp(pair.points[side.points[contact.active]], axis=0)))
+        remedy = "formulation 'node_to_segment' measures the gap at nodes, which stand on the arc"
+    mean = float(contact.pressure[contact.pressure > 0.0].mean())
+    error = pair.modulus * spread / max(length, size)
+    if error <= doubtful * mean:
+        return ""
+    finer = f"facets of length {size * (doubtful * mean / error) ** (1.0 / power):.2g} instead of {size:.2g}"
+    return (
+        f"facets of '{side.group}' and of what it faces stand off their arcs by up to {spread:.3g}, which may move pressures "
+        f"by the order of {error:.3g}, beside a mean of {mean:.3g}: {remedy}; "
+        f"{'quadratic elements, or ' if order == 1 else ''}{finer} bring it down"
+    )
+
+
+def _standing_off(pair: Formulation, at: Configuration, active: NDArray[np.bool_]) -> Array:
+    """Return how far facets stand off their arcs where the gap of closed facets is measured (n,) [length]."""
+    points, deformed, closed = _points(pair), pair.points + at.displacement, np.zeros(len(pair.points), bool)
+    closed[pair.secondary.points[active]] = True
+    if isinstance(pair.primary, RigidSide):
+        rows = np.flatnonzero(closed[points.nodes].all(axis=1))
+        nodes, stance = points.nodes[rows], Stance(at.obstacle, at.angle)
+        at_nodes = pair.primary.facing(deformed[nodes].reshape(-1, deformed.shape[1]), stance)[0].reshape(nodes.shape)
+        inside = pair.primary.facing(points.positions(deformed)[rows], stance)[0]
+        return np.einsum("nk,nk->n", points.shape[rows], at_nodes) - inside
+    smoothing, facing = Smoothing.of(pair.secondary, pair.primary, pair.points), pair.facing(points, at)
+    rows = np.flatnonzero(facing.paired & closed[points.nodes].any(axis=1))
+    if smoothing is None or points.facet is None or points.xi is None:
+        return np.empty(0)
+    axes = frames(pair.secondary, deformed), frames(pair.primary, deformed)
+    return smoothing.overlap((points.facet[rows], points.xi[rows]), (facing.facet[rows], facing.xi[rows]), axes)
+
+
+def _points(pair: Formulation) -> Candidates:
+    """Return the points of the secondary side where the gap counts: nodes alone, or points inside of facets, too."""
+    if pair.name == "node_to_segment":
+        return Candidates.nodes_of(pair.secondary)
+    return Candidates.inside(pair.secondary, [fine_rule(block.element)[0] for block in pair.secondary.blocks])

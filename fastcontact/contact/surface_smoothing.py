@@ -1,0 +1,311 @@
+r"""Geometric correction of contact surfaces: gaps between the smooth surfaces that straight facets stand for.
+
+Facets of curved sides that do not match leave gaps and overlaps of the size of their sag :math:`h`, and thus pressure errors
+of the order of :math:`E h / L` for facets of length L, whatever the interference. A surface of constant curvature and a
+polynomial of twice the order of the facet are fitted to the nodes of the facet and of those around it (local surface fitting:
+Jiao and Zha, 2008). The height of this smooth surface P above the facet is what interpolation between the nodes of the facet
+leaves of it, :math:`h = P - \sum_a N_a P(x_a)`. It vanishes at nodes, on flat sides, and where facets follow the surface.
+
+Only the curvature that both sides share is corrected for: facets of a ball on a flat lie flat in the contact, as it does.
+With the curvature tensors :math:`K_s` and :math:`K_p` of facets that face each other, heights of one side are multiplied by
+:math:`\min(\max(-K_s : K_p / K : K, 0), 1)`, K its own. Fits do not reach across corners, and where the curvature changes
+from one facet to the next, heights are multiplied by the limiter of van Albada, van Leer and Roberts (1982),
+:math:`2 K : K' / (K : K + K' : K')`, so that a flat beside a fillet stays flat.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.special import comb
+
+from fastcontact.contact.projection import CORNER
+from fastcontact.contact.search.closest import closest_of_kinds
+from fastcontact.contact.surface import FacetBlock, Surface
+from fastcontact.mesh import elements
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+# Heights below this part of the size of a facet are rounding errors of node positions.
+ROUND_OFF = 1e-10
+# Columns of a fit are scaled by this with each degree, and its squares damped: where nodes leave terms undetermined, as on a
+# strip one facet wide, those of low degree take all.
+LOWER, DAMPING = 0.1, 1e-13
+# Circles, spheres and cylinders are matched to (L / R)^(2 PASSES).
+PASSES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothSide:
+    """Heights and curvatures of the smooth surface above the facets of one side, counted through its blocks.
+
+    Attributes
+    ----------
+    heights : ndarray (n_facets, k, k), on lines (n_facets, k, 1)
+        Coefficients of the powers of the reference coordinates, positive outward [length].
+    curvature : ndarray (n_facets, dim - 1, dim - 1)
+        Tensors along the `frames` of the facets, positive where the side is convex [1 / length].
+    """
+
+    heights: Array
+    curvature: Array
+
+    def part(self, rows: slice) -> SmoothSide:
+        """Return the smooth surface above some of the facets."""
+        return SmoothSide(self.heights[rows], self.curvature[rows])
+
+    def at(self, facet: Indices, xi: Array) -> Array:
+        """Return the heights (n,) at the reference coordinates `xi` (n, dim - 1) of facets (n,) [length]."""
+        k, m = self.heights.shape[1:]
+        powers = np.vander(xi[:, 0], k, True), np.vander(xi[:, -1], m, True)
+        return np.asarray(np.einsum("nij,ni,nj->n", self.heights[facet], *powers))
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothing:
+    """The smooth surfaces of both sides of a contact pair."""
+
+    secondary: SmoothSide
+    primary: SmoothSide
+
+    @classmethod
+    def of(cls, secondary: Surface, primary: Surface, points: Array) -> Smoothing | None:
+        """Return the smooth surfaces of two sides at reference `points` (n_points, dim); None if no curvature is shared."""
+        theirs = smooth_side(primary, points)
+        ours = None if theirs is None else smooth_side(secondary, points)
+        if ours is None or theirs is None:
+            return None
+        made, axes = cls(ours, theirs), (frames(secondary, points), frames(primary, points))
+        middles = [points[b.facets[:, : elements.get(b.element).n_corners]].mean(axis=1) for b in secondary.blocks]
+        opposite = closest_of_kinds(np.concatenate(middles), primary.corners(points)).facet
+        factor = made.shared(np.arange(len(opposite)), opposite, axes)
+        counts = factor[:, 0] * np.abs(ours.heights).max(axis=(1, 2)) > 0.0
+        counts |= factor[:, 1] * np.abs(theirs.heights[opposite]).max(axis=(1, 2)) > 0.0
+        return made if counts.any() else None
+
+    def shared(self, ours: Indices, theirs: Indices, frames: tuple[Array, Array]) -> Array:
+        """Return the factors (n, 2) of the heights of secondary and primary facets, both (n,), that face each other.
+
+        `frames` are those of all facets where they are now.
+        """
+        a = self.secondary.curvature[ours]
+        b = _in_plane_of(frames[0][ours], frames[1][theirs], self.primary.curvature[theirs])
+        common = -np.einsum("nij,nij->n", a, b)
+        own = np.stack([np.einsum("nij,nij->n", tensor, tensor) for tensor in (a, b)], axis=1)
+        return np.clip(np.divide(common[:, None], own, out=np.zeros_like(own), where=own > 0.0), 0.0, 1.0)
+
+    def overlap(self, ours: tuple[Indices, Array], theirs: tuple[Indices, Array], frames: tuple[Array, Array]) -> Array:
+        """Return by how much (n,) the smooth surfaces are closer to each other than the facets, where these face [length].
+
+        `ours` and `theirs` are facets (n,) and reference coordinates (n, dim - 1) in them.
+        """
+        factor = self.shared(ours[0], theirs[0], frames)
+        return factor[:, 0] * self.secondary.at(*ours) + factor[:, 1] * self.primary.at(*theirs)
+
+
+def frames(side: Surface, coordinates: Array) -> Array:
+    """Return the unit tangents (n_facets, dim - 1, dim) of the middles of facets, the first towards their first corner."""
+    return np.concatenate([_axes(block, coordinates, _normals(block, coordinates))[:, :-1] for block in side.blocks])
+
+
+def _normals(block: FacetBlock, coordinates: Array) -> Array:
+    """Return the unit normals (n_facets, dim) of the planes through the corners of facets."""
+    corners = coordinates[block.facets[:, : elements.get(block.element).n_corners]]
+    first = corners[:, 1] - corners[:, 0]
+    if coordinates.shape[1] == 2:
+        normal = first[:, ::-1] * [1.0, -1.0]
+    else:
+        normal = np.cross(first, corners[:, 2] - corners[:, 0])
+        normal += np.cross(corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 0])  # of quadrangles
+    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+
+
+def _axes(block: FacetBlock, coordinates: Array, normal: Array) -> Array:
+    """Return tangents and normal (n_facets, dim, dim) in the middle of facets, from that `normal` (n_facets, dim)."""
+    corners = coordinates[block.facets[:, : elements.get(block.element).n_corners]]
+    first = corners[:, 0] - corners.mean(axis=1)
+    first -= np.einsum("nd,nd->n", first, normal)[:, None] * normal
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, normal] if len(normal.T) == 2 else [first, np.cross(normal, first), normal], axis=1)
+
+
+def smooth_side(side: Surface, points: Array) -> SmoothSide | None:
+    """Return the smooth surface of a side at `points` (n_points, dim); None where its facets have no sag."""
+    near, nodes, taken = _neighbours(side, np.concatenate([_normals(block, points) for block in side.blocks]))
+    around, first, fits = points[side.points[nodes]], 0, []
+    if _flat(points[side.points], around, taken):
+        return None
+    for block in side.blocks:
+        rows = slice(first, first + len(block.facets))
+        fits.append(_heights(block, points, _fit(block, points, around[rows], taken[rows], 2 * side.order)))
+        first += len(block.facets)
+    heights, curvature, axes = (np.concatenate(parts) for parts in zip(*fits, strict=True))
+    if not heights.any():
+        return None
+    return SmoothSide(heights * _limiter(near, curvature, axes)[:, None, None], curvature)
+
+
+def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, NDArray[np.bool_]]:
+    """Return which facets share a node and meet at no corner, and the nodes of all these for each facet.
+
+    A matrix (n_facets, n_facets), each facet with itself, positions (n_facets, most) in the points of the side, and which of
+    them are taken.
+    """
+    size = [block.local.shape[1] for block in side.blocks for _ in block.local]
+    nodes = np.concatenate([block.local.ravel() for block in side.blocks])
+    at = np.repeat(np.arange(side.n_facets), size), nodes
+    incidence = csr_array((np.ones(len(nodes)), at), shape=(side.n_facets, len(side.points)))
+    i, j = (incidence @ incidence.T).tocoo().coords
+    smooth = np.einsum("nd,nd->n", normal[i], normal[j]) > np.cos(np.radians(CORNER))
+    near = csr_array((np.ones(smooth.sum()), (i[smooth], j[smooth])), shape=(side.n_facets, side.n_facets))
+    around = csr_array(near @ incidence)
+    taken = np.arange(np.diff(around.indptr).max()) < np.diff(around.indptr)[:, None]
+    padded = np.zeros(taken.shape, np.intp)
+    padded[taken] = around.indices
+    return near, padded, taken
+
+
+def _flat(points: Array, around: Array, taken: NDArray[np.bool_]) -> bool:
+    """Return whether points (n, dim) lie in one plane, or the points `around` (n, m, dim) every facet in one of their own."""
+    away = points - points.mean(axis=0)
+    if np.linalg.svd(away, compute_uv=False)[-1] <= ROUND_OFF * np.linalg.norm(away):
+        return True
+    count = taken.sum(axis=1)[:, None]
+    away = np.where(taken[:, :, None], around, 0.0)
+    away = np.where(taken[:, :, None], away - (away.sum(axis=1) / count)[:, None], 0.0)
+    least = np.linalg.eigvalsh(away.transpose(0, 2, 1) @ away)[:, 0]
+    return bool((least <= (ROUND_OFF * np.linalg.norm(away, axis=(1, 2))) ** 2).all())
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Surfaces over planes of facets (n,): of a constant `curvature` (n, d, d), and polynomials (n, n_terms) beside it.
+
+    The planes have the `axes` (n, dim, dim), the last one normal, through the middle of the corners; lengths are counted in
+    the `size` (n,) of the facets.
+    """
+
+    axes: Array
+    origin: Array
+    size: Array
+    curvature: Array
+    powers: tuple[Indices, Indices]
+    polynomial: Array
+
+    def in_planes(self, points: Array) -> tuple[Array, Array]:
+        """Return places (n, m, d) in the planes of `points` (n, m, dim), and their heights (n, m) above."""
+        local = np.einsum("nkd,ned->nke", points - self.origin[:, None], self.axes) / self.size[:, None, None]
+        return local[..., :-1], local[..., -1]
+
+    def fitted(self, points: Array, taken: NDArray[np.bool_]) -> _Fit:
+        """Return this one with polynomials fitted to those `points` (n, m, dim) that are `taken` (n, m)."""
+        (plane, height), (i, j) = self.in_planes(points), self.powers
+        lower = LOWER ** (i + j) * np.sqrt(comb(i + j, i))  # no direction counts more than others (Bombieri's norm)
+        columns = np.where(taken[..., None], lower * _terms(plane, i, j), 0.0)
+        rest = (height - _conic(self.curvature, plane))[..., None]
+        normal = columns.transpose(0, 2, 1) @ columns
+        normal += DAMPING * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(len(i))
+        return replace(self, polynomial=lower * np.linalg.solve(normal, columns.transpose(0, 2, 1) @ rest)[..., 0])
+
+    def at(self, plane: Array) -> Array:
+        """Return the heights (n, m) over points (n, m, d) of the planes."""
+        return _conic(self.curvature, plane) + np.einsum("nqt,nt->nq", _terms(plane, *self.powers), self.polynomial)
+
+    def in_the_middle(self) -> tuple[Array, Array]:
+        """Return slopes (n, d) and curvatures (n, d, d) in the middle of the facets."""
+        at = {(int(a), int(b)): n for n, (a, b) in enumerate(zip(*self.powers, strict=True))}
+        if self.curvature.shape[1] == 1:
+            slope, second = [at[1, 0]], np.array([[at[2, 0]]])
+        else:
+            slope, second = [at[1, 0], at[0, 1]], np.array([[at[2, 0], at[1, 1]], [at[1, 1], at[0, 2]]])
+        return self.polynomial[:, slope], self.curvature - self.polynomial[:, second] * (1.0 + np.eye(len(second)))
+
+
+def _fit(block: FacetBlock, points: Array, around: Array, taken: NDArray[np.bool_], degree: int) -> _Fit:
+    """Fit surfaces to those of the points `around` (n, m, dim) the facets of a block that are `taken` (n, m).
+
+    From pass to pass, planes turn to be tangent, and what is of constant curvature is taken out of the polynomials.
+    """
+    corners = points[block.facets[:, : elements.get(block.element).n_corners]]
+    origin, normal = corners.mean(axis=1), _normals(block, points)
+    size = np.linalg.norm(corners - origin[:, None], axis=2).max(axis=1)
+    powers = _powers(points.shape[1] - 1, degree)
+    curvature = np.zeros((len(corners), *2 * (points.shape[1] - 1,)))
+    fit = _Fit(np.empty(0), origin, size, curvature, powers, np.empty(0))
+    for _ in range(PASSES):
+        fit = replace(fit, axes=_axes(block, points, normal), curvature=curvature).fitted(around, taken)
+        slope, curvature = fit.in_the_middle()
+        normal = fit.axes[:, -1] - np.einsum("nj,njd->nd", slope, fit.axes[:, :-1])
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    return fit
+
+
+def _heights(block: FacetBlock, points: Array, smooth: _Fit) -> tuple[Array, Array, Array]:
+    """Return coefficients (n, k, m) of the heights of surfaces above facets, their curvatures and tangents in the middle."""
+    element, k = elements.get(block.element), smooth.powers[0].max() + 1
+    (xi, powers), (corners, _) = _lattice(element, k), smooth.in_planes(points[block.facets])
+    shape = element.shape(xi)
+    height = smooth.at(np.einsum("qk,nke->nqe", shape, corners)) - smooth.at(corners) @ shape.T
+    height = smooth.size[:, None] * np.where(np.abs(height) > ROUND_OFF, height, 0.0)
+    heights = np.zeros((len(corners), k, k if element.dim == 2 else 1))
+    heights[:, powers[0], powers[1]] = np.linalg.solve(_terms(xi, *powers), height.T).T
+    return heights, smooth.in_the_middle()[1] / smooth.size[:, None, None], smooth.axes[:, :-1]
+
+
+def _conic(curvature: Array, plane: Array) -> Array:
+    r"""Return the heights (n, m) of surfaces of constant `curvature` K (n, d, d) over points x (n, m, d) of their planes.
+
+    :math:`-x^T K x / (1 + \sqrt{1 - x^T K^2 x})`, spheres and cylinders without error.
+    """
+    bent = np.einsum("nqd,nde->nqe", plane, curvature)
+    root = np.sqrt(np.maximum(1.0 - (bent**2).sum(axis=2), 0.0))
+    return np.asarray(-(bent * plane).sum(axis=2) / (1.0 + root))
+
+
+def _powers(dim: int, degree: int) -> tuple[Indices, Indices]:
+    """Return the exponents of the terms of a polynomial in one or two variables."""
+    i, j = (part.ravel() for part in np.indices((degree + 1, degree + 1 if dim == 2 else 1)))
+    kept = i + j <= degree
+    return i[kept], j[kept]
+
+
+def _terms(x: Array, i: Indices, j: Indices) -> Array:
+    """Return the terms with exponents `i` and `j` (n_terms,) at coordinates (..., 1 or 2)."""
+    powers = [np.ones_like(x)]
+    for _ in range(int(i.max())):
+        powers.append(powers[-1] * x)
+    table = np.stack(powers, axis=-1)
+    return np.asarray(table[..., 0, i] * table[..., -1, j])
+
+
+def _lattice(element: elements.Element, k: int) -> tuple[Array, tuple[Indices, Indices]]:
+    """Return points of a reference facet, and exponents of as many terms that they determine."""
+    if element.n_corners == 3:
+        i, j = _powers(2, k - 1)
+        return np.column_stack([i, j]) / (k - 1.0), (i, j)
+    i, j = (part.ravel() for part in np.indices((k, k if element.dim == 2 else 1)))
+    at = np.linspace(-1.0, 1.0, k)
+    return (at[i][:, None] if element.dim == 1 else np.column_stack([at[i], at[j]])), (i, j)
+
+
+def _limiter(near: csr_array, curvature: Array, axes: Array) -> Array:
+    """Return the factors (n_facets,) by which changes of the curvature to facets `near` reduce heights."""
+    i, j = near.tocoo().coords
+    other, square = _in_plane_of(axes[i], axes[j], curvature[j]), np.einsum("nij,nij->n", curvature, curvature)
+    common, both = 2.0 * np.einsum("nij,nij->n", curvature[i], other), square[i] + square[j]
+    factor = np.ones(len(curvature))
+    np.minimum.at(factor, i, np.divide(common, both, out=np.ones_like(both), where=both > 0.0))
+    return np.maximum(factor, 0.0)
+
+
+def _in_plane_of(axes: Array, other: Array, tensor: Array) -> Array:
+    """Return tensors (n, d, d) along the `other` axes (n, d, dim) along `axes`, one plane turned to the other."""
+    turn = np.einsum("nid,njd->nij", axes, other)
+    if turn.shape[1] == 2:  # the rotation or reflection next to it
+        cofactors = turn[:, ::-1, ::-1] * [[1.0, -1.0], [-1.0, 1.0]]
+        turn = turn + np.sign(np.linalg.det(turn))[:, None, None] * cofactors
+    turn = turn / (np.abs(np.linalg.det(turn)) ** (1.0 / turn.shape[1]))[:, None, None]
+    return np.asarray(turn @ tensor @ turn.transpose(0, 2, 1))

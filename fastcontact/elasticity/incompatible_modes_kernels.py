@@ -1,0 +1,207 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Element loops of incompatible modes: what they take from the stiffness, and what they add to stresses.
+
+Shared arguments: ``points`` (n_points, dim) [length]; ``cells`` (n_cells, n_nodes); ``dN`` (n_q, n_nodes, dim), ``xi`` (n_q,
+dim) and ``weights`` (n_q,) of the quadrature; ``middle`` (1, n_nodes, dim), shape derivatives in the middle of the reference
+cell; ``pairs`` (dim, dim), the component of stress of two directions; ``moduli`` (n_moduli, n_components, n_components)
+[pressure]; ``bends`` (n_moduli,) of bool, which of them have modes; ``material`` (n_cells, 1 or n_q), numbers of the cells,
+or of their quadrature points. dim is 2 or 3, with 4 or 13 modes.
+
+With the strains M of unit modes and B of unit displacements of the nodes, own = sum w M^T D M = L L^T and mixed = sum w M^T D
+B: modes give way by a = -own^-1 mixed u, and take (L^-1 mixed)^T (L^-1 mixed) from the stiffness.
+"""
+
+import numpy as np
+
+from fastcontact._jit.decorators import kernel
+
+
+@kernel
+def _derivatives(x, dN, q, J, inverse):
+    """Fill `inverse` (dim, dim) with the inverse Jacobian of the nodes `x` (n_nodes, dim); return det J."""
+    dim = x.shape[1]
+    J[:] = 0.0
+    for a in range(x.shape[0]):
+        for k in range(dim):
+            for i in range(dim):
+                J[k, i] += dN[q, a, k] * x[a, i]
+    if dim == 2:
+        det = J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
+        inverse[0, 0], inverse[0, 1] = J[1, 1] / det, -J[0, 1] / det
+        inverse[1, 0], inverse[1, 1] = -J[1, 0] / det, J[0, 0] / det
+        return det
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        for m in range(3):
+            n, r = (m + 1) % 3, (m + 2) % 3
+            inverse[i, m] = J[n, j] * J[r, k] - J[n, k] * J[r, j]
+    det = J[0, 0] * inverse[0, 0] + J[0, 1] * inverse[1, 0] + J[0, 2] * inverse[2, 0]
+    for i in range(3):
+        for m in range(3):
+            inverse[i, m] /= det
+    return det
+
+
+@kernel
+def _modes(xi, q, inverse, ratio, pairs, M):
+    """Fill `M` (n_components, n_modes) with the strains of modes; `inverse` is that of the middle, `ratio` of Jacobians."""
+    dim = xi.shape[1]
+    M[:] = 0.0
+    for k in range(dim):
+        for j in range(dim):
+            slope = -2.0 * ratio * xi[q, k] * inverse[j, k]
+            for i in range(dim):
+                M[pairs[i, j], dim * k + i] += slope
+    if dim == 3:
+        for i in range(3):
+            M[i, 9] = ratio * xi[q, 0] * xi[q, 1]
+            M[i, 10] = ratio * xi[q, 1] * xi[q, 2]
+            M[i, 11] = ratio * xi[q, 0] * xi[q, 2]
+            M[i, 12] = ratio * xi[q, 0] * xi[q, 1] * xi[q, 2]
+
+
+@kernel
+def _integrate(x, dN, xi, weights, middle, pairs, moduli, numbers, own, mixed):
+    """Fill `own` (n_modes, n_modes) and `mixed` (n_modes, n_nodes * dim) of the cell with the nodes `x` (n_nodes, dim)."""
+    dim, n_modes = x.shape[1], own.shape[0]
+    J, inverse, at_middle = np.empty((dim, dim)), np.empty((dim, dim)), np.empty((dim, dim))
+    M, S = np.empty((moduli.shape[1], n_modes)), np.empty((moduli.shape[1], n_modes))
+    gradient = np.empty(dim)
+    whole = _derivatives(x, middle, 0, J, at_middle)
+    own[:] = 0.0
+    mixed[:] = 0.0
+    for q in range(weights.shape[0]):
+        det = _derivatives(x, dN, q, J, inverse)
+        _modes(xi, q, at_middle, whole / det, pairs, M)
+        D = moduli[numbers[q % numbers.shape[0]]]
+        for c in range(M.shape[0]):
+            for m in range(n_modes):
+                S[c, m] = 0.0
+            for e in range(M.shape[0]):
+                factor = det * weights[q] * D[c, e]
+                if factor != 0.0:
+                    for m in range(n_modes):
+                        S[c, m] += factor * M[e, m]
+        for c in range(M.shape[0]):
+            for m in range(n_modes):
+                if M[c, m] != 0.0:
+                    for n in range(m + 1):
+                        own[m, n] += M[c, m] * S[c, n]
+        for a in range(x.shape[0]):
+            for i in range(dim):
+                gradient[i] = 0.0
+                for k in range(dim):
+                    gradient[i] += dN[q, a, k] * inverse[i, k]
+            for i in range(dim):
+                for j in range(dim):
+                    for m in range(n_modes):
+                        mixed[m, dim * a + i] += S[pairs[i, j], m] * gradient[j]
+
+
+@kernel
+def _reduce(own, mixed):
+    """Replace the lower half of `own` (m, m) by its Cholesky factor L, and `mixed` (m, n) by L^-1 mixed."""
+    for m in range(own.shape[0]):
+        for n in range(m + 1):
+            value = own[m, n]
+            for k in range(n):
+                value -= own[m, k] * own[n, k]
+            own[m, n] = np.sqrt(value) if m == n else value / own[n, n]
+        for n in range(m):
+            for k in range(mixed.shape[1]):
+                mixed[m, k] -= own[m, n] * mixed[n, k]
+        for k in range(mixed.shape[1]):
+            mixed[m, k] /= own[m, m]
+
+
+@kernel
+def subtract_stiffness(
+    points, cells, dN, xi, weights, middle, pairs, moduli, bends, material, slots, owner, part, data
+):
+    """Subtract what modes give way from `data` (n_blocks, dim, dim), in the rows of a part's nodes.
+
+    `slots`, `owner` and `part` as for the element loops of the whole stiffness; Jacobians have been found positive.
+    """
+    n_cells, n_nodes = cells.shape
+    dim = points.shape[1]
+    n_modes = 4 if dim == 2 else 13
+    x, row = np.empty((n_nodes, dim)), np.empty(n_nodes * dim)
+    own, mixed = np.empty((n_modes, n_modes)), np.empty((n_modes, n_nodes * dim))
+    for c in range(n_cells):
+        mine = False
+        for a in range(n_nodes):
+            mine = mine or owner[cells[c, a]] == part
+        if not mine or not bends[material[c, 0]]:
+            continue
+        for a in range(n_nodes):
+            for i in range(dim):
+                x[a, i] = points[cells[c, a], i]
+        _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], own, mixed)
+        _reduce(own, mixed)
+        for a in range(n_nodes):
+            if owner[cells[c, a]] != part:
+                continue
+            for i in range(dim):
+                row[:] = 0.0
+                for m in range(n_modes):
+                    for k in range(n_nodes * dim):
+                        row[k] += mixed[m, dim * a + i] * mixed[m, k]
+                for b in range(n_nodes):
+                    for j in range(dim):
+                        data[slots[c, a, b], i, j] -= row[dim * b + j]
+
+
+@kernel
+def add_stress(
+    points, cells, dN, xi, weights, middle, pairs, moduli, bends, material, displacement, lost, at, slopes, beside, out
+):
+    """Add the stresses of modes to `out` (n_cells, n_out, n_components), in place.
+
+    `displacement` (n_points, dim); `lost` (n_cells or 0, n_q, n_components), the stresses that the cells lose by temperature
+    and initial states; `at` (n_out, dim) and `slopes` (n_out, n_nodes, dim): the points of `out` and shape derivatives
+    there; `beside` (n_out, n_q): weights of values at the quadrature points for those at the points of `out`.
+    """
+    n_cells, n_nodes = cells.shape
+    dim, size = points.shape[1], moduli.shape[1]
+    n_modes = 4 if dim == 2 else 13
+    x, u = np.empty((n_nodes, dim)), np.empty(n_nodes * dim)
+    own, mixed, force = np.empty((n_modes, n_modes)), np.empty((n_modes, n_nodes * dim)), np.empty((n_modes, 1))
+    J, inverse, at_middle = np.empty((dim, dim)), np.empty((dim, dim)), np.empty((dim, dim))
+    M, strain = np.empty((size, n_modes)), np.empty(size)
+    for c in range(n_cells):
+        if not bends[material[c, 0]]:
+            continue
+        for a in range(n_nodes):
+            for i in range(dim):
+                x[a, i] = points[cells[c, a], i]
+                u[dim * a + i] = displacement[cells[c, a], i]
+        _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], own, mixed)
+        whole = _derivatives(x, middle, 0, J, at_middle)
+        for m in range(n_modes):
+            force[m, 0] = 0.0
+            for k in range(n_nodes * dim):
+                force[m, 0] -= mixed[m, k] * u[k]
+        if lost.shape[0]:
+            for q in range(weights.shape[0]):
+                det = _derivatives(x, dN, q, J, inverse)
+                _modes(xi, q, at_middle, whole / det, pairs, M)
+                for e in range(size):
+                    for m in range(n_modes):
+                        force[m, 0] += det * weights[q] * M[e, m] * lost[c, q, e]
+        _reduce(own, force)
+        for m in range(n_modes - 1, -1, -1):  # the transposed factor
+            for k in range(m + 1, n_modes):
+                force[m, 0] -= own[k, m] * force[k, 0]
+            force[m, 0] /= own[m, m]
+        for k in range(at.shape[0]):
+            det = _derivatives(x, slopes, k, J, inverse)
+            _modes(at, k, at_middle, whole / det, pairs, M)
+            for e in range(size):
+                strain[e] = 0.0
+                for m in range(n_modes):
+                    strain[e] += M[e, m] * force[m, 0]
+            for q in range(material.shape[1]):
+                weight = 1.0 if material.shape[1] == 1 else beside[k, q]
+                for e in range(size):
+                    for f in range(size):
+                        out[c, k, e] += weight * moduli[material[c, q], e, f] * strain[f]

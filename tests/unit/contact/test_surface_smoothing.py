@@ -1,0 +1,161 @@
+"""The smooth surfaces that facets stand for: exact on circles, cylinders and spheres, nothing on flats, and what is told."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.contact.configuration import Configuration
+from fastcontact.contact.surface import surface
+from fastcontact.contact.surface_smoothing import Smoothing, frames, smooth_side
+from fastcontact.mesh import elements
+from fastcontact.model.fingerprint import different, fingerprint
+
+STEEL = fc.LinearElastic(E=210e3, nu=0.3)
+
+
+def bent(element, divisions, radius, double, shift=0.0):
+    """A box bent so that ZMAX lies on a cylinder about the y axis, or on a sphere."""
+    mesh = fc.generate.box((1.0, 1.0, 0.3), divisions, element, (-0.5, -0.5, 0.0))
+    x, y, z = mesh.points.T
+    height = np.sqrt(radius**2 - (x + shift) ** 2 - (y**2 if double else 0.0))
+    return mesh.replace(points=np.column_stack([x, y, height + z - 0.3]))
+
+
+@pytest.mark.parametrize(("element", "tolerance"), [("quad4", 1e-3), ("tri3", 1e-3), ("quad8", 2e-3), ("tri6", 2e-3)])
+def test_circles_are_met_from_both_sides_and_up_to_their_ends(element, tolerance):
+    mesh = fc.generate.rings(element, divisions_inner=(1, 8), divisions_outer=(1, 8))
+    for group, sign in (("CONT_INNER", 1.0), ("CONT_OUTER", -1.0)):
+        side = surface(mesh, group)
+        smooth = smooth_side(side, mesh.points)
+        xi = np.full((side.n_facets, 1), 0.4)
+        place = elements.get(side.element).shape(xi[:1])[0] @ mesh.points[side.facets]
+        exact = 50.0 - np.linalg.norm(place, axis=1)
+        assert smooth.at(np.arange(side.n_facets), xi) == pytest.approx(sign * exact, rel=tolerance)
+        assert smooth.curvature.ravel() == pytest.approx(sign / 50.0, rel=2e-4)
+        assert smooth.at(np.arange(side.n_facets), np.ones_like(xi)) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("double", [False, True], ids=["cylinder", "sphere"])
+@pytest.mark.parametrize(("element", "divisions", "tolerance"), [
+    ("hex8", (6, 5, 1), 1e-3), ("hex8", (6, 1, 1), 2e-3), ("tet4", (6, 5, 1), 1e-3),
+    ("hex20", (5, 4, 1), 0.02), ("tet10", (5, 4, 1), 0.02),
+])  # fmt: skip
+def test_cylinders_and_spheres_are_met(element, divisions, tolerance, double):
+    if double and divisions[1] == 1:
+        pytest.skip("one facet across tells nothing of the curvature that way")
+    mesh = bent(element, divisions, 2.0, double, shift=0.2)
+    side = surface(mesh, "ZMAX")
+    smooth, facets = smooth_side(side, mesh.points), np.arange(side.n_facets)
+    xi = np.tile(elements.get(side.element).nodes[:3].mean(axis=0)[None] + [0.1, 0.05], (side.n_facets, 1))
+    place = elements.get(side.element).shape(xi[:1])[0] @ mesh.points[side.facets]
+    place += [0.2, 0.0, 0.0]
+    exact = 2.0 - np.linalg.norm(place if double else place[:, [0, 2]], axis=1)
+    assert np.abs(smooth.at(facets, xi) - exact).max() < tolerance * np.abs(exact).max()
+    principal = np.sort(np.linalg.eigvalsh(smooth.curvature), axis=1)
+    assert principal == pytest.approx(np.tile([0.5 if double else 0.0, 0.5], (len(facets), 1)), abs=1e-3)
+
+
+def test_flats_stay_flat_beside_fillets_and_up_to_corners():
+    assert (
+        smooth_side(surface(fc.generate.box(divisions=(3, 3, 1)), "ZMAX"), fc.generate.box(divisions=(3, 3, 1)).points)
+        is None
+    )
+    mesh = fc.generate.block((2.0, 0.2), (20, 1))
+    x, y = mesh.points.T
+    angle = np.maximum(x - 1.0, 0.0)  # flat up to x = 1, then round with radius 1
+    points = np.column_stack([np.minimum(x, 1.0) + (1 + y) * np.sin(angle), (1 + y) * np.cos(angle)])
+    side = surface(mesh, "TOP")
+    smooth = smooth_side(side, points)
+    middle = points[side.facets].mean(axis=1)
+    height = smooth.at(np.arange(20), np.zeros((20, 1)))
+    assert np.abs(height[middle[:, 0] < 1.0]).max() < 0.25 * 0.12**2 / 8
+    assert height[middle[:, 0] > 1.2] == pytest.approx(1.2 * (1 - np.cos(0.05)), rel=1e-3)
+
+
+def test_only_the_curvature_that_both_sides_share_counts():
+    rings = fc.generate.rings("quad4", divisions_inner=(1, 24), divisions_outer=(1, 36))
+    inner, outer = surface(rings, "CONT_INNER"), surface(rings, "CONT_OUTER")
+    both = Smoothing.of(inner, outer, rings.points)
+    axes = frames(inner, rings.points), frames(outer, rings.points)
+    assert both.shared(np.array([0, 2]), np.array([1, 7]), axes) == pytest.approx(np.ones((2, 2)), rel=1e-5)
+    twice = Smoothing(both.secondary, smooth_side(outer, 2.0 * rings.points))
+    assert twice.shared(np.array([3]), np.array([4]), axes) == pytest.approx(np.array([[0.5, 1.0]]), rel=1e-5)
+    same = Smoothing(both.secondary, both.secondary)  # convex on convex
+    assert same.shared(np.array([3]), np.array([4]), (axes[0], axes[0])) == pytest.approx(np.zeros((1, 2)))
+    mesh = fc.generate.sphere_on_block()
+    model = fc.Model(mesh, "3d")
+    model.add_material(STEEL)
+    model.add_contact("ball", secondary="CONT_SPHERE", primary="CONT_BLOCK")
+    assert model.bind(model.contact[0]).smoothing is None
+
+
+def fit(element="quad4", divisions=(24, 36), clearance=-0.05, **options):
+    mesh = fc.generate.rings(element, divisions_inner=(6, divisions[0]), divisions_outer=(6, divisions[1]))
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(STEEL)
+    model.fix("SYMMETRY_X", "x")
+    model.fix("SYMMETRY_Y", "y")
+    if clearance is not None:
+        options["clearance"] = clearance
+    model.add_contact("fit", secondary="CONT_INNER", primary="CONT_OUTER", **options)
+    return model
+
+
+@pytest.mark.parametrize("options", [
+    {}, {"multipliers": "standard"}, {"formulation": "continuous", "surface_smoothing": True},
+    {"formulation": "node_to_segment", "surface_smoothing": True},
+], ids=["dual", "standard", "continuous", "node_to_segment"])  # fmt: skip
+def test_rings_touch_all_round_where_their_circles_do(options):
+    """Two circles of one radius have no gap, whatever their facets."""
+    model = fit(clearance=0.0, **options)
+    pair, at = model.bind(model.contact[0]), Configuration.undeformed(model.mesh.points)
+    sag = 50.0 * (1 - np.cos(np.pi / 96))
+    gaps = pair.unilateral(at).gaps(at.displacement)
+    assert np.abs(gaps).max() < 2e-4 * sag
+    assert np.abs(pair.nodal_gap(at)[0]).max() < 2e-4 * sag
+
+
+@pytest.mark.parametrize(("options", "told"), [
+    ({}, False), ({"surface_smoothing": False}, True), ({"formulation": "continuous"}, True),
+    ({"formulation": "continuous", "divisions": (24, 24)}, False), ({"clearance": -5.0, "formulation": "continuous"}, False),
+])  # fmt: skip
+def test_chords_that_push_sides_apart_are_told(options, told):
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        fc.solve(fit(**options), 1)
+    texts = [str(warning.message) for warning in found if "stand off their arcs" in str(warning.message)]
+    assert bool(texts) == told
+    if told:
+        assert "surface_smoothing=True" in texts[0]
+
+
+@pytest.mark.parametrize(("n", "told"), [(12, True), (48, False)])
+def test_chords_against_exact_shapes_are_told(n, told):
+    model = fit(divisions=(n, n), kind="tied", clearance=None)
+    model.add_obstacle(
+        "rod", secondary="BORE", obstacle=fc.obstacles.Sphere(centre=(0.0, 0.0), R=20.05), formulation="continuous"
+    )
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        fc.solve(model, 1)
+    texts = [str(warning.message) for warning in found if "stand off their arcs" in str(warning.message)]
+    assert bool(texts) == told
+    assert all("formulation 'node_to_segment'" in text for text in texts)
+
+
+def test_steps_with_and_without_smoothing_are_of_different_cases():
+    """A file that was begun without goes on without; where nothing is smoothed, the option makes no difference."""
+    curved = [
+        fingerprint(fit(**options)) for options in ({}, {"surface_smoothing": False}, {"surface_smoothing": True})
+    ]
+    assert different(curved[0], curved[1]) == ["surface_smoothing of contact 'fit'"]
+    assert different(curved[0], curved[2]) == []
+
+
+def test_an_obstacle_has_no_facets_to_smooth():
+    model = fit(kind="tied", clearance=None)
+    plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    with pytest.raises(fc.ContactError, match="leave it out at an obstacle"):
+        model.add_obstacle("rod", secondary="BORE", obstacle=plane, surface_smoothing=True)
