@@ -34,6 +34,7 @@ _NAMES = {
     "analysis.criteria": ("Criteria",),
     "analysis.run": ("solve", "solve_steps"),
     "analysis.sensitivities": ("Sensitivities", "sensitivities"),
+    "analysis.support_forces": ("pretension_history", "spring_forces", "support_forces"),
     "cases.decks.deck": ("Deck", "read_deck"),
     "elasticity.anisotropic_materials": ("Anisotropic", "Orthotropic"),
     "elasticity.material_axes": ("CylindricalAxes",),

@@ -12,6 +12,9 @@ from fastcontact.analysis.run import solve as solve
 from fastcontact.analysis.run import solve_steps as solve_steps
 from fastcontact.analysis.sensitivities import Sensitivities as Sensitivities
 from fastcontact.analysis.sensitivities import sensitivities as sensitivities
+from fastcontact.analysis.support_forces import pretension_history as pretension_history
+from fastcontact.analysis.support_forces import spring_forces as spring_forces
+from fastcontact.analysis.support_forces import support_forces as support_forces
 from fastcontact.cases.decks.deck import Deck as Deck
 from fastcontact.cases.decks.deck import read_deck as read_deck
 from fastcontact.contact import obstacles as obstacles

@@ -43,6 +43,8 @@ class Balance:
         The largest force that nothing balances over the largest one of this step, zero where that is round-off.
     noise : float
         Forces up to this are round-off [force].
+    energy : float
+        Of deformation, springs included [energy].
     """
 
     reaction: Array
@@ -51,6 +53,7 @@ class Balance:
     bound: float
     relative: float
     noise: float = 0.0
+    energy: float = 0.0
 
     @property
     def excess(self) -> float:
@@ -102,6 +105,7 @@ def balance(problem: Problem, u: Array, contact_force: Array, external: Array, l
     """
     criteria = problem.criteria
     out = problem.system.K @ u
+    energy = 0.5 * float(u @ out)
     out -= contact_force
     out -= external
     reaction, residual = problem.system.balance(out)
@@ -124,6 +128,7 @@ def balance(problem: Problem, u: Array, contact_force: Array, external: Array, l
         max(bound, round_off),
         float(off / force) if force > round_off else 0.0,
         noise,
+        energy,
     )
 
 

@@ -73,7 +73,6 @@ def contact_result(
         radius=half_width(middle.places(part.positions), active, middle.across(part.positions)),
         shear=along.shear,
         sticking=closed & along.sticking,
-        dissipation=along.dissipation,
         middle=middle.position,
         place=middle.places(coordinates),
         tangent=middle.tangent,
@@ -120,11 +119,10 @@ def _forces(pair: Formulation, part: Constraints, multiplier: Array, along: _Alo
 
 @dataclass(frozen=True, eq=False)
 class _AlongTheSurface:
-    """Nodal traction (n_nodes, dim) [pressure], nodes that stick, dissipation [energy], tangential forces (m, k) [force]."""
+    """Nodal traction (n_nodes, dim) [pressure], nodes that stick, tangential forces (m, k) [force]."""
 
     shear: Array
     sticking: Mask
-    dissipation: float = 0.0
     force: Array | None = None
 
 
@@ -139,12 +137,11 @@ def _along_the_surface(
         return _AlongTheSurface(np.where(found.nodes[:, None], shear, 0.0), everywhere)
     if not (isinstance(solution, FrictionalEquilibrium) and part.tangents):
         return _AlongTheSurface(np.zeros_like(normal), everywhere)
-    tangential, slip = solution.tangential[rows], solution.slip[rows]
+    tangential = solution.tangential[rows]
     shear = _nodal_shear(part, part.directions, tangential, normal, part.normal_forces(multiplier))
     return _AlongTheSurface(
         shear * found.kept[:, None],
         _mostly_sticking(part, solution.sticking[rows], multiplier, part.pressure(multiplier)),
-        float(-(tangential * slip).sum()),
         tangential,
     )
 

@@ -14,6 +14,7 @@ from fastcontact.analysis.slip import slip_in_step
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import Worn
+from fastcontact.analysis.work import contact_work
 from fastcontact.results.step import ContactResult
 
 Array = NDArray[np.float64]
@@ -40,13 +41,19 @@ def keep_contact(problem: Problem, start: State, load: StepLoad, settled: Settle
     )  # fmt: skip
 
 
-def keep_slip(
-    problem: Problem, start: State, load: StepLoad, end: State, results: dict[str, ContactResult]
-) -> tuple[State, dict[str, ContactResult]]:
-    """Return the state at the end of a step with slip and wear so far, and the results of contact pairs with both."""
-    worn, slipped, told, displacement = dict(start.worn), dict(start.slipped), {}, problem.displacement(end.u)
-    for name, contact in results.items():
-        pair, at = problem.pairs[name], problem.configuration(name, start, load, displacement, end.u)
+def keep_path(
+    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State, results: dict[str, ContactResult],
+    energy: float,
+) -> tuple[State, dict[str, ContactResult]]:  # fmt: skip
+    """Return the state at the end of a step with slip, wear and work so far, and the results of contact pairs with them.
+
+    `energy` is that of deformation [energy].
+    """
+    displacement, told, works = problem.displacement(end.u), dict(results), np.zeros(2)
+    worn, slipped, forces = dict(start.worn), dict(start.slipped), dict(start.forces)
+    for name, rows in settled.constraints.rows().items():
+        pair, contact, part = problem.pairs[name], results[name], settled.constraints.parts[name]
+        at = problem.configuration(name, start, load, displacement, end.u)
         slip = slip_in_step(pair, at, contact)
         slipped[name] = slip + start.slipped.get(name, 0.0)
         told[name] = replace(contact, slip=slip, slip_total=slipped[name])
@@ -54,7 +61,14 @@ def keep_slip(
             before = start.worn.get(name, Worn.nothing(len(contact.points)))
             worn[name] = before.after(pair, at, contact, pair.options.wear)
             told[name] = replace(told[name], wear=worn[name].depth)
-    return replace(end, worn=worn, slipped=slipped), told
+        if not (pair.options.tied or pair.options.gap_only):
+            given = part, settled.solution, rows, at, contact, start.forces.get(name)
+            forces[name], *found = contact_work(pair, *given)
+            told[name] = replace(told[name], dissipation=found[0])
+            works += found
+    stored = sum(own.stored for own in forces.values())
+    work = None if start.work is None else start.work.after(energy, stored, *works.tolist())
+    return replace(end, worn=worn, slipped=slipped, forces=forces, work=work), told
 
 
 def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> dict[str, tuple[Array, Array]]:

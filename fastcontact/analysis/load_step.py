@@ -19,7 +19,7 @@ from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis.balance import Balance, balance
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import StepContext
-from fastcontact.analysis.keep_contact import keep_contact, keep_slip
+from fastcontact.analysis.keep_contact import keep_contact, keep_path
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_result import contact_results, counted, recover
@@ -63,7 +63,13 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     end = replace(
         start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles
     )
-    end, contact = (end, {}) if settled is None else after_contact(problem, start, load, settled, end)
+    contact: dict[str, ContactResult] = {}
+    if settled is not None:
+        end, contact = after_contact(problem, start, load, settled, end, balanced.energy)
+    elif start.work is not None:
+        end = replace(end, work=start.work.after(balanced.energy, 0.0, 0.0, 0.0))
+    if end.work is not None:
+        iterations["work"] = end.work.told()
     if problem.unsupported_bodies is not None and end.rigid is not None:
         iterations["regularised"] = problem.unsupported_bodies.report(end.rigid, end.largest_rigid_force)
     end = replace(end, solver=problem.solver.snapshot())
@@ -137,10 +143,10 @@ def solve_displacements(
 
 
 def after_contact(
-    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State
+    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State, energy: float
 ) -> tuple[State, dict[str, ContactResult]]:
     """Return the end of the step with what later steps start from, and the results of all contact pairs."""
     end = keep_contact(problem, start, load, settled, end)
     results = contact_results(problem, start, load, settled, end)
-    end, results = keep_slip(problem, start, load, end, results)
+    end, results = keep_path(problem, start, load, settled, end, results, energy)
     return end.after_touching(name for name, pair in results.items() if pair.active.any()), results

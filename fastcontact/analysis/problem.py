@@ -16,6 +16,7 @@ from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.state import State
 from fastcontact.analysis.unsupported_bodies import UnsupportedBodies
+from fastcontact.analysis.work import Work
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.held_motions import HeldMotions
@@ -194,7 +195,7 @@ class Problem:
         """Return the state before the first load step."""
         # Gaps are differences of coordinates and no more accurate than those.
         round_off = 8 * np.finfo(float).eps * float(np.abs(self.model.mesh.points).max())
-        return State(np.zeros(self.force_driven.n_dofs), round_off, solver=self.solver.snapshot())
+        return State(np.zeros(self.force_driven.n_dofs), round_off, solver=self.solver.snapshot(), work=Work())
 
 
 @parallel.on_one_blas_thread

@@ -34,12 +34,16 @@ ROTATION = 0.3
 MANY_STEPS = 1000
 # Worn depth by the size of the model, likewise.
 WORN = 0.1
+# Energies below this part of the largest force times the largest displacement are round-off.
+ROUND_OFF = 1e-9
 # Elements across the radius of a contact that resolve its pressure.
 ACROSS = 4
 # Change of the displacement by the last of a fixed number of geometry updates, relative to its largest component.
 UNSETTLED = 1e-2
 # What criteria may leave, of the displacement or of the forces, before it is worth a warning.
 LOOSE = 1e-4
+# Part of the largest energy or work that may be missing in the balance of works.
+IMBALANCE = 0.02
 
 
 def result_warnings(problem: Problem, state: State, last: StepResult) -> list[str]:
@@ -56,7 +60,7 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
         found += _deep(pair, contact, state.u) + _lost(pair, contact, name in state.touched, loaded)
         found += [sagging[name]] if name in sagging else _unresolved(name, pair, contact)
         found += _too_fast(name, pair, state)
-    return found + seam_warnings(problem, last) + _unsettled(state) + _loose(problem, last)
+    return found + seam_warnings(problem, last) + _unsettled(state) + _loose(problem, last) + _unbalanced(state)
 
 
 def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> list[str]:
@@ -86,6 +90,20 @@ def _too_fast(name: str, pair: Formulation, state: State) -> list[str]:
     return [
         f"contact '{name}' wears so much in a load step that pressures may waver from node to node and depths are too large: "
         f"take {math.ceil(many)} times as many steps, or larger elements"
+    ]
+
+
+def _unbalanced(state: State) -> list[str]:
+    """Return a warning where energies and works of all steps do not add up, but for what is round-off beside forces."""
+    work = state.work
+    if work is None or not abs(work.imbalance) > IMBALANCE * work.largest:
+        return []
+    if work.largest <= ROUND_OFF * state.largest_force * float(np.abs(state.u).max(initial=0.0)):
+        return []
+    return [
+        f"the works of these load steps do not add up: {work.imbalance:.3g} of the external work {work.external:.4g} is "
+        f"neither strain energy ({work.strain_energy:.4g}), nor work of friction ({work.friction:.4g}), nor in penalties, "
+        f"{abs(work.imbalance) / work.largest:.1%} of the largest of them: take more load steps where works matter"
     ]
 
 

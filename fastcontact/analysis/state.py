@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.unsupported_bodies import RigidPosition
 from fastcontact.analysis.wear import Worn
+from fastcontact.analysis.work import ContactForces, Work
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -58,6 +59,10 @@ class State:
         Of all steps so far: the largest force [force], and the largest force of loads on a free rigid motion [force].
     touched : frozenset of str
         Contact pairs that were closed at the end of a step.
+    work : Work, optional
+        Of all steps so far; None behind steps of a version that did not count it.
+    forces : dict of str to ContactForces
+        By contact pair, what the work of the next step needs.
     last_change : (int, float), optional
         The fixed number of geometry updates of the last step, and the relative change by the last one.
     rigid : RigidPosition, optional
@@ -82,6 +87,8 @@ class State:
     largest_force: float = 0.0
     largest_rigid_force: float = 0.0
     touched: frozenset[str] = frozenset()
+    work: Work | None = None
+    forces: Mapping[str, ContactForces] = field(default_factory=dict)
     last_change: tuple[int, float] | None = None
     rigid: RigidPosition | None = None
     solver: Any = None
@@ -103,6 +110,8 @@ class State:
             "obstacles": self.u[n_dofs:].copy(),
             "touched": sorted(self.touched),
             "locked": dict(self.locked),
+            "work": None if self.work is None else dataclasses.asdict(self.work),
+            "forces": {name: vars(own) for name, own in self.forces.items()},
             "active": dict(self.active),
             "pressure": dict(self.pressure),
             "pairs": {
@@ -153,6 +162,8 @@ class State:
             first_contact={name: (both[0], both[1]) for name, both in found["first_contact"].items()},
             traction={name: (both[0], both[1]) for name, both in found["traction"].items()},
             locked=dict(kept.get("locked", {})),
+            work=Work(**kept["work"]) if kept.get("work") else None,
+            forces={name: ContactForces(**own) for name, own in kept.get("forces", {}).items()},
             extrapolation=Extrapolation.from_dict(kept["extrapolation"], u)
             if "extrapolation" in kept
             else Extrapolation(),

@@ -88,6 +88,8 @@ def of_step(step: StepResult) -> dict[str, Any]:
     worked = {name: contact.dissipation for name, contact in step.contact.items() if contact.dissipation}
     if worked:
         found["dissipation"] = worked
+    if step.work:
+        found["work"] = step.work
     if step.pretension:
         found["pretension"] = step.pretension
     return found

@@ -254,8 +254,8 @@ class StepResult:
         alone holds bodies, ``regularised``: their springs and the forces in them. If round-off kept the contact geometry
         from settling to the criterion, ``scatter``: by how much ``displacement`` and contact ``force`` still vary [-].
         With temperatures, ``temperature_factors``: what each of them is multiplied with; with initial
-        stresses and strains ``initial_factors`` [-]. With pretension sections,
-        ``pretension``, see the property of that name.
+        stresses and strains ``initial_factors`` [-]. ``work`` and, with pretension sections, ``pretension``: see the
+        properties of these names.
     warnings : tuple of str
         Warnings of the step.
     cell_fields : dict of str to ndarray (n_solids,)
@@ -312,6 +312,16 @@ class StepResult:
     def pretension(self) -> dict[str, dict[str, float]]:
         """By pretension section its ``force``, positive in tension [force], and its ``shortening`` [length]."""
         return dict(self.iterations.get("pretension", {}))
+
+    @property
+    def work(self) -> dict[str, float]:
+        """Energies at the end of the step, and works of all steps so far [energy].
+
+        ``strain_energy``, of springs of the model, too, and of temperatures as if they were forces; ``external_work``, of
+        loads, supports and obstacles; ``friction_work``; ``penalty_energy``, of springs at contacts; ``imbalance``, the first
+        of the works less all others. Empty in files from before it was told, and behind steps of these.
+        """
+        return dict(self.iterations.get("work", {}))
 
     def stress_of_material(self, number: int) -> Array:
         """Return the nodal stress (n_points, 4) or (n_points, 6) with the side of one material where several meet [pressure].

@@ -58,6 +58,13 @@ def test_a_locked_bar_keeps_its_length_and_cools():
     before, after = fc.solve(model, [1.0, 2.0])
     assert after.pretension["bolt"]["shortening"] == pytest.approx(before.pretension["bolt"]["shortening"], rel=1e-12)
     assert after.pretension["bolt"]["force"] == pytest.approx(FORCE + E * 1e-4 * 20.0, rel=1e-9)
+    table = fc.pretension_history([before, after])
+    assert table.dtype.names == ("step", "load_factor", "bolt_force", "bolt_shortening")
+    for row, step in zip(table, (before, after), strict=True):
+        force = step.pretension["bolt"]["force"]
+        assert row.tolist() == (step.index, step.load_factor, force, step.pretension["bolt"]["shortening"])
+        held = fc.support_forces(model, step)  # neither the sides of the cut nor the lock are among them
+        assert (held["TOP"][1], held["BOTTOM"][1]) == pytest.approx((force, -force), rel=1e-9)
 
 
 SOLVERS = ("direct", "amg")

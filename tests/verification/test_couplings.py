@@ -191,3 +191,33 @@ def test_nothing_turns_in_axisymmetry():
         model.add_coupling("REF", "TOP")
     with pytest.raises(fc.ModelError, match="no moment can act on an axisymmetric model"):
         model.add_moment("TOP", z=1.0)
+
+
+@pytest.mark.parametrize("said", ["component", "normal", "axes"])
+def test_forces_of_supports_hold_neither_springs_nor_couplings(said):
+    """A block on a support and a spring, its top coupled: the support carries what the spring does not."""
+    model = fc.Model(fc.generate.block((2.0, 1.0), (4, 2)), "plane_stress")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    if said == "normal":
+        model.fix("BOTTOM", "normal")
+    elif said == "axes":
+        model.prescribe("BOTTOM", y=0.0, axes=(1.0, 0.0))
+    else:
+        model.fix("BOTTOM", "y")
+    model.fix("LEFT", "x")
+    model.add_spring("RIGHT", y=5.0, x=2.0)
+    model.couple("TOP", "y")
+    model.add_traction("TOP", x=1.0, y=-3.0)
+    (step,) = fc.solve(model, 1)
+    found, springs = fc.support_forces(model, step), fc.spring_forces(model, step)
+    assert found.keys() == {"BOTTOM", "LEFT"}
+    right = step.displacement[model.mesh.points_of("RIGHT")]
+    assert springs["spring on 'RIGHT'"].sum() == pytest.approx((right @ [2.0, 5.0]).sum(), rel=1e-12)
+    pulled = right.sum(axis=0) * [2.0, 5.0]
+    assert found["BOTTOM"] + found["LEFT"] == pytest.approx(np.array([-2.0, 6.0]) + pulled, rel=1e-9)
+    assert found["BOTTOM"][0] == pytest.approx(0.0, abs=1e-9)
+    assert found["LEFT"][1] == 0.0
+    other = fc.Model(fc.generate.block((2.0, 1.0), (3, 2)), "plane_stress")
+    for asked in (fc.support_forces, fc.spring_forces):
+        with pytest.raises(fc.ModelError, match="give the model that it was computed for"):
+            asked(other, step)

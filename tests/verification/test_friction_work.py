@@ -110,6 +110,9 @@ def test_a_load_that_turns_round_leaves_work_in_elasticity_and_friction_only(for
     assert lost == pytest.approx(FRICTION * 2.0 * (4e-4 + 8e-4 + 8e-4), rel=1e-8)
     assert energy[-1] == pytest.approx(0.5 * 2.0 * 1e-3 + 0.5 * 0.6 * 6e-4, rel=1e-8)
     assert work == pytest.approx(energy[-1] + lost, rel=1e-8)
+    told = steps[-1].work
+    assert told["external_work"] == pytest.approx(work, rel=1e-8)
+    assert (told["friction_work"], told["strain_energy"]) == pytest.approx((lost, energy[-1]), rel=1e-8)
     for k, step in enumerate(steps):
         contact = step.contact["plane"]
         if k in (2, 4, 6):
@@ -119,8 +122,8 @@ def test_a_load_that_turns_round_leaves_work_in_elasticity_and_friction_only(for
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-def test_every_implicit_step_balances_its_energy_in_partial_slip(dim):
-    # With the forces at the end of each step, work is energy, friction, and half the energy of the increment.
+def test_every_step_balances_its_energy_in_partial_slip(dim):
+    # By the mean of the forces at both ends of each step, work is energy and friction.
     mesh = blocks(dim)
     model = fc.Model(mesh, "plane_strain" if dim == 2 else "3d")
     model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
@@ -132,16 +135,58 @@ def test_every_implicit_step_balances_its_energy_in_partial_slip(dim):
     sides = ("CONT_UPPER", "CONT_LOWER") if dim == 2 else ("UPPER_BOTTOM", "LOWER_TOP")
     model.add_contact("pair", secondary=sides[0], primary=sides[1], formulation="node_to_segment", friction=FRICTION)
     ramp = fc.Ramp(tuple(range(1, 10)), ((0, 0), (9, 9)))
-    steps, energy, K = analysed(model, ramp, keep_pairing=True)
-    u, before, partial = np.zeros(model.n_dofs), 0.0, 0
+    steps, energy, _ = analysed(model, ramp, keep_pairing=True)
+    u, partial, force, slid, work = np.zeros(model.n_dofs), 0, 0.0, 0.0, 0.0
     for step, now in zip(steps, energy, strict=True):
         contact = step.contact["pair"]
         assert contact.active.all()  # an opening or closing gap would be a term of its own
         change = step.displacement.ravel() - u
-        work = step.reaction.ravel() @ change
-        found = now - before + 0.5 * change @ (K @ change) + contact.dissipation
-        assert work == pytest.approx(found, abs=1e-10 * max(energy))
+        work += 0.5 * (step.reaction.ravel() + force) @ change
+        slid += contact.dissipation
+        assert step.work["strain_energy"] == pytest.approx(now, rel=1e-12)
+        assert step.work["friction_work"] == pytest.approx(slid, abs=1e-12 * max(energy))
+        assert abs(step.work["imbalance"]) < 1e-9 * max(energy)
+        # Where friction was not at its limit as the step began, the mean force is less than that of sliding.
+        assert step.work["external_work"] == pytest.approx(work, abs=0.02 * max(energy))
         assert contact.dissipation >= -1e-12 * max(energy)
         partial += contact.sticking.any() and not contact.sticking.all()
-        u, before = step.displacement.ravel(), now
+        u, force = step.displacement.ravel(), step.reaction.ravel()
     assert partial >= 3
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
+@pytest.mark.filterwarnings("ignore:contact .* penetrates by")
+@pytest.mark.parametrize("penalty", [None, 2e4])
+def test_works_add_up_however_few_the_steps(formulation, penalty):
+    """A contact that grows: the mean of the forces at both ends of one step would tell 27 % more than the energy."""
+    found = []
+    for count in (1, 5):
+        model = fc.Model(fc.generate.half_spheres("quad4", arc_sizes=(3.0, 9.0), segments=3), "axisymmetric")
+        model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+        model.fix("A1A2", "x")
+        model.prescribe("A2B2", y=-2.0)
+        model.prescribe("A1B1", y=2.0)
+        model.add_contact("c", secondary="CONT1", primary="CONT2", formulation=formulation, penalty=penalty)
+        found.append(fc.solve(model, count)[-1].work)
+    for told in found:
+        assert told["external_work"] == pytest.approx(told["strain_energy"] + told["penalty_energy"], rel=2e-3)
+        assert told["friction_work"] == 0.0
+        assert (told["penalty_energy"] > 0.02 * told["strain_energy"]) == (penalty is not None)
+
+
+@pytest.mark.filterwarnings("ignore:.*across its radius", "ignore:a displacement of 2 is")
+@pytest.mark.filterwarnings("ignore:the works of these load steps do not add up")
+@pytest.mark.parametrize("count", [1, 16])
+def test_works_that_do_not_add_up_are_told(count):
+    """A block on springs is drawn up a drum: in one step the normal turns by half a radian under its force."""
+    model = fc.Model(fc.generate.block((0.2, 0.2), (2, 2), origin=(-0.1, 0.0)), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1e4, nu=0.0))
+    model.add_spring("TOP", y=100.0)
+    model.prescribe("TOP", x=-2.0, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
+    drum = fc.obstacles.Sphere((0.0, -4.0), 4.0)
+    model.add_obstacle("drum", secondary="BOTTOM", obstacle=drum, motion={"y": 0.5}, ramp=[(0, 0), (1, 1), (2, 1)])
+    steps = fc.solve(model, [1.0, *np.linspace(1.0, 2.0, count + 1)[1:]])
+    told = any("do not add up" in text and "take more load steps" in text for text in steps[-1].warnings)
+    assert told == (count == 1)
+    # The springs give back what they hold, 1/2 k u^2 at three nodes.
+    assert abs(steps[-1].work["imbalance"]) < (0.1 if told else 0.005) * 0.5 * 300.0 * 0.5**2

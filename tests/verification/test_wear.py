@@ -110,6 +110,7 @@ def test_bodies_wear_on_the_secondary_side(multipliers):
     assert last.pressure_max < 0.98 * before.pressure_max
 
 
+@pytest.mark.filterwarnings("ignore:the works of these load steps")
 def test_steps_that_wear_too_much_are_told():
     with pytest.warns(
         fc.FastcontactWarning, match=r"contact 'sole' wears so much in a load step .* take 3 times as many"

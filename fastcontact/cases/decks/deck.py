@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, vstack
-from scipy.sparse.linalg import lsqr
 
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.result_warnings import largest_rotation
 from fastcontact.analysis.run import solve_steps
+from fastcontact.analysis.support_forces import multipliers
 from fastcontact.cases.decks.blocks import Place, read_blocks
 from fastcontact.cases.decks.building import Building
 from fastcontact.cases.decks.content import Content
@@ -124,7 +123,8 @@ class Deck:
             )
             for name, c in step.contact.items()
         }  # fmt: skip
-        return replace(step, reaction=t * reaction, contact=whole)
+        work = {"work": {name: t * value for name, value in step.work.items()}} if step.work else {}
+        return replace(step, reaction=t * reaction, contact=whole, iterations=step.iterations | work)
 
     def _supports_alone(self, reaction: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return nodal forces (n_points, dim) without those of relations, found where no support acts [force]."""
@@ -134,10 +134,10 @@ class Deck:
         held = self.model.prescribed()[0].ravel()
         for support in self.building.local_supports:
             held[support.rows.indices] = True
-        R = csr_array(vstack([link.rows for link in links], format="csr"))
-        free = csr_array(R[:, np.flatnonzero(~held)])
-        multipliers = lsqr(free.T, reaction.ravel()[~held], atol=1e-14, btol=1e-14, iter_lim=20 * sum(R.shape))[0]
-        return (reaction.ravel() - R.T @ multipliers).reshape(reaction.shape)
+        rows = [link.rows for link in links]
+        forces = multipliers(reaction.ravel(), rows, held)
+        linked = sum((own.T @ force for own, force in zip(rows, forces, strict=True)), np.zeros(held.size))
+        return reaction - linked.reshape(reaction.shape)
 
     def _largest_strain(self, step: StepResult) -> float:
         """Return the largest equivalent strain of the solid cells, from their nodal stresses [-]."""

@@ -87,6 +87,7 @@ class ModelBase:
         self.temperatures: list[Temperature] = []
         self.initial_states: list[InitialState] = []
         self.relations: list[Relation] = []
+        self.related_supports: list[tuple[str, Relation]] = []  # those of the relations that support a group
         self.springs: list[Springs] = []
         self.pretensions: list[Pretension] = []
         self.seams: list[Seam] = []  # nodes that are one place of a part that repeats itself

@@ -76,7 +76,7 @@ class ModelSupports(ModelContact):
             nodes, directions = normals_of(self.mesh, group)
             values = evaluated(normal, self.mesh.points[nodes], name)
             table = table_of(ramp, f"the ramp of {name}")
-            self.relations.append(Relation(name, along(nodes, directions, self.n_dofs), values, table))
+            self._related_support(group, Relation(name, along(nodes, directions, self.n_dofs), values, table))
         if components or normal is None:
             self._support(group, components, ramp)
 
@@ -99,7 +99,11 @@ class ModelSupports(ModelContact):
                 raise ModelError(f"{name}: its axes leave the plane, where nothing moves")
             rows = along(nodes, np.ascontiguousarray(direction[:, :dim]), self.n_dofs)
             table = table_of(ramp, f"the ramp of {what}")
-            self.relations.append(Relation(f"{what} along axes", rows, evaluated(value, places, what), table))
+            self._related_support(group, Relation(f"{what} along axes", rows, evaluated(value, places, what), table))
+
+    def _related_support(self, group: str, relation: Relation) -> None:
+        self.relations.append(relation)
+        self.related_supports.append((group, relation))
 
     def _support(self, group: str, components: Mapping[str, Value], ramp: History) -> None:
         if not len(self.mesh.points_of(group)):

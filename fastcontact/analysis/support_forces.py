@@ -1,0 +1,125 @@
+"""Forces of supports by group, of springs, and of bolts over the load: what engineers read off the ends of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, vstack
+from scipy.sparse.linalg import lsqr
+
+from fastcontact.elasticity.springs import ground_force
+from fastcontact.errors import ModelError
+from fastcontact.mesh.argument_types import typed
+from fastcontact.model.model import Model
+from fastcontact.results.step import StepResult
+
+Array = NDArray[np.float64]
+
+
+@typed(ModelError)
+def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
+    """Return the resultant (dim,) of the supports of each group that has some [force].
+
+    `StepResult.reaction` also holds the forces of relations and of springs to the ground; these do not. Where a node has the
+    same component in several groups, the first one counts it, so that the sum over the groups is that of all supports.
+
+    Parameters
+    ----------
+    model : Model
+    step : StepResult
+        Of this model.
+
+    Returns
+    -------
+    dict of str to ndarray (dim,)
+        In axisymmetry over the full circle.
+
+    Raises
+    ------
+    ModelError
+        If the step is of another model.
+    """
+    _check(model, step)
+    n, (held, _) = model.n_dofs, model.prescribed()
+    related = [relation for _, relation in model.related_supports]
+    coupling = [relation for relation in model.relations if not any(relation is own for own in related)]
+    reaction = step.reaction.ravel() - ground_force(model.springs, step.displacement.ravel())
+    rows = [relation.rows for relation in (*related, *coupling)]
+    rows += [section.row(n) for section in model.pretensions]  # which may be locked
+    forces = multipliers(reaction, rows, held.ravel())
+    reaction = reaction - sum((own.T @ force for own, force in zip(rows, forces, strict=True)), np.zeros(n))
+    found: dict[str, Array] = {}
+    left = np.where(held, reaction.reshape(held.shape), 0.0)
+    for support in model.supports:
+        nodes, k = model.mesh.points_of(support.group), support.component
+        found.setdefault(support.group, np.zeros(held.shape[1]))[k] += left[nodes, k].sum()
+        left[nodes, k] = 0.0
+    for (group, relation), force in zip(model.related_supports, forces, strict=False):
+        own = (relation.rows.T @ force).reshape(held.shape).sum(axis=0)
+        found[group] = found.get(group, 0.0) + own
+    return found
+
+
+def multipliers(reaction: Array, rows: Sequence[csr_array], held: NDArray[np.bool_]) -> list[Array]:
+    """Return the forces (m,) of relations with rows (m, n_dofs), found where no support acts [force].
+
+    `reaction` (n_dofs,) are those of supports and relations [force]; `held` (n_dofs,) is where supports act.
+    """
+    if not rows:
+        return []
+    free = csr_array(csr_array(vstack(rows, format="csr"))[:, np.flatnonzero(~held)])
+    found = lsqr(free.T, reaction[~held], atol=1e-14, btol=1e-14, iter_lim=20 * sum(free.shape))[0]
+    return np.split(found, np.cumsum([own.shape[0] for own in rows])[:-1])
+
+
+@typed(ModelError)
+def spring_forces(model: Model, step: StepResult) -> dict[str, Array]:
+    """Return the tension (m,) in springs by what they are called, such as ``"spring on 'TOP'"`` [force].
+
+    Parameters
+    ----------
+    model : Model
+    step : StepResult
+        Of this model.
+
+    Raises
+    ------
+    ModelError
+        If the step is of another model.
+    """
+    _check(model, step)
+    found: dict[str, Array] = {}
+    for spring in model.springs:
+        name, tension = spring.name.removeprefix("the "), spring.tension(step.displacement)
+        found[name] = np.concatenate([found[name], tension]) if name in found else tension
+    return found
+
+
+def pretension_history(steps: Iterable[StepResult]) -> NDArray[np.void]:
+    """Return force and shortening of every pretension section as a table, one row for each load step, for `write_csv`.
+
+    Returns
+    -------
+    structured ndarray (n_steps,)
+        ``step``, ``load_factor``; for each section ``NAME_force``, positive in tension [force], and ``NAME_shortening``
+        [length]; NaN in steps without it.
+    """
+    steps = list(steps)
+    names = list(dict.fromkeys(name for step in steps for name in step.pretension))
+    asked = [(name, kind) for name in names for kind in ("force", "shortening")]
+    rows = [
+        (step.index, step.load_factor, *(step.pretension.get(name, {}).get(kind, np.nan) for name, kind in asked))
+        for step in steps
+    ]
+    columns = [(f"{name}_{kind}", float) for name, kind in asked]
+    return np.array(rows, [("step", int), ("load_factor", float), *columns])
+
+
+def _check(model: Model, step: StepResult) -> None:
+    if step.displacement.shape != model.mesh.points.shape:
+        raise ModelError(
+            f"load step {step.index} has {len(step.displacement)} points and the model {model.mesh.n_points}: give the model "
+            "that it was computed for"
+        )

@@ -1,0 +1,235 @@
+"""Work of a load step at its contacts: of friction, of springs, and what of it nothing explains.
+
+Over a step forces count as the mean of those at both ends, times the displacement between (trapezoidal rule). What is known
+of the path in between is put right: a normal force acts only on closed gaps, and friction slides where its traction is at
+the limit, whatever it was as the step began. The energy of deformation and these works add up to the external work, but for
+what contact forces do where gaps stay closed or sides stick: an error of long steps, in which normals turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array
+
+from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.contact.configuration import Configuration
+from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.pairing import Candidates
+from fastcontact.results.step import ContactResult
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ContactForces:
+    """What the work of the next load step needs of a contact pair at the end of one.
+
+    Attributes
+    ----------
+    positions : ndarray (m, dim)
+        Reference places of its constraints [length].
+    pressure, traction : ndarray (m,), ndarray (m, dim)
+        There [pressure].
+    energy : ndarray (m,)
+        Of penalties along the normals, twice [energy].
+    rows : sequence of ndarray
+        Rows of the gaps times the normal forces: data, indices and starts of a sparse matrix (m, n_dofs) [force].
+    tangential : ndarray (n_points, dim)
+        Tangential forces on the nodes [force].
+    pressing, added : ndarray (n_nodes,)
+        Normal forces on the secondary nodes [force], and what clearances and wear add to their gaps [length].
+    stored : float
+        Energy of penalties [energy].
+    """
+
+    positions: Array
+    pressure: Array
+    traction: Array
+    energy: Array
+    rows: Sequence[NDArray[Any]]
+    tangential: Array
+    pressing: Array
+    added: Array
+    stored: float
+
+    def at(self, positions: Array) -> tuple[Array, Array]:
+        """Return pressure (m,) and traction (m, dim) at the nearest of other places (m, dim) [pressure]."""
+        if np.array_equal(positions, self.positions):
+            return self.pressure, self.traction
+        if not len(self.positions):
+            return np.zeros(len(positions)), np.zeros_like(positions)
+        from scipy.spatial import cKDTree
+
+        nearest = cKDTree(self.positions).query(positions)[1]
+        return self.pressure[nearest], self.traction[nearest]
+
+    def kept(self, other: ContactForces, moved: Array) -> float:
+        """Return the work that normal forces take over half a step where they act at its other end, too [energy].
+
+        Under relative motions `moved` (n_points, dim) [length]. Gaps that open or close are left out: no force acts on them,
+        for all that the mean of both ends tells.
+        """
+        shut = other.at(self.positions)[0] != 0.0
+        data, indices, start = self.rows
+        opening = csr_array((data, indices, start), shape=(len(start) - 1, moved.size)) @ moved.ravel()
+        return -0.5 * float(opening[shut].sum())
+
+    def alone(self, other: ContactForces) -> float:
+        """Return the energy of penalties along the normals where no force acts at the other end of the step [energy]."""
+        return 0.5 * float(self.energy[other.at(self.positions)[0] == 0.0].sum())
+
+
+@dataclass(frozen=True)
+class Work:
+    """Energies at the end of a load step, and works of all steps so far [energy].
+
+    Attributes
+    ----------
+    strain_energy : float
+        Of bodies and springs.
+    friction, imbalance : float
+    stored : float
+        Energy of penalties.
+    largest : float
+        The largest of these energies and works so far.
+    """
+
+    strain_energy: float = 0.0
+    friction: float = 0.0
+    imbalance: float = 0.0
+    stored: float = 0.0
+    largest: float = 0.0
+
+    @property
+    def external(self) -> float:
+        """Work of loads, supports and obstacles."""
+        return self.strain_energy + self.friction + self.imbalance + self.stored
+
+    def after(self, strain_energy: float, stored: float, friction: float, imbalance: float) -> Work:
+        """Return the work after a step more, from the energies at its end, and the works in it."""
+        found = Work(strain_energy, self.friction + friction, self.imbalance + imbalance, stored)
+        terms = (self.largest, strain_energy, found.friction, abs(found.external))
+        return replace(found, largest=max(terms))
+
+    def told(self) -> dict[str, float]:
+        """Return what results tell, see `StepResult.work`."""
+        return {
+            "strain_energy": self.strain_energy, "external_work": self.external, "friction_work": self.friction,
+            "penalty_energy": self.stored, "imbalance": self.imbalance,
+        }  # fmt: skip
+
+
+def contact_work(
+    pair: Formulation, part: Constraints, solution: Solution, rows: slice, at: Configuration, contact: ContactResult,
+    before: ContactForces | None,
+) -> tuple[ContactForces, float, float]:  # fmt: skip
+    """Return the contact forces of a pair at the end of a step, the work of friction in it, and the imbalance [energy].
+
+    Parameters
+    ----------
+    pair : Formulation
+    part : Constraints
+    solution : Solution
+        Of all pairs; those of this one are its `rows`.
+    rows : slice
+    at : Configuration
+        At the end of the step.
+    contact : ContactResult
+        Likewise.
+    before : ContactForces, optional
+        At its beginning; None before the first step.
+    """
+    normal, tangents = solution.multiplier[rows], np.zeros((len(part), 0))
+    slip, directions = tangents, np.zeros((len(part), 0, contact.coordinates.shape[1]))
+    if isinstance(solution, FrictionalEquilibrium) and part.tangents:
+        tangents, slip, directions = solution.tangential[rows], solution.slip[rows], np.stack(part.directions, axis=1)
+    force, moved = (np.einsum("mk,mkd->md", values, directions) for values in (tangents, slip))
+    now = _forces(pair, part, normal, tangents, force, contact, _added(pair, at, contact))
+    before = before or _nothing(now)
+    areas = _areas(part)
+    pressure, traction = before.at(part.positions)
+    ratio = np.divide(pressure * areas, normal, out=np.zeros(len(part)), where=normal != 0.0)
+    along, earlier = (-0.5 * np.einsum("md,md->m", own, moved) for own in (force, areas[:, None] * traction))
+    friction = float(np.where(normal != 0.0, (1.0 + ratio) * along, np.maximum(earlier, 0.0)).sum())
+    sliding = float((along + earlier).sum())
+    moved = _relative(pair, at)
+    taken = now.kept(before, moved) + before.kept(now, moved) + now.alone(before) - before.alone(now)
+    wider = np.where((now.pressing != 0.0) & (before.pressing != 0.0), now.added - before.added, 0.0)
+    taken -= 0.5 * float((now.pressing + before.pressing) @ wider)
+    taken -= 0.5 * float(((now.tangential + before.tangential) * moved).sum())
+    return now, friction, taken - (now.stored - before.stored) - sliding
+
+
+def _areas(part: Constraints) -> Array:
+    """Return the areas (m,) that constraints stand for, zero where for none [area]."""
+    return np.zeros(len(part)) if part.areas is None else np.where(np.isfinite(part.areas), part.areas, 0.0)
+
+
+def _forces(
+    pair: Formulation, part: Constraints, normal: Array, tangents: Array, force: Array, contact: ContactResult,
+    added: Array,
+) -> ContactForces:  # fmt: skip
+    """Return the contact forces of normal forces (m,), tangential ones along tangents (m, k) and as vectors (m, dim).
+
+    `added` (n_nodes,) are clearances [length].
+    """
+    size, dim = pair.points.size, contact.coordinates.shape[1]
+    rows = csr_array(diags_array(normal) @ part.B)[:, :size]
+    rows.eliminate_zeros()
+    along = np.zeros(size)
+    for tangent, own in zip(part.tangents, tangents.T, strict=False):
+        along += (tangent.T @ own)[:size]
+    ours = rows.sum(axis=0).reshape(-1, dim)[pair.secondary.points]
+    facing = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
+    share = 1.0 / np.where(_areas(part) > 0.0, _areas(part), np.inf)
+    give = np.zeros(len(part)) if part.normal_compliance is None else part.normal_compliance.apply(normal)
+    return ContactForces(
+        part.positions, normal * share, force * share[:, None], give * normal, (rows.data, rows.indices, rows.indptr),
+        along.reshape(-1, dim), np.einsum("nd,nd->n", ours, facing), added, _stored(part, normal, tangents, give),
+    )  # fmt: skip
+
+
+def _stored(part: Constraints, normal: Array, tangents: Array, give: Array) -> float:
+    """Return the energy of penalties that give way (m,) [length] under normal forces (m,) and tangential ones (m, k)."""
+    total = float(normal @ give)
+    if part.tangential_softness is not None:
+        total += float(part.tangential_softness @ (tangents**2).sum(axis=1))
+    if part.low_rank_compliance is not None:
+        all_forces = np.column_stack([normal, tangents]).T
+        total += float((np.einsum("am,amh->h", all_forces, part.low_rank_compliance[: len(all_forces)]) ** 2).sum())
+    return 0.5 * total
+
+
+def _relative(pair: Formulation, at: Configuration) -> Array:
+    """Return the motion (n_points, dim) of the nodes in the step, past the obstacle where there is one [length]."""
+    moved = at.displacement - at.start
+    if isinstance(pair.primary, RigidSide):
+        points = pair.secondary.points
+        turning = pair.turning(Candidates(points[:, None], np.ones((len(points), 1))), at)
+        moved[points] -= (at.obstacle - at.obstacle_start) + (0.0 if turning is None else turning)
+    return moved
+
+
+def _nothing(now: ContactForces) -> ContactForces:
+    """Return the beginning, without forces."""
+    dim = now.positions.shape[1]
+    rows = np.empty(0), np.empty(0, np.int32), np.zeros(1, np.int32)
+    return ContactForces(
+        np.empty((0, dim)), np.empty(0), np.empty((0, dim)), np.empty(0), rows, np.zeros_like(now.tangential),
+        np.zeros_like(now.pressing), now.added, 0.0,
+    )  # fmt: skip
+
+
+def _added(pair: Formulation, at: Configuration, contact: ContactResult) -> Array:
+    """Return what clearances and wear add to the gaps (n_nodes,) of the secondary nodes [length]."""
+    if pair.options.clearance is None and at.worn is None:
+        return np.zeros(len(contact.gap))
+    bare = pair.nodal_gap(at, with_clearance=False)[0]
+    return np.subtract(contact.gap, bare, out=np.zeros_like(bare), where=np.isfinite(bare) & np.isfinite(contact.gap))
