@@ -280,6 +280,9 @@ def _ramp(data: dict[str, Any]) -> Ramp:
         return linear_ramp(data.get("steps", 20), float(data.get("end", 1.0)))
     if "steps" in data or "end" in data:
         raise CaseError("'ramp' takes either 'instants', or 'steps' and 'end', not both")
+    wrong = [t for t in data["instants"] if isinstance(t, bool) or not isinstance(t, NUMBER)]
+    if wrong:
+        raise CaseError(f"ramp.instants holds {wrong[0]!r}, which is no number")
     instants = tuple(float(t) for t in data["instants"])
     table = points(data["table"]) if "table" in data else ((0.0, 0.0), (1.0, 1.0))
     return Ramp(instants, table)

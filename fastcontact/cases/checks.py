@@ -128,6 +128,14 @@ def read_check(
         source=entry.get("source", ""),
         factor=float(entry.get("factor", _whole(what, theories.get(entry.get("theory", ""), {})))),
     )
+    if not 0.0 < check.tolerance < math.inf:
+        raise CaseError(
+            f"{where}.tolerance = {check.tolerance:g} must be a positive number, e.g. 0.01 for one per cent"
+        )
+    if not (math.isfinite(check.factor) and check.factor):
+        raise CaseError(f"{where}.factor = {check.factor:g} must be a number other than 0")
+    if check.value is not None and not math.isfinite(check.value):
+        raise CaseError(f"{where}.value = {check.value:g} must be finite")
     if check.value == 0.0:
         raise CaseError(f"{where}: the value is 0, so no relative deviation can be told; check another quantity")
     if check.theory:

@@ -122,6 +122,15 @@ def test_it_says_what_is_compared():
             {"quantity": "pole.pressure", "value": 0.0},
             r"check\[0\]: the value is 0, so no relative deviation can be told",
         ),
+        *(
+            ({"quantity": "pole.pressure", "value": 1.0, name: number}, rf"check\[0\].{name} = .* must be ")
+            for name, numbers in {
+                "tolerance": (0, -1.0, np.nan, np.inf),
+                "factor": (0, np.nan),
+                "value": (np.inf, np.nan),
+            }.items()
+            for number in numbers
+        ),
         ({"quantity": "poll.pressure", "value": 1.0}, "'poll': did you mean 'pole'"),
         ({"quantity": "pole.presure", "value": 1.0}, "did you mean 'pressure'"),
         ({"quantity": "hertz.stickradius", "value": 1.0}, "did you mean 'stick_radius'"),
