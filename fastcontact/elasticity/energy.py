@@ -14,8 +14,8 @@ Array = NDArray[np.float64]
 def elastic_energy(stress: Array, compliance: Array) -> Array:
     """Return stress : strain (n_cells, n) [pressure] at points of cells.
 
-    From `stress` (n_cells, n, n_components) [pressure] and `compliance` (n_cells, n, n_components, n_components) [1 / pressure],
-    n = 1 there for that of whole cells, see `Material.compliance_at`.
+    From `stress` (n_cells, n, n_components) [pressure] and `compliance` (n_cells, m, n_components, n_components)
+    [1 / pressure], m = 1 for that of whole cells, otherwise n; see `Material.compliance_at`.
     """
     return np.asarray((stress * (compliance @ stress[..., None])[..., 0]).sum(axis=-1))
 
