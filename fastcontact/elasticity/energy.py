@@ -14,8 +14,12 @@ Array = NDArray[np.float64]
 def elastic_energy(stress: Array, compliance: Array) -> Array:
     """Return stress : strain (n_cells, n) [pressure] at points of cells.
 
-    From `stress` (n_cells, n, n_components) [pressure] and `compliance` (n_cells, m, n_components, n_components)
-    [1 / pressure], m = 1 for that of whole cells, otherwise n; see `Material.compliance_at`.
+    Parameters
+    ----------
+    stress : ndarray (n_cells, n, n_components)
+        [pressure].
+    compliance : ndarray (n_cells, 1 or n, n_components, n_components)
+        That of whole cells or of their points, see `Material.compliance_at` [1 / pressure].
     """
     return np.asarray((stress * (compliance @ stress[..., None])[..., 0]).sum(axis=-1))
 
