@@ -34,7 +34,7 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     Returns
     -------
     dict of str to ndarray (dim,)
-        In axisymmetry over the full circle.
+        [force]; in axisymmetry over the full circle.
 
     Raises
     ------
