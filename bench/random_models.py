@@ -4,9 +4,11 @@
     python bench/random_models.py --seed 137 --show
 
 Each seed is a model (tests/random_models): two- and three-dimensional, one to three contact pairs, any element, materials
-of any contrast, rigid obstacles, clearances, friction, meshes shifted, turned, graded, partly covered. What must hold for any
-result is checked (tests/mechanics.py); "told" are those whose moments are as coarse as a warning says. Printed are counts by
-dimension, formulation and outcome, errors by their first words, and the seeds of all findings; exit code 1 if there are any.
+of any contrast, rigid obstacles that move and turn, clearances, friction, meshes shifted, turned, graded, partly covered,
+cyclic sectors and periods, plates, orthotropic rings, bolts, couplings, heat. What must hold for any result is checked
+(tests/mechanics.py), and that the same model in other words (turned, renumbered, its supports along normals, along axes, as
+relations) has the same answer; "told" are those that fail what a warning says. Printed are counts by dimension, formulation,
+words and outcome, errors by their first words, and the seeds of all findings; exit code 1 if there are any.
 """
 
 from __future__ import annotations
@@ -116,7 +118,7 @@ def first_words(text: str) -> str:
 
 def summary(found: list[dict[str, Any]]) -> str:
     """Return all tables, the errors by their first words, and the findings."""
-    parts = [table(found, key) for key in ("kinematics", "family", "formulation", "pairs")]
+    parts = [table(found, key) for key in ("kinematics", "family", "formulation", "pairs", "words")]
     errors = [row for row in found if row["outcome"] == "own error"]
     by_text: dict[str, list[int]] = collections.defaultdict(list)
     for row in errors:
@@ -126,7 +128,19 @@ def summary(found: list[dict[str, Any]]) -> str:
         for text, seeds in sorted(by_text.items(), key=lambda item: -len(item[1]))
     ]
     worst = []
-    for name in ("balance", "given back", "moment", "penetration", "tension", "product", "cone", "driving", "carried"):
+    names = (
+        "balance",
+        "given back",
+        "moment",
+        "penetration",
+        "tension",
+        "product",
+        "cone",
+        "driving",
+        "carried",
+        "said again",
+    )
+    for name in names:
         row = max(found, key=lambda one: one.get(name, 0.0))
         worst.append(f"{name} {row.get(name, 0.0):.2g} (seed {row['seed']})")
     findings = [

@@ -34,6 +34,7 @@ def out_of_balance(model: fc.Model, step: fc.StepResult, factor: float, toleranc
     K = stiffness_of(model)
     internal = (K @ step.displacement.ravel()).reshape(step.displacement.shape)
     external = sum((factor * model.load_vector(load) for load in model.loads), np.zeros_like(internal))
+    external = sum((factor * heat for heat in model.thermal_forces_by_ramp().values()), external)
     contact = contact_forces(model, step)
     largest = max(np.abs(part).max(initial=0.0) for part in (external, contact, step.reaction))
     noise = max(ROUND_OFF, 10 * tolerance) * (abs(K) @ np.abs(step.displacement).ravel()).max(initial=0.0)
@@ -97,7 +98,7 @@ def complementarity(settled, sizes: Sizes) -> tuple[float, float, float]:
     usable = np.diff(constraints.B.indptr) > 0
     if constraints.equality is not None:
         usable &= ~constraints.equality
-    gap, force = state.gap[usable] / sizes.length, state.multiplier[usable] / sizes.force
+    gap, force = np.minimum(state.gap[usable] / sizes.length, 1e6), state.multiplier[usable] / sizes.force
     product = float(np.abs(gap * force).max(initial=0.0))
     return float(-gap.min(initial=0.0)), float(-force.min(initial=0.0)), product
 

@@ -240,7 +240,7 @@ class Material:
         local = self.local_compliance if constants is None or not self.graded else self.compliances(constants)
         compliance = np.asarray(back.transpose(0, 2, 1) @ local @ back)
         across = np.abs(compliance[:, :4, 4:]).max(initial=0.0)
-        if kinematics != "3d" and across > ROUND_OFF * np.abs(compliance).max():
+        if kinematics != "3d" and across > ROUND_OFF * np.abs(compliance).max(initial=0.0):
             raise ModelError(
                 f"the material with {self.described} couples strains in the plane with shear out of it, by its constants or "
                 f"by its axes: {kinematics} has no such shear; turn one axis along z, or use a mesh in 3D"

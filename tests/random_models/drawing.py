@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from bodies import Random
+from wording import SpokenModel
 
 import fastcontact as fc
 
@@ -20,7 +21,7 @@ LARGEST = 3000
 class Draft:
     """A model that is being built, with what the table of results tells about it."""
 
-    model: fc.Model
+    model: SpokenModel
     family: str
     length: float
     stiffness: float
@@ -32,7 +33,7 @@ class Drawn:
     """A model and how to solve it."""
 
     seed: int
-    model: fc.Model
+    model: SpokenModel
     ramp: fc.Ramp
     options: dict[str, Any]
     labels: dict[str, Any]
@@ -94,13 +95,16 @@ def materials(random: Random, draft: Draft, groups: list[str]) -> None:
 
 
 def pair_options(
-    random: Random, length: float, obstacle: bool = False, friction: float | None = None
+    random: Random, length: float, obstacle: bool = False, friction: float = 0.3, clearance: float | None = None
 ) -> dict[str, Any]:
-    """Return the options of a pair: mostly none; `length` is that by which it is pressed."""
+    """Return the options of a pair: mostly none.
+
+    `length` is that by which it is pressed, `friction` how many have friction, `clearance` that of all but tied ones.
+    """
     options: dict[str, Any] = {}
     if random.random() < 0.3:
         options |= formulation(random, obstacle)
-    if random.random() < 0.3 if friction is None else friction:
+    if random.random() < friction:
         options["friction"] = round(float(random.uniform(0.05, 0.8)), 3)
     if random.random() < 0.25:
         options["clearance"] = float(random.uniform(-1.0, 0.5) * length)
@@ -113,6 +117,9 @@ def pair_options(
         options["kind"] = str(random.choice(kinds))
         if options["kind"] == "tied":
             options.pop("search_distance", None)
+    if clearance is not None and options.get("kind") != "tied":
+        options.pop("clearance_ramp", None)
+        options["clearance"] = clearance
     return options
 
 

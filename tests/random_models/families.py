@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 
+import engineering
 import generated
 import numpy as np
 from bodies import FLAT, SOLIDS, Array, Body, Placement, Random, flat, rotation
 from drawing import Draft, add_contact, materials
 from holding import hold, load
+from wording import SpokenModel
 
 import fastcontact as fc
 
@@ -71,7 +73,7 @@ def layers(random: Random) -> Draft:
     if at.upright:
         at = Placement(dim, None, True, at.Q, at.shift + np.array([length * random.choice([0.0, 0.5, 2.0]), 0, 0]))
     mesh = fc.generate.union(*(body.mesh(at) for body in bodies))
-    draft = Draft(fc.Model(mesh, kinematics), "layers", length, 1.0)
+    draft = Draft(SpokenModel(mesh, kinematics), "layers", length, 1.0)
     draft.labels |= {"elements": " ".join(body.element for body in bodies), "bent": at.radius is not None}
     materials(random, draft, [body.name for body in bodies])
     hold(random, draft, bodies, at, pressed)
@@ -117,7 +119,9 @@ def punches(random: Random) -> Draft:
     pressed = length * 10.0 ** random.uniform(-4, -2)
     bodies = [foundation(random, dim, length)]
     bodies += [punch(random, f"B{i + 1}", bodies[0], (i, n), kinematics) for i in range(n)]
-    draft = Draft(fc.Model(fc.generate.union(*(body.mesh(at) for body in bodies)), kinematics), "punches", length, 1.0)
+    draft = Draft(
+        SpokenModel(fc.generate.union(*(body.mesh(at) for body in bodies)), kinematics), "punches", length, 1.0
+    )
     draft.labels |= {"elements": " ".join(body.element for body in bodies), "bent": False}
     materials(random, draft, [body.name for body in bodies])
     draft.model.fix("B0_BOTTOM", "xyz"[:dim])
@@ -155,4 +159,9 @@ def punch(random: Random, name: str, base: Body, place: tuple[int, int], kinemat
     return replace(one, low=low, high=high, under=under, over=flat)
 
 
-FAMILIES = {"layers": Family(0.5, layers), "punches": Family(0.2, punches), "generated": Family(0.3, generated.build)}
+FAMILIES = {
+    "layers": Family(0.3, layers),
+    "punches": Family(0.15, punches),
+    "generated": Family(0.2, generated.build),
+    "engineering": Family(0.35, engineering.build),
+}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from bodies import FLAT, Random
 from drawing import Draft, add_contact, add_obstacle, materials
+from wording import SpokenModel
 
 import fastcontact as fc
 from fastcontact.mesh import generate
@@ -23,7 +24,7 @@ def build(random: Random) -> Draft:
 
 def begun(random: Random, mesh: fc.Mesh, kinematics: str, bodies: list[str], length: float, element: str) -> Draft:
     """Return a model with materials."""
-    draft = Draft(fc.Model(mesh, kinematics), "", length, 1.0)
+    draft = Draft(SpokenModel(mesh, kinematics), "", length, 1.0)
     materials(random, draft, bodies)
     draft.labels["elements"] = element
     return draft
@@ -120,14 +121,7 @@ def rings(random: Random) -> Draft:
     sag = 0.5 * (0.5 * np.pi / (n.min() * (1 if element in ("tri3", "quad4") else 2))) ** 2 / 4
     pressed = R * (sag + part / 10)
     if random.random() < 0.5:
-        add_contact(random, draft, ("CONT_INNER", "CONT_OUTER"), 0.3 * pressed)
-        name = model.contact[0].name
-        options = {**model.contact[0].options}
-        options.pop("clearance_ramp", None)
-        if options.get("kind") != "tied":
-            options["clearance"] = -2 * pressed
-        pair = model.contact.pop()
-        model.add_contact(name, secondary=pair.secondary, primary=pair.primary, formulation=pair.formulation, **options)
+        add_contact(random, draft, ("CONT_INNER", "CONT_OUTER"), 0.3 * pressed, clearance=-2 * pressed)
     else:
         model.add_pressure("BORE", draft.stiffness * 2 * pressed / R)
         add_contact(random, draft, ("CONT_INNER", "CONT_OUTER"), 0.2 * pressed)

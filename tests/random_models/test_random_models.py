@@ -7,8 +7,9 @@ import mechanics
 import numpy as np
 import pytest
 from drawing import drawn
-from outcome import BOUNDS, figures, outcome, told, unfit
+from outcome import BOUNDS, SAME, figures, outcome, told, unfit
 from stepping import watching
+from wording import WORDS
 
 import fastcontact as fc
 
@@ -34,6 +35,18 @@ def test_random_models_end_right():
 @pytest.mark.parametrize("first", range(1000, 1300, 50))
 def test_more_random_models_end_right(first):
     check(range(first, first + 50))
+
+
+@pytest.mark.parametrize("words", WORDS)
+def test_a_model_in_other_words_has_the_same_answer(words):
+    given = drawn(47)
+    again = WORDS[words](given.model, np.random.default_rng(1))
+    step, other = fc.solve(given.model, 1)[-1], fc.solve(again.model, 1)[-1]
+    largest = np.abs(step.displacement).max()
+    assert np.abs(again.back(other.displacement) - step.displacement).max() < SAME * largest
+    assert any(found.active.any() for found in step.contact.values())
+    spoilt = replace(again, Q=again.Q @ [[0, -1], [1, 0]])
+    assert np.abs(spoilt.back(other.displacement) - step.displacement).max() > 0.1 * largest
 
 
 def test_a_seed_is_a_model():
