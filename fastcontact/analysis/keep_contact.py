@@ -49,7 +49,7 @@ def keep_path(
 
     `energy` is that of deformation [energy].
     """
-    displacement, told, works = problem.displacement(end.u), dict(results), np.zeros(2)
+    displacement, told, works = problem.displacement(end.u), dict(results), np.zeros(3)
     worn, slipped, forces = dict(start.worn), dict(start.slipped), dict(start.forces)
     for name, rows in settled.constraints.rows().items():
         pair, contact, part = problem.pairs[name], results[name], settled.constraints.parts[name]
@@ -63,11 +63,11 @@ def keep_path(
             told[name] = replace(told[name], wear=worn[name].depth)
         if not (pair.options.tied or pair.options.gap_only):
             given = part, settled.solution, rows, at, contact, start.forces.get(name)
-            forces[name], *found = contact_work(pair, *given)
+            forces[name], found = contact_work(pair, *given)
             told[name] = replace(told[name], dissipation=found[0])
             works += found
     stored = sum(own.stored for own in forces.values())
-    work = None if start.work is None else start.work.after(energy, stored, *works.tolist())
+    work = None if start.work is None else start.work.after(energy, stored, works.tolist())
     return replace(end, worn=worn, slipped=slipped, forces=forces, work=work), told
 
 

@@ -67,7 +67,7 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     if settled is not None:
         end, contact = after_contact(problem, start, load, settled, end, balanced.energy)
     elif start.work is not None:
-        end = replace(end, work=start.work.after(balanced.energy, 0.0, 0.0, 0.0))
+        end = replace(end, work=start.work.after(balanced.energy, 0.0, (0.0, 0.0, 0.0)))
     if end.work is not None:
         iterations["work"] = end.work.told()
     if problem.unsupported_bodies is not None and end.rigid is not None:

@@ -94,7 +94,8 @@ class Work:
     ----------
     strain_energy : float
         Of bodies and springs.
-    friction, imbalance : float
+    friction, touching, imbalance : float
+        `touching` is the part of friction at constraints that closed in their step.
     stored : float
         Energy of penalties.
     largest : float
@@ -103,6 +104,7 @@ class Work:
 
     strain_energy: float = 0.0
     friction: float = 0.0
+    touching: float = 0.0
     imbalance: float = 0.0
     stored: float = 0.0
     largest: float = 0.0
@@ -112,9 +114,11 @@ class Work:
         """Work of loads, supports and obstacles."""
         return self.strain_energy + self.friction + self.imbalance + self.stored
 
-    def after(self, strain_energy: float, stored: float, friction: float, imbalance: float) -> Work:
-        """Return the work after a step more, from the energies at its end, and the works in it."""
-        found = Work(strain_energy, self.friction + friction, self.imbalance + imbalance, stored)
+    def after(self, strain_energy: float, stored: float, works: Sequence[float]) -> Work:
+        """Return the work after a step more, from the energies at its end, and the works in it as of `contact_work`."""
+        friction, touching, imbalance = works
+        more = self.friction + friction, self.touching + touching, self.imbalance + imbalance
+        found = Work(strain_energy, *more, stored)
         terms = (self.largest, strain_energy, found.friction, abs(found.external))
         return replace(found, largest=max(terms))
 
@@ -122,15 +126,15 @@ class Work:
         """Return what results tell, see `StepResult.work`."""
         return {
             "strain_energy": self.strain_energy, "external_work": self.external, "friction_work": self.friction,
-            "penalty_energy": self.stored, "imbalance": self.imbalance,
+            "friction_while_touching": self.touching, "penalty_energy": self.stored, "imbalance": self.imbalance,
         }  # fmt: skip
 
 
 def contact_work(
     pair: Formulation, part: Constraints, solution: Solution, rows: slice, at: Configuration, contact: ContactResult,
     before: ContactForces | None,
-) -> tuple[ContactForces, float, float]:  # fmt: skip
-    """Return the contact forces of a pair at the end of a step, the work of friction in it, and the imbalance [energy].
+) -> tuple[ContactForces, tuple[float, float, float]]:  # fmt: skip
+    """Return the contact forces of a pair at the end of a step, and friction, touching, imbalance of `Work` in it [energy].
 
     Parameters
     ----------
@@ -158,13 +162,14 @@ def contact_work(
     ratio = np.divide(pressure * areas, normal, out=np.zeros(len(part)), where=normal != 0.0)
     along, earlier = (-0.5 * np.einsum("md,md->m", own, moved) for own in (force, areas[:, None] * traction))
     friction = float(np.where(normal != 0.0, (1.0 + ratio) * along, np.maximum(earlier, 0.0)).sum())
+    touching = float(along[pressure == 0.0].sum())
     sliding = float((along + earlier).sum())
     moved = _relative(pair, at)
     taken = now.kept(before, moved) + before.kept(now, moved) + now.alone(before) - before.alone(now)
     wider = np.where((now.pressing != 0.0) & (before.pressing != 0.0), now.added - before.added, 0.0)
     taken -= 0.5 * float((now.pressing + before.pressing) @ wider)
     taken -= 0.5 * float(((now.tangential + before.tangential) * moved).sum())
-    return now, friction, taken - (now.stored - before.stored) - sliding
+    return now, (friction, touching, taken - (now.stored - before.stored) - sliding)
 
 
 def _areas(part: Constraints) -> Array:
