@@ -210,6 +210,7 @@ def test_swapping_the_sides_changes_no_more_than_the_mesh_error():
     [(e, "node_to_segment") for e in ("hex8", "tet4")]
     + [(e, "continuous") for e in ("hex8", "hex20", "tet4", "tet10")],
 )
+@pytest.mark.filterwarnings("ignore:the works of these load steps")
 def test_forces_are_in_equilibrium(element, formulation):
     mesh = sphere_on_block(element, size=25.0, contact_size=5.0, contact_radius=5.0)
     model = sphere_model(mesh, formulation)
