@@ -124,7 +124,7 @@ def _told(given: list[str], raised: list[int]) -> int:
 
 
 def _run(given: list[str]) -> int:
-    arguments = parser(given[0] if given else None).parse_args(given)
+    arguments = parser(given[0] if given else None).parse_args(given or ["--help"])
     handler = _Printable()
     log.handlers[:] = [handler]
     log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)

@@ -284,6 +284,11 @@ def test_wrong_options_are_refused(options, words):
         fc.solve(touching(model, "node_to_segment", **options), fc.linear_ramp(1))
 
 
+def test_an_option_that_is_none_is_left_out():
+    model = touching(held(blocks()), "node_to_segment", friction=None, penalty=None)
+    assert model.contact[0].options == {}
+
+
 @pytest.mark.parametrize(("options", "words"), [
     ({"normals": "secondary", "formulation": "continuous"}, "a rigid obstacle has its own"),
     ({"opposite": "node", "formulation": "node_to_segment"}, "a rigid obstacle has no nodes"),

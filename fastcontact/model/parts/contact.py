@@ -54,7 +54,7 @@ class ModelContact(ModelConnections):
             ``"node_to_segment"``, ``"continuous"`` or ``"mortar"``. By default mortar with dual multipliers, which is right
             on any two surfaces; ``repr(model)`` and the log tell it.
         **options
-            What every formulation takes, in addition to the fields of the formulation itself:
+            What every formulation takes, in addition to the fields of the formulation itself; None is the default:
 
             - ``friction``: coefficient of Coulomb friction.
             - ``kind``: ``"unilateral"`` (default) contact closes and opens. ``"bilateral"`` closes every gap that faces
@@ -88,6 +88,7 @@ class ModelContact(ModelConnections):
               side's body: one normal for all of it. ``projection_tolerance``: how far points may stand out beyond the end of
               the primary side and still carry force, in facet lengths.
         """
+        options = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
             formulation, options, reason = default_formulation(self.mesh.dim, options)
             log.info("contact '%s': %s, since %s", name, method(formulation, options), reason)
@@ -141,6 +142,7 @@ class ModelContact(ModelConnections):
             obstacle.check_apart(self.mesh)
         obstacle.distance(self.mesh.points[:1])  # what does not fit this dimension shows at once
         history = table_of(ramp, f"the ramp of the motion of obstacle '{name}'")
+        options = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
             formulation, reason = against_obstacle(self.mesh.dim, *self._facet_kinds(secondary), options)
             log.info("contact '%s': %s, since %s", name, method(formulation, options), reason)

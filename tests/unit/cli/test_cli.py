@@ -464,3 +464,10 @@ def test_a_window_without_a_display_is_refused(tmp_path, capsys, monkeypatch):
         fc.solve(case, 1, on_step=out.write)
     assert main(["plot", str(tmp_path / "a.vtkhdf"), "--view"]) == 1
     assert "there is no display to open a window on" in capsys.readouterr().err
+
+
+def test_the_command_by_itself_prints_its_help(capsys):
+    with pytest.raises(SystemExit) as end:
+        main([])
+    assert end.value.code == 0
+    assert capsys.readouterr().out.startswith("usage: fastcontact")
