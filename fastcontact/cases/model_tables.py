@@ -12,8 +12,6 @@ from pathlib import Path
 from reprlib import repr
 from typing import Any
 
-import numpy as np
-
 from fastcontact.cases.keys import AXES, FIELD, NUMBER, ROTATION, SURFACE, at, called, check_keys, tables
 from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
@@ -39,20 +37,10 @@ VALUES = ("E", "nu", "G", "density", "expansion", "value", *COMPONENTS)
 def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
     """Add the material whose constants are given: isotropic, orthotropic where E, nu or G are lists, anisotropic with D."""
     kind = _material_law(constants)
-    if "axes" in constants:
-        constants["axes"] = _axes("material", constants["axes"])
     if kind is LinearElastic:
         if isinstance(constants.get("expansion"), list):  # no array over cells: case files have tables for that
             check_expansion(constants["expansion"], 1)
-        for key in constants:
-            if (
-                key not in ("volumetric", "incompatible_modes")
-                and not isinstance(constants[key], (list, tuple))
-                and key != "axes"
-                and not callable(constants[key])
-                and not isinstance(constants[key], np.ndarray)
-            ):
-                constants[key] = float(constants[key])
+        constants = {key: float(value) if type(value) is int else value for key, value in constants.items()}
     for key in constants:
         if key not in inspect.signature(kind).parameters:
             raise CaseError(f"the key 'material.{key}' is none of a material that is {_LAWS[kind]}")
@@ -72,26 +60,6 @@ def _add_temperature(model: Model, **given: Any) -> None:
         raise CaseError("a temperature with 'file' needs 'field', its name there")
     else:
         model.add_temperature_file(**given)
-
-
-@functools.wraps(Model.prescribe)
-def _add_support(model: Model, axes: Any = None, **given: Any) -> None:
-    model.prescribe(axes=_axes("support", axes), **given)
-
-
-@functools.wraps(Model.add_initial_stress)
-def _add_initial_stress(model: Model, axes: Any = None, **given: Any) -> None:
-    model.add_initial_stress(axes=_axes("initial_stress", axes), **given)
-
-
-@functools.wraps(Model.add_initial_strain)
-def _add_initial_strain(model: Model, axes: Any = None, **given: Any) -> None:
-    model.add_initial_strain(axes=_axes("initial_strain", axes), **given)
-
-
-def _axes(where: str, axes: Any) -> Any:
-    """Return axes given as vectors, or by the keys of a cylinder."""
-    return called(f"{where}.axes", CylindricalAxes, axes) if isinstance(axes, dict) else axes
 
 
 @functools.wraps(Model.add_coupling)
@@ -124,15 +92,15 @@ _NEEDED: dict[type[Material], tuple[str, ...]] = {
 # By kind of table, in the order in which they are added to the model.
 _ADD: dict[str, Callable[..., None]] = {
     "material": _add_material,
-    "support": _add_support,
+    "support": Model.prescribe,
     "pressure": Model.add_pressure,
     "traction": Model.add_traction,
     "body_force": Model.add_body_force,
     "gravity": Model.add_gravity,
     "centrifugal": Model.add_centrifugal,
     "temperature": _add_temperature,
-    "initial_stress": _add_initial_stress,
-    "initial_strain": _add_initial_strain,
+    "initial_stress": Model.add_initial_stress,
+    "initial_strain": Model.add_initial_strain,
     "force": Model.add_force,
     "moment": Model.add_moment,
     "hydrostatic_pressure": Model.add_hydrostatic_pressure,
@@ -336,6 +304,8 @@ def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
 def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
     """Return an entry as arguments of a method of the model, its lists of numbers and terms checked."""
     arguments = dict(entry)
+    if isinstance(entry.get("axes"), dict):
+        arguments["axes"] = called(f"{where}.axes", CylindricalAxes, entry["axes"])
     if "ramp" in entry:
         arguments["ramp"] = points(entry["ramp"], f"{where}.ramp")
     for term in entry.get("terms", []):
