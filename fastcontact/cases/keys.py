@@ -45,6 +45,7 @@ STUDY_ENTRIES: dict[str, tuple[Any, str]] = {
 TOP: dict[str, Any] = {
     "title": str,
     "kinematics": str,
+    "strain": str,
     **dict.fromkeys(("units", "mesh", "contact", "obstacle", "ramp", "solve", "probes", "theory", "study"), dict),
     **dict.fromkeys(("check", "sensitivity"), list),
 }
