@@ -36,6 +36,7 @@ _NAMES = {
     "analysis.sensitivities": ("Sensitivities", "sensitivities"),
     "analysis.support_forces": ("pretension_history", "spring_forces", "support_forces"),
     "cases.decks.deck": ("Deck", "read_deck"),
+    "contact.found_contacts": ("FoundContacts", "find_contacts"),
     "elasticity.anisotropic_materials": ("Anisotropic", "Orthotropic"),
     "elasticity.material_axes": ("CylindricalAxes",),
     "elasticity.materials": ("LinearElastic",),

@@ -18,6 +18,8 @@ from fastcontact.analysis.support_forces import support_forces as support_forces
 from fastcontact.cases.decks.deck import Deck as Deck
 from fastcontact.cases.decks.deck import read_deck as read_deck
 from fastcontact.contact import obstacles as obstacles
+from fastcontact.contact.found_contacts import FoundContacts as FoundContacts
+from fastcontact.contact.found_contacts import find_contacts as find_contacts
 from fastcontact.elasticity import recovery as recovery
 from fastcontact.elasticity.anisotropic_materials import Anisotropic as Anisotropic
 from fastcontact.elasticity.anisotropic_materials import Orthotropic as Orthotropic

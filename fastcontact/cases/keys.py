@@ -150,7 +150,8 @@ STUDY_ENTRIES: dict[str, tuple[Any, str]] = {
 TOP: dict[str, Any] = {
     "title": str,
     "kinematics": str,
-    **dict.fromkeys(("units", "mesh", "contact", "obstacle", "ramp", "solve", "probes", "theory", "study"), dict),
+    "contact": (dict, str),
+    **dict.fromkeys(("units", "mesh", "contacts", "obstacle", "ramp", "solve", "probes", "theory", "study"), dict),
     **dict.fromkeys((*LISTS, "check", "sensitivity"), list),
 }
 
