@@ -303,7 +303,7 @@ class Mesh:
     def with_facets(self, groups: Mapping[str, Mapping[str, ArrayLike]]) -> Mesh:
         """Return the mesh with new groups of facets; facets that it lacks are added, groups of the same names replaced.
 
-        `groups` has by name, and by element in it, point numbers (n_facets, n_nodes) of int.
+        `groups` (n_facets, n_nodes) of int has their nodes by name of the group and by element.
         """
         cells = dict(self.cells)
         rows: dict[str, dict[str, Indices]] = {}

@@ -8,10 +8,10 @@ from typing import Any
 from numpy.typing import NDArray
 
 from fastcontact.studies import convergence_tables as tables
-from fastcontact.studies.convergence_figures import error_panel, pressure_panel, theory_panel
+from fastcontact.studies.convergence_figures import draw_differences, draw_errors, draw_pressure
 from fastcontact.studies.fit import CONFIDENCE
 from fastcontact.studies.render import page
-from fastcontact.studies.render.figure import Panel, figure
+from fastcontact.studies.render.figure import panels
 from fastcontact.studies.render.table import Rows, aligned, structured
 from fastcontact.studies.report import Report
 from fastcontact.studies.sentences import MAIN, sentences
@@ -101,10 +101,12 @@ class Study(Report):
 
     def figure(self) -> Any:
         """Return a matplotlib figure: errors, pressure over the radius, differences from theory."""
-        pressure = pressure_panel(self.best, self.theory, self.units)
-        difference = theory_panel(self.series, self.best, "pressure_max", self.units)
-        errors = [error_panel(self.series, name, self.units) for name in COMPARED]
-        return figure([errors, [pressure, difference]], (12.0, 9.2), self.title)
+        upper, (pressure, difference) = panels(2, 2, (12.0, 9.2), self.title)
+        for ax, name in zip(upper, COMPARED, strict=True):
+            self._draw_errors(ax, name)
+        draw_pressure(pressure, self.best, self.theory, self.units)
+        self._draw_differences(difference, "pressure_max")
+        return pressure.figure
 
     def html(self) -> str:
         """Return the study as one self-contained HTML page."""
@@ -114,7 +116,8 @@ class Study(Report):
             for name in (name for name in MAIN if name in self.best.quantities):
                 rows = tables.page_comparison_rows(self.series, name)
                 parts.append(page.table(rows, tables.caption(name, self.units)))
-        parts += [page.section("Pictures"), *self._pictures()]
+        if pictures := self._pictures():
+            parts += [page.section("Pictures"), *pictures]
         for series in self.series:
             parts += self._series_parts(series)
         parts += [page.failure(f"{name} failed: {text}") for name, text in self.failed.items()]
@@ -124,21 +127,27 @@ class Study(Report):
     def _pictures(self) -> list[str]:
         limits = [name for name in COMPARED if any(name in series.limits for series in self.series)]
         theories = [name for name in COMPARED if any(series.split(name) for series in self.series)]
-        errors = [error_panel(self.series, name, self.units) for name in limits] or [Panel(grid=0.0)]
-        differences = [theory_panel(self.series, self.best, name, self.units) for name in theories]
-        described = {
-            "mesh errors over the mesh size, doubly logarithmic": errors,
-            "difference from theory over the mesh size: model and mesh error": differences,
-        }
-        found = [
-            page.image(figure([panels], (5.6 * len(panels), 4.8), self.title), description)
-            for description, panels in described.items()
-            if panels
-        ]
+        found = []
+        for names, draw, about in (
+            (limits, self._draw_errors, "mesh errors over the mesh size, doubly logarithmic"),
+            (theories, self._draw_differences, "difference from theory over the mesh size: model and mesh error"),
+        ):
+            if names:
+                axes = panels(1, len(names), (5.6 * len(names), 4.8), self.title)[0]
+                for ax, name in zip(axes, names, strict=True):
+                    draw(ax, name)
+                found.append(page.image(axes[0].figure, about))
         if self.best.finest.profile:
-            drawn = figure([[pressure_panel(self.best, self.theory, self.units)]], (7.4, 5.0))
-            found.append(page.image(drawn, "contact pressure of all levels over theory"))
+            ax = panels(1, 1, (7.4, 5.0))[0, 0]
+            draw_pressure(ax, self.best, self.theory, self.units)
+            found.append(page.image(ax.figure, "contact pressure of all levels over theory"))
         return found
+
+    def _draw_errors(self, ax: Any, quantity: str) -> None:
+        draw_errors(ax, self.series, quantity, self.units)
+
+    def _draw_differences(self, ax: Any, quantity: str) -> None:
+        draw_differences(ax, self.series, self.best, quantity, self.units)
 
     def _series_parts(self, series: Series) -> list[str]:
         parts = [page.section(str(series.combination))]
