@@ -131,7 +131,7 @@ class ModelContact(ModelConnections):
         moduli = None
         if self.materials:
             own = np.array([material.contact_modulus for material, _ in self.materials])
-            moduli = {name: own[rows] for name, rows in self._material_of_cells().items()}
+            moduli = {name: own[rows] for name, rows in self.material_of_cells().items()}
         found = find_contacts(self.mesh, distance=distance, angle=angle, groups=groups, moduli=moduli)
         if not found.pairs:
             raise ContactError(nothing_found(self.mesh, distance, angle, groups))
