@@ -14,6 +14,7 @@ from fastcontact._jit import parallel
 from fastcontact.analysis.locked_sections import at_present_length
 from fastcontact.analysis.modal.eigenpairs import lowest
 from fastcontact.analysis.modal.held_contact import held_contact
+from fastcontact.analysis.modal.reduced import Reduced
 from fastcontact.analysis.problem import near_nullspace
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.elasticity import recovery
@@ -179,15 +180,16 @@ def modes(
     shift = SHIFT * _uniform(model, K, M)
     relations = driven.relations([*model.relations, *at_present_length(model)])
     K, M = contact.stiffened(driven.stiffness(K)), driven.stiffness(M)
-    system = System(K, driven.supported(supported).ravel(), [*relations, *contact.relations])
-    if n >= int(system.free.sum()):
-        raise ModelError(f"n = {n} modes of {int(system.free.sum())} free displacements: ask for fewer")
+    touched = np.isin(np.arange(K.shape[0]), contact.rows.indices)
+    system = System(K, driven.supported(supported).ravel(), relations, driven.without_stiffness & touched)
+    reduced = Reduced(system, M, contact.rows, contact.nodes)
+    if n >= int(reduced.free.sum()):
+        raise ModelError(f"n = {n} modes of {int(reduced.free.sum())} free displacements: ask for fewer")
     solver = choice.make(linear_solver, dim=model.mesh.dim, n_dofs=model.n_dofs, columns=True)
     solver.contrast = field.contrast
-    kept = system.unknowns_of(driven.near_nullspace(near_nullspace(model)))
-    found = lowest(solver, (system.matrix, _of_unknowns(system, M)), kept, system.free, n, shift)
-    vectors = np.column_stack([system.displacement(v, np.zeros(len(v))) for v in found[1].T])
-    return _modes(model, field, M, found[0], vectors)
+    modes = np.where(reduced.free[:, None], driven.near_nullspace(near_nullspace(model)), 0.0)
+    values, vectors = lowest(solver, (reduced.K, reduced.M), modes, reduced.free, n, shift)
+    return _modes(model, field, M, values, reduced.displacement(vectors))
 
 
 def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> bsr_array:
@@ -211,15 +213,6 @@ def _uniform(model: Model, K: bsr_array, M: bsr_array) -> float:
             u[:, component] = points[:, axis]
             found.append(float(u.ravel() @ (K @ u.ravel())) / float(u.ravel() @ (M @ u.ravel())))
     return min((own for own in found if own > 0.0), default=1.0)
-
-
-def _of_unknowns(system: System, M: bsr_array) -> bsr_array:
-    """Return the mass of the unknowns of a system, without rows and columns of what is none."""
-    if system.T is not None:
-        M = (system.T.T @ M.tocsr() @ system.T).tobsr(M.blocksize)
-    row = np.repeat(np.arange(len(M.indptr) - 1), np.diff(M.indptr))
-    free = system.free.reshape(-1, M.blocksize[0])
-    return bsr_array((M.data * free[row][:, :, None] * free[M.indices][:, None, :], M.indices, M.indptr), shape=M.shape)
 
 
 def _modes(model: Model, field: MaterialField, M: bsr_array, values: Array, vectors: Array) -> Modes:

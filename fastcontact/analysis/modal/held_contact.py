@@ -19,7 +19,6 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.formulations._pressure_field import PressureField
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.tied import moments_of
-from fastcontact.elasticity.relations import Relation
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -33,13 +32,16 @@ class HeldContact:
 
     Attributes
     ----------
-    relations : list of Relation
-        Rows that vanish.
+    rows : csr_array (m, n_dofs)
+        Relative displacements that vanish [-].
+    nodes : ndarray of int (m,)
+        The secondary node of each.
     springs : list of (csr_array (m, n_dofs), ndarray (m, m))
         Rows [-] that give way, and by how much [length / force].
     """
 
-    relations: list[Relation]
+    rows: csr_array
+    nodes: NDArray[np.intp]
     springs: list[tuple[csr_array, Array]]
 
     def stiffened(self, K: bsr_array) -> bsr_array:
@@ -51,7 +53,8 @@ class HeldContact:
 
 def held_contact(model: Model, step: StepResult | None, held: HeldMotions) -> HeldContact:
     """Return the conditions of all pairs at the end of a step; without one those of tied and bilateral pairs, at rest."""
-    found = HeldContact([], [])
+    n_dofs = model.force_driven.n_dofs
+    equations, nodes, springs = [csr_array((0, n_dofs))], [np.empty(0, np.intp)], []
     for pair in model.contact:
         bound, contact = model.bind(pair, held), None if step is None else step.contact[pair.name]
         if bound.options.gap_only:
@@ -59,18 +62,14 @@ def held_contact(model: Model, step: StepResult | None, held: HeldMotions) -> He
         at = _configuration(model, step, contact)
         position = at.obstacle if contact is not None else np.zeros(model.mesh.dim)
         part = model.force_driven.constraints(pair.name, bound.constraints(at), position)
-        name = f"contact '{pair.name}'"
-        if part.tied is not None:
-            found.relations.append(Relation(name, part.B))
-            continue
-        for rows, softness in _rows(bound, part, contact):
+        for rows, owners, softness in _rows(bound, part, contact):
             kept = np.flatnonzero(np.diff(rows.indptr) > 0)
-            rows = csr_array(rows[kept])
             if softness is None:
-                found.relations.append(Relation(name, rows))
+                equations.append(csr_array(rows[kept]))
+                nodes.append(owners[kept])
             elif len(kept):
-                found.springs.append((rows, softness.toarray()[np.ix_(kept, kept)]))
-    return found
+                springs.append((csr_array(rows[kept]), softness.toarray()[np.ix_(kept, kept)]))
+    return HeldContact(csr_array(vstack(equations, format="csr")), np.concatenate(nodes), springs)
 
 
 def _configuration(model: Model, step: StepResult | None, contact: ContactResult | None) -> Configuration:
@@ -93,17 +92,22 @@ def _worn(model: Model, contact: ContactResult) -> Array | None:
 
 def _rows(
     pair: Formulation, part: Constraints, contact: ContactResult | None
-) -> Iterator[tuple[csr_array, csr_array | None]]:
-    """Yield rows along the normal and along each tangent, with the matrix by which they give way, None where they do not.
+) -> Iterator[tuple[csr_array, NDArray[np.intp], csr_array | None]]:
+    """Yield rows along the normal and along each tangent, their nodes, and the matrix by which they give way, if they do.
 
     They are tested with the formulation's multipliers, as those of tied pairs are, see `contact.tied`.
     """
+    if part.tied is not None:
+        count = part.tied.moments.shape[0]
+        yield part.B, np.tile(pair.secondary.points[_nodes(pair, part, part.tied.moments)], len(part) // count), None
+        return
     moments = moments_of(part)
+    node = _nodes(pair, part, moments)
+    owners = pair.secondary.points[node].astype(np.intp)
     always = np.zeros(len(part), bool) if part.equality is None else part.equality
     closed = abs(moments) @ always.astype(float) > 0.0
     sticking = np.zeros(len(closed), bool)
     if contact is not None:
-        node = _nodes(pair, part, moments)
         closed |= contact.active[node]
         rubs = abs(moments) @ (part.coefficients > 0.0).astype(float) > 0.0
         sticking = (contact.active & contact.sticking)[node] & rubs
@@ -111,9 +115,10 @@ def _rows(
         (part.B, closed, part.softness),
         *((tangent, sticking, part.tangential_softness) for tangent in part.tangents),
     ):
-        rows = csr_array(moments[np.flatnonzero(held)])
-        gives = softness is not None and (rows @ softness).any()
-        yield csr_array(rows @ along), csr_array(rows @ diags_array(softness) @ rows.T) if gives else None
+        tested = csr_array(moments[np.flatnonzero(held)])
+        gives = softness is not None and (tested @ softness).any()
+        compliance = csr_array(tested @ diags_array(softness) @ tested.T) if gives else None
+        yield csr_array(tested @ along), owners[held], compliance
 
 
 def _nodes(pair: Formulation, part: Constraints, moments: csr_array) -> NDArray[np.intp]:
@@ -127,4 +132,4 @@ def _nodes(pair: Formulation, part: Constraints, moments: csr_array) -> NDArray[
     if part.nodes is None:
         return np.arange(len(points))
     order = np.argsort(points)
-    return np.asarray(order[np.searchsorted(points, part.nodes, sorter=order)])
+    return np.asarray(order[np.searchsorted(points, part.nodes[: moments.shape[0]], sorter=order)])
