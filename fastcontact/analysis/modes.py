@@ -187,8 +187,8 @@ def modes(
         raise ModelError(f"n = {n} modes of {int(reduced.free.sum())} free displacements: ask for fewer")
     solver = choice.make(linear_solver, dim=model.mesh.dim, n_dofs=model.n_dofs, columns=True)
     solver.contrast = field.contrast
-    modes = np.where(reduced.free[:, None], driven.near_nullspace(near_nullspace(model)), 0.0)
-    values, vectors = lowest(solver, (reduced.K, reduced.M), modes, reduced.free, n, shift)
+    soft = np.where(reduced.free[:, None], driven.near_nullspace(near_nullspace(model)), 0.0)
+    values, vectors = lowest(solver, (reduced.K, reduced.M), soft, reduced.free, n, shift)
     return _modes(model, field, M, values, reduced.displacement(vectors))
 
 
@@ -198,8 +198,8 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> b
     K = stiffened(stiffness(mesh, kinematics, field.moduli, field.loops, None, field.treatment), model.springs)
     if step is None:
         return K
-    factors = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
-    offset = model.stress_offset(*factors, field)
+    temperature, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
+    offset = model.stress_offset(temperature, initial, field)
     stresses = CellStress(mesh, kinematics, field.moduli, step.displacement, field.treatment, offset)
     return bsr_array(K + stress_stiffness(mesh, stresses, field.loops, kinematics == "axisymmetric"))
 

@@ -62,6 +62,8 @@ class Case:
         In which the files lie that the case names, absolute.
     sensitivities : list of (tuple, list of tuple)
         Quantities and their parameters, see `fastcontact.sensitivities`.
+    modes : dict, optional
+        Arguments of `fastcontact.modes` about the last step; None where none are asked for.
     deck : Deck, optional
         The input deck of which the case was made.
     """
@@ -82,6 +84,7 @@ class Case:
     approach: dict[str, float] = field(default_factory=dict)
     folder: Path = Path()
     sensitivities: list[tuple[Asked, list[Asked]]] = field(default_factory=list)
+    modes: dict[str, Any] | None = None
     deck: Deck | None = None
 
     def finished(self, step: StepResult) -> StepResult:
@@ -213,6 +216,7 @@ def build_case(
         approach=approach,
         folder=Path(folder).resolve(),
         sensitivities=_sensitivities(model, data),
+        modes=data.get("modes"),
     )
 
 

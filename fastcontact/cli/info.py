@@ -51,11 +51,14 @@ def run(options: argparse.Namespace) -> int:
 
 def _contacts(options: argparse.Namespace) -> int:
     """Print the contacts that are found in a mesh, and draw them."""
+    from fastcontact.cases.case import files_of_case, read_case
     from fastcontact.contact.found_contacts import find_contacts
     from fastcontact.results import plot
 
-    check_outputs([options.file], [], [options.png])
-    found = find_contacts(_mesh_of(options.file), distance=options.distance, angle=options.angle)
+    case = _is_case(Path(options.file))
+    check_outputs(files_of_case(options.file) if case else [options.file], [], [options.png])
+    mesh = read_case(options.file).mesh if case else _mesh_of(options.file)
+    found = find_contacts(mesh, distance=options.distance, angle=options.angle)
     say(str(found))
     if options.png:
         save(plot.contacts(found), options.png)
@@ -63,18 +66,18 @@ def _contacts(options: argparse.Namespace) -> int:
     return 0
 
 
+def _is_case(path: Path) -> bool:
+    """Whether a file is a case file, or a deck that is more than a mesh."""
+    return path.suffix.lower() == ".toml" or (path.suffix.lower() == ".inp" and _is_deck(path))
+
+
 def _mesh_of(file: str) -> Any:
-    """Return the mesh of a case, a deck, a result file or a mesh file."""
-    suffix = Path(file).suffix.lower()
-    if suffix == ".vtkhdf":
+    """Return the mesh of a result file or a mesh file."""
+    if Path(file).suffix.lower() == ".vtkhdf":
         from fastcontact.results.reader import open_results
 
         with open_results(file) as results:
             return results.mesh
-    if suffix == ".toml" or (suffix == ".inp" and _is_deck(Path(file))):
-        from fastcontact.cases.case import read_case
-
-        return read_case(file).mesh
     from fastcontact.mesh.files.mesh_files import read_mesh
 
     return read_mesh(file)

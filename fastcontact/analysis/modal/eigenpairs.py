@@ -11,6 +11,7 @@ import warnings
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 from scipy.sparse import bsr_array
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh, lobpcg
 
@@ -21,6 +22,12 @@ from fastcontact.linear.protocol import LinearSolver
 Array = NDArray[np.float64]
 # Error of vectors, to the square of which eigenvalues are right.
 ACCURACY = 1e-5
+# Below so many unknowns all eigenvalues are found at once.
+FEW = 200
+UNSTABLE = (
+    "the settled step is not stable: small motions about it grow by themselves, or what has no mass is free; take a lower "
+    "load, hold it, or leave out the stiffness by stresses (stress_stiffening=False)"
+)
 # Iterations until that is looked at, and how often.
 ROUND, ROUNDS = 20, 15
 
@@ -52,25 +59,37 @@ def lowest(
         If the iteration does not end.
     """
     K, M = matrices
+    if free.sum() < max(FEW, 3 * n):
+        return _of_few(K, M, np.flatnonzero(free), n, shift)
     shifted = bsr_array(K + shift * M)
     shifted.sort_indices()
     try:
         solver.prepare(shifted, near_nullspace, np.empty(0, np.intp))
     except ModelError as error:
-        raise ModelError(
-            f"the settled step is not stable: small motions about it grow by themselves, or a body without mass is free "
-            f"({error}); take a lower load or hold it, or leave out the stiffness by stresses (stress_stiffening=False)"
-        ) from error
+        raise ModelError(f"{UNSTABLE} ({error})") from error
     rng = np.random.default_rng(0)
     if isinstance(solver, Multigrid):
-        found = _by_multigrid(solver, shifted, M, np.where(free[:, None], rng.normal(size=(len(free), n + n // 2 + 2)), 0.0), n)
+        start = rng.normal(size=(len(free), n + n // 2 + 2)) * free[:, None]
+        found = _by_multigrid(solver, shifted, M, start, n)
     else:
-        found = _by_factors(solver, shifted, M, np.where(free, rng.normal(size=len(free)), 0.0), n)
+        found = _by_factors(solver, shifted, M, rng.normal(size=len(free)) * free, n)
     # Ritz values in the span: more accurate than those of the iteration, and vectors of equal ones are orthogonal.
     small, mass = found.T @ (K @ found), found.T @ (M @ found)
     lower = np.linalg.inv(np.linalg.cholesky(mass))
     values, vectors = np.linalg.eigh(lower @ (0.5 * (small + small.T)) @ lower.T)
     return values[:n], (found @ (lower.T @ vectors))[:, :n]
+
+
+def _of_few(K: bsr_array, M: bsr_array, free: NDArray[np.intp], n: int, shift: float) -> tuple[Array, Array]:
+    """Return what `lowest` does for so few unknowns `free` (k,) that all eigenvalues are found at once."""
+    stiff, heavy = (np.asarray(matrix.tocsr()[free][:, free].todense()) for matrix in (K, M))
+    try:  # the inverse eigenvalues, since M may be singular
+        inverse, own = eigh(heavy, stiff + shift * heavy, subset_by_index=[len(free) - n, len(free) - 1])
+    except np.linalg.LinAlgError as error:
+        raise ModelError(UNSTABLE) from error
+    vectors = np.zeros((K.shape[0], n))
+    vectors[free] = own[:, ::-1] / np.sqrt(inverse[::-1])
+    return 1.0 / inverse[::-1] - shift, vectors
 
 
 def _by_factors(solver: LinearSolver, shifted: bsr_array, M: bsr_array, start: Array, n: int) -> Array:
@@ -80,7 +99,9 @@ def _by_factors(solver: LinearSolver, shifted: bsr_array, M: bsr_array, start: A
     try:
         return np.asarray(eigsh(shifted, n, M, sigma=0.0, OPinv=inverse, v0=loaded.full_solution(M @ start))[1])
     except ArpackNoConvergence as error:
-        raise ConvergenceError(f"Lanczos iterations found {len(error.eigenvalues)} of {n} modes: ask for fewer") from error
+        raise ConvergenceError(
+            f"Lanczos iterations found {len(error.eigenvalues)} of {n} modes: ask for fewer"
+        ) from error
 
 
 def _by_multigrid(solver: Multigrid, shifted: bsr_array, M: bsr_array, start: Array, n: int) -> Array:

@@ -18,7 +18,7 @@ from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.formulations._pressure_field import PressureField
 from fastcontact.contact.held_motions import HeldMotions
-from fastcontact.contact.tied import moments_of
+from fastcontact.contact.tied import TiedPair, moments_of
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -97,9 +97,9 @@ def _rows(
 
     They are tested with the formulation's multipliers, as those of tied pairs are, see `contact.tied`.
     """
-    if part.tied is not None:
-        count = part.tied.moments.shape[0]
-        yield part.B, np.tile(pair.secondary.points[_nodes(pair, part, part.tied.moments)], len(part) // count), None
+    if isinstance(part.tied, TiedPair):
+        node = _nodes(pair, part, part.tied.moments)
+        yield part.B, np.tile(pair.secondary.points[node].astype(np.intp), len(part) // len(node)), None
         return
     moments = moments_of(part)
     node = _nodes(pair, part, moments)
