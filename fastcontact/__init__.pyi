@@ -8,6 +8,8 @@ from fastcontact.analysis.contact_answers import contact_history as contact_hist
 from fastcontact.analysis.contact_answers import contact_moment as contact_moment
 from fastcontact.analysis.contact_answers import wear as wear
 from fastcontact.analysis.criteria import Criteria as Criteria
+from fastcontact.analysis.modes import Modes as Modes
+from fastcontact.analysis.modes import modes as modes
 from fastcontact.analysis.run import solve as solve
 from fastcontact.analysis.run import solve_steps as solve_steps
 from fastcontact.analysis.sensitivities import Sensitivities as Sensitivities
@@ -18,6 +20,8 @@ from fastcontact.analysis.support_forces import support_forces as support_forces
 from fastcontact.cases.decks.deck import Deck as Deck
 from fastcontact.cases.decks.deck import read_deck as read_deck
 from fastcontact.contact import obstacles as obstacles
+from fastcontact.contact.found_contacts import FoundContacts as FoundContacts
+from fastcontact.contact.found_contacts import find_contacts as find_contacts
 from fastcontact.elasticity import recovery as recovery
 from fastcontact.elasticity.anisotropic_materials import Anisotropic as Anisotropic
 from fastcontact.elasticity.anisotropic_materials import Orthotropic as Orthotropic

@@ -207,7 +207,18 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
             with at(where):
                 given = _from_files(where, entry, mesh, folder) if kind == "material" else entry
                 add(model, **_arguments(where, _found(folder, _placed(where, given))))
-    for name, entry in data.get("contact", {}).items():
+    _add_contacts(model, data)
+    for name, entry in data.get("obstacle", {}).items():
+        _add_obstacle(model, name, entry, folder)
+    return model
+
+
+def _add_contacts(model: Model, data: dict[str, Any]) -> None:
+    """Add the contact pairs that the data name, and then those that are to be found."""
+    named = data.get("contact", {})
+    if isinstance(named, str) and named != "auto":
+        raise CaseError(f"'contact' must be \"auto\" or tables [contact.NAME], not {repr(named)}")
+    for name, entry in named.items() if isinstance(named, dict) else ():
         if not isinstance(entry, dict):
             raise CaseError(f"'contact' needs a name for each pair: write [contact.NAME] above its keys, not '{name}'")
         for key in ("secondary", "primary"):
@@ -215,9 +226,9 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
                 raise CaseError(f"contact.{name} needs '{key}', the name of a group of facets")
         with at(f"contact.{name}"):
             model.add_contact(name, **entry)
-    for name, entry in data.get("obstacle", {}).items():
-        _add_obstacle(model, name, entry, folder)
-    return model
+    if named == "auto" or "contacts" in data:
+        with at("contacts"):
+            model.add_contacts(**data.get("contacts", {}))
 
 
 def _from_files(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> dict[str, Any]:

@@ -56,10 +56,10 @@ class ModelMaterials(ModelBase):
     def material_field(self) -> MaterialField:
         """Return the materials of all solid cells; ModelError if a cell has none, or two."""
         return material_field(
-            self.mesh, self.kinematics, [material for material, _ in self.materials], self._material_of_cells()
+            self.mesh, self.kinematics, [material for material, _ in self.materials], self.material_of_cells()
         )
 
-    def _material_of_cells(self) -> dict[str, NDArray[np.int32]]:
+    def material_of_cells(self) -> dict[str, NDArray[np.int32]]:
         """Return by element every solid cell's material (n_cells,)."""
         if not self.materials:
             raise ModelError("no material: call add_material(LinearElastic(E=..., nu=...)) for the solid cells")
