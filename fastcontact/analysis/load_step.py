@@ -21,7 +21,7 @@ from fastcontact.analysis.displacements import solve_displacements, with_loads
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.keep_contact import keep_contact, keep_path
-from fastcontact.analysis.newton import NewtonSolution, newton
+from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_result import contact_results, counted, recover
@@ -58,7 +58,12 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     loaded = with_loads(problem, load)
     start, expected = prepare_start(problem, state, load, loaded)
     if problem.bodies is not None:
-        return _nonlinear(problem, start, load, newton(problem, start, load, expected), (index, instant))
+        found = newton(problem, start, load, expected)
+        done = problem.solver.counters.iterations - solved_before
+        iterations = {**counted(found.settled, done), **found.counts, "history": found.history}
+        return _ended(
+            problem, start, load, found.settled, (found.u, found.balance, iterations), (index, instant), found.bodies
+        )
     settled, u, balanced = equilibrium(problem, start, load, loaded, expected)
     # An iterative solver was too inaccurate: it is asked for more, and goes on from the same contact.
     while balanced.excess > 1.0 and problem.solver.improve(balanced.wanting):
@@ -91,14 +96,6 @@ def _ended(
         iterations["regularised"] = problem.unsupported_bodies.report(end.rigid, end.largest_rigid_force)
     end = replace(end, solver=problem.solver.snapshot())
     return end, recover(problem, end, contact, balanced.reaction, iterations, place, bodies)
-
-
-def _nonlinear(
-    problem: Problem, start: State, load: StepLoad, found: NewtonSolution, place: tuple[int, float]
-) -> tuple[State, StepResult]:
-    """Return state and result of a load step with nonlinear bodies."""
-    iterations = {**counted(found.settled, len(found.history)), "history": found.history}
-    return _ended(problem, start, load, found.settled, (found.u, found.balance, iterations), place, found.bodies)
 
 
 def prepare_start(problem: Problem, state: State, load: StepLoad, loaded: Loaded) -> tuple[State, float]:

@@ -24,7 +24,7 @@ from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
-from fastcontact.errors import ConvergenceError
+from fastcontact.errors import ConvergenceError, ModelError
 
 log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
@@ -61,6 +61,12 @@ class NewtonSolution:
     bodies: DeformedBodies
     history: list[dict[str, Any]]
 
+    @property
+    def counts(self) -> dict[str, int]:
+        """Pairings and active-set iterations of all iterations, see `StepResult.iterations`."""
+        names = {"geometry_updates": "pairings", "active_set_iterations": "active_set_iterations"}
+        return {name: sum(entry[key] for entry in self.history) for name, key in names.items()}
+
 
 def newton(problem: Problem, start: State, load: StepLoad, expected: float) -> NewtonSolution:
     """Return the equilibrium of a load step.
@@ -93,13 +99,7 @@ def _iterated(problem: Problem, start: State, load: StepLoad, expected: float, p
     iterate, history = Iterate.of(start), []
     u, bodies, changes = place, problem.deformed(place, start), [1.0]
     for _ in range(MOST):
-        try:
-            tangent, linear = problem.linearised(bodies, u, load, iterate.rigid)
-        except ConvergenceError:
-            definite = problem.deformed(u, start, geometric=False)
-            tangent, linear = problem.linearised(definite, u, load, iterate.rigid)
-        iterate.u, iterate.history = u.copy(), []
-        settled, target, force = _solve(tangent, start, linear, iterate, expected, changes[-1])
+        settled, target, force = _solve(problem, start, load, (bodies, u), iterate, (expected, changes[-1]))
         before, (u, bodies, whole) = u, _reach(problem, start, u, target)
         moved, size = largest_difference(u, before), max(largest(u), largest(load.lift))
         balanced = balance(problem, u, force, load.force, start.largest_force, problem.internal(bodies, u))
@@ -124,20 +124,42 @@ def _still(problem: Problem, changes: list[float]) -> bool:
 
 
 def _solve(
-    tangent: Problem, start: State, linear: StepLoad, iterate: Iterate, expected: float, change: float
-) -> tuple[SettledContact | None, Array, Array]:
-    """Return contact, displacements (n_dofs,) [length] and contact forces (n_dofs,) [force] of the linearised problem.
+    problem: Problem, start: State, load: StepLoad, at: tuple[DeformedBodies, Array], iterate: Iterate,
+    scale: tuple[float, float],
+) -> tuple[SettledContact | None, Array, Array]:  # fmt: skip
+    """Return contact, displacements (n_dofs,) [length] and contact forces (n_dofs,) [force] of the bodies linearised.
 
-    Its contact geometry settles to a part of the last relative `change` of the displacement.
+    `at` are the bodies and their displacements (n_dofs,) [length], `scale` the displacement to expect [length] and the last
+    relative change: contact geometry settles to a part of that. Where the tangent is not positive definite, there is no
+    equilibrium to lead to, and the part of the pressure that turns is left out.
     """
+    try:
+        return _linear_contact(problem, start, load, at, iterate, scale)
+    except (ModelError, ConvergenceError) as error:
+        log.info("the tangent leaves out how pressure turns: %s", error)
+    try:
+        definite = problem.deformed(at[1], start, geometric=False)
+        return _linear_contact(problem, start, load, (definite, at[1]), iterate, scale)
+    except ModelError as error:
+        raise ConvergenceError(
+            f"the tangent stiffness of the bodies cannot be factorised ({error}): they buckle, or the load step is too large"
+        ) from None
+
+
+def _linear_contact(
+    problem: Problem, start: State, load: StepLoad, at: tuple[DeformedBodies, Array], iterate: Iterate,
+    scale: tuple[float, float],
+) -> tuple[SettledContact | None, Array, Array]:  # fmt: skip
+    """Return what `_solve` does, with the tangent as it is."""
+    tangent, linear = problem.linearised(*at, load, iterate.rigid)
+    iterate.u, iterate.history = at[1].copy(), []
     loaded, settled = with_loads(tangent, linear), None
     if tangent.pairs:
-        criteria = tangent.criteria
-        enough = min(max(criteria.geometry, FORCING * change), LOOSEST)
-        inner = replace(tangent, criteria=replace(criteria, geometry=enough))
+        enough = min(max(tangent.criteria.geometry, FORCING * scale[1]), LOOSEST)
+        inner = replace(tangent, criteria=replace(tangent.criteria, geometry=enough))
         dofs = tangent.dofs.for_step(iterate.u, linear.lift)
         step = StepContext(inner, start, linear, dofs.loaded(loaded), dofs)
-        settled = settle_geometry(step, Extrapolation(), expected, iterate)
+        settled = settle_geometry(step, Extrapolation(), scale[0], iterate)
     return settled, *solve_displacements(tangent, start, linear, loaded, settled)
 
 

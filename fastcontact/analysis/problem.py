@@ -31,7 +31,6 @@ from fastcontact.elasticity.relations import stacked_rows
 from fastcontact.elasticity.springs import spring_force, stiffened, too_stiff
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.elasticity.temperature import Temperature
-from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear import choice
 from fastcontact.linear.protocol import LinearSolver
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
@@ -223,12 +222,7 @@ class Problem:
         solver = copy.copy(self.solver)
         involved = system.involved(self.contact_dofs)
         modes = self.force_driven.near_nullspace(near_nullspace(self.model))
-        try:
-            involved = _prepare_solver(solver, system, self.unsupported_bodies, modes, involved)
-        except ModelError:
-            raise ConvergenceError(
-                "the tangent stiffness of the bodies is not positive definite: they buckle, or the load step is too large"
-            ) from None
+        involved = _prepare_solver(solver, system, self.unsupported_bodies, modes, involved)
         dofs = active_dofs(system, self.contact_dofs, involved, self.pairs, self.unsupported_bodies, solver)
         return replace(self, system=system, solver=solver, dofs=dofs), replace(load, force=force)
 
