@@ -102,7 +102,7 @@ def _iterated(problem: Problem, start: State, load: StepLoad, expected: float, p
         settled, target, force = _solve(problem, start, load, (bodies, u), iterate, (expected, changes[-1]))
         before, (u, bodies, whole) = u, _reach(problem, start, u, target)
         moved, size = largest_difference(u, before), max(largest(u), largest(load.lift))
-        balanced = balance(problem, u, force, load.force, start.largest_force, problem.internal(bodies, u))
+        balanced = balance(problem, u, force, load.force, start.largest_force, problem.internal(bodies, u, load))
         changes.append(moved / size if size else 0.0)
         history.append(_told(iterate, changes[-1], balanced, whole))
         if whole and balanced.excess <= 1.0 and (_still(problem, changes) or moved <= start.gap_round_off):

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, eye_array, kron
+from scipy.sparse import bsr_array, csr_array, eye_array, kron
 
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
@@ -23,6 +23,7 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.elasticity.constrained_system import System
+from fastcontact.elasticity.following_pressure import FollowingPressure
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.material_sides import MaterialSides, material_sides
@@ -59,6 +60,8 @@ class StepLoad:
         By contact pair, what its clearances are multiplied with.
     angles : dict of str to float
         By contact pair, by how much its rigid obstacle has turned, where one does [radian].
+    following : tuple of float
+        What pressures that follow the surface are multiplied with.
     """
 
     lift: Array
@@ -66,6 +69,7 @@ class StepLoad:
     obstacles: Mapping[str, Array]
     clearance_factors: Mapping[str, float]
     angles: Mapping[str, float] = field(default_factory=dict)
+    following: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +105,8 @@ class Problem:
         Warnings about the stiffness.
     bodies : NonlinearBodies, optional
         The solid cells, where they are nonlinear; `system` and `solver` then hold their stiffness before any load.
+    following : sequence of (FollowingPressure, ramp table)
+        Pressures in finite strain; `forces` hold them as they are before any displacement.
     """
 
     model: Model
@@ -119,6 +125,7 @@ class Problem:
     forces: ByRamp
     doubtful: tuple[str, ...] = ()
     bodies: NonlinearBodies | None = None
+    following: Sequence[tuple[FollowingPressure, Table | None]] = ()
 
     @cached_property
     def material_of_cells(self) -> NDArray[np.int32]:
@@ -145,7 +152,8 @@ class Problem:
             if pair.clearance_ramp is not None:
                 clearances[pair.name] = multiplier(pair.clearance_ramp, self.ramp, instant)
         force = combined(self.forces, self.ramp, instant, self.shape).ravel()
-        return StepLoad(lift, force, obstacles, clearances, angles)
+        following = tuple(multiplier(table, self.ramp, instant) for _, table in self.following)
+        return StepLoad(lift, force, obstacles, clearances, angles, following)
 
     def factors(self, histories: Iterable[Temperature | InitialState], instant: float) -> list[float]:
         """Return what temperatures or initial states of the model are multiplied with at an instant of the ramp [-]."""
@@ -201,21 +209,30 @@ class Problem:
         assert self.bodies is not None
         return self.bodies.at(self.displacement(u), start.history or self.bodies.beginning, geometric=geometric)
 
-    def internal(self, bodies: DeformedBodies, u: Array) -> tuple[Array, tuple[float, float]]:
-        """Return forces (n_dofs,) [force] of nonlinear bodies and springs, their elastic energy and plastic work [energy]."""
+    def internal(self, bodies: DeformedBodies, u: Array, load: StepLoad) -> tuple[Array, tuple[float, float]]:
+        """Return forces (n_dofs,) [force] of nonlinear bodies and springs, their elastic energy and plastic work [energy].
+
+        Less what following pressures have changed by.
+        """
         force, springs = np.zeros_like(u), self.model.springs
         n = self.model.n_dofs
         force[:n] = bodies.force.ravel()
         pull = spring_force(springs, u[:n])
         force[:n] += pull
+        for (pressure, _), factor in zip(self.following, load.following, strict=True):
+            here, before = pressure.at(self.displacement(u))[0], pressure.at(np.zeros_like(bodies.force))[0]
+            force[:n] -= factor * (here - before).ravel()
         return force, (bodies.energy + 0.5 * float(pull @ u[:n]), bodies.plastic_work)
 
     def linearised(
         self, bodies: DeformedBodies, u: Array, load: StepLoad, rigid: RigidPosition | None
     ) -> tuple[Problem, StepLoad]:
         """Return the problem with the tangent of nonlinear bodies, at displacements u (n_dofs,) [length], and its loads."""
-        force = -self.internal(bodies, u)[0]
-        system = self.system.renewed(self.force_driven.stiffness(stiffened(bodies.K, self.model.springs)))
+        force, K = -self.internal(bodies, u, load)[0], stiffened(bodies.K, self.model.springs)
+        for (pressure, _), factor in zip(self.following, load.following, strict=True):
+            K = bsr_array(K + (factor * pressure.at(self.displacement(u))[1]).tobsr(K.blocksize))
+            K.sort_indices()
+        system = self.system.renewed(self.force_driven.stiffness(K))
         force += load.force + system.K @ u
         if self.unsupported_bodies is not None and rigid is not None:  # turned bodies under load are not free to turn
             force -= system.K @ self.unsupported_bodies.rigid(rigid.position)
@@ -275,7 +292,7 @@ def prepare(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies,
         active_dofs(system, contact_dofs, involved, pairs, bodies, solver),
         contact_dofs, driven, driven.prescribed(prescribed), driven.forces(_forces(model)),
-        tuple(doubtful), model.nonlinear_bodies(field),
+        tuple(doubtful), model.nonlinear_bodies(field), model.following_pressures(),
     )  # fmt: skip
 
 

@@ -74,7 +74,7 @@ def sentences(model: Any) -> Iterator[str]:
 def _solved(model: Any) -> str:
     nonlinear = any(isinstance(law, NonlinearElastic) for law, _ in model.materials)
     if model.strain == "finite":
-        return "finite strains, loads keeping their directions and areas"
+        return "finite strains, pressures following the surface"
     return "small strains with plasticity" if nonlinear else "small strains and linear elasticity"
 
 

@@ -50,8 +50,8 @@ class Model(ModelSupports):
         Text kept in result files beside the numbers, usually the case file.
     strain : {"small", "finite"}
         ``"finite"``: the bodies may stretch and turn (total Lagrangian): `NeoHookean` and its like, and `LinearElastic` as
-        Saint Venant-Kirchhoff's law, for small strains under large rotations. Loads keep their directions and act on the
-        reference areas; stresses are Cauchy's.
+        Saint Venant-Kirchhoff's law, for small strains under large rotations. Pressures follow the deformed surface, other
+        loads keep their directions and reference areas; stresses are Cauchy's.
 
     Examples
     --------

@@ -220,3 +220,56 @@ def test_cells_tell_their_change_of_volume_and_their_logarithmic_strain() -> Non
         across = 1.0 + steps[-1].displacement[mesh.points_of("XMAX" if kinematics == "3d" else "RIGHT"), 0].mean()
         assert steps[-1].cell_fields["J"] == pytest.approx(1.5 * across**2, rel=1e-9)
         assert steps[-1].cell_fields["logarithmic_strain"] == pytest.approx(np.log(1.5), rel=1e-9)
+
+
+@pytest.mark.parametrize(("element", "count"), [("quad4", 24), ("quad8", 8), ("tri6", 8)])
+def test_pressure_follows_the_wall_of_a_tube(element: str, count: int) -> None:
+    """The pressure of the tube that was blown up by a displacement leads back to it."""
+    inner, outer, nu = 1.0, 2.0, 0.4999
+    mesh = fc.generate.block((outer - inner, 0.05), (count, 1), element=element, origin=(inner, 0.0))
+    model = fc.Model(mesh, "axisymmetric", strain="finite")
+    model.add_material(fc.NeoHookean(E=2.0 * (1.0 + nu), nu=nu))
+    model.fix("BOTTOM", "y")
+    model.fix("TOP", "y")
+    far = 1.4
+
+    def difference(R: float) -> float:
+        r = np.sqrt(R**2 + (far**2 - 1.0) * inner**2)
+        return ((r / R) ** 2 - (R / r) ** 2) * R / r**2
+
+    model.add_pressure("LEFT", quad(difference, inner, outer)[0])
+    steps = fc.solve(model, 4)
+    assert steps[-1].displacement[mesh.points_of("LEFT"), 0] == pytest.approx(far - 1.0, rel=3e-3)
+    assert max(len(step.iterations["history"]) for step in steps) <= 7
+
+
+@pytest.mark.parametrize(
+    ("kinematics", "element"), [("plane_strain", "quad8"), ("axisymmetric", "tri6"), ("3d", "hex8"), ("3d", "tet10")]
+)
+def test_following_pressure_is_the_derivative_of_a_volume(kinematics: str, element: str) -> None:
+    from fastcontact.elasticity.following_pressure import FollowingPressure
+    from fastcontact.elasticity.loads import Pressure
+
+    if kinematics == "3d":
+        mesh, names = (
+            fc.generate.box((1.0, 1.0, 1.0), (1, 1, 1), element=element),
+            ("XMIN", "XMAX", "YMIN", "YMAX", "ZMIN", "ZMAX"),
+        )
+    else:
+        mesh, names = (
+            fc.generate.block((1.0, 1.0), (1, 1), element=element, origin=(1.0, 0.0)),
+            ("BOTTOM", "RIGHT", "TOP", "LEFT"),
+        )
+    rng = np.random.default_rng(0)
+    u, along = 0.1 * rng.normal(size=(2, *mesh.points.shape))
+    pressures = [FollowingPressure(mesh, kinematics, Pressure(name, 2.0)) for name in names]
+
+    def forces(displacement: np.ndarray) -> np.ndarray:
+        return sum(pressure.at(displacement)[0] for pressure in pressures)
+
+    # All around a volume: no resultant, and the derivative is symmetric.
+    if kinematics != "axisymmetric":
+        assert np.abs(forces(u).sum(axis=0)).max() <= 1e-13
+    K = sum(pressure.at(u)[1] for pressure in pressures)
+    change = (forces(u + 1e-6 * along) - forces(u - 1e-6 * along)) / 2e-6
+    assert -K @ along.ravel() == pytest.approx(change.ravel(), abs=1e-8 * np.abs(change).max())

@@ -19,6 +19,7 @@ from fastcontact.cases.decks.cyclic_symmetry import add_sectors
 from fastcontact.cases.decks.initial_stresses import add_initial_stresses
 from fastcontact.cases.decks.local_axes import local_axes, orientation_of
 from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface
+from fastcontact.cases.decks.nonlinear import strain_of
 from fastcontact.cases.decks.pretension import add_sections, cut_sections
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
@@ -27,6 +28,7 @@ from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.elasticity.anisotropic_materials import Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic
+from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
 from fastcontact.elasticity.relations import Relation
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
@@ -48,6 +50,8 @@ class Building:
         Of a plane model; forces of the model are those of a unit of it [length].
     local_supports : list of Relation
         Relations that are supports along local axes.
+    linearised : str
+        Why small strains are solved although a step has NLGEOM; empty where not.
     gap_ends : dict of str to dict of int to int
         By the name of a contact made of gap elements: its nodes, and the nodes behind the gaps.
     """
@@ -64,7 +68,8 @@ class Building:
         groups = self._groups(conditions)
         gaps = self._gap_groups()
         mesh = cut_sections(self.found, self.found.mesh())
-        self.model = Model(mesh, self.found.kinematics, case_text)
+        strain, self.linearised = strain_of(content, [law for law, _ in materials])
+        self.model = Model(mesh, self.found.kinematics, case_text, strain=strain)
         for material, group in materials:
             self.model.add_material(material, group)
         self.local_supports: list[Relation] = []
@@ -119,7 +124,7 @@ class Building:
             group += " with incompatible modes" if modes else ""
             found.append(
                 (
-                    replace(_law(self.content, material, axes), incompatible_modes=modes),
+                    _law(self.content, material, axes, modes),
                     self.found.add_solids(group, keys),
                 )
             )
@@ -391,10 +396,17 @@ class Building:
         return Ramp(tuple(sorted(instants)), ((0.0, 0.0), (float(len(steps)), 1.0)))
 
 
-def _law(content: Content, material: Material, axes: Any) -> Any:
-    """Return the material of the model along axes, with its expansion."""
+def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
+    """Return the material of the model along axes, with its expansion and incompatible modes where elements have them."""
     assert material.law is not None
     law, expansion = material.law(axes), material.expansion
+    if isinstance(law, NonlinearElastic):
+        if modes:
+            content.note(
+                material.place, f"material '{material.name}': incompatible modes are left out, since it is nonlinear"
+            )
+        return law
+    law = replace(law, incompatible_modes=modes)
     heated = any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
     if expansion is None:
         if heated:

@@ -66,8 +66,8 @@ class Deck:
             With the load factor k at the end of step k. Displacements are along the global axes; reactions are the forces of
             supports alone, without those of equations and couplings; forces of plane models are those of the whole thickness.
 
-        Errors and warnings are those of `fastcontact.solve`; where the deck asks for NLGEOM, a FastcontactWarning tells the
-        largest strain and rotation, which linear kinematics leave out the squares of.
+        Errors and warnings are those of `fastcontact.solve`; where the deck asks for NLGEOM and small strains are solved, a
+        FastcontactWarning tells the largest strain and rotation, which linear kinematics leave out the squares of.
         """
         given = {"criteria": self.criteria, **options}
         steps: list[StepResult] = []
@@ -151,7 +151,7 @@ class Deck:
 
     def _tell_nonlinear(self, step: StepResult) -> None:
         """Warn with the largest strain and rotation where the deck asks for large ones."""
-        for asked in (s for s in self.building.content.steps if s.nonlinear):
+        for asked in (s for s in self.building.content.steps if s.nonlinear and self.building.linearised):
             strain = self._largest_strain(step)
             angle, _ = largest_rotation(self.model.mesh, step.displacement)
             warn(
@@ -163,7 +163,7 @@ class Deck:
 
 @typed(FileError)
 def read_deck(path: PathLike) -> Deck:
-    """Read an input deck of Abaqus or CalculiX: static steps of linear elastic bodies in contact.
+    """Read an input deck of Abaqus or CalculiX: static steps of elastic, plastic and hyperelastic bodies in contact.
 
     Every keyword and parameter is translated, noted as without effect, or refused. Nothing but the deck and what it includes
     below its own folder is read.
@@ -188,7 +188,7 @@ def read_deck(path: PathLike) -> Deck:
     Warns
     -----
     FastcontactWarning
-        If a step has NLGEOM: small strains and rotations are solved.
+        If a step has NLGEOM, and small strains are solved nevertheless: with plasticity, temperatures, couplings.
 
     Examples
     --------
@@ -198,16 +198,15 @@ def read_deck(path: PathLike) -> Deck:
     """
     found = existing_file(path)
     content = read_content(read_blocks(found))
-    for step in content.steps:
-        if step.nonlinear:
-            warn(
-                f"{step.place}: NLGEOM: fastcontact solves small strains and rotations; the result is valid only while they "
-                "stay small, and a warning after the solution tells how large they are"
-            )
-            break
     if not content.steps:
         raise Place(found.name, 1, "STEP").refuse("the deck has no step, so nothing is loaded")
     building = Building(content, _text(found))
+    if building.linearised:
+        step = next(step for step in content.steps if step.nonlinear)
+        warn(
+            f"{step.place}: NLGEOM: with {building.linearised} small strains and rotations are solved; the result is valid "
+            "only while they stay small, and a warning after the solution tells how large they are"
+        )
     return Deck(
         path=found,
         title=content.title or found.stem,

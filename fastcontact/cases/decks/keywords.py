@@ -48,6 +48,7 @@ TRANSLATED = {
     "FRICTION": _keyword(),
     "GAP": _keyword("ELSET"),
     "HEADING": Keyword(anything=True),
+    "HYPERELASTIC": _keyword("NEO HOOKE; MOONEY-RIVLIN; YEOH; OGDEN; N", "MODULI"),
     "INITIAL CONDITIONS": _keyword("TYPE"),
     "INSTANCE": _keyword("NAME; PART"),
     "KINEMATIC": _keyword(),
@@ -57,6 +58,7 @@ TRANSLATED = {
     "NSET": _keyword("NSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED; FREQUENCY"),
     "ORIENTATION": _keyword("NAME; SYSTEM"),
     "PART": _keyword("NAME"),
+    "PLASTIC": _keyword("HARDENING"),
     "PRE-TENSION SECTION": _keyword("SURFACE; NODE"),
     "RIGID BODY": _keyword("NSET; ELSET; REF NODE; ROT NODE"),
     "SOLID SECTION": _keyword("ELSET; MATERIAL; ORIENTATION", "CONTROLS"),
@@ -79,14 +81,14 @@ OUTPUT = (
     "PREPRINT", "PRINT", "RESTART", "SECTION FILE", "SECTION PRINT", "TIME POINTS", "CONTROLS",
 )  # fmt: skip
 # Why other keywords of the format are refused.
-LINEAR = "is outside of fastcontact (linear elastic)"
+LINEAR = "is outside of fastcontact (elastic, elastic-plastic and hyperelastic materials)"
 STATIC = "is outside of fastcontact (quasi-static: *STATIC only)"
 SOLIDS = "is outside of fastcontact (solid elements only)"
 HEAT = "is outside of fastcontact (temperatures are given by *TEMPERATURE, not computed)"
 NOT_YET = "is not supported"
 REFUSED = {
     **dict.fromkeys(
-        ("PLASTIC", "HYPERELASTIC", "HYPERFOAM", "CREEP", "CYCLIC HARDENING", "DAMAGE INITIATION", "DAMAGE EVOLUTION",
+        ("HYPERFOAM", "CREEP", "CYCLIC HARDENING", "DAMAGE INITIATION", "DAMAGE EVOLUTION",
          "DEFORMATION PLASTICITY", "DRUCKER PRAGER", "MOHR COULOMB", "VISCOELASTIC", "USER MATERIAL", "DEPVAR",
          "CONCRETE DAMAGED PLASTICITY", "GASKET BEHAVIOR", "COHESIVE BEHAVIOR", "RATE DEPENDENT", "NO COMPRESSION"), LINEAR),
     **dict.fromkeys(

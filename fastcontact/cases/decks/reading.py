@@ -9,6 +9,7 @@ from fastcontact.cases.decks import (
     connections,
     cyclic_symmetry,
     geometry,
+    nonlinear,
     pretension,
     properties,
     stepping,
@@ -28,6 +29,8 @@ IN_PARTS: dict[str, Callable[[Content, Part, Block], None]] = {
 }
 OF_MATERIALS: dict[str, Callable[[Content, Material, Block], None]] = {
     "ELASTIC": properties.elastic,
+    "PLASTIC": nonlinear.plastic,
+    "HYPERELASTIC": nonlinear.hyperelastic,
     "DENSITY": properties.density,
     "EXPANSION": temperatures.expansion,
     "CONDUCTIVITY": temperatures.without_effect,

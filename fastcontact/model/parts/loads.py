@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.elasticity.following_pressure import FollowingPressure
 from fastcontact.elasticity.inertia_loads import Centrifugal, Densities, Gravity, InertiaLoad
 from fastcontact.elasticity.loads import (
     BodyForce,
@@ -241,6 +242,13 @@ class ModelLoads(ModelMaterials):
             check_forces(self.mesh, forces, related, load.name)
             by_ramp[load.ramp] = by_ramp.get(load.ramp, 0.0) + forces
         return by_ramp
+
+    def following_pressures(self) -> list[tuple[FollowingPressure, Table | None]]:
+        """Return the pressures of finite strain, which follow the deformed surface, with their histories."""
+        if self.strain == "small":
+            return []
+        pressures = [load for load in self.loads if isinstance(load, Pressure)]
+        return [(FollowingPressure(self.mesh, self.kinematics, load), load.ramp) for load in pressures]
 
     def load_vector(self, load: Load) -> Array:
         """Return the nodal forces (n_points, dim) of a load at multiplier 1 [force]."""

@@ -41,8 +41,11 @@ def test_two_cubes_are_a_bar(tmp_path):
         ("17, 18\n*Nset, nset=bottom", "17\n*Nset, nset=bottom", "2, 11, 12", "has 7 nodes, 8 are needed"),
         ("200000., 0.\n", "200000., O.3\n", "200000.", "'O.3' is no number"),
         ("200000., 0.\n", "200000., 0.5\n", "200000.", "material 'steel': Poisson's ratio"),
-        ("200000., 0.\n", "200000., 0.\n*Plastic\n1., 0.\n", "*Plastic",
-         r"material 'steel': \*PLASTIC is outside of fastcontact"),
+        ("200000., 0.\n", "200000., 0.\n*Creep\n1., 0.\n", "*Creep", r"material 'steel': \*CREEP is outside of fastcontact"),
+        ("200000., 0.\n", "200000., 0.\n*Plastic, hardening=combined\n1., 0.\n", "*Plastic",
+         "HARDENING=COMBINED is not supported"),
+        ("200000., 0.\n", "200000., 0.\n*Plastic\n1., 0.1\n", "1., 0.1", "the first plastic strain"),
+        ("200000., 0.\n", "200000., 0.\n*Hyperelastic, reduced polynomial\n1.\n", "*Hyperelastic", "REDUCED POLYNOMIAL"),
         ("*Static\n", "*Dynamic\n", "*Dynamic", "quasi-static"),
         ("*Static\n", "", "*Step", r"has no \*STATIC"),
         ("*End Step\n", "", "*Step", r"has no \*END STEP"),
@@ -76,12 +79,48 @@ def test_a_deck_without_steps_says_so(tmp_path):
         deck_of(tmp_path, WHOLE.replace(STEP, ""))
 
 
-def test_nlgeom_warns_and_tells_the_strain_found(tmp_path):
-    text = WHOLE.replace("*Step\n", "*Step, nlgeom=YES\n").replace("P, 100.", "P, 2000.")
-    with pytest.warns(fc.FastcontactWarning, match=r"deck\.inp, line 50, \*STEP: NLGEOM"):
+def test_nlgeom_is_finite_strain(tmp_path):
+    deck = deck_of(tmp_path, WHOLE.replace("*Step\n", "*Step, nlgeom=YES\n").replace("P, 100.", "P, 20000."))
+    assert deck.model.strain == "finite"
+    top = deck.solve()[-1].displacement[deck.points_of("top"), 2].mean() / 2.0
+    # Saint Venant-Kirchhoff, nu = 0: the pressure on the deformed area, which stays.
+    assert 0.5 * ((1.0 + top) ** 2 - 1.0) * (1.0 + top) == pytest.approx(-0.1, rel=1e-6)
+
+
+def test_nlgeom_with_plasticity_warns_and_tells_the_strain_found(tmp_path):
+    plastic = WHOLE.replace("200000., 0.\n", "200000., 0.\n*Plastic\n5000., 0.\n")
+    text = plastic.replace("*Step\n", "*Step, nlgeom=YES\n").replace("P, 100.", "P, 2000.")
+    with pytest.warns(fc.FastcontactWarning, match=r"deck\.inp, line 52, \*STEP: NLGEOM: with plasticity"):
         deck = deck_of(tmp_path, text)
     with pytest.warns(fc.FastcontactWarning, match=r"equivalent strain up to 0\.00667"):  # 2/3 of 0.01 at nu = 0
         deck.solve()
+
+
+@pytest.mark.parametrize(
+    ("keyword", "law"),
+    [
+        ("*Hyperelastic, neo hooke\n0.5, 0.2\n", fc.NeoHookean(E=90.0 / 31.0, nu=28.0 / 62.0)),
+        ("*Hyperelastic, mooney-rivlin\n0.4, 0.1, 0.2\n", fc.MooneyRivlin(0.4, 0.1, bulk=10.0)),
+        ("*Hyperelastic, yeoh\n0.5, -0.1, 0.01, 0.2\n", fc.Yeoh(0.5, -0.1, 0.01, bulk=10.0)),
+        ("*Hyperelastic, ogden, n=2\n0.8, 2., 0.2, -1., 0.2\n", fc.Ogden([0.8, 0.2], [2.0, -1.0], bulk=10.0)),
+    ],
+)
+def test_hyperelastic_materials(tmp_path, keyword, law):
+    deck = deck_of(tmp_path, WHOLE.replace("*Elastic\n200000., 0.\n", keyword).replace("P, 100.", "P, 0.1"))
+    (found, _), *_ = deck.model.materials
+    assert found.constants == pytest.approx(law.constants)
+    assert deck.model.strain == "finite"
+    assert deck.solve()[-1].displacement[:, 2].min() < -0.01
+
+
+def test_plastic_tables_and_kinematic_hardening(tmp_path):
+    for text, law in (
+        ("*Plastic\n50., 0.\n60., 0.01\n", {"hardening": [(0.0, 50.0), (0.01, 60.0)]}),
+        ("*Plastic, hardening=kinematic\n50., 0.\n60., 0.01\n", {"kinematic": 1000.0}),
+    ):
+        deck = deck_of(tmp_path, WHOLE.replace("200000., 0.\n", "200000., 0.\n" + text).replace("P, 100.", "P, 55."))
+        assert deck.model.materials[0][0] == fc.ElasticPlastic(E=200000.0, nu=0.0, yield_stress=50.0, **law)
+        assert deck.solve()[-1].cell_fields["plastic_strain"] == pytest.approx(0.005, rel=1e-6)
     deck_of(tmp_path, WHOLE.replace("*Step\n", "*Step, nlgeom=NO\n"))
 
 
