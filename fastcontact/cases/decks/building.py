@@ -119,7 +119,7 @@ class Building:
             group += " with incompatible modes" if modes else ""
             found.append(
                 (
-                    replace(_law(self.content, material, axes), incompatible_modes=modes),
+                    replace(_law(self.content, material, axes), incompatible_modes=modes, density=material.density),
                     self.found.add_solids(group, keys),
                 )
             )
