@@ -41,6 +41,7 @@ _NAMES = {
     "elasticity.anisotropic_materials": ("Anisotropic", "Orthotropic"),
     "elasticity.material_axes": ("CylindricalAxes",),
     "elasticity.materials": ("LinearElastic",),
+    "elasticity.nonlinear_materials": ("ElasticPlastic", "MooneyRivlin", "NeoHookean", "Ogden", "Yeoh"),
     "elasticity.varying_constants": ("Tabulated",),
     "errors": (
         "CaseError",

@@ -195,6 +195,11 @@ def modes(
 def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> bsr_array:
     """Return the stiffness (n_dofs, n_dofs) of cells and springs, with that of the stresses of a step [force / length]."""
     mesh, kinematics = model.mesh, model.kinematics
+    bodies = model.nonlinear_bodies(field)
+    if bodies is not None and step is not None:
+        if model.strain == "small":
+            model.refuse_nonlinear("modes about a step are")
+        return stiffened(bodies.at(step.displacement, bodies.beginning).K, model.springs)
     K = stiffened(stiffness(mesh, kinematics, field.moduli, field.loops, None, field.treatment), model.springs)
     if step is None:
         return K

@@ -46,6 +46,7 @@ MODES: dict[str, Any] = {"n": int, "stress_stiffening": bool}
 TOP: dict[str, Any] = {
     "title": str,
     "kinematics": str,
+    "strain": str,
     "contact": (dict, str),
     **dict.fromkeys(
         ("units", "mesh", "contacts", "obstacle", "ramp", "solve", "probes", "theory", "study", "modes"), dict
