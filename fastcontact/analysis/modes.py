@@ -122,13 +122,15 @@ def modes(
     n: int = 10,
     *,
     stress_stiffening: bool = True,
+    hold_sliding: bool = False,
     linear_solver: str = "auto",
 ) -> Modes:
     """Return the lowest frequencies and shapes of small vibrations, about a settled load step or at rest.
 
     What contact has closed stays closed, what sticks does not slip, what slides or is open is free; supports, relations,
     couplings and springs hold, with what they prescribe kept, and pretension sections keep their length. Stresses of the step
-    stiffen, as in a string, or soften. Obstacles that forces drive have no mass.
+    stiffen, as in a string, or soften; at finite strains the bodies are those deformed. Obstacles that forces drive have no
+    mass.
 
     Parameters
     ----------
@@ -141,6 +143,10 @@ def modes(
         How many.
     stress_stiffening : bool
         Whether stresses of the step count.
+    hold_sliding : bool
+        Whether nodes that slide in the step are held along the surface, too, as friction does as soon as small motions turn
+        the slip round. Without, what friction alone holds and slides everywhere, as a bolt that is pressed on all round may,
+        is free to turn.
     linear_solver : str
         As for `solve`: by factors the Lanczos method, by multigrid conjugate gradients (LOBPCG).
 
@@ -151,7 +157,8 @@ def modes(
     Raises
     ------
     ModelError
-        If a density is missing, the step is of another mesh, the step is not stable, or there are fewer than n modes.
+        If a density is missing, the step is of another mesh or of bodies that yield, the step is not stable, or there are
+        fewer than n modes.
     ConvergenceError
         If the iteration does not end.
 
@@ -176,7 +183,9 @@ def modes(
     K = _stiffness(model, step if stress_stiffening else None, field)
     M = mass(model.mesh, model.kinematics, density)
     supported, _ = model.prescribed_by_ramp()
-    contact = held_contact(model, step, HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs)))
+    contact = held_contact(
+        model, step, HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs)), hold_sliding
+    )
     shift = SHIFT * _uniform(model, K, M)
     relations = driven.relations([*model.relations, *at_present_length(model)])
     K, M = contact.stiffened(driven.stiffness(K)), driven.stiffness(M)

@@ -132,6 +132,7 @@ def _case_of_deck(path: Path) -> Case:
         probes={},
         units=known_units({}),
         folder=path.parent.resolve(),
+        modes=deck.modes,
         deck=deck,
     )
 

@@ -12,8 +12,8 @@ FLAT = ("tri3", "quad4", "tri6", "quad8", "quad9")
 SOLID = ("tet4", "hex8", "wedge6", "pyramid5", "tet10", "hex20", "hex27", "wedge15", "pyramid13")
 
 
-def model_of(mesh, kinematics, nu=0.0, E=1.0):
-    model = fc.Model(mesh, kinematics)
+def model_of(mesh, kinematics, nu=0.0, E=1.0, **options):
+    model = fc.Model(mesh, kinematics, **options)
     model.add_material(fc.LinearElastic(E=E, nu=nu, density=1.0))
     return model
 
@@ -90,10 +90,12 @@ def test_a_clamped_disc_and_a_ring():
     assert fc.modes(ring, step, 1).frequencies[0] == pytest.approx(np.sqrt(1.1) / (2 * np.pi), rel=2e-3)
 
 
-@pytest.mark.parametrize("element", ["quad8", "tri6", "hex20"])
+@pytest.mark.parametrize(
+    ("element", "strain"), [("quad8", "small"), ("tri6", "small"), ("hex20", "small"), ("quad8", "finite")]
+)
 @pytest.mark.parametrize("stress", [0.01, -0.0002])
-def test_tension_stiffens_a_beam_and_pressure_softens_it(element, stress):
-    """Simply supported: ``(2 pi f)^2 = (pi / L)^2 (T + E I (pi / L)^2) / (density A)``."""
+def test_tension_stiffens_a_beam_and_pressure_softens_it(element, strain, stress):
+    """Simply supported: ``(2 pi f)^2 = (pi / L)^2 (T + E I (pi / L)^2) / (density A)``; finite strains of 0.01 beside."""
     height, flat = 0.02, element in FLAT
     mesh = (
         block((1.0, height), (20, 2), element, origin=(0.0, -0.5 * height))
@@ -103,7 +105,7 @@ def test_tension_stiffens_a_beam_and_pressure_softens_it(element, stress):
     ends = ("LEFT", "RIGHT") if flat else ("XMIN", "XMAX")
     middle = np.abs(mesh.points[:, 1]) < 1e-9
     pins = {f"PIN {x:g}": np.flatnonzero(middle & (np.abs(mesh.points[:, 0] - x) < 1e-9)) for x in (0.0, 1.0)}
-    model = model_of(mesh.with_groups(points=pins), "plane_stress" if flat else "3d")
+    model = model_of(mesh.with_groups(points=pins), "plane_strain" if flat else "3d", strain=strain)
     model.fix("PIN 0", "xy")
     model.fix("PIN 1", "y")
     if not flat:
@@ -111,10 +113,10 @@ def test_tension_stiffens_a_beam_and_pressure_softens_it(element, stress):
     for end, sign in zip(ends, (-1.0, 1.0)):
         model.add_traction(end, x=sign * stress)
     (step,) = fc.solve(model, 1)
-    bending = height**2 / 12 * np.pi**2
+    bending, off = height**2 / 12 * np.pi**2, 0.6 * abs(stress) if strain == "finite" else 0.0
     at_rest, loaded = (fc.modes(model, own, 1).frequencies[0] for own in (None, step))
-    assert loaded / at_rest == pytest.approx(np.sqrt(1.0 + stress / bending), rel=1e-3)
-    assert loaded == pytest.approx(0.5 * np.sqrt(stress + bending), rel=1.5e-3)
+    assert loaded / at_rest == pytest.approx(np.sqrt(1.0 + stress / bending), rel=1e-3 + off)
+    assert loaded == pytest.approx(0.5 * np.sqrt(stress + bending), rel=1.5e-3 + off)
     assert fc.modes(model, step, 1, stress_stiffening=False).frequencies[0] == pytest.approx(at_rest, rel=1e-12)
 
 
@@ -160,6 +162,25 @@ def test_what_is_tied_or_sticks_vibrates_as_the_whole_body(kinematics, element, 
     up, low = (smooth.mesh.points_of(group) for group in ("UP BOTTOM", "LOW TOP"))
     slips = [np.ptp(shape[np.concatenate([up, low]), 0]) for shape in found.shapes]
     assert max(slips) > 0.1 * np.abs(found.shapes).max()
+
+
+def test_what_slides_is_free_along_the_surface_unless_it_is_held():
+    mesh = union(
+        bar("quad8", "plane_strain", (4, 4), "LOW", height=0.1), bar("quad8", "plane_strain", (4, 4), "UP", 0.1, 0.1)
+    )
+    found = {}
+    for name, options in {"slides": {"friction": 0.05}, "tied": {"kind": "tied"}}.items():
+        model = model_of(mesh, "plane_strain")
+        model.fix("LOW BOTTOM", "xy")
+        model.prescribe("UP TOP", x=2e-4, y=-2e-4)
+        model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", **options)
+        (step,) = fc.solve(model, 1)
+        own = {"stress_stiffening": False, "n": 3}
+        found[name] = fc.modes(model, step, hold_sliding=True, **own).frequencies
+        if name == "slides":
+            assert not (step.contact["joint"].active & step.contact["joint"].sticking).any()
+            assert fc.modes(model, step, **own).frequencies[0] < 0.85 * found[name][0]
+    assert found["slides"] == pytest.approx(found["tied"], rel=1e-3)
 
 
 @pytest.mark.filterwarnings("ignore:contact 'joint' penetrates")

@@ -26,7 +26,7 @@ ACCURACY = 1e-5
 FEW = 200
 UNSTABLE = (
     "the settled step is not stable: small motions about it grow by themselves, or what has no mass is free; take a lower "
-    "load, hold it, or leave out the stiffness by stresses (stress_stiffening=False)"
+    "load, hold what slides (hold_sliding=True), or leave out the stiffness by stresses (stress_stiffening=False)"
 )
 # Iterations until that is looked at, and how often.
 ROUND, ROUNDS = 20, 15

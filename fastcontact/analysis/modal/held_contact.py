@@ -51,7 +51,7 @@ class HeldContact:
         return K
 
 
-def held_contact(model: Model, step: StepResult | None, held: HeldMotions) -> HeldContact:
+def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_sliding: bool) -> HeldContact:
     """Return the conditions of all pairs at the end of a step; without one those of tied and bilateral pairs, at rest."""
     n_dofs = model.force_driven.n_dofs
     equations, nodes, springs = [csr_array((0, n_dofs))], [np.empty(0, np.intp)], []
@@ -62,7 +62,7 @@ def held_contact(model: Model, step: StepResult | None, held: HeldMotions) -> He
         at = _configuration(model, step, contact)
         position = at.obstacle if contact is not None else np.zeros(model.mesh.dim)
         part = model.force_driven.constraints(pair.name, bound.constraints(at), position)
-        for rows, owners, softness in _rows(bound, part, contact):
+        for rows, owners, softness in _rows(bound, part, contact, hold_sliding):
             kept = np.flatnonzero(np.diff(rows.indptr) > 0)
             if softness is None:
                 equations.append(csr_array(rows[kept]))
@@ -91,7 +91,7 @@ def _worn(model: Model, contact: ContactResult) -> Array | None:
 
 
 def _rows(
-    pair: Formulation, part: Constraints, contact: ContactResult | None
+    pair: Formulation, part: Constraints, contact: ContactResult | None, hold_sliding: bool
 ) -> Iterator[tuple[csr_array, NDArray[np.intp], csr_array | None]]:
     """Yield rows along the normal and along each tangent, their nodes, and the matrix by which they give way, if they do.
 
@@ -110,7 +110,7 @@ def _rows(
     if contact is not None:
         closed |= contact.active[node]
         rubs = abs(moments) @ (part.coefficients > 0.0).astype(float) > 0.0
-        sticking = (contact.active & contact.sticking)[node] & rubs
+        sticking = (contact.active & (contact.sticking | hold_sliding))[node] & rubs
     for along, held, softness in (
         (part.B, closed, part.softness),
         *((tangent, sticking, part.tangential_softness) for tangent in part.tangents),

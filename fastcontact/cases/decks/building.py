@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -405,8 +406,10 @@ def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
             content.note(
                 material.place, f"material '{material.name}': incompatible modes are left out, since it is nonlinear"
             )
+        law = copy.copy(law)
+        object.__setattr__(law, "density", material.density)
         return law
-    law = replace(law, incompatible_modes=modes)
+    law = replace(law, incompatible_modes=modes, density=material.density)
     heated = any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
     if expansion is None:
         if heated:

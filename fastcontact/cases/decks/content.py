@@ -233,6 +233,8 @@ class Step:
     period: float = 1.0
     increment: float = 1.0
     static: bool = False
+    perturbation: bool = False
+    modes: int = 0
     given: list[Given] = field(default_factory=list)
 
 
@@ -262,6 +264,7 @@ class Content:
     initial: list[Block] = field(default_factory=list)
     stresses: list[Block] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)
+    modes: dict[str, Any] | None = None
     notes: list[str] = field(default_factory=list)
     outputs: list[Place] = field(default_factory=list)
 

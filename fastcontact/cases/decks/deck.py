@@ -46,6 +46,8 @@ class Deck:
         What lines mean here where that is not plain: what has no effect, what is solved in another way.
     thickness : float
         Of a plane model [length]; forces that `solve` returns are those of all of it.
+    modes : dict, optional
+        What ``*FREQUENCY`` asks for, as arguments of `fastcontact.modes` about the last step; None without.
     """
 
     path: Path
@@ -55,6 +57,7 @@ class Deck:
     criteria: Criteria
     notes: tuple[str, ...]
     thickness: float = 1.0
+    modes: dict[str, Any] | None = None
     building: Building = field(default=None, repr=False)  # type: ignore[assignment]
 
     def solve(self, **options: Any) -> list[StepResult]:
@@ -215,6 +218,7 @@ def read_deck(path: PathLike) -> Deck:
         criteria=Criteria(),
         notes=_notes(content, building.thickness),
         thickness=building.thickness,
+        modes=content.modes,
         building=building,
     )
 

@@ -45,6 +45,7 @@ TRANSLATED = {
     "END STEP": _keyword(),
     "EQUATION": _keyword(),
     "EXPANSION": _keyword("TYPE", "ZERO"),
+    "FREQUENCY": _keyword("", "EIGENSOLVER; NORMALIZATION; SOLVER; STORAGE; GLOBAL"),
     "FRICTION": _keyword(),
     "GAP": _keyword("ELSET"),
     "HEADING": Keyword(anything=True),
@@ -82,7 +83,7 @@ OUTPUT = (
 )  # fmt: skip
 # Why other keywords of the format are refused.
 LINEAR = "is outside of fastcontact (elastic, elastic-plastic and hyperelastic materials)"
-STATIC = "is outside of fastcontact (quasi-static: *STATIC only)"
+STATIC = "is outside of fastcontact (quasi-static: *STATIC, and *FREQUENCY behind it)"
 SOLIDS = "is outside of fastcontact (solid elements only)"
 HEAT = "is outside of fastcontact (temperatures are given by *TEMPERATURE, not computed)"
 NOT_YET = "is not supported"
@@ -92,7 +93,7 @@ REFUSED = {
          "DEFORMATION PLASTICITY", "DRUCKER PRAGER", "MOHR COULOMB", "VISCOELASTIC", "USER MATERIAL", "DEPVAR",
          "CONCRETE DAMAGED PLASTICITY", "GASKET BEHAVIOR", "COHESIVE BEHAVIOR", "RATE DEPENDENT", "NO COMPRESSION"), LINEAR),
     **dict.fromkeys(
-        ("DYNAMIC", "FREQUENCY", "BUCKLE", "MODAL DYNAMIC", "STEADY STATE DYNAMICS", "VISCO", "HEAT TRANSFER",
+        ("DYNAMIC", "BUCKLE", "MODAL DYNAMIC", "STEADY STATE DYNAMICS", "VISCO", "HEAT TRANSFER",
          "ELECTROMAGNETICS",
          "COUPLED TEMPERATURE-DISPLACEMENT", "UNCOUPLED TEMPERATURE-DISPLACEMENT",
          "COMPLEX FREQUENCY", "SENSITIVITY",

@@ -171,11 +171,15 @@ class Reader:
             raise block.place.refuse("belongs into a step")
         stepping.static(self.content, self.step, block)
 
+    def _frequency(self, block: Block) -> None:
+        if self.step is None:
+            raise block.place.refuse("belongs into a step")
+        stepping.frequency(self.step, block)
+
     def _end_step(self, block: Block) -> None:
         if self.step is None:
             raise block.place.refuse("there is no step to end")
-        if not self.step.static:
-            raise self.step.place.refuse("the step has no *STATIC, so it is unknown what to solve")
+        stepping.end_step(self.content, self.step)
         self.step = None
 
 

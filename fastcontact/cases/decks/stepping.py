@@ -1,4 +1,4 @@
-"""Keywords of the steps: *STEP, *STATIC, and the blocks of supports and loads in them."""
+"""Keywords of the steps: *STEP, *STATIC, *FREQUENCY, and the blocks of supports and loads in them."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ MOST_PARTS = 20
 def new_step(content: Content, block: Block) -> Step:
     """*STEP."""
     nonlinear = "NLGEOM" in block.parameters and block.get("NLGEOM", "YES").upper() != "NO"
-    if "PERTURBATION" in block.parameters:
-        raise block.place.refuse("PERTURBATION is not supported: contact has no linear perturbation")
+    if content.modes is not None:
+        raise block.place.refuse("follows a step with *FREQUENCY, which is supported as the last one only")
     block.choice("AMPLITUDE", ("RAMP",))
-    content.steps.append(Step(block.place, nonlinear))
+    content.steps.append(Step(block.place, nonlinear, perturbation="PERTURBATION" in block.parameters))
     return content.steps[-1]
 
 
@@ -23,6 +23,12 @@ def static(content: Content, step: Step, block: Block) -> None:
     """*STATIC: first increment and length of the step; how it is cut is decided here."""
     if step.static:
         raise block.place.refuse("the step has two of it")
+    if step.modes:
+        raise block.place.refuse("a step has either *STATIC or one *FREQUENCY")
+    if step.perturbation:
+        raise step.place.refuse(
+            "PERTURBATION is not supported: contact has no linear perturbation, but modes by *FREQUENCY"
+        )
     step.static = True
     if "STABILIZE" in block.parameters:
         content.note(
@@ -35,6 +41,38 @@ def static(content: Content, step: Step, block: Block) -> None:
             row.number(index, 1.0)
         if not (step.period > 0 and step.increment > 0):
             raise row.place.refuse("the increment and the length of the step must be positive")
+
+
+def frequency(step: Step, block: Block) -> None:
+    """*FREQUENCY: how many modes."""
+    if step.static or step.modes:
+        raise block.place.refuse("a step has either *STATIC or one *FREQUENCY")
+    number = block.rows[0].whole(0, 10) if block.rows else 10
+    if number < 1:
+        raise block.rows[0].place.refuse("asks for no mode: write how many")
+    step.modes = number
+
+
+def end_step(content: Content, step: Step) -> None:
+    """*END STEP: what a step with *FREQUENCY asks for is kept, and no load step."""
+    if not step.modes:
+        if not step.static:
+            raise step.place.refuse("the step has no *STATIC, so it is unknown what to solve")
+        return
+    if step.given:
+        raise step.given[0].block.place.refuse(
+            "cannot stand in a step with *FREQUENCY: modes have the supports of before"
+        )
+    content.steps.pop()
+    if not content.steps:
+        raise step.place.refuse("*FREQUENCY needs a step with *STATIC before: modes are those about its end")
+    stiffening = step.perturbation or any(own.nonlinear for own in content.steps)
+    content.modes = {"n": step.modes, "stress_stiffening": stiffening}
+    content.note(
+        step.place,
+        f"{step.modes} modes about the last step, {'with' if stiffening else 'without'} the stiffness by its stresses "
+        "(PERTURBATION, or NLGEOM before)",
+    )
 
 
 def given(content: Content, step: Step | None, block: Block) -> None:

@@ -10,6 +10,7 @@ from test_temperatures import TIED, heated
 from test_tightening import BAR, HELD, TIGHT, cooled
 
 import fastcontact as fc
+from fastcontact.cli import main
 
 
 def notes_of(deck):
@@ -378,3 +379,36 @@ def test_components_of_a_coupling_count_along_its_orientation(tmp_path, kind):
     ]
     assert steps[0].contact["ss/sm"].force[2] == pytest.approx(100.0)
     np.testing.assert_allclose(steps[1].displacement, steps[0].displacement, atol=1e-12)
+
+
+FREQUENCY = "*Step, perturbation\n*Frequency\n 2\n*End Step\n"
+
+
+def test_frequencies_about_the_last_step(tmp_path, capsys):
+    """A bar of two linear elements: ``w^2 = 6 E / (density h^2) (1 - cos k h) / (2 + cos k h)``, ``k h = pi / 4``."""
+    text = WHOLE.replace("200000., 0.\n", "200000., 0.\n*Density\n8e-9\n").replace(
+        "x0, 1\ny0, 2", "low, 1, 2\nup, 1, 2"
+    )
+    text = text.replace(
+        "*Nset, nset=x0", "*Nset, nset=low, generate\n1, 8\n*Nset, nset=up, generate\n11, 18\n*Nset, nset=x0"
+    )
+    deck = deck_of(tmp_path, text + FREQUENCY)
+    assert deck.modes == {"n": 2, "stress_stiffening": True}
+    assert "2 modes about the last step, with the stiffness by its stresses" in notes_of(deck)
+    k = np.cos(np.pi / 4)
+    exact = np.sqrt(6 * 2e5 / 8e-9 * (1 - k) / (2 + k)) / (2 * np.pi)
+    assert fc.modes(deck.model, deck.solve()[-1], n=1).frequencies[0] == pytest.approx(exact, rel=1e-3)  # 100 of 2e5
+    assert main(["run", str(tmp_path / "deck.inp"), "-o", str(tmp_path / "r.vtkhdf")]) == 0
+    assert f"frequencies about the last step: {exact / 1e5:.0f}" in capsys.readouterr().out
+    for wrong, said in (
+        (text.replace(STEP, FREQUENCY), r"\*FREQUENCY needs a step with \*STATIC before"),
+        (text + FREQUENCY + STEP, r"\*STEP: follows a step with \*FREQUENCY"),
+        (
+            text + FREQUENCY.replace(" 2\n", " 2\n*Boundary\ntop, 3\n"),
+            r"\*BOUNDARY: cannot stand in a step with \*FREQ",
+        ),
+        (text + FREQUENCY.replace(" 2\n", " 0\n"), "asks for no mode"),
+        (text + FREQUENCY.replace(" 2\n", " 2\n*Static\n"), r"either \*STATIC or one"),
+    ):
+        with pytest.raises(fc.CaseError, match=said):
+            deck_of(tmp_path, wrong)
