@@ -14,6 +14,7 @@ from fastcontact.results.units import labelled
 from fastcontact.studies.quantities import title
 from fastcontact.studies.render.figure import Curve, Line, Panel, marker
 from fastcontact.studies.series import Series
+from fastcontact.studies.settings import Named
 
 Array = NDArray[np.float64]
 # With more curves than this, error bars would hide them.
@@ -25,6 +26,7 @@ def error_panel(all_series: Sequence[Series], quantity: str, units: Mapping[str,
     known = [(k, series) for k, series in enumerate(all_series) if quantity in series.limits]
     if not known:
         return Panel(instead=f"no limit of the {title(quantity)}:\na limit takes three levels")
+    named = isinstance(all_series[0].combination, Named)
     few = len(known) <= MOST_CURVES_WITH_BARS
     curves = []
     for position, (k, series) in enumerate(known):
@@ -41,7 +43,7 @@ def error_panel(all_series: Sequence[Series], quantity: str, units: Mapping[str,
             curves.append(Curve(h, factor * h**limit.order, ":", color=color))
     return Panel(
         f"Mesh error of the {title(quantity)}",
-        labelled("facet length at the contact h", units, "length"),
+        labelled("mesh size h" if named else "facet length at the contact h", units, "length"),
         "|value - limit| / limit",
         curves,
         x_scale="plain log",

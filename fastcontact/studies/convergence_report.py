@@ -16,6 +16,7 @@ from fastcontact.studies.render.table import Rows, aligned, structured
 from fastcontact.studies.report import Report
 from fastcontact.studies.sentences import MAIN, sentences
 from fastcontact.studies.series import Series
+from fastcontact.studies.settings import Named
 
 # In figures, and in the table of all combinations.
 COMPARED = ("force", "pressure_max")
@@ -94,17 +95,28 @@ class Study(Report):
             found += [f"  level {number} failed: {text}" for number, text in series.failed.items()]
         found += [f"  {name} failed: {text}" for name, text in self.failed.items()]
         if len(self.series) > 1:
-            names = [name for name in COMPARED if name in self.best.quantities]
+            names = self.best.shown(COMPARED)
             found += ["", f"all combinations: limits and model errors {self.best.compared}"]
             found += aligned(tables.comparison_rows(self.series, names, self.units))
         return [*found, "", *sentences(self.best)]
 
     def figure(self) -> Any:
         """Return a matplotlib figure: errors, pressure over the radius, differences from theory."""
-        pressure = pressure_panel(self.best, self.theory, self.units)
-        difference = theory_panel(self.series, self.best, "pressure_max", self.units)
-        errors = [error_panel(self.series, name, self.units) for name in COMPARED]
-        return figure([errors, [pressure, difference]], (12.0, 9.2), self.title)
+        panels = [error_panel(self.series, name, self.units) for name in self._drawn()]
+        of_case = not isinstance(self.best.combination, Named)
+        if of_case or self.best.finest.profile:
+            panels.append(pressure_panel(self.best, self.theory, self.units))
+        if of_case:
+            panels.append(theory_panel(self.series, self.best, "pressure_max", self.units))
+        if len(panels) > 1 and len(panels) % 2:
+            panels.append(Panel(instead=" "))
+        rows = [panels[first : first + 2] for first in range(0, len(panels), 2)]
+        return figure(rows, (6.0 * len(rows[0]), 4.6 * len(rows)), self.title)
+
+    def _drawn(self) -> list[str]:
+        """Return the quantities whose errors are drawn."""
+        known = self.best.shown(COMPARED) or list(self.best.quantities[:2])
+        return known if isinstance(self.best.combination, Named) else list(COMPARED)
 
     def html(self) -> str:
         """Return the study as one self-contained HTML page."""
@@ -122,7 +134,7 @@ class Study(Report):
         return page.page(f"Mesh convergence: {self.title}", parts, self.text)
 
     def _pictures(self) -> list[str]:
-        limits = [name for name in COMPARED if any(name in series.limits for series in self.series)]
+        limits = [name for name in self._drawn() if any(name in series.limits for series in self.series)]
         theories = [name for name in COMPARED if any(series.split(name) for series in self.series)]
         errors = [error_panel(self.series, name, self.units) for name in limits] or [Panel(grid=0.0)]
         differences = [theory_panel(self.series, self.best, name, self.units) for name in theories]
@@ -142,7 +154,7 @@ class Study(Report):
 
     def _series_parts(self, series: Series) -> list[str]:
         parts = [page.section(str(series.combination))]
-        names = [name for name in tables.IN_TABLES if name in series.quantities]
+        names = series.shown(tables.IN_TABLES)
         for first in range(0, len(names), 2):
             parts.append(page.table(tables.level_rows(series, self.units, names[first : first + 2])))
         if series.limits:
