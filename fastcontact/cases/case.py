@@ -14,7 +14,7 @@ from fastcontact.cases.decks.blocks import files_of_deck
 from fastcontact.cases.decks.deck import Deck, read_deck
 from fastcontact.cases.input_files import files_named
 from fastcontact.cases.keys import NUMBER, RAMP, SENSITIVITY, TOP, at, called, check_keys, check_settings, tables
-from fastcontact.cases.model_tables import build_model, points
+from fastcontact.cases.model_tables import LISTS, build_model, points
 from fastcontact.cases.shipped import case_path, shipped_cases
 from fastcontact.errors import CaseError, unknown
 from fastcontact.linear.choice import check_tolerance
@@ -181,7 +181,7 @@ def build_case(
     studies take it too, or make one of the data.
     Raises CaseError if a key is unknown or a value wrong, FastcontactError if the mesh or the model is wrong.
     """
-    check_keys("", data, TOP)
+    check_keys("", data, {**TOP, **dict.fromkeys(LISTS, list)})
     check_settings(data)
     for key in ("kinematics", "mesh", "material"):
         if key not in data:

@@ -11,8 +11,6 @@ from typing import Any
 from fastcontact.errors import CaseError, FastcontactError, unknown
 
 NUMBER = (int, float)
-# A number, or a table of a value that depends on the position.
-PLACE = (int, float, dict)
 AXES = {"x": NUMBER, "y": NUMBER, "z": NUMBER}
 UNITS = {"length": str, "force": str, "pressure": str}
 RAMP = {"steps": int, "end": NUMBER, "instants": list, "table": list}
@@ -21,109 +19,6 @@ SOLVE: dict[str, Any] = {
     "keep_pairing": bool,
     **dict.fromkeys(("linear_tolerance", "relative", "absolute", "geometry"), NUMBER),
     **dict.fromkeys(("geometry_updates", "max_geometry_updates", "max_active_set_iterations", "max_halvings"), int),
-}
-# Tables that may occur several times, by kind: the types of their keys, and the keys that are required.
-LISTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
-    "material": (
-        {
-            **dict.fromkeys(("E", "nu"), (int, float, list, dict)),
-            "groups": (list, str),
-            "volumetric": str,
-            "incompatible_modes": bool,
-            **dict.fromkeys(("G", "D"), list),
-            "axes": (list, dict),
-            "density": PLACE,
-            "expansion": (int, float, list, dict),
-        },
-        (),
-    ),
-    "support": ({"group": str, **AXES, "normal": NUMBER, "axes": (list, dict), "ramp": list}, ("group",)),
-    "pressure": ({"group": str, "value": PLACE, "ramp": list}, ("group", "value")),
-    "traction": ({"group": str, **AXES, "ramp": list}, ("group",)),
-    "body_force": ({"groups": (list, str), **AXES, "ramp": list}, ()),
-    "gravity": ({"groups": (list, str), **AXES, "ramp": list}, ()),
-    "centrifugal": (
-        {"speed": NUMBER, "groups": (list, str), "origin": list, "direction": list, "ramp": list},
-        ("speed",),
-    ),
-    "temperature": (
-        {
-            "value": PLACE,
-            "groups": (list, str),
-            **dict.fromkeys(("reference", "instant"), NUMBER),
-            "file": (str, list),
-            "field": str,
-            **dict.fromkeys(("times", "ramp"), list),
-        },
-        (),
-    ),
-    **dict.fromkeys(
-        ("initial_stress", "initial_strain"),
-        (
-            {
-                "groups": (list, str),
-                **dict.fromkeys(("xx", "yy", "zz", "xy", "yz", "xz"), PLACE),
-                "axes": (list, dict),
-                "ramp": list,
-            },
-            (),
-        ),
-    ),
-    "force": (
-        {"group": str, **AXES, "distribute": bool, "at": list, "weighting": str, "radius": NUMBER, "ramp": list},
-        ("group",),
-    ),
-    "moment": ({"group": str, **AXES, "ramp": list}, ("group",)),
-    "hydrostatic_pressure": (
-        {"group": str, **dict.fromkeys(("weight", "level"), NUMBER), "axis": str, "ramp": list},
-        ("group", "weight", "level"),
-    ),
-    "coupling": (
-        {
-            **dict.fromkeys(("reference", "group", "kind", "components", "weighting"), str),
-            "place": list,
-            "radius": NUMBER,
-        },
-        ("reference", "group"),
-    ),
-    "couple": ({"group": str, "component": str}, ("group", "component")),
-    "group_relation": (
-        {
-            **dict.fromkeys(("first", "second", "component"), str),
-            **dict.fromkeys(("coefficients", "translation", "ramp"), list),
-            "value": NUMBER,
-        },
-        ("first", "second", "component"),
-    ),
-    "periodicity": (
-        {"first": str, "second": str, **AXES, "free": str, "translation": list, "ramp": list},
-        ("first", "second"),
-    ),
-    "cyclic_symmetry": (
-        {"first": str, "second": str, "sectors": int, "origin": list, "direction": list},
-        ("first", "second", "sectors"),
-    ),
-    "relation": ({"terms": list, "value": NUMBER, "ramp": list}, ("terms",)),
-    "pretension": (
-        {
-            **dict.fromkeys(("name", "section", "opposite"), str),
-            **dict.fromkeys(("force", "shortening", "locked_from"), NUMBER),
-            **dict.fromkeys(("normal", "ramp"), list),
-        },
-        ("name", "section"),
-    ),
-    "spring": (
-        {
-            "group": (str, int),
-            "to": (str, int),
-            **AXES,
-            "axial": NUMBER,
-            "transverse": NUMBER,
-            "direction": list,
-            "translation": list,
-        },
-        ("group",),
-    ),
 }
 # A rigid surface: the facets of a group of a file, or of the mesh of the model.
 SURFACE = {"file": str, "group": str, "flip": bool, "crease": NUMBER}
@@ -151,7 +46,7 @@ TOP: dict[str, Any] = {
     "title": str,
     "kinematics": str,
     **dict.fromkeys(("units", "mesh", "contact", "obstacle", "ramp", "solve", "probes", "theory", "study"), dict),
-    **dict.fromkeys((*LISTS, "check", "sensitivity"), list),
+    **dict.fromkeys(("check", "sensitivity"), list),
 }
 
 
@@ -163,9 +58,9 @@ def check_keys(where: str, data: Any, known: Mapping[str, Any]) -> None:
         label = f"{where}.{key}" if where else key
         if key not in known:
             raise CaseError(unknown("key", label, [f"{where}.{k}" if where else k for k in known]))
-        kind = known[key]
-        if kind is not None and (not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool)):
-            names = " or ".join(k.__name__ for k in (kind if isinstance(kind, tuple) else (kind,)))
+        kinds = known[key] if isinstance(known[key], tuple | None) else (known[key],)
+        if kinds is not None and (not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds)):
+            names = " or ".join(kind.__name__ for kind in kinds)
             raise CaseError(f"the value of '{label}' must be of type {names}, not {repr(value)}")
 
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
-from collections.abc import Callable
+import types
+import typing
+from collections import abc
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from reprlib import repr
 from typing import Any
 
-import numpy as np
-
-from fastcontact.cases.keys import AXES, FIELD, LISTS, NUMBER, ROTATION, SURFACE, at, called, check_keys, tables
+from fastcontact.cases.keys import AXES, FIELD, NUMBER, ROTATION, SURFACE, at, called, check_keys, tables
 from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.initial_states import COMPONENTS
@@ -18,6 +20,7 @@ from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import CONSTANTS, LinearElastic, Material, check_expansion
 from fastcontact.elasticity.varying_constants import Tabulated
 from fastcontact.errors import CaseError, unknown
+from fastcontact.mesh.argument_types import types_of
 from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.files.mesh_fields import read_field
 from fastcontact.mesh.files.mesh_files import read_mesh
@@ -34,20 +37,10 @@ VALUES = ("E", "nu", "G", "density", "expansion", "value", *COMPONENTS)
 def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
     """Add the material whose constants are given: isotropic, orthotropic where E, nu or G are lists, anisotropic with D."""
     kind = _material_law(constants)
-    if "axes" in constants:
-        constants["axes"] = _axes("material", constants["axes"])
     if kind is LinearElastic:
         if isinstance(constants.get("expansion"), list):  # no array over cells: case files have tables for that
             check_expansion(constants["expansion"], 1)
-        for key in constants:
-            if (
-                key not in ("volumetric", "incompatible_modes")
-                and not isinstance(constants[key], (list, tuple))
-                and key != "axes"
-                and not callable(constants[key])
-                and not isinstance(constants[key], np.ndarray)
-            ):
-                constants[key] = float(constants[key])
+        constants = {key: float(value) if type(value) is int else value for key, value in constants.items()}
     for key in constants:
         if key not in inspect.signature(kind).parameters:
             raise CaseError(f"the key 'material.{key}' is none of a material that is {_LAWS[kind]}")
@@ -69,26 +62,10 @@ def _add_temperature(model: Model, **given: Any) -> None:
         model.add_temperature_file(**given)
 
 
-def _add_support(model: Model, axes: Any = None, **given: Any) -> None:
-    model.prescribe(axes=_axes("support", axes), **given)
-
-
-def _add_initial_stress(model: Model, axes: Any = None, **given: Any) -> None:
-    model.add_initial_stress(axes=_axes("initial_stress", axes), **given)
-
-
-def _add_initial_strain(model: Model, axes: Any = None, **given: Any) -> None:
-    model.add_initial_strain(axes=_axes("initial_strain", axes), **given)
-
-
-def _axes(where: str, axes: Any) -> Any:
-    """Return axes given as vectors, or by the keys of a cylinder."""
-    return called(f"{where}.axes", CylindricalAxes, axes) if isinstance(axes, dict) else axes
-
-
-def _add_coupling(model: Model, reference: str, group: str, place: Any = None, **options: Any) -> None:
+@functools.wraps(Model.add_coupling)
+def _add_coupling(model: Model, place: Any = None, **given: Any) -> None:
     """Add a coupling; the mesh has its reference point already, whose `place` one of the couplings tells."""
-    model.add_coupling(reference, group, **options)
+    model.add_coupling(**given)
 
 
 def _material_law(entry: dict[str, Any]) -> type[Material]:
@@ -115,15 +92,15 @@ _NEEDED: dict[type[Material], tuple[str, ...]] = {
 # By kind of table, in the order in which they are added to the model.
 _ADD: dict[str, Callable[..., None]] = {
     "material": _add_material,
-    "support": _add_support,
+    "support": Model.prescribe,
     "pressure": Model.add_pressure,
     "traction": Model.add_traction,
     "body_force": Model.add_body_force,
     "gravity": Model.add_gravity,
     "centrifugal": Model.add_centrifugal,
     "temperature": _add_temperature,
-    "initial_stress": _add_initial_stress,
-    "initial_strain": _add_initial_strain,
+    "initial_stress": Model.add_initial_stress,
+    "initial_strain": Model.add_initial_strain,
     "force": Model.add_force,
     "moment": Model.add_moment,
     "hydrostatic_pressure": Model.add_hydrostatic_pressure,
@@ -135,6 +112,58 @@ _ADD: dict[str, Callable[..., None]] = {
     "cyclic_symmetry": Model.add_cyclic_symmetry,
     "spring": Model.add_spring,
     "pretension": Model.add_pretension,
+}
+
+
+def _keys(*adding: Callable[..., None], **further: Any) -> tuple[dict[str, Any], list[str]]:
+    """Return the types of values by the keys of a table, and the keys that it needs: the arguments of what adds it."""
+    known: dict[str, Any] = {}
+    needed = []
+    for add in adding:
+        annotated = types_of(inspect.unwrap(add))
+        for key, parameter in [*inspect.signature(add).parameters.items()][1:]:  # but for the model
+            kinds = _toml_types(annotated[key])
+            if parameter.kind is parameter.VAR_KEYWORD:
+                known |= AXES
+            else:
+                known[key] = kinds if key in (*VALUES, "axes") else tuple(kind for kind in kinds if kind is not dict)
+                needed += [key] * (parameter.default is parameter.empty)
+    return {**known, **further}, needed
+
+
+# Numbers, functions of the position and series as they stand in a case file.
+_TOML: dict[Any, tuple[type, ...]] = {
+    float: NUMBER,
+    abc.Callable: (dict,),
+    **dict.fromkeys((abc.Sequence, abc.Iterable), (list,)),
+}
+
+
+def _toml_types(annotation: Any) -> tuple[type, ...]:
+    """Return the types of values in a case file that an annotated argument takes; a table stands for a function."""
+    kind, members = typing.get_origin(annotation) or annotation, typing.get_args(annotation)
+    if kind in (typing.Union, types.UnionType):
+        return tuple(dict.fromkeys(found for member in members for found in _toml_types(member)))
+    if kind in (bool, int, str):
+        return (kind,)
+    return _TOML.get(kind, ())
+
+
+# By kind of table: the types of the values of its keys, and the keys that are needed.
+LISTS: dict[str, tuple[dict[str, Any], Sequence[str]]] = {
+    **{kind: _keys(add) for kind, add in _ADD.items() if kind not in ("material", "temperature", "coupling")},
+    "coupling": _keys(_add_coupling, place=list),
+    "material": (
+        {
+            **dict.fromkeys(("E", "nu", "expansion"), (*NUMBER, list, dict)),
+            **dict.fromkeys(("G", "D"), list),
+            **{"groups": (list, str), "axes": (list, dict), "density": (*NUMBER, dict)},
+            **{"volumetric": str, "incompatible_modes": bool},
+        },
+        (),
+    ),
+    # By its value or by a file: neither has what the other needs.
+    "temperature": (_keys(Model.add_temperature, Model.add_temperature_file)[0], ()),
 }
 
 
@@ -275,6 +304,8 @@ def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
 def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
     """Return an entry as arguments of a method of the model, its lists of numbers and terms checked."""
     arguments = dict(entry)
+    if isinstance(entry.get("axes"), dict):
+        arguments["axes"] = called(f"{where}.axes", CylindricalAxes, entry["axes"])
     if "ramp" in entry:
         arguments["ramp"] = points(entry["ramp"], f"{where}.ramp")
     for term in entry.get("terms", []):

@@ -16,7 +16,7 @@ from fastcontact.results.units import labelled
 from fastcontact.studies.error_estimate import ErrorEstimate
 from fastcontact.studies.quantities import column, title, unit
 from fastcontact.studies.render import page
-from fastcontact.studies.render.figure import Curve, Line, Panel, figure
+from fastcontact.studies.render.figure import frame, panels
 from fastcontact.studies.render.table import Rows, aligned, finite, number, structured
 from fastcontact.studies.report import Report
 
@@ -130,7 +130,10 @@ class AdaptiveStudy(Report):
         heading = f"{self.title}: {self.combination}, refined for the {title(self.quantity)}"
         width, height = np.ptp(self.case.mesh.points, axis=0)
         beside = float(np.clip(4.2 * width / height, 2.0, 8.0)) + 1.3  # [inch], the scale of colours included
-        return figure([[self._error_panel(), self._mesh_panel()]], (6.2 + beside, 5.2), heading, widths=(6.2, beside))
+        errors, mesh = panels(1, 2, (6.2 + beside, 5.2), heading, widths=(6.2, beside))[0]
+        self._draw_errors(errors)
+        self._draw_mesh(mesh)
+        return mesh.figure
 
     def html(self) -> str:
         """Return the study as one self-contained HTML page."""
@@ -170,22 +173,18 @@ class AdaptiveStudy(Report):
         true = last.true_error(q)
         return text + (f"; true error {true:.1e}, effectivity {self.effectivity():.2g}" if math.isfinite(true) else "")
 
-    def _error_panel(self) -> Panel:
+    def _draw_errors(self, ax: Any) -> None:
         n_dofs, errors = [found.n_dofs for found in self.rounds], self._errors()
-        curves = [
-            Curve(n_dofs, errors["estimate"], "o-", "estimated error"),
-            Curve(n_dofs, errors["true_error"], "s-", "true error"),
-            Curve(n_dofs, errors["energy_error"], "^-", "estimated error in the energy norm"),
-        ]
-        curves = [curve for curve in curves if np.isfinite(curve.y).any()]
-        heading, asked = f"Error of the {title(self.quantity)}", Line(self.tolerance, style="--", label="asked for")
-        label = "relative error [-]"
-        return Panel(heading, "degrees of freedom", label, curves, [asked], x_scale="plain log", y_scale="log")
-
-    def _mesh_panel(self) -> Panel:
-        heading = f"Last mesh: {self.rounds[-1].n_cells} cells, estimated error"
-        x, y = (labelled(axis, self.units, "length") for axis in "xy")
-        return Panel(heading, x, y, grid=0.0, draw=self._draw_mesh)
+        for name, style, label in (
+            ("estimate", "o-", "estimated error"),
+            ("true_error", "s-", "true error"),
+            ("energy_error", "^-", "estimated error in the energy norm"),
+        ):
+            if np.isfinite(errors[name]).any():
+                ax.plot(n_dofs, errors[name], style, ms=4, lw=1.0, label=label)
+        ax.axhline(self.tolerance, color="black", ls="--", lw=1.0, label="asked for")
+        labels = ("degrees of freedom", "relative error [-]")
+        frame(ax, f"Error of the {title(self.quantity)}", labels, scales=("plain log", "log"))
 
     def _draw_mesh(self, ax: Any) -> None:
         from matplotlib.collections import PolyCollection
@@ -200,3 +199,5 @@ class AdaptiveStudy(Report):
         ax.set_aspect("equal")
         bar = ax.figure.colorbar(drawn, ax=ax)
         bar.set_label("energy norm" + (f" [({work})$^{{1/2}}$]" if (work := self.units.get("moment")) else ""))
+        labels = labelled("x", self.units, "length"), labelled("y", self.units, "length")
+        frame(ax, f"Last mesh: {self.rounds[-1].n_cells} cells, estimated error", labels, grid=0.0)

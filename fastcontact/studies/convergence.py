@@ -206,24 +206,12 @@ def _series(
     names = tuple(dict.fromkeys(name for name in (*LABELS, *checked, *wanted) if name in known))
     limits = {name: limit for name in names if (limit := _limit(levels, name)) is not None}
     failed = {number: str(result["error"]) for number, result in results if "error" in result}
-    last = solved[-1][1]
     at_force, spread = _at_force(*theory[:2], limits.get("force"))
-    exact = isinstance(theory[0], EXACT_THEORIES)
+    last = {key: solved[-1][1][key] for key in ("theory", "reference")}
     return Series(
-        member,
-        levels,
-        failed,
-        last["theory"],
-        last["reference"],
-        at_force,
-        spread,
-        names,
-        limits,
-        exact,
-        theory[2],
-        theory[1],
-        asked,
-    )
+        member, levels, failed, **last, equal_force=at_force, equal_force_spread=spread, quantities=names, limits=limits,
+        exact_theory=isinstance(theory[0], EXACT_THEORIES), share=theory[1], compared=theory[2], asked=asked,
+    )  # fmt: skip
 
 
 def _at_force(theory: Any, share: float, force: Limit | None) -> tuple[dict[str, float], dict[str, float]]:

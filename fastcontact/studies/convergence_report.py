@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
+from itertools import zip_longest
 from typing import Any
 
 from numpy.typing import NDArray
 
 from fastcontact.studies import convergence_tables as tables
-from fastcontact.studies.convergence_figures import error_panel, pressure_panel, theory_panel
+from fastcontact.studies.convergence_figures import draw_differences, draw_errors, draw_pressure
 from fastcontact.studies.fit import CONFIDENCE
 from fastcontact.studies.render import page
-from fastcontact.studies.render.figure import Panel, figure
+from fastcontact.studies.render.figure import message, panels
 from fastcontact.studies.render.table import Rows, aligned, structured
 from fastcontact.studies.report import Report
 from fastcontact.studies.sentences import MAIN, sentences
@@ -102,16 +104,17 @@ class Study(Report):
 
     def figure(self) -> Any:
         """Return a matplotlib figure: errors, pressure over the radius, differences from theory."""
-        panels = [error_panel(self.series, name, self.units) for name in self._drawn()]
         of_case = not isinstance(self.best.combination, Named)
+        drawn = [partial(self._draw_errors, quantity=name) for name in self._drawn()]
         if of_case or self.best.finest.profile:
-            panels.append(pressure_panel(self.best, self.theory, self.units))
+            drawn.append(partial(draw_pressure, series=self.best, theory=self.theory, units=self.units))
         if of_case:
-            panels.append(theory_panel(self.series, self.best, "pressure_max", self.units))
-        if len(panels) > 1 and len(panels) % 2:
-            panels.append(Panel(instead=" "))
-        rows = [panels[first : first + 2] for first in range(0, len(panels), 2)]
-        return figure(rows, (6.0 * len(rows[0]), 4.6 * len(rows)), self.title)
+            drawn.append(partial(self._draw_differences, quantity="pressure_max"))
+        rows, columns = (len(drawn) + 1) // 2, min(2, len(drawn))
+        axes = panels(rows, columns, (6.0 * columns, 4.6 * rows), self.title)
+        for ax, draw in zip_longest(axes.flat, drawn, fillvalue=partial(message, text="")):
+            draw(ax)
+        return axes[0, 0].figure
 
     def _drawn(self) -> list[str]:
         """Return the quantities whose errors are drawn."""
@@ -126,7 +129,8 @@ class Study(Report):
             for name in (name for name in MAIN if name in self.best.quantities):
                 rows = tables.page_comparison_rows(self.series, name)
                 parts.append(page.table(rows, tables.caption(name, self.units)))
-        parts += [page.section("Pictures"), *self._pictures()]
+        if pictures := self._pictures():
+            parts += [page.section("Pictures"), *pictures]
         for series in self.series:
             parts += self._series_parts(series)
         parts += [page.failure(f"{name} failed: {text}") for name, text in self.failed.items()]
@@ -136,21 +140,27 @@ class Study(Report):
     def _pictures(self) -> list[str]:
         limits = [name for name in self._drawn() if any(name in series.limits for series in self.series)]
         theories = [name for name in COMPARED if any(series.split(name) for series in self.series)]
-        errors = [error_panel(self.series, name, self.units) for name in limits] or [Panel(grid=0.0)]
-        differences = [theory_panel(self.series, self.best, name, self.units) for name in theories]
-        described = {
-            "mesh errors over the mesh size, doubly logarithmic": errors,
-            "difference from theory over the mesh size: model and mesh error": differences,
-        }
-        found = [
-            page.image(figure([panels], (5.6 * len(panels), 4.8), self.title), description)
-            for description, panels in described.items()
-            if panels
-        ]
+        found = []
+        for names, draw, about in (
+            (limits, self._draw_errors, "mesh errors over the mesh size, doubly logarithmic"),
+            (theories, self._draw_differences, "difference from theory over the mesh size: model and mesh error"),
+        ):
+            if names:
+                axes = panels(1, len(names), (5.6 * len(names), 4.8), self.title)[0]
+                for ax, name in zip(axes, names, strict=True):
+                    draw(ax, name)
+                found.append(page.image(axes[0].figure, about))
         if self.best.finest.profile:
-            drawn = figure([[pressure_panel(self.best, self.theory, self.units)]], (7.4, 5.0))
-            found.append(page.image(drawn, "contact pressure of all levels over theory"))
+            ax = panels(1, 1, (7.4, 5.0))[0, 0]
+            draw_pressure(ax, self.best, self.theory, self.units)
+            found.append(page.image(ax.figure, "contact pressure of all levels over theory"))
         return found
+
+    def _draw_errors(self, ax: Any, quantity: str) -> None:
+        draw_errors(ax, self.series, quantity, self.units)
+
+    def _draw_differences(self, ax: Any, quantity: str) -> None:
+        draw_differences(ax, self.series, self.best, quantity, self.units)
 
     def _series_parts(self, series: Series) -> list[str]:
         parts = [page.section(str(series.combination))]

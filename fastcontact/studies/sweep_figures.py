@@ -1,4 +1,4 @@
-"""Panels of a parameter sweep: quantities over the first parameter with theory as a curve, and ratios to theory."""
+"""Pictures of a parameter sweep: quantities over the first parameter with theory as a curve, and ratios to theory."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fastcontact.studies.quantities import column, title
-from fastcontact.studies.render.figure import Curve, Line, Panel, marker
+from fastcontact.studies.render.figure import frame, marker, message
 
 if TYPE_CHECKING:
     from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
@@ -56,7 +56,7 @@ def parameter_label(parameter: str, units: Mapping[str, str]) -> str:
     return f"{words} [{unit}]" if unit else words
 
 
-class Panels:
+class Drawing:
     """What is drawn of a sweep over its first parameter; points that differ in the others are curves of their own.
 
     Parameters
@@ -81,26 +81,29 @@ class Panels:
         wide = len(numbers) == len(values) and min(numbers) > 0 and max(numbers) >= WIDE * min(numbers)
         self.scale = "plain log" if wide else "linear"
 
-    def values(self, quantity: str) -> Panel:
-        """Return values over the parameter, and the theory as a curve; both axes are of one kind."""
-        curves = []
+    def draw_values(self, ax: Any, quantity: str) -> None:
+        """Draw values over the parameter, and the theory as a curve; both axes are of one kind."""
         for k, (label, x, points) in enumerate(self._curves()):
             y = [point.values.get(quantity, math.nan) for point in points]
-            curves.append(Curve(x, y, marker(k), label or "computed", color=f"C{k}", size=5))
-            curves += self._theory(quantity, label, x, points, k)
+            ax.plot(x, y, marker(k), ms=5, label=label or "computed", color=f"C{k}")
+            self._draw_theory(ax, quantity, label, x, points, k)
         positive = all(point.values.get(quantity, 1.0) > 0 for point in self.points)
         scale = self.scale if positive else "linear"
-        return self._panel(title(quantity), column(title(quantity), quantity, self.units), curves, y_scale=scale)
+        self._frame(ax, title(quantity), column(title(quantity), quantity, self.units), scale)
 
-    def _theory(self, quantity: str, label: str, x: Sequence[Any], points: Sequence[Point], k: int) -> list[Curve]:
-        """Return the theory of one choice of the other parameters; between the points where it is known there, too."""
+    def _draw_theory(
+        self, ax: Any, quantity: str, label: str, x: Sequence[Any], points: Sequence[Point], k: int
+    ) -> None:
+        """Draw the theory of one choice of the other parameters; between the points where it is known there, too."""
         name = (self.theory + self._unmoved(quantity)) if k == 0 else None
         color = "black" if not self.others else f"C{k}"
         for curve in self.theories:
             if curve.label == label and quantity in curve.values:
-                return [Curve(curve.x, curve.values[quantity], "--", name, color=color, width=1.1)]
+                ax.plot(curve.x, curve.values[quantity], "--", lw=1.1, label=name, color=color)
+                return
         exact = [point.theory.get(quantity, math.nan) for point in points]
-        return [Curve(x, exact, "_", name, color=color, size=9)] if np.isfinite(exact).any() else []
+        if np.isfinite(exact).any():
+            ax.plot(x, exact, "_", ms=9, label=name, color=color)
 
     def _unmoved(self, quantity: str) -> str:
         """Return what is to be said of a theory that is the same at all values of the first parameter; else nothing."""
@@ -112,25 +115,26 @@ class Panels:
                 return ""
         return f"\n(the same for every {self.first})" if several else ""
 
-    def ratios(self, quantity: str) -> Panel:
-        """Return the ratios to theory at equal approach and at equal force over the parameter."""
+    def draw_ratios(self, ax: Any, quantity: str) -> None:
+        """Draw the ratios to theory at equal approach and at equal force over the parameter."""
         styles = {"theory": ("-", self.theory), "equal_force": ("--", "theory at equal force")}
-        curves: list[Curve] = []
+        drawn = 0
         for k, (label, x, points) in enumerate(self._curves()):
             for other, (style, name) in styles.items():
                 ratios = [point.ratio(quantity, other) for point in points]
                 if np.isfinite(ratios).any() and (other, quantity) != ("equal_force", "force"):
                     name = f"to {name}" + (f"\n{label}" if label else "")
-                    color = f"C{k if self.others else len(curves)}"
-                    curves.append(Curve(x, ratios, f"{marker(k)}{style}", name, color=color))
-        if not curves:
-            return Panel(instead=f"no theory of the {title(quantity)}")
-        heading = f"{title(quantity)}: ratio to theory{self._unmoved(quantity)}"
-        return self._panel(heading, "computed / theory [-]", curves, lines=[Line(1.0, width=0.8)])
+                    color = f"C{k if self.others else drawn}"
+                    ax.plot(x, ratios, f"{marker(k)}{style}", ms=4, lw=1.0, label=name, color=color)
+                    drawn += 1
+        if not drawn:
+            return message(ax, f"no theory of the {title(quantity)}")
+        ax.axhline(1.0, color="black", lw=0.8)
+        self._frame(ax, f"{title(quantity)}: ratio to theory{self._unmoved(quantity)}", "computed / theory [-]")
 
-    def _panel(self, heading: str, y_label: str, curves: list[Curve], **more: Any) -> Panel:
-        label = parameter_label(self.first, self.units)
-        return Panel(heading, label, y_label, curves, x_scale=self.scale, title_size=10, **more)
+    def _frame(self, ax: Any, heading: str, y_label: str, y_scale: str = "linear") -> None:
+        labels = parameter_label(self.first, self.units), y_label
+        frame(ax, heading, labels, scales=(self.scale, y_scale), title_size=10)
 
     def _curves(self) -> list[tuple[str, Sequence[Any], list[Point]]]:
         """Return label, values of the first parameter and points, for each choice of the other parameters."""

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from fastcontact.studies.quantities import column, title
 from fastcontact.studies.render import page
-from fastcontact.studies.render.figure import figure
+from fastcontact.studies.render.figure import panels
 from fastcontact.studies.render.table import Rows, aligned, finite, number, percent, structured
 from fastcontact.studies.report import Report
-from fastcontact.studies.sweep_figures import Panels
+from fastcontact.studies.sweep_figures import Drawing
 from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
 
 # Quantities in tables and figures.
@@ -99,11 +99,15 @@ class Sweep(Report):
 
         Points that differ in other parameters are curves of their own.
         """
-        names, drawn = self._main(), Panels(self.parameters, self.points, self.theories, self.units, self.compared)
+        names, drawing = self._main(), Drawing(self.parameters, self.points, self.theories, self.units, self.compared)
         known = any(name in point.theory for point in self.points for name in names)
-        rows = [[drawn.values(name), *([drawn.ratios(name)] if known else [])] for name in names]
-        size = (8.8 if known else 5.2, 0.5 + 3.1 * max(1, len(names)))
-        return figure(rows, size, f"{self.title}\n{self.combination}", fontsize=11)
+        size = (8.8 if known else 5.2, 0.5 + 3.1 * len(names))
+        axes = panels(len(names), 1 + known, size, f"{self.title}\n{self.combination}", fontsize=11)
+        for row, name in zip(axes, names, strict=True):
+            drawing.draw_values(row[0], name)
+            if known:
+                drawing.draw_ratios(row[1], name)
+        return axes[0, 0].figure
 
     def html(self) -> str:
         """Return the sweep as one self-contained HTML page."""

@@ -92,7 +92,7 @@ def no_matplotlib_for_outputs(patch):
 
 def no_matplotlib_for_studies(patch):
     patch.setitem(sys.modules, "matplotlib.backends.backend_agg", None)
-    figure.figure([[figure.Panel()]], (4.0, 3.0))
+    figure.panels(1, 1, (4.0, 3.0))
 
 
 def no_scheduler(patch):

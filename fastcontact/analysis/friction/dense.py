@@ -35,7 +35,7 @@ EDGES, LARGEST = (8, 16, 32), 2500
 # supports hold on one side, forces along the surface would be any. So do problems with a pivot below DEPENDENT. Forces that
 # make slips yield by more than JAMMED of the gaps balance nothing: bodies jam.
 JAMMED = 1e-6
-YIELDING, DEPENDENT = 1e-11, 1e-8
+YIELDING, DEPENDENT = (1e-11, 1e-9), 1e-8
 # Edges repeat each other, which pivots do not bear: their problem is shifted by this fraction.
 SHIFT = 1e-6
 
@@ -63,36 +63,35 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
     unit = 1.0 / np.sqrt(np.maximum(own, np.finfo(float).eps * own.max()))
     length = float(np.abs(free * unit).max()) or 1.0
     everywhere = np.tile(unit, parts)
-    problem = _Problem(_determined(everywhere[:, None] * F * everywhere, m), free * unit / length, mu)
-    best, iterations = None, 0
+    F, best, iterations, yielded = everywhere[:, None] * F * everywhere, None, 0, 0.0
     if guess is not None:
         guess = guess / (length * unit)
-    for start, line_search in _starts(problem, closed, guess):
-        found = newton(problem, start, problem.gaps(start), line_search=line_search)
-        iterations += 1 + found.iterations
-        if best is None or found.residual < best.residual:
-            best = found
-        if found.settled:
+    for yielding in YIELDING if _dependent(F) else (0.0,):
+        slips = np.arange(m, len(F))
+        F[slips, slips] += yielding
+        problem = _Problem(F, free * unit / length, mu)
+        for start, line_search in _starts(problem, closed, guess):
+            found = newton(problem, start, problem.gaps(start), line_search=line_search)
+            iterations += 1 + found.iterations
+            if best is None or found.residual < best.residual:
+                best, yielded = found, yielding * float(np.abs(found.y[1:]).max(initial=0.0))
+            if found.settled:
+                break
+        if best is not None and best.settled and yielded <= JAMMED:
             break
     assert best is not None
-    yielded = YIELDING * float(np.abs(best.y[1:]).max(initial=0.0))
     settled = (best.settled or best.residual <= ACCEPTABLE) and yielded <= JAMMED
     residual = best.residual if yielded <= JAMMED else max(best.residual, yielded)
     gaps = best.gaps * length / unit
     return Forces(best.y * length * unit, gaps, best.closed, best.sticking, settled, residual, iterations)
 
 
-def _determined(F: Array, m: int) -> Array:
-    """Return a scaled compliance F whose slips, those behind the m gaps, yield a little if some of them are dependent."""
+def _dependent(F: Array) -> bool:
+    """Return whether rows of a scaled compliance F depend on each other but for round-off."""
     try:
-        lower = np.linalg.cholesky(F + 1e-2 * DEPENDENT * np.eye(len(F)))
-        if np.diag(lower).min() ** 2 >= DEPENDENT:
-            return F
+        return bool(np.diag(np.linalg.cholesky(F)).min() ** 2 < DEPENDENT)
     except np.linalg.LinAlgError:
-        pass
-    slips = np.arange(m, len(F))
-    F[slips, slips] += YIELDING
-    return F
+        return True
 
 
 class _Problem:

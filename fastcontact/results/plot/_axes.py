@@ -77,18 +77,21 @@ def drawable(ax: Any) -> Any:
 
 def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None = None) -> Any:
     """Return `ax`, or new axes in a figure of their own, ``projection="3d"`` for solids."""
-    if ax is not None:
-        return drawable(ax)
+    return new_panels(1, 1, size, subplot_kw={"projection": projection})[0, 0] if ax is None else drawable(ax)
+
+
+def new_panels(rows: int, columns: int, size: tuple[float, float], dpi: int = 150, **options: Any) -> Any:
+    """Return the axes (rows, columns) of a new figure of a `size` [inches]; `options` are those of ``Figure.subplots``."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     except ImportError as error:
         raise FastcontactError("pictures need matplotlib: pip install 'fastcontact[plot]'") from error
-    figure = Figure(figsize=size, layout="constrained", dpi=150)
+    figure = Figure(figsize=size, layout="constrained", dpi=dpi)
     FigureCanvasAgg(figure)
-    axes = figure.add_subplot(projection=projection)
+    panels = figure.subplots(rows, columns, squeeze=False, **options)
     displayed(figure)
-    return axes
+    return panels
 
 
 def size_around(place: Array) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from fastcontact.errors import FastcontactError, unknown
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, new_axes
+from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, new_panels
 from fastcontact.results.plot.hiding import across
 from fastcontact.results.plot.patches import fill
 from fastcontact.results.step import ContactResult
@@ -108,10 +108,7 @@ def _panels(axes: Sequence[Any] | None, both: bool) -> list[Any]:
         if len(given) < 1 + both:
             raise FastcontactError(f"this contact has shear: it takes two axes, and {len(given)} are given")
         return given[: 1 + both]
-    first = new_axes(None, (9.6 if both else 5.6, 4.6))
-    figure = first.figure
-    first.remove()
-    return list(figure.subplots(1, 1 + both, squeeze=False)[0])
+    return list(new_panels(1, 1 + both, (9.6 if both else 5.6, 4.6))[0])
 
 
 def _facets(mesh: Mesh, contact: ContactResult) -> dict[str, Indices]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fastcontact.analytic.pressure_curve import NAMES
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
-from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, contacts_of, new_axes
+from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, contacts_of, new_axes, new_panels
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled, units_of_results
 
@@ -55,10 +55,7 @@ def history(
     axes : two matplotlib Axes, optional
     """
     if axes is None:
-        first = new_axes(None, (6.0, 5.8))
-        figure = first.figure
-        first.remove()
-        axes = Panels(figure.subplots(2, 1, sharex=True))
+        axes = Panels(new_panels(2, 1, (6.0, 5.8), sharex=True)[:, 0])
     upper, lower = axes
     contacts = contacts_of(steps, pair)
     x = np.array([step.load_factor for step in steps]) * (approach or 1.0)

@@ -1,62 +1,13 @@
-"""Figures: panels of curves and horizontal lines, drawn with matplotlib."""
+"""Figures of studies: axes side by side, and what all of them have, scales, labels, grid and legend."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
-from fastcontact.errors import FastcontactError
-from fastcontact.results.plot._axes import displayed
+from fastcontact.results.plot._axes import new_panels
 
 MARKERS = "osD^v<>ph*"
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """Points of a panel, joined: `x` and `y` (n_points,), in the units of its axes."""
-
-    x: Any
-    y: Any
-    style: str = "-"  # marker and line, as matplotlib writes them
-    label: str | None = None  # in the legend; None leaves it out
-    color: Any = None  # None: the next one of matplotlib's cycle
-    width: float = 1.0  # of the line [point]
-    size: float = 4  # of the markers [point]
-    bars: tuple[Any, Any] | None = None  # lower and upper ends of error bars, each (n_points,), in the unit of y
-
-
-@dataclass(frozen=True)
-class Line:
-    """A horizontal line at `value`, with a band of `half_width` on both sides; both in the unit of the y axis."""
-
-    value: float
-    color: str = "black"
-    style: str = "-"
-    width: float = 1.0
-    label: str | None = None
-    half_width: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Panel:
-    """One pair of axes and what is drawn on it."""
-
-    title: str = ""
-    x_label: str = ""
-    y_label: str = ""
-    curves: Sequence[Curve] = ()
-    lines: Sequence[Line] = ()
-    x_scale: str = "linear"  # or "log", or "plain log": few plain numbers instead of powers of ten
-    y_scale: str = "linear"  # or "log", or "plain log"
-    x_end: float | None = None  # end of the x axis, in its unit; the y axis starts from zero then
-    x_start: float = 0.0  # where the x axis then begins
-    grid: float = 0.4  # opacity at major ticks; 0: no grid
-    minor_grid: float = 0.0  # opacity at minor ticks
-    title_size: float | None = None  # [point]
-    legend_size: float = 8  # [point]
-    draw: Callable[[Any], None] | None = None  # draws on the axes what is more than curves and lines
-    instead: str = ""  # shown in place of everything else, where there is nothing to draw
 
 
 def marker(number: int) -> str:
@@ -64,81 +15,70 @@ def marker(number: int) -> str:
     return MARKERS[number % len(MARKERS)]
 
 
-def figure(
-    panels: Sequence[Sequence[Panel]],
+def panels(
+    rows: int,
+    columns: int,
     size: tuple[float, float],
     title: str = "",
     widths: Sequence[float] | None = None,
     **style: Any,
 ) -> Any:
-    """Return a figure of rows of panels, of a `size` [inch], for which matplotlib is needed; `style` is of its title.
+    """Return the axes (rows, columns) of a new figure of a `size` [inch]; `style` is of its title.
 
     `widths` are those of the columns, in any unit; all are alike by default.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise FastcontactError("pictures need matplotlib: pip install 'fastcontact[plot]'") from error
-    made = Figure(figsize=size, layout="constrained", dpi=130)
-    FigureCanvasAgg(made)
-    axes = made.subplots(len(panels), max(map(len, panels)), squeeze=False, width_ratios=widths)
-    for ax, panel in zip(axes.flat, (panel for row in panels for panel in row), strict=True):
-        _draw(panel, ax)
+    made = new_panels(rows, columns, size, 130, width_ratios=widths)
     if title:
-        made.suptitle(title, **style)
-    displayed(made)
+        made[0, 0].figure.suptitle(title, **style)
     return made
 
 
-def _draw(panel: Panel, ax: Any) -> None:
-    if panel.instead:
-        ax.set_axis_off()
-        ax.text(0.5, 0.5, panel.instead, ha="center", va="center", transform=ax.transAxes, wrap=True)
-        return
-    for curve in panel.curves:
-        color = {} if curve.color is None else {"color": curve.color}
-        (drawn,) = ax.plot(curve.x, curve.y, curve.style, ms=curve.size, lw=curve.width, label=curve.label, **color)
-        if curve.bars is not None:
-            ax.vlines(curve.x, *curve.bars, colors=drawn.get_color(), lw=0.7)
-    for line in panel.lines:
-        ax.axhline(line.value, color=line.color, ls=line.style, lw=line.width, label=line.label)
-        if line.half_width:
-            ax.axhspan(line.value - line.half_width, line.value + line.half_width, color=line.color, alpha=0.15, lw=0)
-    _scale(panel, ax)
-    if panel.draw is not None:
-        panel.draw(ax)
-    ax.set_xlabel(panel.x_label)
-    ax.set_ylabel(panel.y_label)
-    ax.set_title(panel.title, fontsize=panel.title_size or "large")
-    if panel.y_scale == "linear":
+def message(ax: Any, text: str) -> None:
+    """Show a text in the place of axes on which there is nothing to draw."""
+    ax.set_axis_off()
+    ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes, wrap=True)
+
+
+def frame(
+    ax: Any,
+    title: str,
+    labels: tuple[str, str],
+    *,
+    scales: tuple[str, str] = ("linear", "linear"),
+    grid: float = 0.4,
+    title_size: float | str = "large",
+    legend_size: float = 8,
+) -> None:
+    """Give axes that curves were drawn on their scales, title, labels, grid and, where curves have labels, a legend.
+
+    Parameters
+    ----------
+    ax : matplotlib Axes
+    title : str
+    labels, scales : (str, str)
+        Of the axes x and y; scales are ``"linear"``, ``"log"`` or ``"plain log"``, with few plain numbers instead of powers
+        of ten.
+    grid : float
+        Opacity at major ticks [-]; 0 for no grid.
+    title_size, legend_size : float or str
+        Sizes of fonts, as matplotlib takes them [point].
+    """
+    for axis, scale, setter in zip((ax.xaxis, ax.yaxis), scales, (ax.set_xscale, ax.set_yscale), strict=True):
+        if scale != "linear":
+            setter("log")
+        if scale == "plain log":
+            _plain(axis)
+    ax.set(xlabel=labels[0], ylabel=labels[1])
+    ax.set_title(title, fontsize=title_size)
+    if scales[1] == "linear":
         ax.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 7))
         low, high = ax.dataLim.intervaly
         if 0.0 <= high - low < 1e-6 * max(abs(low), abs(high)):  # round-off is no trend
             ax.set_ylim(sorted((0.9 * low, 1.1 * low)))
-    if panel.x_end is not None:
-        ax.set_xlim(panel.x_start, panel.x_end or None)
-        top = float(ax.dataLim.y1)
-        ax.set_ylim(0.0, 1.08 * top if 0.0 < top < float("inf") else None)
-    if panel.grid:
-        ax.grid(which="major", alpha=panel.grid)
-    if panel.minor_grid:
-        ax.grid(which="minor", alpha=panel.minor_grid)
-    entries = len(ax.get_legend_handles_labels()[0])
-    if entries and any(curve.bars is not None for curve in panel.curves):  # matplotlib does not see them in the way
-        low, high = ax.get_ylim()
-        ax.set_ylim(low, high * (high / low) ** (0.02 * panel.legend_size * entries / 2.2))
-    if entries:
-        ax.legend(fontsize=panel.legend_size)
-
-
-def _scale(panel: Panel, ax: Any) -> None:
-    for axis, scale, setter in ((ax.xaxis, panel.x_scale, ax.set_xscale), (ax.yaxis, panel.y_scale, ax.set_yscale)):
-        if scale == "plain log":
-            setter("log")
-            _plain(axis)
-        elif scale != "linear":
-            setter(scale)
+    if grid:
+        ax.grid(which="major", alpha=grid)
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(fontsize=legend_size)
 
 
 def _plain(axis: Any) -> None:

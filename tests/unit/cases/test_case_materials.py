@@ -88,7 +88,7 @@ def test_constants_that_vary_reach_the_model(tmp_path):
             r"material\[0\]: in cell 0 .* nu12 = 4.5 must be less",
         ),
         ("D = [[1, 2], [2, 1]]", r"material\[0\]: the moduli D must be a matrix of 6 x 6"),
-        (WOOD + "axes = {orgin = [0, 0, 0]}", r"'material.axes.orgin': did you mean 'material.axes.origin'"),
+        (WOOD + "axes = {orgin = [0, 0, 0]}", r"'material\[0\].axes.orgin': did you mean 'material\[0\].axes.origin'"),
         (WOOD + "axes = [[1, 0, 0], [1, 1, 0]]", r"material\[0\]: .* not at right angles"),
         ("E = 1.0\nnu = 0.3\nexpansion = [1, 2, 3]", r"material\[0\]: .*must be a number"),
     ],
