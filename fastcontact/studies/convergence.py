@@ -2,62 +2,71 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fastcontact.cases.case import Case, read_case
-from fastcontact.errors import CaseError, unknown
+from fastcontact.errors import CaseError, unknown, warn
 from fastcontact.mesh.argument_types import typed
+from fastcontact.studies import function_runs as functions
 from fastcontact.studies.affordable import check_levels, check_runs
 from fastcontact.studies.convergence_report import Study
 from fastcontact.studies.execute import Progress, Result, raise_first, run_all
 from fastcontact.studies.fit import Limit, fit_limit
+from fastcontact.studies.function_runs import Function, FunctionRun, Quantities
 from fastcontact.studies.job import Job, fields_of, job_of
 from fastcontact.studies.progress import told
 from fastcontact.studies.quantities import EXACT_THEORIES, LABELS, check_names, of_theory
 from fastcontact.studies.report import of_case
 from fastcontact.studies.series import Level, Series
-from fastcontact.studies.settings import Combination, Settings, combinations, settings
+from fastcontact.studies.settings import Combination, Named, Settings, combinations, settings
 
 
 @typed(CaseError)
 def convergence_study(
-    case: Case | str | Path,
-    levels: int = 5,
+    case: Case | str | Path | Function,
+    levels: int | Sequence[float] = 5,
     elements: Sequence[str] | None = None,
     formulations: Sequence[str] | None = None,
     *,
-    quantities: Sequence[str] = (),
+    quantities: Quantities = (),
     executor: Executor | None = None,
     workers: int | None = None,
     store: str | Path | None = None,
     on_progress: Callable[[Progress], None] | None = None,
     progress: bool = False,
 ) -> Study:
-    """Solve a case on finer and finer meshes; fit order and limit; separate model error from mesh error.
+    """Solve a case or a Python model on finer and finer meshes; fit order and limit; separate model error from mesh error.
 
-    Meshes come from the generator that the case names, its sizes halved on every level, or from uniform refinement of
-    its mesh file, arcs kept round; see the table ``[study]`` of case files.
+    Meshes of a case come from the generator that it names, its sizes halved on every level, or from uniform refinement of
+    its mesh file, arcs kept round; see the table ``[study]`` of case files. Of a function they are what it makes.
 
     Parameters
     ----------
-    case : Case or path-like
-    levels : int
-        Number of meshes; a limit needs three, a reliable one five.
+    case : Case, path-like or callable
+        A function of the mesh size returns a `Model`, which is solved in 20 equal steps, or what `solve` returns.
+    levels : int or sequence of float
+        Of a case the number of meshes; a limit needs three, a reliable one five. Of a function the mesh sizes, any length
+        that goes to zero as the mesh is refined [length].
     elements, formulations : sequence of str, optional
-        Compared in all combinations; ``["all"]`` for all; by default what ``[study]`` names, or the case's own.
-    quantities : sequence of str
-        Further ones to fit, such as ``"C1.stress.yy"``, ``"C1.displacement.y"``, ``"C1.pressure"``.
+        Of a case, compared in all combinations; ``["all"]`` for all; by default what ``[study]`` names, or the case's own.
+    quantities : sequence of str, or dict of str to callable
+        Further ones to fit, such as ``"C1.stress.yy"``, ``"C1.displacement.y"``, ``"C1.pressure"``; of a function, functions
+        of the last `StepResult` that return a number, by name, or names of standard quantities.
     executor : concurrent.futures.Executor, optional
         Where to run: by default processes of this machine, or e.g. ``Client.get_executor()`` of Dask or an
         ``MPIPoolExecutor`` of mpi4py. It is not shut down here.
     workers : int, optional
-        Number of these processes, by default one for each processor; 1 runs everything in this one. More than one start
-        by importing the script they are called from: there the call belongs under ``if __name__ == "__main__":``.
+        Number of these processes, by default one for each processor, of a function 1, which runs everything in this one.
+        More than one start by importing the script they are called from: there the call belongs under
+        ``if __name__ == "__main__":``.
     store : path-like, optional
-        Folder of finished runs: those found there are not run again; new ones are added.
+        Folder of finished runs of a case: those found there are not run again; new ones are added.
     on_progress : callable, optional
         Called with a `Progress` after every run.
     progress : bool
@@ -71,7 +80,33 @@ def convergence_study(
     ------
     CaseError, FastcontactError
         If the case, a name or a number is wrong, or no level of any combination could be solved.
+
+    Warns
+    -----
+    FastcontactWarning
+        If the meshes of a function do not get finer as its sizes get smaller.
+
+    Examples
+    --------
+    >>> def squeezed(size):
+    ...     n = round(1 / size)
+    ...     model = fc.Model(fc.generate.block(divisions=(n, n)), kinematics="plane_strain")
+    ...     model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    ...     model.fix("BOTTOM", "xy")
+    ...     model.prescribe("TOP", y=-0.01)
+    ...     return fc.solve(model, 1)
+    >>> bulge = {"bulge": lambda step: step.displacement[:, 0].max()}
+    >>> study = fc.convergence_study(squeezed, [0.5, 0.25, 0.125], quantities=bulge)  # doctest: +SKIP
+    >>> study.best.limits["bulge"].value, study.best.limits["bulge"].uncertainty  # doctest: +SKIP
     """
+    if callable(case):
+        functions.refuse({"elements": elements, "formulations": formulations})
+        options = {"executor": executor, "workers": workers, "store": store, "on_progress": on_progress}
+        return _of_function(case, levels, quantities, {**options, "progress": progress})
+    if not isinstance(levels, int | np.integer) or isinstance(quantities, Mapping):
+        raise CaseError(
+            "mesh sizes and functions as quantities are for Python models: give a case its number of levels"
+        )
     case = case if isinstance(case, Case) else read_case(case)
     if levels < 1:
         raise CaseError(f"levels = {levels} must be at least 1; a limit takes 3")
@@ -84,6 +119,44 @@ def convergence_study(
     with told(on_progress, progress) as told_to:
         results = run_all(jobs, executor=executor, workers=workers, store=store, on_progress=told_to)
     return gathered(case, jobs, results, [*chosen.quantities, *quantities])
+
+
+def _of_function(
+    function: Function, sizes: int | Sequence[float], wanted: Quantities, options: dict[str, Any]
+) -> Study:
+    """Return the study of a function that makes models; `options` are those of `run_functions`."""
+    if isinstance(sizes, int | np.integer):
+        raise CaseError(f"a study of a function needs its mesh sizes, such as [4.0, 2.0, 1.0], not {sizes} levels")
+    given = sorted(map(float, sizes), reverse=True)
+    if not given or len({*given}) < len(given) or not (given[-1] > 0 and given[0] < np.inf):
+        raise CaseError(f"the mesh sizes must be positive and all different, not {[*sizes]}")
+    name, measures, argument = (
+        functions.function_name(function),
+        functions.measures_of(wanted),
+        functions.first_parameter(function),
+    )
+    runs = [
+        FunctionRun(
+            label=f"{argument} = {size:g}", name=name, marks={"level": level}, size=level,
+            function=function, positional=(size,), named={}, measures=measures,
+        )
+        for level, size in enumerate(given)
+    ]  # fmt: skip
+    results = functions.run_functions(runs, "no size could be solved", **options)
+    solved = [(level, {**result, "h": given[level]}) for level, result in enumerate(results)]
+    series = _series(Named(None, None, name), solved, [*wanted], (), (None, 1.0, ""), asked=tuple(wanted))
+    _tell_coarser(series.levels)
+    return Study(**functions.of_function(function), series=[series], failed={}, theory=None)
+
+
+def _tell_coarser(levels: Sequence[Level]) -> None:
+    for coarse, fine in pairwise(levels):
+        if fine.n_dofs <= coarse.n_dofs:
+            warn(
+                f"the mesh of size {fine.h:g} has {fine.n_dofs} degrees of freedom, that of size {coarse.h:g} has "
+                f"{coarse.n_dofs}: sizes must be lengths that shrink as meshes get finer, or limits and orders mean nothing"
+            )
+            return
 
 
 def level_job(case: Case, chosen: Settings, member: Combination, level: int) -> Job:
@@ -118,6 +191,7 @@ def _series(
     wanted: Sequence[str],
     checked: Sequence[str],
     theory: tuple[Any, float, str],
+    asked: tuple[str, ...] = (),
 ) -> Series:
     """Return one element and formulation with its limits; `checked` are fitted where they are known.
 
@@ -136,7 +210,7 @@ def _series(
     last = {key: solved[-1][1][key] for key in ("theory", "reference")}
     return Series(
         member, levels, failed, **last, equal_force=at_force, equal_force_spread=spread, quantities=names, limits=limits,
-        exact_theory=isinstance(theory[0], EXACT_THEORIES), share=theory[1], compared=theory[2],
+        exact_theory=isinstance(theory[0], EXACT_THEORIES), share=theory[1], compared=theory[2], asked=asked,
     )  # fmt: skip
 
 

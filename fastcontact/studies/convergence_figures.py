@@ -14,6 +14,7 @@ from fastcontact.results.units import labelled
 from fastcontact.studies.quantities import title
 from fastcontact.studies.render.figure import frame, marker, message
 from fastcontact.studies.series import Series
+from fastcontact.studies.settings import Named
 
 Array = NDArray[np.float64]
 # With more curves than this, error bars would hide them.
@@ -25,6 +26,7 @@ def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Map
     known = [(k, series) for k, series in enumerate(all_series) if quantity in series.limits]
     if not known:
         return message(ax, f"no limit of the {title(quantity)}:\na limit takes three levels")
+    named = isinstance(all_series[0].combination, Named)
     few = len(known) <= MOST_CURVES_WITH_BARS
     for position, (k, series) in enumerate(known):
         limit, h = series.limits[quantity], np.array(series.h)
@@ -42,7 +44,10 @@ def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Map
             ax.plot(h, factor * h**limit.order, ":", lw=1.0, color=color)
     _slope_triangles(ax, quantity, [series for _, series in known])
     labels, size = (
-        (labelled("facet length at the contact h", units, "length"), "|value - limit| / limit"),
+        (
+            labelled("mesh size h" if named else "facet length at the contact h", units, "length"),
+            "|value - limit| / limit",
+        ),
         8 if few else 6.5,
     )
     frame(ax, f"Mesh error of the {title(quantity)}", labels, scales=("plain log", "log"), legend_size=size)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
+from itertools import zip_longest
 from typing import Any
 
 from numpy.typing import NDArray
@@ -11,11 +13,12 @@ from fastcontact.studies import convergence_tables as tables
 from fastcontact.studies.convergence_figures import draw_differences, draw_errors, draw_pressure
 from fastcontact.studies.fit import CONFIDENCE
 from fastcontact.studies.render import page
-from fastcontact.studies.render.figure import panels
+from fastcontact.studies.render.figure import message, panels
 from fastcontact.studies.render.table import Rows, aligned, structured
 from fastcontact.studies.report import Report
 from fastcontact.studies.sentences import MAIN, sentences
 from fastcontact.studies.series import Series
+from fastcontact.studies.settings import Named
 
 # In figures, and in the table of all combinations.
 COMPARED = ("force", "pressure_max")
@@ -94,19 +97,29 @@ class Study(Report):
             found += [f"  level {number} failed: {text}" for number, text in series.failed.items()]
         found += [f"  {name} failed: {text}" for name, text in self.failed.items()]
         if len(self.series) > 1:
-            names = [name for name in COMPARED if name in self.best.quantities]
+            names = self.best.shown(COMPARED)
             found += ["", f"all combinations: limits and model errors {self.best.compared}"]
             found += aligned(tables.comparison_rows(self.series, names, self.units))
         return [*found, "", *sentences(self.best)]
 
     def figure(self) -> Any:
         """Return a matplotlib figure: errors, pressure over the radius, differences from theory."""
-        upper, (pressure, difference) = panels(2, 2, (12.0, 9.2), self.title)
-        for ax, name in zip(upper, COMPARED, strict=True):
-            self._draw_errors(ax, name)
-        draw_pressure(pressure, self.best, self.theory, self.units)
-        self._draw_differences(difference, "pressure_max")
-        return pressure.figure
+        of_case = not isinstance(self.best.combination, Named)
+        drawn = [partial(self._draw_errors, quantity=name) for name in self._drawn()]
+        if of_case or self.best.finest.profile:
+            drawn.append(partial(draw_pressure, series=self.best, theory=self.theory, units=self.units))
+        if of_case:
+            drawn.append(partial(self._draw_differences, quantity="pressure_max"))
+        rows, columns = (len(drawn) + 1) // 2, min(2, len(drawn))
+        axes = panels(rows, columns, (6.0 * columns, 4.6 * rows), self.title)
+        for ax, draw in zip_longest(axes.flat, drawn, fillvalue=partial(message, text="")):
+            draw(ax)
+        return axes[0, 0].figure
+
+    def _drawn(self) -> list[str]:
+        """Return the quantities whose errors are drawn."""
+        known = self.best.shown(COMPARED) or list(self.best.quantities[:2])
+        return known if isinstance(self.best.combination, Named) else list(COMPARED)
 
     def html(self) -> str:
         """Return the study as one self-contained HTML page."""
@@ -125,7 +138,7 @@ class Study(Report):
         return page.page(f"Mesh convergence: {self.title}", parts, self.text)
 
     def _pictures(self) -> list[str]:
-        limits = [name for name in COMPARED if any(name in series.limits for series in self.series)]
+        limits = [name for name in self._drawn() if any(name in series.limits for series in self.series)]
         theories = [name for name in COMPARED if any(series.split(name) for series in self.series)]
         found = []
         for names, draw, about in (
@@ -151,7 +164,7 @@ class Study(Report):
 
     def _series_parts(self, series: Series) -> list[str]:
         parts = [page.section(str(series.combination))]
-        names = [name for name in tables.IN_TABLES if name in series.quantities]
+        names = series.shown(tables.IN_TABLES)
         for first in range(0, len(names), 2):
             parts.append(page.table(tables.level_rows(series, self.units, names[first : first + 2])))
         if series.limits:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -22,9 +23,9 @@ UNSETTLED = " (unsettled)"
 COMBINATION = ("combination", "levels", "finest DOF")
 
 
-def level_rows(series: Series, units: Mapping[str, str], quantities: Sequence[str] = IN_TABLES) -> Rows:
+def level_rows(series: Series, units: Mapping[str, str], quantities: Sequence[str] | None = None) -> Rows:
     """Return header and rows of h, DOF, and of each quantity value, error against the limit, order from level to level."""
-    names = [name for name in quantities if name in series.quantities]
+    names = series.shown(IN_TABLES) if quantities is None else quantities
     header = ["level", labelled("h", units, "length"), "DOF"]
     rows = [[str(level.number), number(level.h, 4), str(level.n_dofs)] for level in series.levels]
     for name in names:
@@ -42,8 +43,9 @@ def limit_rows(series: Series, units: Mapping[str, str], page: bool = False) -> 
     """
     columns = ON_PAGE if page else ON_TERMINAL
     label = caption if page else lambda name, units: column(title(name), name, units)
-    cells = ([label(name, units), *_cells(series, name, columns, page)] for name in series.limits)
-    return [["quantity", *columns], *cells]
+    cells = [[label(name, units), *_cells(series, name, columns, page)] for name in series.limits]
+    told = [any(row[place] != "-" for row in cells) for place in range(len(columns) + 1)]
+    return [list(itertools.compress(row, told)) for row in (["quantity", *columns], *cells)]
 
 
 def comparison_rows(all_series: Sequence[Series], quantities: Sequence[str], units: Mapping[str, str]) -> Rows:

@@ -23,7 +23,7 @@ from fastcontact import errors
 from fastcontact.errors import CaseError, FastcontactError, FileError
 from fastcontact.mesh.files.paths import replacing
 from fastcontact.results.committed_file import uninterrupted
-from fastcontact.studies.job import Job, run
+from fastcontact.studies.job import Run, run
 
 Result = dict[str, Any]
 # NumPy and Numba read these when they are imported, so they are set before a worker process starts.
@@ -60,7 +60,7 @@ class Progress:
 
 
 def run_all(
-    jobs: Sequence[Job],
+    jobs: Sequence[Run],
     *,
     executor: Executor | None = None,
     workers: int | None = None,
@@ -72,7 +72,7 @@ def run_all(
     Raises CaseError if the number of workers is wrong, FastcontactError if no worker process can start.
     """
     kept = None if store is None else Store(store)
-    results = {index: result for index, job in enumerate(jobs) if kept and (result := kept.get(job)) is not None}
+    results = {i: found for i, job in enumerate(jobs) if kept and (found := kept.get(job)) is not None}
     waiting = {index: job.label for index, job in enumerate(jobs)}
 
     def ended(index: int, stored: bool = False) -> None:
@@ -102,11 +102,11 @@ class Store:
         except OSError as error:
             raise FileError(f"the folder '{folder}' cannot be made: {error.strerror}; name another store") from error
 
-    def path(self, job: Job) -> Path:
+    def path(self, job: Run) -> Path:
         """Return where the result of a run is kept."""
         return self.folder / f"{job.key}.json"
 
-    def get(self, job: Job) -> Result | None:
+    def get(self, job: Run) -> Result | None:
         """Return the result of a run, or None if it is not there or was not written whole."""
         try:
             stored = json.loads(self.path(job).read_text(encoding="utf-8"))
@@ -115,14 +115,14 @@ class Store:
         result = stored.get("result") if isinstance(stored, dict) else None
         return result if isinstance(result, dict) and "values" in result else None
 
-    def put(self, job: Job, result: Result) -> None:
+    def put(self, job: Run, result: Result) -> None:
         """Keep the result of a run; the file appears whole or not at all."""
         text = json.dumps({"label": job.label, "case": job.name, "marks": job.marks, "result": result}, default=str)
         with replacing(self.path(job)) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def raise_first(what: str, jobs: Sequence[Job], results: Sequence[Result]) -> None:
+def raise_first(what: str, jobs: Sequence[Run], results: Sequence[Result]) -> None:
     """Raise the error of the first run if all runs failed; `what` begins the message."""
     if all("error" in result for result in results):
         kind = getattr(errors, str(results[0].get("kind")), CaseError)
@@ -130,7 +130,7 @@ def raise_first(what: str, jobs: Sequence[Job], results: Sequence[Result]) -> No
 
 
 def _run_rest(
-    jobs: Sequence[Job], rest: list[int], executor: Executor | None, workers: int | None
+    jobs: Sequence[Run], rest: list[int], executor: Executor | None, workers: int | None
 ) -> Iterator[tuple[int, Result]]:
     if workers is not None and workers < 1:
         raise CaseError(f"workers = {workers} must be at least 1, the number of processes")
@@ -144,7 +144,7 @@ def _run_rest(
         yield from on_processes(count, jobs, rest)
 
 
-def on_processes(count: int, jobs: Sequence[Job], rest: list[int]) -> Iterator[tuple[int, Result]]:
+def on_processes(count: int, jobs: Sequence[Run], rest: list[int]) -> Iterator[tuple[int, Result]]:
     """Run on `count` processes of this machine; a run that kills its worker is tried once more alone, then reported."""
     if _imports_its_script():
         # The script calls the study outside of "if __name__ == '__main__'": the process that waits for this one says so.
@@ -224,7 +224,7 @@ def _imports_its_script() -> bool:
     return script not in (None, sys.modules["__main__"])  # which it becomes once it is imported
 
 
-def _alone(job: Job) -> Result:
+def _alone(job: Run) -> Result:
     pool = started_pool(1)
     try:
         result = pool.submit(run, job, 1).result()
@@ -247,7 +247,7 @@ def _processors() -> int:
     return os.cpu_count() or 1
 
 
-def on_executor(executor: Executor, jobs: Sequence[Job], rest: list[int]) -> Iterator[tuple[int, Result]]:
+def on_executor(executor: Executor, jobs: Sequence[Run], rest: list[int]) -> Iterator[tuple[int, Result]]:
     """Run on any executor and yield number and result of each job as it ends; cancel the others if one raises."""
     futures: dict[Future[Result], int] = {}
     try:

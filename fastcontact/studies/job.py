@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import dataclasses
 import hashlib
@@ -10,6 +11,7 @@ import time
 import traceback
 import warnings
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -23,7 +25,7 @@ from fastcontact.analysis.run import solve_steps
 from fastcontact.cases.case import Case, build_case
 from fastcontact.cases.input_files import digest, files_named
 from fastcontact.contact.formulations import FORMULATIONS
-from fastcontact.errors import FastcontactError, FastcontactWarning
+from fastcontact.errors import CaseError, FastcontactError, FastcontactWarning
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.contact_pair import AGAINST_OBSTACLES
 from fastcontact.model.pair_options import SHARED_OPTIONS
@@ -41,18 +43,35 @@ KEYS = {
 SCHEMA = 3
 
 
-@dataclass(frozen=True, eq=False)
-class Job:
-    """All data of one run: a case to solve."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Run:
+    """One run of a study."""
 
-    label: str  # name of the run, for messages
-    name: str  # of the case
+    label: str  # for messages
+    name: str  # of the case, or of the function that makes the model
+    marks: dict[str, Any]  # distinguish this run from the others of its study, e.g. its level
+    size: float = 0.0  # amount of work, in any unit that the runs of a study share
+
+    def measured(self) -> dict[str, Any]:
+        """Return the result of `run`; raises where the mesh, the model or the solution fails."""
+        raise NotImplementedError
+
+    @property
+    def key(self) -> str:
+        """Name of the run in a store, a hash of all that its numbers depend on; CaseError where that is not known."""
+        raise CaseError(
+            "a store keeps runs of case files, whose text tells what they do: of a function leave 'store' out"
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Job(Run):
+    """All data of the run of a case."""
+
     data: dict[str, Any]  # the parsed case file with all values of this run
     pair: str | None  # contact pair to measure
     recipe: Recipe  # of the mesh
     base: Mesh | None  # the case's mesh, where it was read from a file
-    marks: dict[str, Any]  # distinguish this run from the others of its study, e.g. its level
-    size: float = 0.0  # amount of work, in any unit that the runs of a study share
     folder: Path = Path()  # in which files lie that the case names
 
     @cached_property  # of the files as they are when a study begins
@@ -66,6 +85,34 @@ class Job:
             found.update(_fingerprint(self.base))
         return found.hexdigest()[:32]
 
+    def measured(self) -> dict[str, Any]:
+        """See `Run`."""
+        started = time.perf_counter()
+        with recorded() as texts:
+            case = build_case(self.data, name=self.name, folder=self.folder, mesh=make_mesh(self.recipe, self.base))
+            last = last_step(case)
+        values = quantities.measure(case, last, self.pair)
+        return {
+            "h": quantities.mesh_size(case, self.pair),
+            "n_dofs": case.model.n_dofs,
+            "values": {name: value for name, value in values.items() if np.isfinite(value)},
+            **quantities.by_theory(case, self.pair, values.get("force", 0.0)),
+            "profile": profile(last, self.pair),
+            "iterations": {k: int(v) for k, v in last.iterations.items() if isinstance(v, int)},
+            "seconds": time.perf_counter() - started,
+            "warnings": texts,
+        }
+
+
+@contextlib.contextmanager
+def recorded() -> Iterator[list[str]]:
+    """Yield a list that holds, behind the block, the texts of the package's warnings in it."""
+    texts: list[str] = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", FastcontactWarning)
+        yield texts
+    texts += [str(entry.message) for entry in caught if issubclass(entry.category, FastcontactWarning)]
+
 
 def job_of(
     case: Case, chosen: Settings, member: Combination, level: int, *, label: str, marks: dict[str, Any], size: float
@@ -73,7 +120,10 @@ def job_of(
     """Return the run of a case with an element and a formulation on the mesh of a level."""
     data, mesh = case_data(chosen, member), recipe(chosen, member.element, level)
     base = case.mesh if chosen.generator is None else None
-    return Job(label, case.name, data, chosen.pair, mesh, base, marks, size, case.folder)
+    return Job(
+        label=label, name=case.name, marks=marks, size=size,
+        data=data, pair=chosen.pair, recipe=mesh, base=base, folder=case.folder,
+    )  # fmt: skip
 
 
 def _fingerprint(mesh: Mesh) -> bytes:
@@ -121,7 +171,7 @@ def ramp_of(ramp: dict[str, Any], steps: int) -> dict[str, Any]:
     return {**ramp, "instants": [last * (k + 1) / steps for k in range(steps)]}
 
 
-def run(job: Job, threads: int | None = None) -> dict[str, Any]:
+def run(job: Run, threads: int | None = None) -> dict[str, Any]:
     """Solve a case and measure its quantities; an error is not raised but returned under the key ``"error"``.
 
     `threads` is the number of threads of the parallel kernels in this process. The result holds ``h`` [length], ``n_dofs``,
@@ -131,33 +181,13 @@ def run(job: Job, threads: int | None = None) -> dict[str, Any]:
     try:
         if threads is not None:
             _jit.set_threads(threads)
-        return measured(job)
+        return job.measured()
     except FastcontactError as error:
         return {"error": str(error), "kind": type(error).__name__}
     except Exception as error:
         # One failed run must not end a study of many.
         where = traceback.extract_tb(error.__traceback__)[-1]
         return {"error": f"{error} ({where.name}, line {where.lineno})", "kind": type(error).__name__}
-
-
-def measured(job: Job) -> dict[str, Any]:
-    """Return the result of `run`; raises where the mesh, the model or the solution fails."""
-    started = time.perf_counter()
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", FastcontactWarning)
-        case = build_case(job.data, name=job.name, folder=job.folder, mesh=make_mesh(job.recipe, job.base))
-        last = last_step(case)
-    values = quantities.measure(case, last, job.pair)
-    return {
-        "h": quantities.mesh_size(case, job.pair),
-        "n_dofs": case.model.n_dofs,
-        "values": {name: value for name, value in values.items() if np.isfinite(value)},
-        **quantities.by_theory(case, job.pair, values.get("force", 0.0)),
-        "profile": _profile(case, last, job.pair),
-        "iterations": {k: int(v) for k, v in last.iterations.items() if isinstance(v, int)},
-        "seconds": time.perf_counter() - started,
-        "warnings": [str(entry.message) for entry in caught if issubclass(entry.category, FastcontactWarning)],
-    }
 
 
 def fields_of(kind: type, result: dict[str, Any]) -> dict[str, Any]:
@@ -178,8 +208,9 @@ def last_step(case: Case) -> StepResult:
     return deque(steps, maxlen=1).pop()
 
 
-def _profile(case: Case, last: StepResult, pair: str | None) -> dict[str, list[float]]:
-    if pair is None or case.mesh.dim != 2:
+def profile(last: StepResult, pair: str | None) -> dict[str, list[float]]:
+    """Return ``r`` and ``pressure`` along the contact of a plane or axisymmetric model; nothing without one."""
+    if pair is None or last.displacement.shape[1] != 2:
         return {}
     contact = last.contact[pair]
     order = np.argsort(contact.place, kind="stable")

@@ -59,7 +59,13 @@ def check_names(case: Case, names: Iterable[str]) -> None:
             raise CaseError(unknown("quantity", name, [*LABELS, *of_probes]))
 
 
-def _of_contact(case: Case, contact: ContactResult, pair: str) -> dict[str, float]:
+def of_contacts(last: StepResult) -> dict[str, float]:
+    """Return the quantities of the first contact pair of a step that need no model; not finite where there is none."""
+    contact = next(iter(last.contact.values()), None)
+    return {} if contact is None else _of_pressure(contact)
+
+
+def _of_pressure(contact: ContactResult) -> dict[str, float]:
     found = {
         "force": float(np.linalg.norm(contact.force)),
         "pressure_max": contact.pressure_max,
@@ -68,6 +74,11 @@ def _of_contact(case: Case, contact: ContactResult, pair: str) -> dict[str, floa
     at_middle = np.abs(contact.place) <= 1e-9 * np.ptp(contact.coordinates, axis=0).max()
     if at_middle.any():
         found["pressure_pole"] = float(contact.pressure[at_middle][0])
+    return found
+
+
+def _of_contact(case: Case, contact: ContactResult, pair: str) -> dict[str, float]:
+    found = _of_pressure(contact)
     theory: Any = case.theories.get(pair, {}).get("theory")
     if case.mesh.dim == 2 and pressure_curve(theory) is not None:
         side = secondary(case, pair)

@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from numpy.typing import NDArray
+
 from fastcontact.cases.case import Case
 from fastcontact.cases.summary import versions
 from fastcontact.mesh.html_table import html_table
+from fastcontact.results.conversions import library
 from fastcontact.results.units import units_of_results
 from fastcontact.studies.render.table import Rows
 
@@ -20,12 +23,13 @@ def of_case(case: Case) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Report:
-    """A finished study of a case.
+    """A finished study of a case or of a function.
 
     Attributes
     ----------
     name, title, text : str
-        Of the case: file name without suffix, title, text of the file.
+        Of the case: file name without suffix, title, text of the file; of a function: its name, the first line of its
+        docstring, its source.
     units : dict of str to str
         Names of the units of length, force and pressure; of plane models, of forces per thickness.
     """
@@ -42,6 +46,14 @@ class Report:
     def tables(self) -> list[tuple[str, Rows]]:
         """Return the main tables, each with its caption; the first row is a header."""
         raise NotImplementedError
+
+    def table(self) -> NDArray[Any]:
+        """Return the numbers as a structured array (n_rows,)."""
+        raise NotImplementedError
+
+    def to_pandas(self) -> Any:
+        """Return `table` as a ``pandas.DataFrame``; FileError if pandas is not installed."""
+        return library("pandas", "pandas", "pandas").DataFrame(self.table())
 
     def __repr__(self) -> str:
         return "\n".join([f"{type(self).__name__} of '{self.name}'", *self.lines()])

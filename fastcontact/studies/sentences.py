@@ -15,7 +15,8 @@ def sentences(series: Series) -> list[str]:
     """Return sentences about the difference of one element and formulation from theory."""
     if not series.limits:
         return [f"{series.combination}: {len(series.levels)} levels were solved, and a limit takes three."]
-    about = [text for quantity in MAIN if quantity in series.limits for text in _about_quantity(series, quantity)]
+    names = [name for name in series.shown(MAIN) if name in series.limits]
+    about = [text for name in names for text in _about_quantity(series, name)]
     return about + _about_equal_force(series)
 
 

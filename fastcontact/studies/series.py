@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from fastcontact.studies.fit import Limit, step_orders
@@ -114,6 +115,8 @@ class Series:
         Whether the theory is about the very bodies of the model, so that there is no model error.
     share : float
         Part of the theory's contact that the model holds [-].
+    asked : tuple of str
+        Quantities that tables, figures and sentences show before the standard ones.
     compared : str
         At what the theory is held against the values: "at equal approach" or "under the given load".
     """
@@ -130,6 +133,11 @@ class Series:
     exact_theory: bool = False
     compared: str = "at equal approach"
     share: float = 1.0
+    asked: tuple[str, ...] = ()
+
+    def shown(self, standard: Sequence[str]) -> list[str]:
+        """Return the quantities to show: those asked for, then the `standard` ones that are known."""
+        return [name for name in dict.fromkeys((*self.asked, *standard)) if name in self.quantities]
 
     @property
     def finest(self) -> Level:

@@ -37,6 +37,16 @@ class Combination:
 
 
 @dataclass(frozen=True)
+class Named(Combination):
+    """What a function makes, known by its name."""
+
+    name: str
+
+    def __str__(self) -> str:
+        return self.name
+
+
+@dataclass(frozen=True)
 class Settings:
     """Settings of a study, checked."""
 

@@ -14,9 +14,11 @@ import numpy as np
 from fastcontact.cases.case import Case, build_case, described, read_case
 from fastcontact.errors import CaseError, FastcontactError
 from fastcontact.mesh.argument_types import typed
+from fastcontact.studies import function_runs as functions
 from fastcontact.studies.affordable import check_runs
 from fastcontact.studies.case_parameters import substituted
-from fastcontact.studies.execute import Progress, raise_first, run_all
+from fastcontact.studies.execute import Progress, Result, raise_first, run_all
+from fastcontact.studies.function_runs import Function, FunctionRun, Quantities
 from fastcontact.studies.job import Job, fields_of, job_of
 from fastcontact.studies.levels import make_mesh, recipe
 from fastcontact.studies.progress import told
@@ -35,9 +37,10 @@ CURVE = 60
 
 @typed(CaseError)
 def parameter_sweep(
-    case: Case | str | Path,
-    parameters: Mapping[str, Sequence[Value]],
+    case: Case | str | Path | Function,
+    parameters: Mapping[str, Sequence[Value]] | Sequence[Value],
     *,
+    quantities: Quantities = (),
     element: str | None = None,
     formulation: str | None = None,
     level: int | None = None,
@@ -47,15 +50,18 @@ def parameter_sweep(
     on_progress: Callable[[Progress], None] | None = None,
     progress: bool = False,
 ) -> Sweep:
-    """Solve a case for all combinations of some parameters' values.
+    """Solve a case or a Python model for all combinations of some parameters' values.
 
     Parameters
     ----------
-    case : Case or path-like
-    parameters : mapping of str to sequence
-        Values by parameter. A parameter is the path of a number in the case file, e.g. ``"contact.hertz.friction"``,
-        ``"material[0].E"`` or ``"mesh.size"`` (tables in a list count from 0), or a name of ``[study.parameters]``,
-        which stands for several paths that change together.
+    case : Case, path-like or callable
+        A function of the parameters returns a `Model`, which is solved in 20 equal steps, or what `solve` returns.
+    parameters : mapping of str to sequence, or sequence
+        Values by parameter; of a function by argument, or of its first argument alone. Of a case, a parameter is the path of
+        a number in the case file, e.g. ``"contact.hertz.friction"``, ``"material[0].E"`` or ``"mesh.size"`` (tables in a list
+        count from 0), or a name of ``[study.parameters]``, which stands for several paths that change together.
+    quantities
+        Further ones to show, as in `convergence_study`.
     element, formulation : str, optional
         By default the last of ``study.combinations``, or the case's own.
     level : int, optional
@@ -73,30 +79,76 @@ def parameter_sweep(
     CaseError, FastcontactError
         If the case, a parameter or a value is wrong, or no point could be solved.
     """
+    if callable(case):
+        functions.refuse({"element": element, "formulation": formulation, "level": level})
+        options = {"executor": executor, "workers": workers, "store": store, "on_progress": on_progress}
+        return _of_function(case, parameters, quantities, {**options, "progress": progress})
+    if not isinstance(parameters, Mapping) or isinstance(quantities, Mapping):
+        raise CaseError("values without a name and functions as quantities are for Python models; a case takes names")
     case = case if isinstance(case, Case) else read_case(case)
-    if not parameters or not all(len(values) for values in parameters.values()):
-        raise CaseError("a sweep needs at least one parameter with at least one value")
-    asked = settings(case).quantities
+    choices = _choices(parameters)
+    asked = tuple(dict.fromkeys((*settings(case).quantities, *quantities)))
     check_names(case, asked)
-    check_runs(prod(len(values) for values in parameters.values()))
-    choices = [dict(zip(parameters, values, strict=True)) for values in itertools.product(*parameters.values())]
     jobs = [_job(case, choice, element, formulation, level) for choice in choices]
     # An unknown key would make every run fail.
     build_case(jobs[0].data, name=case.name, folder=case.folder, mesh=case.mesh)
     with told(on_progress, progress) as told_to:
         results = run_all(jobs, executor=executor, workers=workers, store=store, on_progress=told_to)
     raise_first("no point of the sweep could be solved", jobs, results)
-    runs = list(zip(choices, results, strict=True))
     return Sweep(
         **of_case(case),
+        **_points(parameters, choices, results),
         combination=str(jobs[0].marks["combination"]),
-        parameters={name: tuple(values) for name, values in parameters.items()},
-        points=[Point(parameters=choice, **fields_of(Point, r)) for choice, r in runs if "error" not in r],
-        failed=[(choice, str(result["error"])) for choice, result in runs if "error" in result],
         theories=_theory_curves(case, parameters, jobs[0].pair),
         asked=asked,
         compared="at equal approach" if jobs[0].pair in case.approach else "",
     )
+
+
+def _of_function(
+    function: Function,
+    parameters: Mapping[str, Sequence[Value]] | Sequence[Value],
+    wanted: Quantities,
+    options: dict[str, Any],
+) -> Sweep:
+    """Return the sweep of a function that makes models; `options` are those of `run_functions`."""
+    named = isinstance(parameters, Mapping)
+    by_name = parameters if isinstance(parameters, Mapping) else {functions.first_parameter(function): [*parameters]}
+    choices, name, measures = _choices(by_name), functions.function_name(function), functions.measures_of(wanted)
+    runs = [
+        FunctionRun(
+            label=_label(choice), name=name, marks=choice, function=function,
+            positional=() if named else tuple(choice.values()), named=choice if named else {}, measures=measures,
+        )
+        for choice in choices
+    ]  # fmt: skip
+    results = functions.run_functions(runs, "no point of the sweep could be solved", **options)
+    found = _points(by_name, choices, results)
+    return Sweep(**functions.of_function(function), **found, combination=name, asked=tuple(wanted), compared="")
+
+
+def _choices(parameters: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]]:
+    """Return all combinations of values, the last parameter fastest; CaseError for none or too many."""
+    if not parameters or not all(len(values) for values in parameters.values()):
+        raise CaseError("a sweep needs at least one parameter with at least one value")
+    check_runs(prod(len(values) for values in parameters.values()))
+    return [dict(zip(parameters, values, strict=True)) for values in itertools.product(*parameters.values())]
+
+
+def _label(choice: Mapping[str, Value]) -> str:
+    return ", ".join(f"{name} = {value}" for name, value in choice.items())
+
+
+def _points(
+    parameters: Mapping[str, Sequence[Value]], choices: Sequence[dict[str, Value]], results: Sequence[Result]
+) -> dict[str, Any]:
+    """Return the fields of a `Sweep` about its parameters and points."""
+    runs = list(zip(choices, results, strict=True))
+    return {
+        "parameters": {name: tuple(values) for name, values in parameters.items()},
+        "points": [Point(parameters=choice, **fields_of(Point, r)) for choice, r in runs if "error" not in r],
+        "failed": [(choice, str(result["error"])) for choice, result in runs if "error" in result],
+    }
 
 
 def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: str | None) -> tuple[TheoryCurve, ...]:
@@ -143,5 +195,4 @@ def _job(case: Case, choice: dict[str, Value], element: str | None, formulation:
     # The largest mesh starts first; of a generator, its size is told by the number of points on level 0.
     size = make_mesh(recipe(chosen, member.element, 0), None).n_points if chosen.generator is not None else 0
     marks = {**choice, "combination": f"{member}, level {finer}"}
-    label = ", ".join(f"{name} = {value}" for name, value in choice.items())
-    return job_of(case, chosen, member, finer, label=label, marks=marks, size=size)
+    return job_of(case, chosen, member, finer, label=_label(choice), marks=marks, size=size)

@@ -20,7 +20,7 @@ def chosen(root):
 
 
 def of(base=None, **data):
-    return job.Job("a run", "case", data, "c", {"refinements": 1}, base, {})
+    return job.Job(label="a run", name="case", marks={}, data=data, pair="c", recipe={"refinements": 1}, base=base)
 
 
 def test_the_key_tells_what_the_numbers_depend_on():
@@ -71,7 +71,7 @@ def test_a_run_that_goes_wrong_in_any_way_is_a_result(monkeypatch):
     def wrong(_):
         raise ZeroDivisionError("by nothing")
 
-    monkeypatch.setattr(job, "measured", wrong)
+    monkeypatch.setattr(job.Job, "measured", wrong)
     found = job.run(of())
     assert found["kind"] == "ZeroDivisionError"
     assert found["error"].startswith("by nothing (wrong, line ")

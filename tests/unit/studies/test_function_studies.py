@@ -1,0 +1,121 @@
+"""Studies of Python functions that make models: order and limit of known problems, what is refused, and how it is told."""
+
+import json
+import math
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+import fastcontact as fc
+
+A, B, E, NU = 1.0, 2.0, 1000.0, 0.3  # a tube of Lame's under unit pressure inside, held between two planes
+SIZES = [0.5, 0.25, 0.125, 0.0625]
+BORE = (1 + NU) / E * A**2 / (B**2 - A**2) * ((1 - 2 * NU) * A + B**2 / A)
+
+
+def tube(size, solved=True, element="quad4"):
+    """Tube of Lame's."""
+    n = round(1 / size)
+    mesh = fc.generate.block(divisions=(n, 1), size=(1.0, size), origin=(A, 0.0), element=element)
+    model = fc.Model(mesh, kinematics="axisymmetric")
+    model.add_material(fc.LinearElastic(E=E, nu=NU))
+    model.fix("BOTTOM", "y")
+    model.fix("TOP", "y")
+    model.add_pressure("LEFT", 1.0)
+    return fc.solve(model, 1) if solved else model
+
+
+def bore(step):
+    return step.displacement[:, 0].max()
+
+
+def overlap(size, friction=0.0):
+    """Half-spheres, loaded by Hertz."""
+    sizes = {"arc_sizes": (size, 4 * size), "radial_sizes": (size, 4 * size), "segments": 8}
+    model = fc.Model(fc.generate.half_spheres("quad4", **sizes), kinematics="axisymmetric")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=NU))
+    model.fix("A1A2", "x")
+    model.prescribe("A2B2", y=-0.5)
+    model.prescribe("A1B1", y=0.5)
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2", friction=friction)
+    return fc.solve(model, 1)
+
+
+@pytest.mark.parametrize(("element", "order"), [("quad4", 2.0), ("tri3", 2.0)])
+def test_lame_is_the_limit_and_the_order_is_that_of_the_element(element, order):
+    def of_size(size):
+        return tube(size, element=element)
+
+    study = fc.convergence_study(of_size, SIZES[::-1], quantities={"bore": bore})
+    limit = study.best.limits["bore"]
+    assert limit.contains(BORE)
+    assert limit.uncertainty < 0.01 * BORE
+    assert abs(limit.order - order) < 2 * limit.order_uncertainty < 1.0
+    assert study.best.h == SIZES
+    assert list(study.table()["bore"]) == study.best.values("bore")
+    assert "the mesh error of the bore is" in study.lines()[-1]
+    assert study.figure().axes[0].get_title() == "Mesh error of the bore"
+    assert "def of_size" in study.html()
+    json.dumps(study.as_dict())
+
+
+def test_standard_quantities_of_a_model_and_of_its_steps():
+    models = fc.convergence_study(lambda size: tube(size, solved=False), SIZES, quantities=["von_mises_max"])
+    bored = math.sqrt(0.5 * ((5 / 3 + 1) ** 2 + (5 / 3 - 0.2) ** 2 + (0.2 + 1) ** 2))  # at the bore: -1, 5/3, 0.2
+    assert models.best.limits["von_mises_max"].contains(bored)
+    steps = fc.convergence_study(overlap, [3.0, 1.5, 0.75], quantities=["force", "pressure_max"])
+    limits = steps.best.limits
+    exact = fc.analytic.hertz_point(
+        R1=50.0, E1=20_000.0, nu1=NU, R2=50.0, E2=20_000.0, nu2=NU, force=limits["force"].value
+    )
+    assert limits["pressure_max"].value == pytest.approx(exact.pressure_max, rel=0.02)
+    assert steps.figure().axes[2].get_title().startswith("Contact pressure")
+
+
+def test_a_sweep_calls_the_function_with_all_choices():
+    found = fc.parameter_sweep(tube, {"size": [0.5, 0.25], "element": ["quad4", "quad8"]}, quantities={"bore": bore})
+    assert [tuple(point.parameters.values()) for point in found.points][1] == (0.5, "quad8")
+    assert all(math.isclose(point.values["bore"], BORE, rel_tol=0.05) for point in found.points)
+    single = fc.parameter_sweep(tube, [0.5, 0.25], quantities={"bore": bore}, executor=ThreadPoolExecutor(2))
+    assert list(single.table()["size"]) == [0.5, 0.25]
+    assert list(single.table()["bore"]) == list(found.table()["bore"][::2])
+    frame = pytest.importorskip("pandas").DataFrame(single.table())
+    assert frame.equals(single.to_pandas())
+    case = fc.parameter_sweep("forma04a", {"approach": [0.4]}, quantities=["von_mises_max"], level=0, workers=1)
+    assert any("von_mises_max" in line for line in case.lines())
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ((tube,), r"needs its mesh sizes, such as \[4.0, 2.0, 1.0\], not 5 levels"),
+        ((tube, [1.0, -1.0]), "must be positive and all different"),
+        ((tube, [1.0], ["tri3"]), "'elements' is for case files"),
+        (("forma04a", [1.0, 0.5]), "give a case its number of levels"),
+        ((lambda size: None, [1.0]), "size = 1: the function <lambda> must return a Model, or what fc.solve returns"),
+        ((lambda size: 1 / 0, [1.0]), "the function <lambda> failed at line .*: ZeroDivisionError"),
+    ],
+)
+def test_what_no_study_can_use_is_told(given, message):
+    with pytest.raises(fc.CaseError, match=message):
+        fc.convergence_study(*given)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"quantities": {"x": lambda step: step.x}}, "the quantity 'x' is a function that failed .AttributeError"),
+        ({"quantities": ["bore"]}, "unknown quantity 'bore'"),
+        ({"store": "there"}, "of a function leave 'store' out"),
+        ({"workers": 2, "quantities": {"x": lambda step: 1.0}}, "cannot be sent to other processes"),
+    ],
+)
+def test_options_that_do_not_fit_a_function_are_told(options, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(fc.CaseError, match=message):
+        fc.convergence_study(tube, [0.5, 0.25, 0.125], **options)
+
+
+def test_sizes_that_are_numbers_of_cells_are_told():
+    with pytest.warns(fc.FastcontactWarning, match="sizes must be lengths that shrink"):
+        fc.convergence_study(lambda n: tube(1 / n), [2, 4, 8], quantities={"bore": bore})
